@@ -184,9 +184,9 @@ def test_both_renderers_draw_the_transient_that_the_daemon_computes(
 
 def test_emulated_graphics_are_left_alone(page: Page) -> None:
     open_page(page)
-    assert page.evaluate(
-        "() => document.createElement('canvas').getContext('webgl2') !== null"
-    ), "Chromium's software renderer grants WebGL2"
+    assert page.evaluate("() => document.createElement('canvas').getContext('webgl2') !== null"), (
+        "Chromium's software renderer grants WebGL2"
+    )
     expect(transient_canvas(page)).to_have_attribute("data-renderer", "typed-array")
 
 

@@ -292,7 +292,7 @@ export class StreamClient {
     }
     this.#store.status.encode_s.value = encode_s;
     this.#pending.clear();
-    this.#fluency.frameTaken();
+    this.#fluency.frameTaken(newest);
     // Another client may have started the camera; or this frame was on its way when it stopped: read the state.
     if (this.#store.status.cameraState.peek() !== "streaming") void this.#readCamera();
     this.#send({ type: "acknowledge", frame: newest });

@@ -3,8 +3,9 @@
 export interface FluencyReport {
   /** Refreshes of the screen a second. */
   readonly pictures_hz: number;
-  /** Frames taken from the stream a second. */
+  /** Frames taken from the stream a second, and those that the camera took. */
   readonly frames_hz: number;
+  readonly camera_hz: number;
 }
 
 /** Time that is counted over. */
@@ -18,14 +19,18 @@ export class Fluency {
   #last_s = 0;
   #pictures = 0;
   #frames = 0;
+  /** Numbers of the newest frame now, and when counting began. */
+  #newest = 0;
+  #oldest = 0;
 
   /** Nothing moves, nobody looks, or something else is asked for: counting begins anew. */
   restart(): void {
     this.#began_s = null;
   }
 
-  frameTaken(): void {
+  frameTaken(number: number): void {
     this.#frames += 1;
+    this.#newest = number;
   }
 
   /** The screen is refreshed while light moves; answers what was counted when it was long enough. */
@@ -38,7 +43,7 @@ export class Fluency {
     this.#pictures += 1;
     const span_s = now_s - this.#began_s;
     if (span_s < WINDOW_S) return null;
-    const report = { pictures_hz: this.#pictures / span_s, frames_hz: this.#frames / span_s };
+    const report = { pictures_hz: this.#pictures / span_s, frames_hz: this.#frames / span_s, camera_hz: Math.max(this.#frames, this.#newest - this.#oldest) / span_s };
     this.#begin(now_s);
     return report;
   }
@@ -46,5 +51,6 @@ export class Fluency {
   #begin(now_s: number): void {
     this.#began_s = this.#last_s = now_s;
     this.#pictures = this.#frames = 0;
+    this.#oldest = this.#newest;
   }
 }

@@ -16,8 +16,9 @@ const SLOW_WINDOWS = 2;
 /** Share of the frames that is asked for next: by how slow the pictures are, within these. */
 const LEAST_STEP = 0.5;
 const MOST_STEP = 0.8;
-/** Never fewer frames a second than this, or than half of the camera's. */
+/** Never fewer frames a second than this, or than half of the camera's, but for a browser that takes hardly as many of all. */
 const ENOUGH_HZ = 5;
+const OF_TAKEN = 0.7;
 /** Fewer frames help where they give so many times as many pictures. */
 const HELPS = 1.15;
 /** Where they did not, they are tried again when pictures are fewer by this. */
@@ -29,8 +30,9 @@ const MOST_PATIENCE = 16;
 
 export class PaceControl {
   #maxRate_hz: number | null = null;
-  /** Frames and pictures a second while all frames were asked for. */
+  /** The camera's frames a second; those that were taken, and pictures, while all frames were asked for. */
   #camera_hz = 0;
+  #taken_hz = 0;
   #before_hz = 0;
   #best_hz = 0;
   /** Below so many pictures a second fewer frames may help: they did not where there were more. */
@@ -57,10 +59,11 @@ export class PaceControl {
   }
 
   /** Takes what was counted over a window; answers whether what to ask for changed. */
-  judge({ pictures_hz, frames_hz }: FluencyReport): boolean {
+  judge({ pictures_hz, frames_hz, camera_hz }: FluencyReport): boolean {
     if (frames_hz === 0) return false; // whatever is slow, it is not the frames
     this.#best_hz = Math.max(this.#best_hz, pictures_hz);
-    if (this.#maxRate_hz === null) this.#camera_hz = frames_hz;
+    this.#camera_hz = camera_hz;
+    if (this.#maxRate_hz === null) this.#taken_hz = frames_hz;
     if (pictures_hz >= FLUENT_HZ) return this.#fluent(pictures_hz);
     this.#calm = 0;
     this.#acts = this.#maxRate_hz === null ? pictures_hz < this.#vain_hz : this.#maxRate_hz > this.#least_hz;
@@ -84,7 +87,7 @@ export class PaceControl {
   }
 
   get #least_hz(): number {
-    return Math.min(ENOUGH_HZ, this.#camera_hz / 2);
+    return Math.min(ENOUGH_HZ, this.#camera_hz / 2, OF_TAKEN * this.#taken_hz);
   }
 
   #giveUp(): boolean {

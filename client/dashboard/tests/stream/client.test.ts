@@ -132,7 +132,7 @@ describe("between worker and store", () => {
 
     test("is counted while it plays, and while it is scrubbed", () => {
       page.store.player.playing.value = true;
-      expect(watches()).toEqual([{ type: "moved", pictures_hz: expect.closeTo(10, 6) as number, frames_hz: expect.closeTo(5, 6) as number }]);
+      expect(watches()).toEqual([{ type: "moved", pictures_hz: expect.closeTo(10, 6) as number, frames_hz: expect.closeTo(5, 6) as number, camera_hz: expect.closeTo(10, 6) as number }]);
       page.store.player.playing.value = false;
       page.store.player.scrubbed.value = true;
       expect(watches()).toHaveLength(1);

@@ -152,7 +152,7 @@ describe("over a thin link", () => {
 describe("with a slow browser", () => {
   const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.["subscriptions"];
   const stutters = (): void => {
-    for (let window = 0; window < 2; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: 16 });
+    for (let window = 0; window < 2; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: 16, camera_hz: 16 });
   };
 
   test("asks for fewer frames and says so, and for all when the user says", () => {
@@ -170,7 +170,7 @@ describe("with a slow browser", () => {
   test("asks for more again where there is room, and for all of another sequence", () => {
     world.socket.opens();
     stutters();
-    world.connection.moved({ pictures_hz: 50, frames_hz: 8 });
+    world.connection.moved({ pictures_hz: 50, frames_hz: 8, camera_hz: 16 });
     expect(asked()).toEqual([{ product: "range", max_rate_hz: 12 }]);
     world.socket.receives({ type: "notice", kind: "sequence-changed", sequence: {} });
     expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
@@ -183,8 +183,8 @@ describe("with a slow browser", () => {
       world.socket.receives({ type: "frame", product: "range", axes: ["y", "x"], meta: { frame }, array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) } });
       world.connection.acknowledge(frame);
       // slow, but from window to window not twice in a row
-      if (report) world.connection.moved({ pictures_hz: 40, frames_hz: 1 });
-      if (report) world.connection.moved({ pictures_hz: 12, frames_hz: 1 });
+      if (report) world.connection.moved({ pictures_hz: 40, frames_hz: 1, camera_hz: 16 });
+      if (report) world.connection.moved({ pictures_hz: 12, frames_hz: 1, camera_hz: 16 });
       await world.passes(2);
     };
     for (let frame = 1; frame <= 6; frame++) await late(frame, true);
@@ -203,9 +203,9 @@ describe("with a slow browser", () => {
     }
     const [{ max_rate_hz: linked_hz }] = asked() as { max_rate_hz: number }[];
     expect(linked_hz).toBeLessThan(2);
-    for (let window = 0; window < 2; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: linked_hz });
+    for (let window = 0; window < 2; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: linked_hz, camera_hz: 16 });
     const event = world.events.at(-1);
-    expect(event).toMatchObject({ type: "demand", pictures_hz: 14.5, demand: { maxRate_hz: linked_hz / 2 } });
+    expect(event).toMatchObject({ type: "demand", pictures_hz: 14.5, demand: { maxRate_hz: expect.closeTo(0.7 * linked_hz, 6) as number } });
     expect(event).not.toMatchObject({ carried_bytes_s: null });
   });
 });

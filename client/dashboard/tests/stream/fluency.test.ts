@@ -6,7 +6,7 @@ import { Fluency, type FluencyReport } from "../../src/stream/fluency";
 function refresh(fluency: Fluency, from_s: number, span_s: number, rate_hz: number, framesEvery = Infinity): FluencyReport[] {
   const reports: FluencyReport[] = [];
   for (let n = 0; n <= span_s * rate_hz; n++) {
-    if (n % framesEvery === 0) fluency.frameTaken();
+    if (n % framesEvery === 0) fluency.frameTaken((3 * n) / framesEvery);
     const report = fluency.refreshed(from_s + n / rate_hz);
     if (report !== null) reports.push(report);
   }
@@ -14,12 +14,13 @@ function refresh(fluency: Fluency, from_s: number, span_s: number, rate_hz: numb
 }
 
 describe("fluency", () => {
-  test("is pictures and frames a second, every 2 s", () => {
+  test("is pictures, frames taken and frames of the camera a second, every 2 s", () => {
     const reports = refresh(new Fluency(), 100, 8.1, 50, 5);
     expect(reports).toHaveLength(4);
-    for (const { pictures_hz, frames_hz } of reports) {
+    for (const { pictures_hz, frames_hz, camera_hz } of reports) {
       expect(pictures_hz).toBeCloseTo(50, 6);
-      expect(frames_hz).toBeCloseTo(10, 0);
+      expect(frames_hz).toBeCloseTo(10, 6);
+      expect(camera_hz).toBeCloseTo(30, 6);
     }
   });
 

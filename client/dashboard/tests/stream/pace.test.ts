@@ -20,7 +20,7 @@ class Watched {
     for (let n = 0; n < windows; n++) {
       const frames_hz = Math.min(camera_hz, this.control.maxRate_hz ?? Infinity);
       this.pictures_hz = Math.min(display_hz, Math.max(1, (1 - frames_hz * frame_s) / picture_s));
-      this.control.judge({ pictures_hz: this.pictures_hz, frames_hz });
+      this.control.judge({ pictures_hz: this.pictures_hz, frames_hz, camera_hz });
       this.asked.push(this.control.maxRate_hz);
     }
     return this;
@@ -62,6 +62,12 @@ describe("of the frames", () => {
     expect(slower.control.acts).toBe(false); // it has done all that it can
   });
 
+  test("a browser that takes hardly 5 of all is asked to take some fewer", () => {
+    const control = new PaceControl();
+    for (let n = 0; n < 8; n++) control.judge({ pictures_hz: n < 2 ? 10 : 20, frames_hz: 4, camera_hz: 18 });
+    expect(control.maxRate_hz).toBeCloseTo(2.8, 6);
+  });
+
   test("a camera's that are few already, half are taken at least", () => {
     expect(new Watched().plays(20, { camera_hz: 4, frame_s: 0.1, picture_s: 0.03 }).control.maxRate_hz).toBe(2);
   });
@@ -96,7 +102,7 @@ describe("of the frames", () => {
 
   test("none are missed where none come", () => {
     const control = new PaceControl();
-    for (let n = 0; n < 10; n++) expect(control.judge({ pictures_hz: 3, frames_hz: 0 })).toBe(false);
+    for (let n = 0; n < 10; n++) expect(control.judge({ pictures_hz: 3, frames_hz: 0, camera_hz: 0 })).toBe(false);
     expect(control.maxRate_hz).toBeNull();
   });
 });
