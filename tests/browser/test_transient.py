@@ -242,6 +242,13 @@ def test_light_is_scrubbed_without_a_request_and_plays(page: Page, watch: Watch)
         page.keyboard.press("Shift+ArrowRight")
         seen.add(transient_canvas(page).screenshot())
     assert len(seen) == 7
+    # it is held until the pointer is let go, wherever
+    scrubbed = "() => transientcam.store.player.scrubbed.peek()"
+    page.mouse.down()
+    assert page.evaluate(scrubbed)
+    page.mouse.move(box["x"], box["y"] - 200)
+    page.mouse.up()
+    assert not page.evaluate(scrubbed)
     # the pixel that is looked at goes on with the live frames
     # the error of the range is requested of some frames
     passing = ("/pixel?", "/range_error.")
