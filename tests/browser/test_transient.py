@@ -34,6 +34,14 @@ pytestmark = pytest.mark.shared_daemon
 F_HZ = 23e6
 LEAST_VALIDITY = 4e-3
 PHASES_RAD = (0.0, 0.7, 1.9, 3.3, 4.4, 6.1)
+# Chromium's software renderer under another name: what emulates WebGL, the page does not draw with.
+WITH_GRAPHICS = """
+const getParameter = WebGL2RenderingContext.prototype.getParameter;
+const UNMASKED_RENDERER = 0x9246;
+WebGL2RenderingContext.prototype.getParameter = function (name) {
+  return name === UNMASKED_RENDERER ? "a graphics processor" : getParameter.call(this, name);
+};
+"""
 WITHOUT_WEBGL = """
 const getContext = HTMLCanvasElement.prototype.getContext;
 HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
@@ -116,6 +124,7 @@ def frame_message(planes: NDArray[np.float32]) -> bytes:
 
 
 def test_the_shader_computes_equation_2(page: Page) -> None:
+    page.add_init_script(WITH_GRAPHICS)
     open_page(page)
     for m in (3, 4, 8):
         the_dense_solution_is_computed(page, m)
@@ -155,6 +164,7 @@ def the_density_of_the_moments_package_is_computed(page: Page, m: int) -> None:
 def test_both_renderers_draw_the_transient_that_the_daemon_computes(
     page: Page, served: Served
 ) -> None:
+    page.add_init_script(WITH_GRAPHICS)
     open_page(page)
     number = stop(served)
     shows_frame(page, number)
@@ -170,6 +180,14 @@ def test_both_renderers_draw_the_transient_that_the_daemon_computes(
         difference = np.abs(ours.astype(int) - theirs.astype(int))
         assert np.mean(difference > 8) < 0.002, "one colour of the map here and there, no more"
         assert ours[..., :3].std() > 5
+
+
+def test_emulated_graphics_are_left_alone(page: Page) -> None:
+    open_page(page)
+    assert page.evaluate("() => document.createElement('canvas').getContext('webgl2') !== null"), (
+        "Chromium's software renderer grants WebGL2"
+    )
+    expect(transient_canvas(page)).to_have_attribute("data-renderer", "typed-array")
 
 
 def draws_what_the_daemon_computes(page: Page, served: Served, expected_renderer: str) -> None:
@@ -224,6 +242,13 @@ def test_light_is_scrubbed_without_a_request_and_plays(page: Page, watch: Watch)
         page.keyboard.press("Shift+ArrowRight")
         seen.add(transient_canvas(page).screenshot())
     assert len(seen) == 7
+    # it is held until the pointer is let go, wherever
+    scrubbed = "() => transientcam.store.player.scrubbed.peek()"
+    page.mouse.down()
+    assert page.evaluate(scrubbed)
+    page.mouse.move(box["x"], box["y"] - 200)
+    page.mouse.up()
+    assert not page.evaluate(scrubbed)
     # the pixel that is looked at goes on with the live frames
     # the error of the range is requested of some frames
     passing = ("/pixel?", "/range_error.")

@@ -1,5 +1,5 @@
 /** What tests and measurements reach the page by; loaded only where the address asks for `?debug`. */
-import { createRenderer } from "./gl/createRenderer";
+import { createRenderer, hasGraphics } from "./gl/createRenderer";
 import type { DensityRenderer } from "./gl/renderer";
 import type { Coefficients } from "./physics/maximumEntropy";
 import { decodeMessage, type FrameMessage } from "./stream/protocol";
@@ -47,7 +47,7 @@ class Bench {
 
   #read(coefficients: Coefficients | null, phase_rad: number): Reading {
     if (coefficients === null) throw new Error("There are no coefficients.");
-    this.#renderer ??= createRenderer(document.createElement("canvas"), true);
+    this.#renderer ??= createRenderer(document.createElement("canvas"), hasGraphics());
     return { renderer: this.#renderer.kind, values: [...this.#renderer.readDensity(coefficients, phase_rad)] };
   }
 }

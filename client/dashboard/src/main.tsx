@@ -18,7 +18,10 @@ const stream = new StreamClient(store, worker, loop);
 loop.add((elapsed_s) => store.frames.of("coefficients").peek() !== null && store.player.advance(elapsed_s));
 loop.add((elapsed_s) => store.replay.advance(elapsed_s));
 effect(() => {
-  if (store.player.playing.value || store.replay.playing.value) loop.wake();
+  if (store.player.playing.value || store.player.scrubbed.value || store.replay.playing.value) loop.wake();
+});
+document.addEventListener("visibilitychange", () => {
+  stream.hid();
 });
 store.player.playing.value = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
 

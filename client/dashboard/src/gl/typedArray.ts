@@ -1,14 +1,14 @@
-import { densityImage, type Coefficients } from "../physics/maximumEntropy";
-import { lightPainter } from "./paintLight";
+import type { Coefficients } from "../physics/maximumEntropy";
+import { LightPainter } from "./paintLight";
 import type { DensityRenderer, Exposure } from "./renderer";
 
-/** Draws with typed arrays on a 2D canvas, for browsers that refuse WebGL2. */
+/** Draws with typed arrays on a 2D canvas, for browsers that refuse WebGL2 or emulate it. */
 export class TypedArrayRenderer implements DensityRenderer {
   readonly kind = "typed-array";
   readonly #canvas: HTMLCanvasElement;
   readonly #context: CanvasRenderingContext2D;
+  readonly #painter = new LightPainter();
   #image: ImageData | null = null;
-  #density = new Float32Array(0);
 
   constructor(canvas: HTMLCanvasElement) {
     const context = canvas.getContext("2d", { alpha: false });
@@ -19,18 +19,13 @@ export class TypedArrayRenderer implements DensityRenderer {
 
   draw(coefficients: Coefficients, exposure: Exposure): void {
     const { width, height } = coefficients;
-    const density = this.#densityOf(coefficients, exposure.phase_rad);
-    const { data } = this.#imageOf(width, height);
-    const paint = lightPainter(density, exposure);
-    for (let pixel = 0; pixel < density.length; pixel++) {
-      paint(pixel, data, 4 * pixel);
-      data[4 * pixel + 3] = 255;
-    }
-    this.#context.putImageData(this.#imageOf(width, height), 0, 0);
+    const image = this.#imageOf(width, height);
+    this.#painter.paint(coefficients, exposure, new Uint32Array(image.data.buffer));
+    this.#context.putImageData(image, 0, 0);
   }
 
   readDensity(coefficients: Coefficients, phase_rad: number): Float32Array {
-    return this.#densityOf(coefficients, phase_rad).slice();
+    return this.#painter.density(coefficients, phase_rad).slice();
   }
 
   onLost(): void {
@@ -39,14 +34,6 @@ export class TypedArrayRenderer implements DensityRenderer {
 
   dispose(): void {
     this.#image = null;
-    this.#density = new Float32Array(0);
-  }
-
-  #densityOf(coefficients: Coefficients, phase_rad: number): Float32Array {
-    const area = coefficients.width * coefficients.height;
-    if (this.#density.length !== area) this.#density = new Float32Array(area);
-    densityImage(coefficients, phase_rad, this.#density);
-    return this.#density;
   }
 
   #imageOf(width: number, height: number): ImageData {

@@ -37,24 +37,3 @@ export function densityAt(c: Coefficients, pixel: number, phase_rad: number): nu
   const modulus = squaredModulus(c, pixel, Math.cos(phase_rad), Math.sin(phase_rad));
   return (c.planes[pixel] * c.baseFrequency_hz) / modulus;
 }
-
-/** Density of every pixel at `phase_rad`, in units of b_0 per second, written into `out`. */
-export function densityImage(c: Coefficients, phase_rad: number, out: Float32Array): void {
-  const area = c.width * c.height;
-  const { planes, harmonics } = c;
-  const re = Math.cos(phase_rad);
-  const im = Math.sin(phase_rad);
-  // The inner loop of the fallback renderer: the same sum as squaredModulus, kept free of calls.
-  for (let pixel = 0; pixel < area; pixel++) {
-    let pRe = 0;
-    let pIm = 0;
-    for (let j = harmonics, at = 2 * harmonics * area + pixel; j >= 1; j--, at -= 2 * area) {
-      const sumRe = pRe + planes[at - area];
-      const sumIm = pIm - planes[at];
-      pRe = sumRe * re - sumIm * im;
-      pIm = sumRe * im + sumIm * re;
-    }
-    pRe += 1;
-    out[pixel] = (planes[pixel] * c.baseFrequency_hz) / (pRe * pRe + pIm * pIm);
-  }
-}

@@ -17,6 +17,8 @@ export class Player {
   /** Share of the period that has passed, 0 to 1: it keeps its meaning when the base frequency changes. */
   readonly turn = signal(0);
   readonly playing = signal(false);
+  /** Whether the timeline is held, to move the light by hand. */
+  readonly scrubbed = signal(false);
   readonly speed_ns = signal<number>(5);
   readonly time_s: ReadonlySignal<number>;
   /** The part of the period in which there is light, in shares of it: what plays passes over the rest. */

@@ -1,6 +1,6 @@
 import { computed, signal } from "@preact/signals";
 
-import type { Decision } from "../stream/demand";
+import type { Decision } from "../stream/connection";
 import type { CameraState, FrameMeta } from "../stream/protocol";
 
 /** How this page stands with the service. */
@@ -68,7 +68,7 @@ export class Status {
   readonly #droppedBefore = signal(0);
   /** Frames the service left out for this page, which was slower than the camera. */
   readonly dropped = computed(() => this.#droppedBefore.value + Math.max(0, ...this.#drops.value.values()));
-  /** Where less than everything is asked for, as the link carries no more: what, and how much the link carried. */
+  /** Where less than everything is asked for, as link or page take no more: what, and why. */
   readonly demanded = signal<Decision | null>(null);
   /** What is on screen is not what the camera sees now. */
   readonly stale = computed(() => this.connection.value.kind !== "open" || this.cameraLoss.value !== null);

@@ -75,7 +75,7 @@ export class Store {
   readonly viewport = new Viewport();
   /** That part in pixels: column and row of the first, width and height; null for the whole. */
   readonly sight = computed(() => sightOf(this.viewport.view.value, this.camera.value));
-  /** Less is asked for over a link that is too thin for all. */
+  /** Less is asked for where link or page are too slow for all. */
   readonly adapts: Signal<boolean>;
   /** Pixels that are kept, and a region. */
   readonly measures = new Measures();

@@ -6,6 +6,7 @@ import { inWords, lossWords, sequenceKey } from "../store/events";
 import { frameOf } from "../store/frames";
 import type { Store } from "../store/store";
 import type { AnimationLoop } from "../ui/animation";
+import { Fluency } from "./fluency";
 import type { AppliedSequence, CameraDocument, ErrorMessage, Hello, Notice, Problem } from "./protocol";
 import type { FrameReport } from "./summary";
 import type { Command, Report } from "./worker";
@@ -34,6 +35,7 @@ export class StreamClient {
   #asking = false;
   #looking: ReturnType<typeof setTimeout> | undefined;
   #session = "";
+  readonly #fluency = new Fluency();
 
   constructor(store: Store, worker: WorkerPort, loop: AnimationLoop, now_s: Clock = () => Date.now() / 1000) {
     this.#store = store;
@@ -46,7 +48,7 @@ export class StreamClient {
     loop.add(() => {
       this.#draw();
       for (const take of this.#brought.splice(0)) take();
-      return false;
+      return this.#count();
     });
     store.replay.loader = store.rangeErrors.loader = (path, products) => this.#bring(path, products);
   }
@@ -91,6 +93,11 @@ export class StreamClient {
     });
   }
 
+  /** The page was hidden, or is seen again. */
+  hid(): void {
+    this.#fluency.restart();
+  }
+
   retryNow(): void {
     this.#send({ type: "retry" });
   }
@@ -120,6 +127,7 @@ export class StreamClient {
         break;
       case "demand":
         status.demanded.value = report.demand.maxRate_hz === null ? null : report;
+        this.#fluency.restart();
         break;
       case "unreadable":
         status.unreadable.value = report.reason;
@@ -284,9 +292,23 @@ export class StreamClient {
     }
     this.#store.status.encode_s.value = encode_s;
     this.#pending.clear();
+    this.#fluency.frameTaken(newest);
     // Another client may have started the camera; or this frame was on its way when it stopped: read the state.
     if (this.#store.status.cameraState.peek() !== "streaming") void this.#readCamera();
     this.#send({ type: "acknowledge", frame: newest });
+  }
+
+  /** Counts how fluently the light of the stream moves; true while each refresh of the screen is to be counted. */
+  #count(): boolean {
+    const { player, frames, held, replay } = this.#store;
+    const moves = (player.playing.peek() || player.scrubbed.peek()) && frames.of("coefficients").peek() !== null;
+    if (!moves || held.peek() || replay.active.peek()) {
+      this.#fluency.restart();
+      return false;
+    }
+    const report = this.#fluency.refreshed(this.#now_s());
+    if (report !== null) this.#send({ type: "moved", ...report });
+    return true;
   }
 
   /** Has the worker bring products of a frame; they come before a refresh of the display, like all frames. */

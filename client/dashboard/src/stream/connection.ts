@@ -4,7 +4,9 @@
  * Knows no worker and no page. The socket, the clock, chance and the probe are arguments.
  */
 import { codesFor } from "./compact";
-import { type Decision, EVERYTHING, DemandControl } from "./demand";
+import { type Demand, DemandControl, EVERYTHING } from "./demand";
+import type { FluencyReport } from "./fluency";
+import { PaceControl } from "./pace";
 import {
   type CameraDocument,
   decodeMessage,
@@ -39,6 +41,15 @@ export interface Surroundings {
   probe(): Promise<CameraDocument>;
 }
 
+/** What is asked for, and why less than everything; null for what is no reason. */
+export interface Decision {
+  readonly demand: Demand;
+  /** What the link carried. */
+  readonly carried_bytes_s: number | null;
+  /** Pictures of the light a second that the page drew while it took all frames. */
+  readonly pictures_hz: number | null;
+}
+
 export type ConnectionEvent =
   | { readonly type: "connecting" }
   | { readonly type: "open" }
@@ -52,6 +63,8 @@ export type ConnectionEvent =
 /** Frames the service may send ahead of what was drawn. */
 export const CREDITS = 2;
 
+/** So long after the last report light may still move; it comes every 2 s. */
+const MOVING_S = 4;
 const FIRST_RETRY_S = 0.5;
 const LONGEST_RETRY_S = 8;
 /** The service admits no client without a valid token. */
@@ -71,7 +84,11 @@ export class StreamConnection {
   #attempts = 0;
   #timer: number | null = null;
   #inFlight = new Set<number>();
-  readonly #control = new DemandControl();
+  readonly #link = new DemandControl();
+  #carried_bytes_s = 0;
+  #pace = new PaceControl();
+  /** When the page last said how fluently light moves. */
+  #moved_s = -Infinity;
   #adapts = true;
   /** The part of the picture in sight: column and row of its first pixel, width and height; null for all of it. */
   #sight: readonly number[] | null = null;
@@ -91,7 +108,7 @@ export class StreamConnection {
     else if (this.#socket === null && this.#timer === null && !this.#refused) this.#connect();
   }
 
-  /** Sets whether less is asked for over a link that is too thin for all. */
+  /** Sets whether less is asked for where link or page are too slow for all. */
   adapt(adapts: boolean): void {
     if (adapts === this.#adapts) return;
     this.#adapts = adapts;
@@ -101,7 +118,7 @@ export class StreamConnection {
   /** Sets which part of the picture is in sight. */
   look(sight: readonly number[] | null): void {
     this.#sight = sight;
-    if (this.#open && this.#control.demand.part) this.#subscribe();
+    if (this.#open && this.#link.demand.part) this.#subscribe();
   }
 
   /** Shows this token from now on; a service that refused the one before is asked anew. */
@@ -117,8 +134,14 @@ export class StreamConnection {
   /** Frame `frame` and all before it were drawn: the service may send on. */
   acknowledge(frame: number): void {
     for (const number of this.#inFlight) if (number <= frame) this.#inFlight.delete(number);
-    if (this.#inFlight.size === 0) this.#control.drewAll(this.#around.now_s());
+    if (this.#inFlight.size === 0) this.#link.drewAll(this.#around.now_s());
     if (this.#open) this.#socket?.send(encodeAck(frame));
+  }
+
+  /** How fluently light moved on the page over a while. */
+  moved(report: FluencyReport): void {
+    this.#moved_s = this.#around.now_s();
+    if (this.#adapts && this.#open && this.#pace.judge(report)) this.#askAnew();
   }
 
   /** Tries at once instead of waiting out the pause between attempts. */
@@ -162,37 +185,53 @@ export class StreamConnection {
   #subscribe(): void {
     const products = this.#products.length === 0 ? LEAST_PRODUCTS : this.#products;
     this.#inFlight.clear(); // the service forgets them too
-    this.#control.restart();
+    this.#link.restart();
     this.#socket?.send(encodeSubscribe(products.map((product) => this.#subscriptionOf(product)), CREDITS, this.#token));
   }
 
   #subscriptionOf(product: string): Subscription {
-    const { maxRate_hz, coded, part } = this.#control.demand;
+    const { maxRate_hz, coded, part } = this.#demand;
     const encoding = coded ? this.#codes.get(product) : null;
     const cut = !part ? {} : this.#sight === null ? { decimation: 2 } : { region: this.#sight };
     return { product, max_rate_hz: maxRate_hz, ...(encoding == null ? {} : { encoding }), ...cut };
   }
 
+  /** What link and page can take. */
+  get #demand(): Demand {
+    const { demand } = this.#link;
+    const limit_hz = this.#pace.maxRate_hz;
+    return limit_hz === null ? demand : { ...demand, maxRate_hz: Math.min(limit_hz, demand.maxRate_hz ?? Infinity) };
+  }
+
   #askForAll(): void {
-    const asked = this.#control.demand;
-    this.#control.reset();
-    if (asked === EVERYTHING) return;
-    this.#emit({ type: "demand", demand: EVERYTHING, carried_bytes_s: 0 });
+    const asked = this.#demand;
+    this.#link.reset();
+    this.#pace = new PaceControl();
+    if (asked !== EVERYTHING) this.#askAnew();
+  }
+
+  /** Says what is asked for now, and asks for it. */
+  #askAnew(): void {
+    const pictures_hz = this.#pace.maxRate_hz === null ? null : this.#pace.before_hz;
+    this.#link.limited = pictures_hz !== null;
+    this.#emit({ type: "demand", demand: this.#demand, carried_bytes_s: this.#link.demand === EVERYTHING ? null : this.#carried_bytes_s, pictures_hz });
     if (this.#open) this.#subscribe();
   }
 
   /** What a message says of the link. */
   #weigh(message: ServerMessage, bytes: number): void {
     if (!this.#adapts) return;
-    if (message.type === "notice" && message.kind === "dropped") this.#control.dropped(message.channel, message.unacknowledged ?? message.count);
+    if (message.type === "notice" && message.kind === "dropped") this.#link.dropped(message.channel, message.unacknowledged ?? message.count);
     if (message.type === "notice" && message.kind === "sequence-changed") this.#askForAll();
     if (message.type !== "frame") return;
     const { product, axes, array, meta } = message;
     this.#codes.set(product, codesFor(axes, array.dtype));
-    const decision = this.#control.arrived(this.#around.now_s(), meta.frame, bytes);
+    const now_s = this.#around.now_s();
+    this.#link.excused = this.#pace.acts && now_s - this.#moved_s < MOVING_S;
+    const decision = this.#link.arrived(now_s, meta.frame, bytes);
     if (decision === null) return;
-    this.#emit({ type: "demand", ...decision });
-    this.#subscribe();
+    this.#carried_bytes_s = decision.carried_bytes_s;
+    this.#askAnew();
   }
 
   #receive(data: ArrayBuffer): void {

@@ -18,14 +18,16 @@ export interface Demand {
 
 export const EVERYTHING: Demand = { maxRate_hz: null, coded: false, part: false };
 
-/** What is decided, and what the link carried when it was. */
-export interface Decision {
+/** What is decided by the link, and what it carried then. */
+export interface LinkDecision {
   readonly demand: Demand;
   readonly carried_bytes_s: number;
 }
 
 /** Time over which the link is judged, at least. */
 const WINDOW_S = 2;
+/** Windows that a link must be bad for before less than everything is asked for: a page that is just opened has much to do. */
+const BAD_WINDOWS = 2;
 /** Least share of the frames that arrives over a link that is good, while all are asked for, and while fewer are. */
 const TAKEN = 0.75;
 const TAKEN_OF_FEWER = 0.9;
@@ -50,10 +52,15 @@ const MOST_PATIENCE = 16;
 
 /** Decides what to ask for by what arrives; times are of any one clock. */
 export class DemandControl {
+  /** Fewer frames are asked for than this asks for. */
+  limited = false;
+  /** The page moves light too slowly, and asks for less because of that: what is late says nothing of the link. */
+  excused = false;
   #demand = EVERYTHING;
   /** Frames that the camera takes a second, measured while all were asked for. */
   #camera_hz = 0;
   #quiet = 0;
+  #bad = 0;
   #patience = 1;
   #raised = false;
   /** What the link carried when it last lost frames. */
@@ -77,6 +84,7 @@ export class DemandControl {
     this.#demand = EVERYTHING;
     this.#camera_hz = 0;
     this.#quiet = 0;
+    this.#bad = 0;
     this.#patience = 1;
     this.#raised = false;
     this.#capacity_bytes_s = 0;
@@ -101,7 +109,7 @@ export class DemandControl {
   }
 
   /** A product of a frame arrived; answers what to ask for where that changes. */
-  arrived(now_s: number, frame: number, bytes: number): Decision | null {
+  arrived(now_s: number, frame: number, bytes: number): LinkDecision | null {
     this.#waited_s += now_s - (this.#waits_s ?? now_s);
     this.#waits_s = null;
     this.#bytes += bytes;
@@ -132,12 +140,16 @@ export class DemandControl {
   #decide(span_s: number, carried_bytes_s: number): boolean {
     const lost = Math.max(0, ...this.#dropped.values());
     const all = this.#demand.maxRate_hz === null;
-    if (all) this.#camera_hz = (this.#frames + lost) / span_s;
-    if (lost === 0) return !all && this.#calm(carried_bytes_s);
+    if (all && !this.limited) this.#camera_hz = (this.#frames + lost) / span_s;
+    if (lost === 0) {
+      this.#bad = 0;
+      return !all && this.#calm(carried_bytes_s);
+    }
     this.#quiet = 0;
     const taken = this.#frames / (this.#frames + lost);
-    const good = taken >= (all ? TAKEN : TAKEN_OF_FEWER) || this.#waited_s < WAITING * span_s || carried_bytes_s > WIDE_BYTES_S;
-    if (good) return false;
+    const good = this.excused || taken >= (all ? TAKEN : TAKEN_OF_FEWER) || this.#waited_s < WAITING * span_s || carried_bytes_s > WIDE_BYTES_S;
+    this.#bad = good ? 0 : this.#bad + 1;
+    if (good || (all && this.#bad < BAD_WINDOWS)) return false;
     if (this.#raised) this.#patience = Math.min(MOST_PATIENCE, 2 * this.#patience);
     this.#raised = false;
     this.#capacity_bytes_s = carried_bytes_s;

@@ -1,5 +1,6 @@
 /** What a view needs to know of a whole frame before it draws: computed in the worker. */
-import { type Coefficients, densityAt } from "../physics/maximumEntropy";
+import { densityImage } from "../physics/densityImage";
+import type { Coefficients } from "../physics/maximumEntropy";
 import type { Span } from "../ui/scale";
 import type { FrameMessage } from "./protocol";
 
@@ -37,27 +38,42 @@ export function summariseMap(values: ArrayLike<number>): MapSummary {
 
 /** Brightness and arrival times of the light in a frame, from a sample of its pixels. */
 export function summariseLight(coefficients: Coefficients): LightSummary {
-  const area = coefficients.width * coefficients.height;
+  const sample = sampleOf(coefficients);
+  const arrivals = new Float32Array(ARRIVAL_TIMES);
+  const count = sample.width;
+  if (count === 0) return { peak: NaN, arrivals };
+  const density = new Float32Array(count);
+  const highest = new Float32Array(count);
+  for (let n = 0; n < ARRIVAL_TIMES; n++) {
+    densityImage(sample, (2 * Math.PI * n) / ARRIVAL_TIMES, density);
+    let sum = 0;
+    for (let pixel = 0; pixel < count; pixel++) {
+      if (!Number.isFinite(density[pixel])) continue;
+      sum += density[pixel];
+      if (density[pixel] > highest[pixel]) highest[pixel] = density[pixel];
+    }
+    arrivals[n] = sum / count;
+  }
+  return { peak: highest.sort()[Math.round(0.9 * (count - 1))], arrivals };
+}
+
+/** About `LIGHT_SAMPLES` of the pixels that have light, in one row. */
+function sampleOf(coefficients: Coefficients): Coefficients {
+  const { planes, harmonics, width, height } = coefficients;
+  const area = width * height;
   // A stride that shares no factor with the width meets every column.
   let stride = Math.max(1, Math.floor(area / LIGHT_SAMPLES));
-  while (stride > 1 && coefficients.width % stride === 0) stride -= 1;
-  const arrivals = new Float32Array(ARRIVAL_TIMES);
-  const highest: number[] = [];
+  while (stride > 1 && width % stride === 0) stride -= 1;
+  const pixels: number[] = [];
   for (let pixel = 0; pixel < area; pixel += stride) {
-    if (!(coefficients.planes[pixel] > 0)) continue; // E = 0 or NaN: no light here
-    let top = 0;
-    for (let n = 0; n < ARRIVAL_TIMES; n++) {
-      const density = densityAt(coefficients, pixel, (2 * Math.PI * n) / ARRIVAL_TIMES);
-      if (!Number.isFinite(density)) continue;
-      arrivals[n] += density;
-      if (density > top) top = density;
-    }
-    highest.push(top);
+    if (planes[pixel] > 0) pixels.push(pixel); // E = 0 or NaN: no light here
   }
-  if (highest.length === 0) return { peak: NaN, arrivals };
-  for (let n = 0; n < ARRIVAL_TIMES; n++) arrivals[n] /= highest.length;
-  const sorted = Float64Array.from(highest).sort();
-  return { peak: sorted[Math.round(0.9 * (sorted.length - 1))], arrivals };
+  const count = pixels.length;
+  const sampled = new Float32Array((2 * harmonics + 1) * count);
+  for (let plane = 0; plane <= 2 * harmonics; plane++) {
+    for (let n = 0; n < count; n++) sampled[plane * count + n] = planes[plane * area + pixels[n]];
+  }
+  return { ...coefficients, planes: sampled, width: count, height: 1 };
 }
 
 /** Coefficients of a frame message; null when its shape is not that of coefficients. */

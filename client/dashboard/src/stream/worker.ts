@@ -1,4 +1,5 @@
 /** The worker: owns the socket, decodes, summarises, and hands buffers to the page without copying. */
+import type { FluencyReport } from "./fluency";
 import { frameUrl } from "./frameUrl";
 import { StreamConnection, type ConnectionEvent } from "./connection";
 import { type CameraDocument, decodeMessage, type Problem, ProtocolError } from "./protocol";
@@ -12,6 +13,7 @@ export type Command =
   | { readonly type: "adapt"; readonly adapts: boolean }
   | { readonly type: "look"; readonly sight: readonly number[] | null }
   | { readonly type: "acknowledge"; readonly frame: number }
+  | ({ readonly type: "moved" } & FluencyReport)
   | { readonly type: "retry" }
   | { readonly type: "bring"; readonly ticket: number; readonly path: string; readonly products: readonly string[] };
 
@@ -113,6 +115,9 @@ scope.onmessage = ({ data: command }) => {
       break;
     case "acknowledge":
       connection?.acknowledge(command.frame);
+      break;
+    case "moved":
+      connection?.moved(command);
       break;
     case "bring":
       void bring(command.ticket, command.path, command.products);

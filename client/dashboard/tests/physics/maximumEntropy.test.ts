@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 
 import { rangeOfTime_m } from "../../src/physics/constants";
-import { densityAt, densityImage } from "../../src/physics/maximumEntropy";
+import { densityAt } from "../../src/physics/maximumEntropy";
 import { cis, complex, densityOf, momentsOf, mul, picture } from "../oracle";
 
 const F_HZ = 23e6;
@@ -44,29 +44,6 @@ describe("the density of Eq. (2)", () => {
       }
       expect(Math.hypot(re - b[j].re, im - b[j].im)).toBeLessThan(0.05); // of b_0 = 1060
     }
-  });
-
-  test("of a whole picture is that of its pixels, each its own", () => {
-    const pixels = [0.5, 1.5, 2.5, 3.5, 4.5, 5.5].map((phase_rad, n) =>
-      momentsOf([{ phase_rad, weight: 100 + n }], 5, 3),
-    );
-    const c = picture(pixels, 3);
-    const image = new Float32Array(6);
-    densityImage(c, 2.5, image);
-    image.forEach((value, pixel) => {
-      expect(value / densityAt(c, pixel, 2.5)).toBeCloseTo(1, 5);
-    });
-  });
-
-  test("a pixel without a density spoils only itself", () => {
-    const good = momentsOf(TWO_RETURNS, 60, 3);
-    const c = picture([good, good, good]);
-    for (let plane = 0; plane < 7; plane++) c.planes[plane * 3 + 1] = NaN;
-    const image = new Float32Array(3);
-    densityImage(c, 1, image);
-    expect(image[1]).toBeNaN();
-    expect(image[0]).toBeGreaterThan(0);
-    expect(image[2]).toBe(image[0]);
   });
 });
 

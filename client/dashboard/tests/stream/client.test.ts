@@ -36,8 +36,9 @@ class Page {
     this.store,
     this.worker,
     new AnimationLoop((callback) => this.#requested.push(callback)),
-    () => 1000,
+    () => this.now_s,
   );
+  now_s = 1000;
 
   receives(...reports: Report[]): void {
     for (const data of reports) this.worker.onmessage?.({ data } as MessageEvent<Report>);
@@ -110,6 +111,51 @@ describe("between worker and store", () => {
     page.store.held.value = false;
     page.refreshes();
     expect(page.acknowledged).toEqual([4]);
+  });
+
+  describe("how fluently light moves", () => {
+    const light = (number: number): Report => ({ ...frame("coefficients", number), light: null }) as Report;
+    /** 3 s of 10 refreshes a second, a new frame at each second one. */
+    const watches = (): Command[] => {
+      const before = page.sent.length;
+      for (let n = 0; n < 30; n++) {
+        if (n % 2 === 0) page.receives(light(n));
+        page.refreshes();
+        page.now_s += 0.1;
+      }
+      return page.sent.slice(before).filter(({ type }) => type === "moved");
+    };
+
+    beforeEach(() => {
+      page.store.frames.claim(["coefficients"]);
+    });
+
+    test("is counted while it plays, and while it is scrubbed", () => {
+      page.store.player.playing.value = true;
+      expect(watches()).toEqual([{ type: "moved", pictures_hz: expect.closeTo(10, 6) as number, frames_hz: expect.closeTo(5, 6) as number, camera_hz: expect.closeTo(10, 6) as number }]);
+      page.store.player.playing.value = false;
+      page.store.player.scrubbed.value = true;
+      expect(watches()).toHaveLength(1);
+    });
+
+    test("is not counted while it stands, the page is held or hidden, or a recording is shown", () => {
+      expect(watches()).toEqual([]);
+      page.store.player.playing.value = true;
+      page.store.held.value = true;
+      expect(watches()).toEqual([]);
+      page.store.held.value = false;
+      page.store.replay.loader = () => new Promise(() => undefined);
+      page.store.replay.recording.value = { id: "r" } as RecordingDocument;
+      expect(watches()).toEqual([]);
+      page.store.replay.leave();
+      page.receives(light(100));
+      page.refreshes();
+      page.now_s += 4.5; // refreshes do not come while the page is hidden
+      page.client.hid();
+      page.receives(light(101));
+      page.refreshes();
+      expect(page.sent.filter(({ type }) => type === "moved")).toEqual([]);
+    });
   });
 
   test("a camera that is lost and comes back is shown in the status", () => {

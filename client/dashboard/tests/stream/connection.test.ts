@@ -117,7 +117,7 @@ describe("over a thin link", () => {
   const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.["subscriptions"];
   /** A frame every 2 s of a camera that takes ten a second, drawn at once. */
   const starves = async (): Promise<void> => {
-    for (let frame = 1; frame <= 4; frame++) {
+    for (let frame = 1; frame <= 5; frame++) {
       world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: 19, total: 19 });
       world.socket.receives(picture(20 * frame));
       world.connection.acknowledge(20 * frame);
@@ -146,6 +146,67 @@ describe("over a thin link", () => {
     await starves();
     world.socket.receives({ type: "notice", kind: "sequence-changed", sequence: {} });
     expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+  });
+});
+
+describe("with a slow browser", () => {
+  const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.["subscriptions"];
+  const stutters = (): void => {
+    for (let window = 0; window < 2; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: 16, camera_hz: 16 });
+  };
+
+  test("asks for fewer frames and says so, and for all when the user says", () => {
+    world.socket.opens();
+    stutters();
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: 8 }]);
+    expect(world.events.at(-1)).toEqual({ type: "demand", demand: { maxRate_hz: 8, coded: false, part: false }, carried_bytes_s: null, pictures_hz: 14.5 });
+    world.connection.adapt(false);
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+    expect(world.events.at(-1)).toMatchObject({ type: "demand", demand: { maxRate_hz: null }, pictures_hz: null });
+    stutters();
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+  });
+
+  test("asks for more again where there is room, and for all of another sequence", () => {
+    world.socket.opens();
+    stutters();
+    world.connection.moved({ pictures_hz: 50, frames_hz: 8, camera_hz: 16 });
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: 12 }]);
+    world.socket.receives({ type: "notice", kind: "sequence-changed", sequence: {} });
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+  });
+
+  test("does not take frames that it is late for to be lost on the way, while it can ask for fewer and light moves", async () => {
+    world.socket.opens();
+    const late = async (frame: number, report: boolean): Promise<void> => {
+      world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: 9, total: 9 });
+      world.socket.receives({ type: "frame", product: "range", axes: ["y", "x"], meta: { frame }, array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) } });
+      world.connection.acknowledge(frame);
+      // slow, but from window to window not twice in a row
+      if (report) world.connection.moved({ pictures_hz: 40, frames_hz: 1, camera_hz: 16 });
+      if (report) world.connection.moved({ pictures_hz: 12, frames_hz: 1, camera_hz: 16 });
+      await world.passes(2);
+    };
+    for (let frame = 1; frame <= 6; frame++) await late(frame, true);
+    expect(world.events.filter(({ type }) => type === "demand")).toEqual([]);
+    for (let frame = 7; frame <= 12; frame++) await late(frame, false); // the light stands
+    expect(world.events.filter(({ type }) => type === "demand").at(-1)).toMatchObject({ pictures_hz: null, demand: { coded: true } });
+  });
+
+  test("asks for what both the link and the browser take", async () => {
+    world.socket.opens();
+    for (let frame = 1; frame <= 5; frame++) {
+      world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: 3, total: 3 });
+      world.socket.receives({ type: "frame", product: "range", axes: ["y", "x"], meta: { frame: 4 * frame }, array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) } });
+      world.connection.acknowledge(4 * frame);
+      await world.passes(1);
+    }
+    const [{ max_rate_hz: linked_hz }] = asked() as { max_rate_hz: number }[];
+    expect(linked_hz).toBeLessThan(2);
+    for (let window = 0; window < 2; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: linked_hz, camera_hz: 16 });
+    const event = world.events.at(-1);
+    expect(event).toMatchObject({ type: "demand", pictures_hz: 14.5, demand: { maxRate_hz: expect.closeTo(0.7 * linked_hz, 6) as number } });
+    expect(event).not.toMatchObject({ carried_bytes_s: null });
   });
 });
 

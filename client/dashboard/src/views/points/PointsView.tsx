@@ -1,9 +1,8 @@
 import { signal, useComputed } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 
-import { lightPainter } from "../../gl/paintLight";
+import { LightPainter } from "../../gl/paintLight";
 import type { Backdrop } from "../../gl/renderer";
-import { densityImage } from "../../physics/maximumEntropy";
 import { LIVE, RequestError } from "../../store/api";
 import type { Frame } from "../../store/frames";
 import { aBoolean, aNumber, oneOf, remembered } from "../../store/settings";
@@ -21,7 +20,7 @@ import { PopoverButton } from "../../ui/PopoverButton";
 import { PinsRow } from "../map/PinsRow";
 import { LightBar } from "../transient/LightBar";
 import type { TransientLook } from "../transient/look";
-import { byFlags, byValue, colourCloud, fillCloud, type Painter } from "./cloud";
+import { byFlags, byPicture, byValue, colourCloud, fillCloud, type Painter } from "./cloud";
 import { FieldOfView } from "./FieldOfView";
 import { knownLens, lensOf } from "./lens";
 import { plyOf } from "./ply";
@@ -56,7 +55,7 @@ export function PointsView() {
   const count = useMemo(() => signal(0), []);
   /** Counts the clouds, which all lie in the same arrays. */
   const cloud = useMemo(() => signal(0), []);
-  const density = useRef(new Float32Array(0));
+  const lit = useMemo(() => ({ painter: new LightPainter(), pixels: new Uint32Array(0) }), []);
 
   useEffect(() => {
     let wanted = true;
@@ -108,9 +107,9 @@ export function PointsView() {
     const coefficients = chosen === "flight" ? (store.frames.of("coefficients").value?.coefficients ?? null) : null;
     if (flags !== null) return byFlags(flags.values);
     if (coefficients !== null && coefficients.width * coefficients.height === frame.values.length) {
-      if (density.current.length !== frame.values.length) density.current = new Float32Array(frame.values.length);
-      densityImage(coefficients, store.player.phase_rad.value, density.current);
-      return lightPainter(density.current, { tone: light.toneNow, colours: light.colours.value, backdrop: backdropOf(amplitude, light) });
+      if (lit.pixels.length !== frame.values.length) lit.pixels = new Uint32Array(frame.values.length);
+      lit.painter.paint(coefficients, { phase_rad: store.player.phase_rad.value, tone: light.toneNow, colours: light.colours.value, backdrop: backdropOf(amplitude, light) }, lit.pixels);
+      return byPicture(lit.pixels);
     }
     if (chosen === "light" && amplitude !== null) return byValue(amplitude.values, lightLook.scale.value, lightLook.colours.value);
     return byValue(frame.values, rangeLook.scale.value, rangeLook.colours.value);

@@ -69,11 +69,21 @@ export function colourCloud({ pixels, colours }: Cloud, count: number, paint: Pa
 export function byValue(values: ArrayLike<number>, scale: Scale, colours: ColourMapName): Painter {
   const pick = picker(scale, colours);
   return (pixel, out, at) => {
-    const rgba = pick(values[pixel]);
-    out[at] = rgba & 255;
-    out[at + 1] = (rgba >> 8) & 255;
-    out[at + 2] = (rgba >> 16) & 255;
+    writeRgb(pick(values[pixel]), out, at);
   };
+}
+
+/** Colours as a picture of RGBA pixels has them. */
+export function byPicture(pixels: Uint32Array): Painter {
+  return (pixel, out, at) => {
+    writeRgb(pixels[pixel], out, at);
+  };
+}
+
+function writeRgb(rgba: number, out: Uint8Array, at: number): void {
+  out[at] = rgba & 255;
+  out[at + 1] = (rgba >> 8) & 255;
+  out[at + 2] = (rgba >> 16) & 255;
 }
 
 const VALID: readonly [number, number, number] = [150, 160, 170];

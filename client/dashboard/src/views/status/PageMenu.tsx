@@ -24,7 +24,7 @@ export function PageMenu() {
         },
         { title: "Colours", actions: THEMES.map((theme) => ({ text: THEME_NAMES[theme] + (theme === choice.value ? " ✓" : ""), run: () => (choice.value = theme) })) },
         { title: "Files", actions: [{ text: "Open a scene, recording or calibration…", run: () => { chooseFile(store); } }] },
-        { title: "Link", actions: [{ text: `Ask for less where it is too thin${store.adapts.value ? " ✓" : ""}`, run: () => (store.adapts.value = !store.adapts.peek()) }] },
+        { title: "Stream", actions: [{ text: `Ask for less where link or browser is too slow${store.adapts.value ? " ✓" : ""}`, run: () => (store.adapts.value = !store.adapts.peek()) }] },
         {
           title: "Help",
           actions: [

@@ -19,7 +19,7 @@ export function StatusBar() {
         <span class="brand-name">transientcam</span>
       </h1>
       <StateChip />
-      <ThinLink />
+      <LessAsked />
       <Performance />
       <Subject />
       <Figures />
@@ -67,13 +67,13 @@ function slowed(state: State, trouble: string | null): State {
 }
 
 /** That less is asked for than there is, and what. */
-function ThinLink() {
+function LessAsked() {
   const { status, sight, replay } = useStore();
   const decision = status.demanded.value;
   if (decision === null || replay.active.value) return null;
   const { long, short } = demandWords(decision, sight.value !== null);
   return (
-    <span class="chip chip-waiting thin-link" role="status" data-field="link" title={long}>
+    <span class="chip chip-waiting less-asked" role="status" data-field="link" title={long}>
       <i aria-hidden="true" />
       {short}
     </span>

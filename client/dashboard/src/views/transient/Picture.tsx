@@ -1,7 +1,7 @@
 import { signal, useComputed } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 
-import { createRenderer } from "../../gl/createRenderer";
+import { createRenderer, hasGraphics } from "../../gl/createRenderer";
 import type { DensityRenderer } from "../../gl/renderer";
 import { useStore } from "../../store/store";
 import { useDrawing } from "../../ui/hooks";
@@ -32,7 +32,7 @@ export function Picture({ look }: { look: TransientLook }) {
     };
     let made: DensityRenderer;
     try {
-      made = createRenderer(canvas.current, attempt.peek() < GRAPHICS_TRIES);
+      made = createRenderer(canvas.current, attempt.peek() < GRAPHICS_TRIES && hasGraphics());
     } catch (error) {
       if (attempt.peek() >= GRAPHICS_TRIES) throw error;
       attempt.value = GRAPHICS_TRIES;

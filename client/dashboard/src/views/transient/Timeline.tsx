@@ -1,4 +1,4 @@
-import { useRef } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 
 import { useStore } from "../../store/store";
 import { useDrawing } from "../../ui/hooks";
@@ -34,6 +34,18 @@ export function Timeline() {
     head.current.style.left = `${100 * turn}%`;
   }, [player]);
 
+  // The pointer may be let go anywhere.
+  useEffect(() => {
+    const release = (): void => {
+      player.scrubbed.value = false;
+    };
+    for (const end of ["pointerup", "pointercancel"]) window.addEventListener(end, release);
+    return () => {
+      for (const end of ["pointerup", "pointercancel"]) window.removeEventListener(end, release);
+      release();
+    };
+  }, [player]);
+
   const period_ns = period_s.value * 1e9;
   const period_m = rangeOfTime_m(period_s.value);
   const marks = ticks({ low: 0, high: period_ns, kind: "linear" }, 6);
@@ -51,7 +63,7 @@ export function Timeline() {
         max={1}
         step={STEP}
         aria-label="Time of flight"
-        onPointerDown={() => (player.playing.value = false)}
+        onPointerDown={() => ([player.playing.value, player.scrubbed.value] = [false, true])}
         onInput={(event) => {
           player.seek(event.currentTarget.valueAsNumber);
         }}

@@ -1,4 +1,4 @@
-"""A page behind a link that does not carry all frames."""
+"""A page that asks for less: behind a link, or in a browser, that is too slow for all frames."""
 
 import re
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, expect
 
-from tests.browser.dashboard import open_page
+from tests.browser.dashboard import choose_from, open_page
 from tests.browser.test_map import product
 from tests.browser.thin_link import ThinLink
 from tests.serving import Served
@@ -47,3 +47,38 @@ def test_over_a_thin_link_less_is_asked_for_and_everything_again_once_it_is_wide
         link.rate_bytes_s = None
         expect(sign).to_have_count(0)
         context.close()
+
+
+# However quick the machine is, each refresh of the screen takes a tenth of a second.
+SLOW_REFRESHES = """
+const refresh = () => {
+  const end_ms = performance.now() + 100;
+  while (performance.now() < end_ms);
+  requestAnimationFrame(refresh);
+};
+requestAnimationFrame(refresh);
+"""
+
+
+def test_a_slow_browser_asks_for_fewer_frames_while_light_plays_unless_it_is_told_not_to(
+    browser: Browser, served: Served
+) -> None:
+    context = browser.new_context(reduced_motion="reduce", base_url=served.url)
+    context.set_default_timeout(60_000)
+    context.add_init_script(SLOW_REFRESHES)
+    page = context.new_page()
+    open_page(page)
+    sign = page.locator("[data-field=link]")
+    expect(sign).to_have_count(0)
+    page.get_by_role("button", name="Play").click()
+    expect(sign).to_contain_text("Slow browser")
+    expect(sign).to_have_attribute(
+        "title", re.compile("drew [0-9]+ pictures of the light a second")
+    )
+    choose_from(
+        page,
+        "Page: layout, colours, help",
+        "Ask for less where link or browser is too slow \u2713",
+    )
+    expect(sign).to_have_count(0)
+    context.close()
