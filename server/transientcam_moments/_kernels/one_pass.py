@@ -35,6 +35,7 @@ class Stages(NamedTuple):
     eigenvalue: Callable[..., Any]
     flag_and_bias: Callable[..., Any]
     returns: Callable[..., Any]
+    steps: int
     separate: Callable[..., Any]
     wide: "WideReturns"
 
@@ -221,7 +222,7 @@ class OnePass:
                 s.returns(
                     s.order, s.turns, smoothed, planes.brightness, 1, planes.uniform,
                     planes.phase_rad, planes.weight, planes.count, scratch.residual, _EPS,
-                    left, right,
+                    s.steps, left, right,
                 )  # fmt: skip
                 # by blocks, so that the same pixels are redone together for any number of parts
                 redone.append(s.wide(smoothed, planes.brightness, found, room, left, right))

@@ -16,7 +16,8 @@ from transientcam_moments._kernels.compiled_entry import (
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.frames import measure_entry, separate_entry, smooth_entry
 from transientcam_moments._kernels.one_pass import Constants, OnePass, Stages
-from transientcam_moments._kernels.returns import half_turns, returns_entry
+from transientcam_moments._kernels.circle import half_turns
+from transientcam_moments._kernels.returns import USUAL_STEPS, returns_entry
 from transientcam_moments._kernels.wide import WideReturns
 
 
@@ -47,6 +48,7 @@ def reconstruct_stages(m: int) -> Stages:
             PIXELS, PIXELS,
         ),
         returns=returns_entry(m, "f"),
+        steps=USUAL_STEPS["f"],
         separate=separate_entry(m),
         wide=WideReturns(m),
     )  # fmt: skip

@@ -1,8 +1,7 @@
 """Pisarenko's returns for one register of pixels at a time, expanded into the kernels.
 
-``order`` is a tuple of length m; banks of registers are taken and filled. Half angles: a point of
-the unit circle z = exp(i phi) is kept as omega = exp(i phi / 2), with which all that is needed of
-a polynomial there is real.
+``order`` is a tuple of length m; banks of registers are taken and filled. Points of the unit circle
+are kept as half angles (see `circle`).
 """
 
 from collections.abc import Callable
@@ -12,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from transientcam_moments._kernels import simd, toeplitz
+from transientcam_moments._kernels.circle import circle_roots
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -21,10 +21,14 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
+from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 _INTERLEAVE = 2
 _FAINT = 1024.0  # times what rounding makes of nothing
-_ROOT_STEPS = 24  # four are usual
+_LATE = 1024  # pixels that are redone with more steps at a time
+USUAL_STEPS = {"f": 3, "d": 4}
+"""Of the iteration for roots: enough for nine pixels of ten, by precision."""
+MOST_STEPS = 24
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -66,83 +70,6 @@ def singular(
 
 
 @njit(forceinline=True, error_model="numpy")
-def circle_roots(
-    order: Any, ar: Any, ai: Any, turns: Any, hr: Any, hi: Any, wr: Any, wi: Any, move: Any
-) -> None:
-    """Fill ``wr``, ``wi`` with the half angles of the m roots of sum_j conj(a_j) exp(i j phi).
-
-    On the circle the polynomial is a phase factor times the real Q(phi), since |a_m| = 1. Newton's
-    iteration on Q with the other roots divided out (Ehrlich, Aberth), as rotations: if the other
-    roots are exact, cot of half the error is 2 Q' / Q - sum_k cot((phi - phi_k) / 2), and one step
-    arrives. ``turns`` holds cos and sin of pi k / m.
-    """
-    m = len(order)
-    gr, gi = ar[m], ai[m]
-    # eta^2 ~ conj(g_m), so that conj(eta) z^(-m/2) sum_j conj(a_j) z^j is real
-    er = simd.select(gr >= 0.0, 1.0 + gr, -gi)
-    ei = simd.select(gr >= 0.0, -gi, 1.0 - gr)
-    terms = m - m // 2
-    first = m // 2 + 1
-    for t in range(terms):
-        cr, ci = ar[first + t], ai[first + t]
-        hr[t], hi[t] = 2.0 * (cr * er - ci * ei), -2.0 * (ci * er + cr * ei)
-    middle = er * 0.0
-    if m % 2 == 0:
-        middle = ar[m // 2] * er - ai[m // 2] * ei
-    # the roots of 1 + conj(g_m) z^m, exact for a uniform density
-    x, y = -gr, -gi
-    ax, ay = simd.absolute(x), simd.absolute(y)
-    tangent = simd.minimum(ax, ay) / (1.0 + simd.maximum(ax, ay))
-    angle = 2.0 * tangent * simd.arctangent_ratio(tangent * tangent)
-    angle = simd.select(ay > ax, 0.5 * np.pi - angle, angle)
-    angle = simd.select(x < 0.0, np.pi - angle, angle)
-    angle = simd.select(y < 0.0, -angle, angle) * (0.5 / m)
-    square = angle * angle
-    c = 1.0 - square * (0.5 - square / 24.0)
-    s = angle * (1.0 - square * (1.0 - square / 20.0) / 6.0)
-    size = 1.0 / simd.sqrt(c * c + s * s)
-    c, s = c * size, s * size
-    for k in range(m):
-        wr[k], wi[k] = c * turns[k] - s * turns[m + k], c * turns[m + k] + s * turns[k]
-    near = simd.nearly(middle)
-    moving = middle == middle
-    for _ in range(_ROOT_STEPS):
-        for i in range(m):
-            move[i] = middle * 0.0
-        for i in range(m):
-            for k in range(i):
-                cosine = wr[i] * wr[k] + wi[i] * wi[k]
-                sine = wi[i] * wr[k] - wr[i] * wi[k]
-                cotangent = cosine / (sine + simd.tiny(sine))
-                move[i] = move[i] + cotangent
-                move[k] = move[k] - cotangent
-        largest = middle * 0.0
-        for i in range(m):
-            x, y = wr[i], wi[i]
-            zr, zi = x * x - y * y, 2.0 * x * y
-            ur, ui = x, y
-            if m % 2 == 0:
-                ur, ui = zr, zi
-            vr, vi = hr[terms - 1], hi[terms - 1]
-            sr, si = vr * m, vi * m
-            for t in range(terms - 2, -1, -1):
-                vr, vi = hr[t] + vr * zr - vi * zi, hi[t] + vr * zi + vi * zr
-                factor = 2 * t + 2 - m % 2
-                sr, si = hr[t] * factor + sr * zr - si * zi, hi[t] * factor + sr * zi + si * zr
-            value = middle + vr * ur - vi * ui
-            below = -(sr * ui + si * ur) - value * move[i]
-            size = 1.0 / simd.sqrt(below * below + value * value + simd.tiny(value))
-            # a pixel that has arrived stays, however long its neighbours take
-            c = simd.select(moving, below * size, 1.0)
-            s = simd.select(moving, -value * size, 0.0)
-            wr[i], wi[i] = x * c - y * s, x * s + y * c
-            largest = simd.maximum(simd.absolute(s), largest)
-        moving = moving & (largest > near)
-        if not simd.some(moving):
-            break
-
-
-@njit(forceinline=True, error_model="numpy")
 def weigh(order: Any, gr: Any, gi: Any, inverse: Any, x: Any, y: Any) -> Any:
     """Return the weight of a return at a half angle, and that half angle corrected.
 
@@ -167,7 +94,7 @@ def weigh(order: Any, gr: Any, gi: Any, inverse: Any, x: Any, y: Any) -> Any:
 
 
 @njit(nogil=True, error_model="numpy")
-def find_returns(
+def _returns(
     order: Any,
     turns: Any,
     b: Any,
@@ -179,17 +106,11 @@ def find_returns(
     count: Any,
     residual: Any,
     noise: float,
+    steps: int,
     start: int,
     stop: int,
 ) -> int:
-    """Write the returns of the pixels start..stop, whose smallest eigenvalues are known.
-
-    b_0 comes from ``zeroth`` if it is ``apart``.
-
-    ``noise`` is the precision of the data. ``residual`` becomes the error of all moments that
-    the returns leave, relative to their sum; infinite where they could not be found, 0 where there
-    is no light. Returns how many pixels have one larger than rounding explains.
-    """
+    """Do as `find_returns` does, but with no more than ``steps`` towards the roots."""
     m = len(order)
     one = simd.ones(uniform, _INTERLEAVE)
     step = simd.width(one)
@@ -224,7 +145,7 @@ def find_returns(
             singular(order, re, im, ar, ai, gr, gi, inverse, floor)
             for k in range(1, m + 1):
                 re[k], im[k] = re[k] / factor, im[k] / factor
-        circle_roots(order, ar, ai, turns, hr, hi, wr, wi, move)
+        circle_roots(order, ar, ai, turns, hr, hi, wr, wi, move, steps)
         found = one * 0.0
         for i in range(m):
             w, x, y = weigh(order, gr, gi, inverse, wr[i], wi[i])
@@ -257,6 +178,79 @@ def find_returns(
     return ill
 
 
+@njit(nogil=True, error_model="numpy")
+def find_returns(
+    order: Any,
+    turns: Any,
+    b: Any,
+    zeroth: Any,
+    apart: bool,
+    uniform: Any,
+    phase: Any,
+    weight: Any,
+    count: Any,
+    residual: Any,
+    noise: float,
+    steps: int,
+    start: int,
+    stop: int,
+) -> int:
+    """Write the returns of the pixels start..stop, whose smallest eigenvalues are known.
+
+    b_0 comes from ``zeroth`` if it is ``apart``.
+
+    ``noise`` is the precision of the data. ``residual`` becomes the error of all moments that
+    the returns leave, relative to their sum; infinite where they could not be found, 0 where there
+    is no light. Returns how many pixels have one larger than rounding explains.
+
+    Pixels share registers, and each step is done for all of them. So after ``steps`` those that do
+    not reproduce their moments are packed, and done again with as many as they need.
+    """
+    ill = _returns(
+        order, turns, b, zeroth, apart, uniform, phase, weight, count, residual, noise,
+        steps, start, stop,
+    )  # fmt: skip
+    if ill == 0 or steps >= MOST_STEPS:
+        return ill
+    m = len(order)
+    tolerance = 16.0 * (m + 1) * noise
+    where = np.empty(_LATE, np.int64)
+    moments = np.empty((m + 1, _LATE), b.dtype)
+    late_zeroth, late_uniform = np.empty(_LATE, uniform.dtype), np.empty(_LATE, uniform.dtype)
+    late_phase, late_weight = (
+        np.empty((m, _LATE), uniform.dtype),
+        np.empty((m, _LATE), uniform.dtype),
+    )
+    late_count, late_residual = np.empty(_LATE, count.dtype), np.empty(_LATE, uniform.dtype)
+    ill, begin = 0, start
+    while begin < stop:
+        late = 0
+        while begin < stop and late < _LATE:
+            where[late] = begin
+            late += int(residual[begin] > tolerance)
+            begin += 1
+        whole = -(-late // LEAST_PIXELS) * LEAST_PIXELS
+        for i in range(late, whole):
+            where[i] = where[0]
+        for i in range(whole):
+            p = where[i]
+            late_zeroth[i] = zeroth[p] if apart else b[0, p].real
+            late_uniform[i] = uniform[p]
+            for j in range(1, m + 1):
+                moments[j, i] = b[j, p]
+        _returns(
+            order, turns, moments, late_zeroth, True, late_uniform, late_phase, late_weight,
+            late_count, late_residual, noise, MOST_STEPS, 0, whole,
+        )  # fmt: skip
+        for i in range(late):
+            p = where[i]
+            count[p], residual[p] = late_count[i], late_residual[i]
+            ill += int(residual[p] > tolerance)
+            for k in range(m):
+                phase[k, p], weight[k, p] = late_phase[k, i], late_weight[k, i]
+    return ill
+
+
 @njit(forceinline=True, error_model="numpy")
 def _sort(order: Any, keys: Any, values: Any) -> None:
     """Sort two banks by the first, ascending."""
@@ -268,12 +262,6 @@ def _sort(order: Any, keys: Any, values: Any) -> None:
             first = simd.select(swap, values[k + 1], values[k])
             second = simd.select(swap, values[k], values[k + 1])
             keys[k], keys[k + 1], values[k], values[k + 1] = low, high, first, second
-
-
-def half_turns(m: int, precision: str) -> Any:
-    """Return cos and sin of pi k / m, k < m, one after the other."""
-    angle = np.pi * np.arange(m) / m
-    return np.concatenate([np.cos(angle), np.sin(angle)]).astype(precision)
 
 
 def returns_entry(m: int, precision: str) -> Callable[..., Any]:
@@ -292,6 +280,7 @@ def returns_entry(m: int, precision: str) -> Callable[..., Any]:
         COUNTS,
         real[1],
         REAL,
+        PIXELS,
         PIXELS,
         PIXELS,
     )

@@ -18,7 +18,8 @@ from transientcam_moments._kernels.compiled_entry import (
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.padding import RAMP
 from transientcam_moments._kernels.refine import Found, redo
-from transientcam_moments._kernels.returns import half_turns, returns_entry
+from transientcam_moments._kernels.circle import half_turns
+from transientcam_moments._kernels.returns import MOST_STEPS, returns_entry
 from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 _EPS = float(np.finfo(np.float32).eps)
@@ -82,7 +83,7 @@ class WideReturns:
             self._eigenvalue(self._order, moments, 0, uniform, 0, end)
             ill = self._returns(
                 self._order, self._turns, moments, uniform, 0, uniform, phase, weight, count,
-                residual, _EPS, 0, end,
+                residual, _EPS, MOST_STEPS, 0, end,
             )  # fmt: skip
             if ill:
                 where = np.flatnonzero(residual[:end] > tolerance)

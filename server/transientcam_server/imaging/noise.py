@@ -218,17 +218,18 @@ def _beyond_own_share(
     validity = np.asarray(found.validity).reshape(-1)
     # affine in the light: with what two brightnesses have, no block needs its planes of moments
     dark, lit = noise_of(np.array([0, 1], light.dtype)).variance.sum(axis=0).tolist()
-    slope, dark = limit * (dark - lit), -limit * dark
+    slope, dark = limit * (lit - dark), limit * dark
     room = np.empty((2, min(places.size, _BLOCK_PIXELS)), light.dtype)
     for start in range(0, places.size, _BLOCK_PIXELS):  # which stay in the caches
         block = slice(start, start + _BLOCK_PIXELS)
-        square, least = room[:, : places[block].size]
-        np.multiply(validity[block], light[block], out=square)
-        square *= np.abs(square)
-        np.maximum(light[block], 0, out=least)
-        least *= slope
-        least += dark
-        places[block] &= square < least
+        square, most = room[:, : places[block].size]
+        most[:] = light[block]  # real parts lie apart: once is enough; lit, so above 0
+        np.multiply(validity[block], most, out=square)
+        np.multiply(square, square, out=square)
+        most *= slope
+        most += dark
+        places[block] &= square > most
+        places[block] &= validity[block] < 0
     return beyond
 
 
