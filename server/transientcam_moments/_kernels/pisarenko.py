@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from transientcam_moments._kernels.circle import half_turns
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.pool import empty
 from transientcam_moments._kernels.refine import Found, redo
-from transientcam_moments._kernels.circle import half_turns
 from transientcam_moments._kernels.returns import USUAL_STEPS, returns_entry
 from transientcam_moments._kernels.wide import WideReturns
 from transientcam_moments._lanes.parallel import Spread, at_once, blocks

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from transientcam_moments._kernels import outputs
+from transientcam_moments._kernels.circle import half_turns
 from transientcam_moments._kernels.compiled_entry import (
     BYTES,
     PIXELS,
@@ -16,7 +17,6 @@ from transientcam_moments._kernels.compiled_entry import (
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.frames import measure_entry, separate_entry, smooth_entry
 from transientcam_moments._kernels.one_pass import Constants, OnePass, Stages
-from transientcam_moments._kernels.circle import half_turns
 from transientcam_moments._kernels.returns import USUAL_STEPS, returns_entry
 from transientcam_moments._kernels.wide import WideReturns
 

@@ -217,10 +217,8 @@ def find_returns(
     where = np.empty(_LATE, np.int64)
     moments = np.empty((m + 1, _LATE), b.dtype)
     late_zeroth, late_uniform = np.empty(_LATE, uniform.dtype), np.empty(_LATE, uniform.dtype)
-    late_phase, late_weight = (
-        np.empty((m, _LATE), uniform.dtype),
-        np.empty((m, _LATE), uniform.dtype),
-    )
+    late_phase = np.empty((m, _LATE), uniform.dtype)
+    late_weight = np.empty_like(late_phase)
     late_count, late_residual = np.empty(_LATE, count.dtype), np.empty(_LATE, uniform.dtype)
     ill, begin = 0, start
     while begin < stop:

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from transientcam_moments._kernels import outputs
+from transientcam_moments._kernels.circle import half_turns
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -18,7 +19,6 @@ from transientcam_moments._kernels.compiled_entry import (
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.padding import RAMP
 from transientcam_moments._kernels.refine import Found, redo
-from transientcam_moments._kernels.circle import half_turns
 from transientcam_moments._kernels.returns import MOST_STEPS, returns_entry
 from transientcam_moments._lanes.registry import LEAST_PIXELS
 
