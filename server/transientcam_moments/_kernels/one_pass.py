@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # it brings along the compiler
 
 _ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
 _ROOM = 1024  # pixels that are redone in double precision at a time
-_ROWS = 8  # that are smoothed while the second cache holds them as they were measured
+_ROWS = 64  # that are smoothed before they leave the caches; fewer are more calls
 _EPS = float(np.finfo(np.float32).eps)
 _SATURATED, _REPLACED = 4, 32  # transientcam_moments.Flags
 

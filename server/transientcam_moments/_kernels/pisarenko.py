@@ -9,7 +9,7 @@ from transientcam_moments._kernels.circle import half_turns
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.pool import empty
 from transientcam_moments._kernels.refine import Found, redo
-from transientcam_moments._kernels.returns import USUAL_STEPS, returns_entry
+from transientcam_moments._kernels.returns import returns_entry, usual_steps
 from transientcam_moments._kernels.wide import WideReturns
 from transientcam_moments._lanes.parallel import Spread, at_once, blocks
 
@@ -49,7 +49,7 @@ def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
                     run_eigenvalue(order, planes, 0, uniform, left, right)
                 worst += run_returns(
                     order, turns, planes, uniform, 0, uniform, phase, weight, count, residual,
-                    eps, USUAL_STEPS[precision], left, right,
+                    eps, usual_steps(m, precision), left, right,
                 )  # fmt: skip
             if worst and wide is not None:
                 wide(planes, brightness, found, wide.room(_ROOM), start, stop)

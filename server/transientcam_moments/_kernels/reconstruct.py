@@ -17,7 +17,7 @@ from transientcam_moments._kernels.compiled_entry import (
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.frames import measure_entry, separate_entry, smooth_entry
 from transientcam_moments._kernels.one_pass import Constants, OnePass, Stages
-from transientcam_moments._kernels.returns import USUAL_STEPS, returns_entry
+from transientcam_moments._kernels.returns import returns_entry, usual_steps
 from transientcam_moments._kernels.wide import WideReturns
 
 
@@ -48,7 +48,7 @@ def reconstruct_stages(m: int) -> Stages:
             PIXELS, PIXELS,
         ),
         returns=returns_entry(m, "f"),
-        steps=USUAL_STEPS["f"],
+        steps=usual_steps(m, "f"),
         separate=separate_entry(m),
         wide=WideReturns(m),
     )  # fmt: skip

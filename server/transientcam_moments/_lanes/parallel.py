@@ -11,8 +11,11 @@ from typing import Protocol
 
 from transientcam_moments.errors import ParameterError
 
-BLOCK = 1 << 14
-"""Pixels that stay in the second cache from one kernel to the next."""
+BLOCK = 1 << 15
+"""Pixels that stay in the caches from one kernel to the next.
+
+After each kernel a thread waits for the interpreter's lock, so that fewer would cost more.
+"""
 LARGE = 1 << 16
 """Pixels from which an image is cut into parts of `BLOCK`."""
 
