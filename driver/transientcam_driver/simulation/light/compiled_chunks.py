@@ -9,7 +9,6 @@ import numpy as np
 
 from transientcam_driver.simulation.light.compiling import (
     AROUND,
-    CHUNK,
     LINE,
     NUMBERS,
     PLACES,
@@ -21,6 +20,7 @@ from transientcam_driver.simulation.light.compiling import (
     lane,
     without_nan,
 )
+from transientcam_driver.simulation.light.lanes import CHUNK
 
 Plane = Any
 """A float32 array as numba compiles it."""

@@ -10,10 +10,10 @@ import numpy as np
 
 from transientcam_driver.simulation.light.compiling import (
     AROUND,
-    CHUNK,
     DOUBLES,
     FLAGS,
     LINE,
+    MARKS,
     NUMBERS,
     PLACES,
     PLANE,
@@ -27,6 +27,7 @@ from transientcam_driver.simulation.light.compiling import (
     int64,
     lane,
 )
+from transientcam_driver.simulation.light.lanes import CHUNK
 
 Plane = Any
 """A float32 array as numba compiles it."""
@@ -472,49 +473,64 @@ def _leave(left: Any, shown: Any, light: Any) -> None:
         light[i] = left[i] if shown[i] > _ZERO else _ONE
 
 
-@lane(WHOLE, WHOLE, REGION)
-def dimmed(seen: Plane, left: Plane, of: Any) -> Any:
-    """Return the shares of light left in pixels of a region that are seen in shadow, of others 1.
+@lane(WHOLE, WHOLE, WHOLE, MARKS, REGION)
+def dimmed(seen: Plane, left: Plane, light: Plane, marks: Any, of: Any) -> None:
+    """Put the shares of light left in pixels of a region that are seen in shadow, of others 1.
 
-    And whether there are any in successive chunks of each row. ``seen`` and ``left`` are shares of
-    all pixels.
+    And whether there are any in successive chunks of each row. Planes are of all pixels.
     """
     top, start, height, width = of
     part = left[top : top + height, start : start + width]
-    light, chunks = np.empty((height, width), float32), (width + CHUNK - 1) // CHUNK
-    dark = np.zeros((height, chunks), np.bool_)
     for row in range(height):
-        # of rows of ``part`` numba does not know that they are contiguous
-        line, shown = left[top + row, start : start + width], seen[top + row, start : start + width]
-        for c in range(chunks):
-            a, b = c * CHUNK, min((c + 1) * CHUNK, width)
-            dark[row, c], mixed = _shadowed(line[a:b], shown[a:b])
-            _leave(line[a:b], shown[a:b], light[row, a:b])
+        r = top + row
+        for c in range((width + CHUNK - 1) // CHUNK):
+            a, b = start + c * CHUNK, start + min((c + 1) * CHUNK, width)
+            # of rows of ``part`` numba does not know that they are contiguous
+            line, shown, put = left[r, a:b], seen[r, a:b], light[r, a:b]
+            marks[r, c], mixed = _shadowed(line, shown)
+            _leave(line, shown, put)
             if not mixed:
                 continue
-            for column in range(a, b):
-                share = shown[column]
-                if not (line[column] < _ONE and _ZERO < share < _ONE):
+            for i in range(len(line)):
+                share = shown[i]
+                if not (line[i] < _ONE and _ZERO < share < _ONE):
                     continue
-                light[row, column] = _ZERO
-                if line[column] > _ZERO:
-                    both = _overlap(seen, part, row, column, of, _ONE)
-                    light[row, column] = both / max(share, _LEAST)
-    return light, dark
+                put[i] = _ZERO
+                if line[i] > _ZERO:
+                    both = _overlap(seen, part, row, a - start + i, of, _ONE)
+                    put[i] = both / max(share, _LEAST)
 
 
-@lane(PLANE)
-def covered(inside: Plane) -> Any:
-    """Return shares of pixels where a function is above 0."""
-    height, width = inside.shape
-    share, border = np.empty(inside.shape, float32), np.empty(width, np.bool_)
-    for row in range(height):
-        _mark(inside, row, 0, width, border)
-        for column in range(width):
-            share[row, column] = _ONE if inside[row, column] > _ZERO else _ZERO
-            if border[column]:
-                share[row, column] = _share(inside, row, column)[0]
-    return share
+@inner
+def _part_above(values: Plane, row: int, column: int) -> Any:
+    """Return the share of a pixel where values are above 0."""
+    value = values[row, column]
+    above, below = _beside(row, values.shape[0])
+    before, after = _beside(column, values.shape[1])
+    beside = values[above, column], values[below, column], values[row, before], values[row, after]
+    if _alike(value, *beside):
+        return _ONE if value > _ZERO else _ZERO
+    return _share(values, row, column)[0]
+
+
+@lane(PLANE, PLANE, PLANE, PLANE, PLANE, PLANE)
+def hide(
+    one: Plane, at: Plane, left: Plane, other: Plane, its: Plane, rest: Plane
+) -> None:  # fmt: skip
+    """Take from shares of pixels that are left of two shapes what each hides of the other.
+
+    Both of whose shares, and t, are planes of the same region.
+    """
+    away, of = its - at, (0, 0, one.shape[0], one.shape[1])
+    for row in range(one.shape[0]):
+        for column in range(one.shape[1]):
+            first, second = one[row, column], other[row, column]
+            if first == _ZERO or second == _ZERO:
+                continue
+            hidden = _overlap(one, other, row, column, of, _ONE)
+            nearer = _part_above(away, row, column)
+            rest[row, column] *= _ONE - nearer * hidden / max(second, _LEAST)
+            left[row, column] *= _ONE - (_ONE - nearer) * hidden / max(first, _LEAST)
 
 
 @lane(PLANE, PLANE)

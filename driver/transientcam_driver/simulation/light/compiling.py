@@ -12,8 +12,6 @@ from numba import njit
 from numba import types as numba_types
 from numba import uint16 as numba_uint16
 
-CHUNK = 64
-"""Points at a time, which are mostly beside each other in a row."""
 LANES: dict[str, Callable[..., Any]] = {}
 """All lanes that are compiled, by their names."""
 
@@ -29,6 +27,7 @@ WHOLE = _types.Array(float32, 2, "C")
 DOUBLES = float64[::1]
 ROWS = float64[:, ::1]
 PLANES = float64[:, :, ::1]
+STACK = _types.Array(float32, 3, "C")
 TILES = _types.boolean[:, :, ::1]
 MARKS = _types.boolean[:, ::1]
 FLAGS = _types.boolean[::1]
