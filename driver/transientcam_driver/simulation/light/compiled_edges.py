@@ -596,11 +596,13 @@ def _may_meet(ball: Any, low: Any, high: Any, may: Any) -> None:
 
 @inner
 def _cross_points(
-    ball: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any, own: Any, values: Any
-) -> Any:
+    ball: Any, corner: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any, own: Any,
+    values: Any,
+) -> Any:  # fmt: skip
     """Put where lines to points of other surfaces meet an ellipsoid; return how many do."""
     for i in range(len(x)):
-        squared, along = _squared(ball, x[i], y[i], z[i]), _along(ball, x[i], y[i], z[i])
+        u, v, w = x[i] - corner[0], y[i] - corner[1], z[i] - corner[2]
+        squared, along = _squared(ball, u, v, w), _along(ball, u, v, w)
         value, at = along * (along / squared) + ball[6], -(along / squared)
         counts = (at > near[i] + touching) & (at < _ONE - touching) & (index[i] != own)
         away = (at - _ONE) * np.sqrt(squared)
@@ -620,10 +622,10 @@ def _above(values: Any) -> Any:
 @inner
 def _cross_chunk(ball: Any, c: int, lines: Any, own: Any, values: Any) -> Any:
     """Do it for a chunk of them."""
-    x, y, z, near, touching, index = lines
+    corner, x, y, z, near, touching, index = lines
     a, b = c * CHUNK, min((c + 1) * CHUNK, len(x))
     return _cross_points(
-        ball, x[a:b], y[a:b], z[a:b], near[a:b], touching, index[a:b], own, values[a:b]
+        ball, corner, x[a:b], y[a:b], z[a:b], near[a:b], touching, index[a:b], own, values[a:b]
     )
 
 
@@ -679,12 +681,13 @@ def dim_softly(
     """Take from the light at points what ellipsoids cover of the pixels around them.
 
     Only chunks of points in and beside which a line meets an ellipsoid have any share, and only
-    those with a box that lines may meet one before are looked at. Boxes are of the ways (x, y, z).
+    those with a box that lines may meet one before are looked at. Boxes are of ways from the apex.
     """
     count, chunks = len(x), len(reach)
     values, counts = np.full(count + 1, _NAN, float32), np.zeros(chunks + 1, int64)
     known, stale = np.ones(chunks + 1, np.bool_), np.zeros(chunks, np.bool_)
-    lines = x, y, z, near, touching, index
+    corner = float32(apex[0]), float32(apex[1]), float32(apex[2])
+    lines = corner, x, y, z, near, touching, index
     low, high = (boxes[0], boxes[1], boxes[2]), (boxes[3], boxes[4], boxes[5])
     for n in range(len(axes)):
         ball = _ball(axes[n], apex)
@@ -708,14 +711,15 @@ def dim_softly(
         stale[:] = known[:chunks]
 
 
-@lane(WHOLE, LINE, LINE, LINE, LINE, float32, PLACES, int64, LINE)
+@lane(WHOLE, LINE, LINE, LINE, LINE, LINE, float32, PLACES, int64, LINE)
 def dim_behind(
-    plate: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any, own: int, clear: Any
-) -> Any:
+    plate: Any, apex: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any, own: int,
+    clear: Any,
+) -> Any:  # fmt: skip
     """Take the light from points whose way to it meets a rectangle."""
-    axes = _axes(plate)
+    axes, (a, b, c) = _axes(plate), (apex[0], apex[1], apex[2])
     for i in range(len(x)):
-        one, other, at, _facing = _of_rectangle(axes, x[i], y[i], z[i])
+        one, other, at, _facing = _of_rectangle(axes, x[i] - a, y[i] - b, z[i] - c)
         between = (at > near[i] + touching) & (at < _ONE - touching) & (index[i] != own)
         clear[i] = _ZERO if between & (one > _ZERO) & (other > _ZERO) else clear[i]
 
@@ -776,12 +780,11 @@ def _gather(share: Any, kept: Any) -> None:
 
 @inner
 def _lines_to(x: Any, y: Any, z: Any, at: Any, apex: Any, lines: Any) -> None:
-    """Put ways from an apex to points, the t where they meet a mirror, and points there."""
+    """Put the t where lines from an apex to points meet a mirror, and the points there."""
     a, b, c = apex[0], apex[1], apex[2]
     for k in range(len(x)):
         u, v, w, t = x[k] - a, y[k] - b, z[k] - c, at[k]
-        lines[0, k], lines[1, k], lines[2, k], lines[3, k] = u, v, w, t
-        lines[4, k], lines[5, k], lines[6, k] = u * t + a, v * t + b, w * t + c
+        lines[0, k], lines[1, k], lines[2, k], lines[3, k] = t, u * t + a, v * t + b, w * t + c
 
 
 @lane(WHOLE, LINE, LINE, LINE, LINE, float32, AROUND, NUMBERS, FLAGS)
@@ -790,7 +793,7 @@ def shown(
 ) -> Any:
     """Return the points that a mirror shows the light to, and its shares of their pixels.
 
-    Then ways to them from the light's image, the t where they meet the mirror, and points there.
+    Then the t where lines to them from the light's image meet the mirror, and the points there.
     """
     axes, corner, count = _axes(plate), (apex[0], apex[1], apex[2]), len(x)
     first, second = np.empty(count + 1, float32), np.empty(count + 1, float32)
@@ -799,7 +802,7 @@ def shown(
     found = 0
     if _meet(axes, corner, x, y, z, touching, (first[:count], second[:count], at)):
         found = _show_points((first, second), around, reach, rim, share)
-    lines = np.empty((7, found), float32)
+    lines = np.empty((4, found), float32)
     if found == count:
         _lines_to(x, y, z, at, corner, lines)
         return np.arange(count), share, lines

@@ -96,7 +96,7 @@ def test_images_are_the_same_with_and_without_lanes(board: bool, mixed: str) -> 
     assert there == expected
     assert used >= {"points", "received", "remaining", "blended", "hide", "layered"}
     if mixed == "on":
-        assert used == set(LANES._ready)
+        assert used == set(LANES._ready) - {"overlapped"}  # of shadows of rectangles that move
 
 
 @pytest.mark.parametrize(
