@@ -12,10 +12,10 @@ from transientcam_driver.simulation.light.compiling import (
     AROUND,
     DOUBLES,
     FLAGS,
+    INDICES,
     LINE,
     MARKS,
     NUMBERS,
-    PLACES,
     PLANE,
     PLANES,
     REGION,
@@ -672,7 +672,19 @@ def _any_beside(values: Any, around: Any, counts: Any, reach: Any, c: int) -> bo
 
 
 @lane(
-    PLANES, DOUBLES, PLACES, LINE, LINE, LINE, LINE, float32, PLACES, AROUND, NUMBERS, WHOLE, LINE
+    PLANES,
+    DOUBLES,
+    INDICES,
+    LINE,
+    LINE,
+    LINE,
+    LINE,
+    float32,
+    INDICES,
+    AROUND,
+    NUMBERS,
+    WHOLE,
+    LINE,
 )
 def dim_softly(
     axes: Any, apex: Any, owns: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any,
@@ -711,16 +723,16 @@ def dim_softly(
         stale[:] = known[:chunks]
 
 
-@lane(WHOLE, LINE, LINE, LINE, LINE, LINE, float32, PLACES, int64, LINE)
+@lane(WHOLE, LINE, LINE, LINE, LINE, LINE, float32, INDICES, int64, LINE)
 def dim_behind(
     plate: Any, apex: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any, own: int,
     clear: Any,
 ) -> Any:  # fmt: skip
     """Take the light from points whose way to it meets a rectangle."""
-    axes, (a, b, c) = _axes(plate), (apex[0], apex[1], apex[2])
+    axes, (a, b, c), mine = _axes(plate), (apex[0], apex[1], apex[2]), np.int32(own)
     for i in range(len(x)):
         one, other, at, _facing = _of_rectangle(axes, x[i] - a, y[i] - b, z[i] - c)
-        between = (at > near[i] + touching) & (at < _ONE - touching) & (index[i] != own)
+        between = (at > near[i] + touching) & (at < _ONE - touching) & (index[i] != mine)
         clear[i] = _ZERO if between & (one > _ZERO) & (other > _ZERO) else clear[i]
 
 

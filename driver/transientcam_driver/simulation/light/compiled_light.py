@@ -9,8 +9,10 @@ import numpy as np
 
 from transientcam_driver.simulation.light.compiling import (
     DOUBLES,
+    INDICES,
     LINE,
     NUMBERS,
+    PIXELS,
     PLACES,
     REGION,
     STACK,
@@ -161,7 +163,7 @@ def upright(x: Any, y: Any, z: Any, balls: Any, ends: Any) -> Any:
     return normal
 
 
-@lane(LINE, LINE, LINE, LINE, LINE, LINE, DOUBLES, DOUBLES, PLACES)
+@lane(LINE, LINE, LINE, LINE, LINE, LINE, DOUBLES, DOUBLES, INDICES)
 def returned(
     across: Any, along: Any, up: Any, x: Any, y: Any, z: Any, throughput: Any, albedos: Any,
     index: Any,
@@ -195,7 +197,7 @@ def arrived(
     return delay_s, weight
 
 
-@lane(WHOLE, NUMBERS, WHOLE, LINE, int64, int64)
+@lane(WHOLE, PIXELS, WHOLE, LINE, int64, int64)
 def layered(moments: Plane, places: Any, of_rays: Any, share: Any, top: int, left: int) -> None:
     """Add moments of what covers pixels, by its share."""
     rows, columns = places[0], places[1]
@@ -209,7 +211,7 @@ def layered(moments: Plane, places: Any, of_rays: Any, share: Any, top: int, lef
         moments[row, column + 1] += of_rays[k, 1] * share[k]
 
 
-@lane(WHOLE, NUMBERS, LINE)
+@lane(WHOLE, PIXELS, LINE)
 def uncover(uncovered: Plane, places: Any, share: Any) -> None:
     """Take from pixels what layers cover of them, one after the other; at most all is covered."""
     rows, columns = places[0], places[1]

@@ -35,6 +35,9 @@ PLACES = int64[::1]
 CODES = _types.Array(numba_uint16, 1, "C")
 NUMBERS = int64[:, ::1]
 AROUND = int32[:, ::1]
+PIXELS = int32[:, ::1]
+"""Rows and columns."""
+INDICES = int32[::1]
 REGION = _types.UniTuple(int64, 4)
 """First row and column, numbers of rows and columns."""
 

@@ -106,7 +106,7 @@ class Ends:
 
     still: Scene
     surfaces: tuple[Surface, ...]
-    index: NDArray[np.intp]
+    index: NDArray[np.int32]
     point: tuple[Plane, Plane, Plane]
     distance_m: Plane
     direction: tuple[Plane, Plane, Plane]
@@ -182,10 +182,9 @@ class Ends:
             np.stack(each, axis=-1).astype(np.float64)
             for each in (self.point, self.direction, normal)
         )
-        ends = RayEnds(
-            np.arange(len(facing)), point, self.index, self.distance_m.astype(np.float64), facing,
-            direction,
-        )  # fmt: skip
+        distance_m, index = self.distance_m.astype(np.float64), self.index.astype(np.intp)
+        every = np.arange(len(facing))
+        ends = RayEnds(every, point, index, distance_m, facing, direction)
         return highlight(self.still, light, ends, up)
 
     def _irradiance(
@@ -241,7 +240,7 @@ class Ends:
         segment: Segment,
         near: list[int],
         movers: tuple[int, ...],
-        of: tuple[NDArray[np.intp], Around],
+        of: tuple[NDArray[np.int32], Around],
         clear: Plane,
     ) -> list[int]:
         """Have a lane do it for all surfaces with soft edges, if it can; return those left.
@@ -255,7 +254,7 @@ class Ends:
             return near
         if soft:
             line = *segment.point, segment.near, TOUCHING, index, around.beside, around.reach[0]
-            lane(axes, segment.apex, np.array(soft), *line, segment.boxes, clear)
+            lane(axes, segment.apex, np.array(soft, np.int32), *line, segment.boxes, clear)
         return [k for k in near if k not in movers]
 
     def _normals(self) -> tuple[Plane, Plane, Plane]:
@@ -297,7 +296,7 @@ class LitEnds:
             delay_s[k, way.on], weight[k, way.on] = way.delay_s, way.weight
         ends = self.ends
         return Lit(
-            ends.index,
+            ends.index.astype(np.intp),
             np.stack(ends.point, axis=-1).astype(np.float64),
             ends.distance_m.astype(np.float64),
             self.reflectance,
@@ -323,7 +322,9 @@ def _dim(
     clear *= 1 - share_around(cross, between & ~cross.holds(1.0), around)
 
 
-def _dimmed(shape: Shape, segment: Segment, of: tuple[NDArray[np.intp], int], clear: Plane) -> bool:
+def _dimmed(
+    shape: Shape, segment: Segment, of: tuple[NDArray[np.int32], int], clear: Plane
+) -> bool:
     """Do the same at hard edges by a lane; ``of`` are the points' surfaces and the shape's."""
     lane = LANES.find("dim_behind")
     if lane is None or not isinstance(shape, Rectangle):

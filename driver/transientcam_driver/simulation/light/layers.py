@@ -26,7 +26,7 @@ class Layers:
     Each of the ``parts`` is one surface from one point, with each pixel once.
     """
 
-    places: NDArray[np.intp]
+    places: NDArray[np.int32]
     share: NDArray[np.float32]
     lit: LitEnds
     parts: tuple[slice, ...]
@@ -274,7 +274,8 @@ class MovingResponses:
     def _pixel(self) -> NDArray[np.intp]:
         """Pixels of layers by index."""
         assert self._layers is not None  # noqa: S101  (who asks has some)
-        pixel: NDArray[np.intp] = self._layers.places[0] * self._shape[1] + self._layers.places[1]
+        rows, columns = self._layers.places.astype(np.intp)
+        pixel: NDArray[np.intp] = rows * self._shape[1] + columns
         return pixel
 
     @cached_property

@@ -59,7 +59,7 @@ class _Seen:
         """How many pixels show it."""
         return int(np.count_nonzero(self.share))
 
-    def put_points(self, start: int, places: NDArray[np.intp], lines: NDArray[np.float32]) -> None:
+    def put_points(self, start: int, places: NDArray[np.int32], lines: NDArray[np.float32]) -> None:
         """Put what is known of its pixels into the columns from one on.
 
         Rows and columns (2, P); shares, distances, and points and ways by component (8, P).
@@ -155,7 +155,7 @@ class MovingLight:
         """Light the parts of surfaces that are seen, all at once."""
         counts = [each.count for each in visible]
         ends = np.cumsum([0, *counts]).tolist()
-        places, lines = np.empty((2, ends[-1]), np.intp), np.empty((8, ends[-1]), np.float32)
+        places, lines = np.empty((2, ends[-1]), np.int32), np.empty((8, ends[-1]), np.float32)
         for start, each in zip(ends, visible, strict=False):
             each.put_points(start, places, lines)
         share, at_m, *components = lines
@@ -163,7 +163,7 @@ class MovingLight:
         lit = Ends(
             self.still.scene,
             scene.surfaces,
-            np.repeat([each.index for each in visible], counts),
+            np.repeat(np.array([each.index for each in visible], np.int32), counts),
             (components[0], components[1], components[2]),
             at_m,
             (components[3], components[4], components[5]),

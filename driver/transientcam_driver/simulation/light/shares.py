@@ -22,7 +22,6 @@ from transientcam_driver.simulation.light.coverage import (
 from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Shape
 
-
 Hidden = tuple[Plane, Plane, Plane]
 """Of a shape, its shares of pixels, the t of its front, and which shares are left to be seen."""
 _TINY = np.float32(1e-9)
@@ -149,7 +148,7 @@ def share_around(cross: Crossing, counts: NDArray[np.bool_], around: Around | No
     return _product([covered_among(each, around.beside) for each in values])
 
 
-def around(rows: NDArray[np.intp], columns: NDArray[np.intp], region: Region) -> Around:
+def around(rows: NDArray[np.int32], columns: NDArray[np.int32], region: Region) -> Around:
     """Return what is around points in a region of an image."""
     top, left, height, width = numbers(region)
     lane = LANES.find("around")
