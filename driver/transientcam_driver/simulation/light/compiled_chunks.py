@@ -9,9 +9,9 @@ import numpy as np
 
 from transientcam_driver.simulation.light.compiling import (
     AROUND,
-    CHUNK,
+    INDICES,
     LINE,
-    NUMBERS,
+    PIXELS,
     PLACES,
     WHOLE,
     float32,
@@ -21,6 +21,7 @@ from transientcam_driver.simulation.light.compiling import (
     lane,
     without_nan,
 )
+from transientcam_driver.simulation.light.lanes import CHUNK
 
 Plane = Any
 """A float32 array as numba compiles it."""
@@ -40,7 +41,7 @@ def _put_run(share: Any, at: Any, way: Any, apex: Any, k: int, lines: Any) -> No
         shares[i], t[i] = share[i], at[i]
 
 
-@lane(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, int64, int64, LINE, int64, NUMBERS, WHOLE)
+@lane(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, int64, int64, LINE, int64, PIXELS, WHOLE)
 def points(
     share: Plane, at: Plane, x: Plane, y: Plane, z: Plane, top: int, left: int, apex: Any,
     start: int, places: Any, lines: Any,
@@ -67,7 +68,7 @@ def points(
             k = after
 
 
-@lane(PLACES, PLACES, int64, int64, int64, int64)
+@lane(INDICES, INDICES, int64, int64, int64, int64)
 def around(rows: Any, columns: Any, top: int, left: int, height: int, width: int) -> Any:
     """Return what is around points in a region of an image."""
     count, wide = len(rows), width + 2

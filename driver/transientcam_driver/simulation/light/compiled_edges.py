@@ -10,12 +10,12 @@ import numpy as np
 
 from transientcam_driver.simulation.light.compiling import (
     AROUND,
-    CHUNK,
     DOUBLES,
     FLAGS,
+    INDICES,
     LINE,
+    MARKS,
     NUMBERS,
-    PLACES,
     PLANE,
     PLANES,
     REGION,
@@ -27,6 +27,7 @@ from transientcam_driver.simulation.light.compiling import (
     int64,
     lane,
 )
+from transientcam_driver.simulation.light.lanes import CHUNK
 
 Plane = Any
 """A float32 array as numba compiles it."""
@@ -472,49 +473,64 @@ def _leave(left: Any, shown: Any, light: Any) -> None:
         light[i] = left[i] if shown[i] > _ZERO else _ONE
 
 
-@lane(WHOLE, WHOLE, REGION)
-def dimmed(seen: Plane, left: Plane, of: Any) -> Any:
-    """Return the shares of light left in pixels of a region that are seen in shadow, of others 1.
+@lane(WHOLE, WHOLE, WHOLE, MARKS, REGION)
+def dimmed(seen: Plane, left: Plane, light: Plane, marks: Any, of: Any) -> None:
+    """Put the shares of light left in pixels of a region that are seen in shadow, of others 1.
 
-    And whether there are any in successive chunks of each row. ``seen`` and ``left`` are shares of
-    all pixels.
+    And whether there are any in successive chunks of each row. Planes are of all pixels.
     """
     top, start, height, width = of
     part = left[top : top + height, start : start + width]
-    light, chunks = np.empty((height, width), float32), (width + CHUNK - 1) // CHUNK
-    dark = np.zeros((height, chunks), np.bool_)
     for row in range(height):
-        # of rows of ``part`` numba does not know that they are contiguous
-        line, shown = left[top + row, start : start + width], seen[top + row, start : start + width]
-        for c in range(chunks):
-            a, b = c * CHUNK, min((c + 1) * CHUNK, width)
-            dark[row, c], mixed = _shadowed(line[a:b], shown[a:b])
-            _leave(line[a:b], shown[a:b], light[row, a:b])
+        r = top + row
+        for c in range((width + CHUNK - 1) // CHUNK):
+            a, b = start + c * CHUNK, start + min((c + 1) * CHUNK, width)
+            # of rows of ``part`` numba does not know that they are contiguous
+            line, shown, put = left[r, a:b], seen[r, a:b], light[r, a:b]
+            marks[r, c], mixed = _shadowed(line, shown)
+            _leave(line, shown, put)
             if not mixed:
                 continue
-            for column in range(a, b):
-                share = shown[column]
-                if not (line[column] < _ONE and _ZERO < share < _ONE):
+            for i in range(len(line)):
+                share = shown[i]
+                if not (line[i] < _ONE and _ZERO < share < _ONE):
                     continue
-                light[row, column] = _ZERO
-                if line[column] > _ZERO:
-                    both = _overlap(seen, part, row, column, of, _ONE)
-                    light[row, column] = both / max(share, _LEAST)
-    return light, dark
+                put[i] = _ZERO
+                if line[i] > _ZERO:
+                    both = _overlap(seen, part, row, a - start + i, of, _ONE)
+                    put[i] = both / max(share, _LEAST)
 
 
-@lane(PLANE)
-def covered(inside: Plane) -> Any:
-    """Return shares of pixels where a function is above 0."""
-    height, width = inside.shape
-    share, border = np.empty(inside.shape, float32), np.empty(width, np.bool_)
-    for row in range(height):
-        _mark(inside, row, 0, width, border)
-        for column in range(width):
-            share[row, column] = _ONE if inside[row, column] > _ZERO else _ZERO
-            if border[column]:
-                share[row, column] = _share(inside, row, column)[0]
-    return share
+@inner
+def _part_above(values: Plane, row: int, column: int) -> Any:
+    """Return the share of a pixel where values are above 0."""
+    value = values[row, column]
+    above, below = _beside(row, values.shape[0])
+    before, after = _beside(column, values.shape[1])
+    beside = values[above, column], values[below, column], values[row, before], values[row, after]
+    if _alike(value, *beside):
+        return _ONE if value > _ZERO else _ZERO
+    return _share(values, row, column)[0]
+
+
+@lane(PLANE, PLANE, PLANE, PLANE, PLANE, PLANE)
+def hide(
+    one: Plane, at: Plane, left: Plane, other: Plane, its: Plane, rest: Plane
+) -> None:  # fmt: skip
+    """Take from shares of pixels that are left of two shapes what each hides of the other.
+
+    Both of whose shares, and t, are planes of the same region.
+    """
+    away, of = its - at, (0, 0, one.shape[0], one.shape[1])
+    for row in range(one.shape[0]):
+        for column in range(one.shape[1]):
+            first, second = one[row, column], other[row, column]
+            if first == _ZERO or second == _ZERO:
+                continue
+            hidden = _overlap(one, other, row, column, of, _ONE)
+            nearer = _part_above(away, row, column)
+            rest[row, column] *= _ONE - nearer * hidden / max(second, _LEAST)
+            left[row, column] *= _ONE - (_ONE - nearer) * hidden / max(first, _LEAST)
 
 
 @lane(PLANE, PLANE)
@@ -580,11 +596,13 @@ def _may_meet(ball: Any, low: Any, high: Any, may: Any) -> None:
 
 @inner
 def _cross_points(
-    ball: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any, own: Any, values: Any
-) -> Any:
+    ball: Any, corner: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any, own: Any,
+    values: Any,
+) -> Any:  # fmt: skip
     """Put where lines to points of other surfaces meet an ellipsoid; return how many do."""
     for i in range(len(x)):
-        squared, along = _squared(ball, x[i], y[i], z[i]), _along(ball, x[i], y[i], z[i])
+        u, v, w = x[i] - corner[0], y[i] - corner[1], z[i] - corner[2]
+        squared, along = _squared(ball, u, v, w), _along(ball, u, v, w)
         value, at = along * (along / squared) + ball[6], -(along / squared)
         counts = (at > near[i] + touching) & (at < _ONE - touching) & (index[i] != own)
         away = (at - _ONE) * np.sqrt(squared)
@@ -604,10 +622,10 @@ def _above(values: Any) -> Any:
 @inner
 def _cross_chunk(ball: Any, c: int, lines: Any, own: Any, values: Any) -> Any:
     """Do it for a chunk of them."""
-    x, y, z, near, touching, index = lines
+    corner, x, y, z, near, touching, index = lines
     a, b = c * CHUNK, min((c + 1) * CHUNK, len(x))
     return _cross_points(
-        ball, x[a:b], y[a:b], z[a:b], near[a:b], touching, index[a:b], own, values[a:b]
+        ball, corner, x[a:b], y[a:b], z[a:b], near[a:b], touching, index[a:b], own, values[a:b]
     )
 
 
@@ -654,7 +672,19 @@ def _any_beside(values: Any, around: Any, counts: Any, reach: Any, c: int) -> bo
 
 
 @lane(
-    PLANES, DOUBLES, PLACES, LINE, LINE, LINE, LINE, float32, PLACES, AROUND, NUMBERS, WHOLE, LINE
+    PLANES,
+    DOUBLES,
+    INDICES,
+    LINE,
+    LINE,
+    LINE,
+    LINE,
+    float32,
+    INDICES,
+    AROUND,
+    NUMBERS,
+    WHOLE,
+    LINE,
 )
 def dim_softly(
     axes: Any, apex: Any, owns: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any,
@@ -663,12 +693,13 @@ def dim_softly(
     """Take from the light at points what ellipsoids cover of the pixels around them.
 
     Only chunks of points in and beside which a line meets an ellipsoid have any share, and only
-    those with a box that lines may meet one before are looked at. Boxes are of the ways (x, y, z).
+    those with a box that lines may meet one before are looked at. Boxes are of ways from the apex.
     """
     count, chunks = len(x), len(reach)
     values, counts = np.full(count + 1, _NAN, float32), np.zeros(chunks + 1, int64)
     known, stale = np.ones(chunks + 1, np.bool_), np.zeros(chunks, np.bool_)
-    lines = x, y, z, near, touching, index
+    corner = float32(apex[0]), float32(apex[1]), float32(apex[2])
+    lines = corner, x, y, z, near, touching, index
     low, high = (boxes[0], boxes[1], boxes[2]), (boxes[3], boxes[4], boxes[5])
     for n in range(len(axes)):
         ball = _ball(axes[n], apex)
@@ -692,15 +723,16 @@ def dim_softly(
         stale[:] = known[:chunks]
 
 
-@lane(WHOLE, LINE, LINE, LINE, LINE, float32, PLACES, int64, LINE)
+@lane(WHOLE, LINE, LINE, LINE, LINE, LINE, float32, INDICES, int64, LINE)
 def dim_behind(
-    plate: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any, own: int, clear: Any
-) -> Any:
+    plate: Any, apex: Any, x: Any, y: Any, z: Any, near: Any, touching: Any, index: Any, own: int,
+    clear: Any,
+) -> Any:  # fmt: skip
     """Take the light from points whose way to it meets a rectangle."""
-    axes = _axes(plate)
+    axes, (a, b, c), mine = _axes(plate), (apex[0], apex[1], apex[2]), np.int32(own)
     for i in range(len(x)):
-        one, other, at, _facing = _of_rectangle(axes, x[i], y[i], z[i])
-        between = (at > near[i] + touching) & (at < _ONE - touching) & (index[i] != own)
+        one, other, at, _facing = _of_rectangle(axes, x[i] - a, y[i] - b, z[i] - c)
+        between = (at > near[i] + touching) & (at < _ONE - touching) & (index[i] != mine)
         clear[i] = _ZERO if between & (one > _ZERO) & (other > _ZERO) else clear[i]
 
 
@@ -760,12 +792,11 @@ def _gather(share: Any, kept: Any) -> None:
 
 @inner
 def _lines_to(x: Any, y: Any, z: Any, at: Any, apex: Any, lines: Any) -> None:
-    """Put ways from an apex to points, the t where they meet a mirror, and points there."""
+    """Put the t where lines from an apex to points meet a mirror, and the points there."""
     a, b, c = apex[0], apex[1], apex[2]
     for k in range(len(x)):
         u, v, w, t = x[k] - a, y[k] - b, z[k] - c, at[k]
-        lines[0, k], lines[1, k], lines[2, k], lines[3, k] = u, v, w, t
-        lines[4, k], lines[5, k], lines[6, k] = u * t + a, v * t + b, w * t + c
+        lines[0, k], lines[1, k], lines[2, k], lines[3, k] = t, u * t + a, v * t + b, w * t + c
 
 
 @lane(WHOLE, LINE, LINE, LINE, LINE, float32, AROUND, NUMBERS, FLAGS)
@@ -774,7 +805,7 @@ def shown(
 ) -> Any:
     """Return the points that a mirror shows the light to, and its shares of their pixels.
 
-    Then ways to them from the light's image, the t where they meet the mirror, and points there.
+    Then the t where lines to them from the light's image meet the mirror, and the points there.
     """
     axes, corner, count = _axes(plate), (apex[0], apex[1], apex[2]), len(x)
     first, second = np.empty(count + 1, float32), np.empty(count + 1, float32)
@@ -783,7 +814,7 @@ def shown(
     found = 0
     if _meet(axes, corner, x, y, z, touching, (first[:count], second[:count], at)):
         found = _show_points((first, second), around, reach, rim, share)
-    lines = np.empty((7, found), float32)
+    lines = np.empty((4, found), float32)
     if found == count:
         _lines_to(x, y, z, at, corner, lines)
         return np.arange(count), share, lines

@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 
 from transientcam_driver.simulation.light.compiling import (
-    CHUNK,
     DOUBLES,
+    INDICES,
     LINE,
-    MARKS,
     NUMBERS,
+    PIXELS,
     PLACES,
     REGION,
+    STACK,
+    TILES,
     WHOLE,
     float32,
     float64,
@@ -22,6 +24,7 @@ from transientcam_driver.simulation.light.compiling import (
     int64,
     lane,
 )
+from transientcam_driver.simulation.light.lanes import CHUNK
 
 Plane = Any
 """A float32 array as numba compiles it."""
@@ -73,27 +76,45 @@ def _darken(moments: Any, each: Any, light: Any) -> None:
         moments[2 * i + 1] -= dark * each[2 * i + 1]
 
 
-@lane(WHOLE, WHOLE, WHOLE, MARKS, int64, int64, int64, int64, int64)
-def darkened(
-    moments: Plane, each: Plane, light: Plane, dark: Any, parts: int, top: int, left: int,
-    first: int, start: int,
-) -> None:  # fmt: skip
-    """Take from moments the part that a shadow leaves out of those by one chain of mirrors.
+@inner
+def _leave(moments: Any, rest: Any) -> None:
+    """Leave a share of the moments in a row of pixels."""
+    if len(moments) == len(rest):
+        for c in range(len(rest)):
+            moments[c] *= rest[c]
+        return
+    for c in range(len(rest)):
+        moments[2 * c] *= rest[c]
+        moments[2 * c + 1] *= rest[c]
 
-    A moment has so many parts: a real number, or a real and an imaginary one. Shares of light begin
-    at a row and a column of all pixels, and so do the moments.
+
+@lane(WHOLE, STACK, PLACES, NUMBERS, STACK, TILES, WHOLE, REGION)
+def remaining(
+    total: Plane, each: Any, chains: Any, regions: Any, light: Any, marks: Any, uncovered: Plane,
+    of: Any,
+) -> Any:  # fmt: skip
+    """Return moments of a region, without what shadows take of each chain's, and what is covered.
+
+    A moment is a real number, or a real and an imaginary one. See `layers` for the shadows.
     """
-    width = light.shape[1]
-    for row in range(len(light)):
-        line, of_chain = moments[top + row - first], each[top + row]
-        for c in range(dark.shape[1]):
-            if dark[row, c]:
-                a, b = c * CHUNK, min((c + 1) * CHUNK, width)
-                _darken(
-                    line[parts * (left + a - start) : parts * (left + b - start)],
-                    of_chain[parts * (left + a) : parts * (left + b)],
-                    light[row, a:b],
-                )
+    top, start, height, width = of
+    parts = total.shape[1] // uncovered.shape[1]
+    moments = np.empty((height, parts * width), float32)
+    for row in range(height):
+        r, line = top + row, moments[row]
+        line[:] = total[r, parts * start : parts * (start + width)]
+        for k in range(len(chains)):
+            first, after = regions[k, 1], regions[k, 1] + regions[k, 3]
+            for c in range((regions[k, 3] + CHUNK - 1) // CHUNK):
+                if marks[k, r, c]:
+                    a, b = first + c * CHUNK, min(first + (c + 1) * CHUNK, after)
+                    _darken(
+                        line[parts * (a - start) : parts * (b - start)],
+                        each[chains[k], r, parts * a : parts * b],
+                        light[k, r, a:b],
+                    )
+        _leave(line, uncovered[r, start : start + width])
+    return moments
 
 
 @lane(DOUBLES, float64)
@@ -108,6 +129,11 @@ def phases(delay_s: Any, angular_hz: Any) -> Any:
 @lane(WHOLE, PLACES, DOUBLES, LINE, LINE)
 def turned(of_rays: Any, on: Any, weight: Any, cosine: Any, sine: Any) -> None:
     """Add phasors to moments of some points, real and imaginary parts in turn."""
+    if len(on) == len(of_rays):
+        for i in range(len(of_rays)):
+            of_rays[i, 0] = of_rays[i, 0] + weight[i] * cosine[i]
+            of_rays[i, 1] = of_rays[i, 1] + weight[i] * sine[i]
+        return
     for k in range(len(on)):
         i = on[k]
         of_rays[i, 0] = of_rays[i, 0] + weight[k] * cosine[k]
@@ -137,7 +163,7 @@ def upright(x: Any, y: Any, z: Any, balls: Any, ends: Any) -> Any:
     return normal
 
 
-@lane(LINE, LINE, LINE, LINE, LINE, LINE, DOUBLES, DOUBLES, PLACES)
+@lane(LINE, LINE, LINE, LINE, LINE, LINE, DOUBLES, DOUBLES, INDICES)
 def returned(
     across: Any, along: Any, up: Any, x: Any, y: Any, z: Any, throughput: Any, albedos: Any,
     index: Any,
@@ -171,29 +197,11 @@ def arrived(
     return delay_s, weight
 
 
-@inner
-def _leave(moments: Any, rest: Any) -> None:
-    """Leave a share of the moments in a row of pixels."""
-    if len(moments) == len(rest):
-        for c in range(len(rest)):
-            moments[c] *= rest[c]
-        return
-    for c in range(len(rest)):
-        moments[2 * c] *= rest[c]
-        moments[2 * c + 1] *= rest[c]
-
-
-@lane(WHOLE, WHOLE, NUMBERS, WHOLE, LINE, int64, int64)
-def layered(
-    moments: Plane, uncovered: Plane, places: Any, of_rays: Any, share: Any, top: int, left: int
-) -> None:
-    """Leave of moments what is not covered, and add those of what covers it, by its share."""
-    parts = of_rays.shape[1]
-    width = moments.shape[1] // parts
-    for row in range(moments.shape[0]):
-        _leave(moments[row], uncovered[top + row, left : left + width])
+@lane(WHOLE, PIXELS, WHOLE, LINE, int64, int64)
+def layered(moments: Plane, places: Any, of_rays: Any, share: Any, top: int, left: int) -> None:
+    """Add moments of what covers pixels, by its share."""
     rows, columns = places[0], places[1]
-    if parts == 1:
+    if of_rays.shape[1] == 1:
         for k in range(len(rows)):
             moments[rows[k] - top, columns[k] - left] += of_rays[k, 0] * share[k]
         return
@@ -203,7 +211,7 @@ def layered(
         moments[row, column + 1] += of_rays[k, 1] * share[k]
 
 
-@lane(WHOLE, NUMBERS, LINE)
+@lane(WHOLE, PIXELS, LINE)
 def uncover(uncovered: Plane, places: Any, share: Any) -> None:
     """Take from pixels what layers cover of them, one after the other; at most all is covered."""
     rows, columns = places[0], places[1]

@@ -12,8 +12,6 @@ from numba import njit
 from numba import types as numba_types
 from numba import uint16 as numba_uint16
 
-CHUNK = 64
-"""Points at a time, which are mostly beside each other in a row."""
 LANES: dict[str, Callable[..., Any]] = {}
 """All lanes that are compiled, by their names."""
 
@@ -29,6 +27,7 @@ WHOLE = _types.Array(float32, 2, "C")
 DOUBLES = float64[::1]
 ROWS = float64[:, ::1]
 PLANES = float64[:, :, ::1]
+STACK = _types.Array(float32, 3, "C")
 TILES = _types.boolean[:, :, ::1]
 MARKS = _types.boolean[:, ::1]
 FLAGS = _types.boolean[::1]
@@ -36,6 +35,9 @@ PLACES = int64[::1]
 CODES = _types.Array(numba_uint16, 1, "C")
 NUMBERS = int64[:, ::1]
 AROUND = int32[:, ::1]
+PIXELS = int32[:, ::1]
+"""Rows and columns."""
+INDICES = int32[::1]
 REGION = _types.UniTuple(int64, 4)
 """First row and column, numbers of rows and columns."""
 

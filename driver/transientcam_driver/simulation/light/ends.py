@@ -33,32 +33,34 @@ from transientcam_driver.simulation.scene.scene import Scene, Surface
 
 @dataclass(frozen=True)
 class Segment:
-    """Lines ``apex + t way`` that light comes along to points at t = 1, from ``near`` on.
+    """Lines from ``apex`` that light comes along to points, at t = 1, from ``near`` on.
 
-    ``mirror`` is the one that the points lie on, if they do, and ``known`` the boxes if they are.
+    ``mirror`` is the one that the points lie on, if they do; ``boxes`` are the lowest and highest
+    coordinates (6, C) of ways from the apex to successive chunks of points, or to all.
     """
 
     apex: Points
-    way: tuple[Plane, Plane, Plane]
+    point: tuple[Plane, Plane, Plane]
     near: Plane
     mirror: Surface | None
-    known: NDArray[np.float32] | None = None
+    boxes: NDArray[np.float32]
 
     def of(self, kept: NDArray[np.intp]) -> "Segment":
         """Return the lines of some of the points."""
-        x, y, z = (w[kept] for w in self.way)
-        return Segment(self.apex, (x, y, z), self.near[kept], self.mirror)
+        x, y, z = (p[kept] for p in self.point)
+        boxes = _boxes_from(self.apex, _boxes((x, y, z)))
+        return Segment(self.apex, (x, y, z), self.near[kept], self.mirror, boxes)
+
+    @cached_property
+    def way(self) -> tuple[Plane, Plane, Plane]:
+        """From the apex to the points."""
+        return _from(self.apex, self.point)
 
     @property
     def ends(self) -> tuple[Points, Points]:
         """Points (P, 3) where the light arrives, and where it comes from."""
         way = np.stack(self.way, axis=-1).astype(np.float64)
         return self.apex + way, self.apex + self.near[:, None] * way
-
-    @cached_property
-    def boxes(self) -> NDArray[np.float32]:
-        """Lowest and highest coordinates (6, C) of ways of successive chunks of points, or all."""
-        return _boxes(self.way) if self.known is None else self.known
 
     @property
     def box(self) -> tuple[Points, Points]:
@@ -67,8 +69,8 @@ class Segment:
         return self.apex + np.minimum(low, 0.0), self.apex + np.maximum(high, 0.0)
 
 
-_Lines = tuple[tuple[Plane, Plane, Plane], Plane, tuple[Plane, Plane, Plane]]
-"""Ways to points, the t where they meet a mirror, and the points there."""
+_Lines = tuple[Plane, tuple[Plane, Plane, Plane]]
+"""The t where ways to points meet a mirror, and the points there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +106,7 @@ class Ends:
 
     still: Scene
     surfaces: tuple[Surface, ...]
-    index: NDArray[np.intp]
+    index: NDArray[np.int32]
     point: tuple[Plane, Plane, Plane]
     distance_m: Plane
     direction: tuple[Plane, Plane, Plane]
@@ -180,10 +182,9 @@ class Ends:
             np.stack(each, axis=-1).astype(np.float64)
             for each in (self.point, self.direction, normal)
         )
-        ends = RayEnds(
-            np.arange(len(facing)), point, self.index, self.distance_m.astype(np.float64), facing,
-            direction,
-        )  # fmt: skip
+        distance_m, index = self.distance_m.astype(np.float64), self.index.astype(np.intp)
+        every = np.arange(len(facing))
+        ends = RayEnds(every, point, index, distance_m, facing, direction)
         return highlight(self.still, light, ends, up)
 
     def _irradiance(
@@ -239,7 +240,7 @@ class Ends:
         segment: Segment,
         near: list[int],
         movers: tuple[int, ...],
-        of: tuple[NDArray[np.intp], Around],
+        of: tuple[NDArray[np.int32], Around],
         clear: Plane,
     ) -> list[int]:
         """Have a lane do it for all surfaces with soft edges, if it can; return those left.
@@ -252,8 +253,8 @@ class Ends:
         if lane is None or len(axes) != len(soft):
             return near
         if soft:
-            line = *segment.way, segment.near, TOUCHING, index, around.beside, around.reach[0]
-            lane(axes, segment.apex, np.array(soft), *line, segment.boxes, clear)
+            line = *segment.point, segment.near, TOUCHING, index, around.beside, around.reach[0]
+            lane(axes, segment.apex, np.array(soft, np.int32), *line, segment.boxes, clear)
         return [k for k in near if k not in movers]
 
     def _normals(self) -> tuple[Plane, Plane, Plane]:
@@ -295,7 +296,7 @@ class LitEnds:
             delay_s[k, way.on], weight[k, way.on] = way.delay_s, way.weight
         ends = self.ends
         return Lit(
-            ends.index,
+            ends.index.astype(np.intp),
             np.stack(ends.point, axis=-1).astype(np.float64),
             ends.distance_m.astype(np.float64),
             self.reflectance,
@@ -321,13 +322,15 @@ def _dim(
     clear *= 1 - share_around(cross, between & ~cross.holds(1.0), around)
 
 
-def _dimmed(shape: Shape, segment: Segment, of: tuple[NDArray[np.intp], int], clear: Plane) -> bool:
+def _dimmed(
+    shape: Shape, segment: Segment, of: tuple[NDArray[np.int32], int], clear: Plane
+) -> bool:
     """Do the same at hard edges by a lane; ``of`` are the points' surfaces and the shape's."""
     lane = LANES.find("dim_behind")
     if lane is None or not isinstance(shape, Rectangle):
         return False
-    line = *segment.way, segment.near, TOUCHING, *of
-    lane(plate_of(shape, segment.apex), *line, clear)
+    line = *segment.point, segment.near, TOUCHING, *of
+    lane(plate_of(shape, segment.apex), segment.apex.astype(np.float32), *line, clear)
     return True
 
 
@@ -343,26 +346,25 @@ def _ways(
     ``every``: all points, all of the pixels around them, and boxes around chunks of them.
     """
     on, share, boxes = every
-    known: NDArray[np.float32] | None = boxes
     segments: list[Segment] = []
     start, last = point, None
     for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
-        kept, part, (way, at, met) = _shown(mirror.mirror, image_m, start, around)
+        kept, part, (at, met) = _shown(mirror.mirror, image_m, start, around)
         if not kept.size:
             return kept, part, around, []
         if len(kept) < len(on):  # mostly few points, or all
-            known = None
             on, share = on[kept], share[kept]
             around = around if around is None else among(kept, around)
             segments = [each.of(kept) for each in segments]
+            start = start[0][kept], start[1][kept], start[2][kept]
+            boxes = _boxes(start)
         share = share * part
-        segments.append(Segment(image_m, way, at, last, _boxes_from(image_m, known)))
-        known = None
-        start = met
+        segments.append(Segment(image_m, start, at, last, _boxes_from(image_m, boxes)))
+        start, boxes = met, _boxes(met)
         last = mirror
     lamp = light.positions_m[-1]
     none = np.zeros(len(on), dtype=np.float32)
-    straight = Segment(lamp, _from(lamp, start), none, last, _boxes_from(lamp, known))
+    straight = Segment(lamp, start, none, last, _boxes_from(lamp, boxes))
     return on, share, around, [*segments, straight]
 
 
@@ -378,8 +380,8 @@ def _shown(
         apex = image_m.astype(np.float32)
         beside = around.beside, *around.reach
         kept, share, lines = lane(plate_of(mirror, image_m), apex, *point, TOUCHING, *beside)
-        x, y, z, at, *met = lines
-        return kept, share, ((x, y, z), at, (met[0], met[1], met[2]))
+        at, x, y, z = lines
+        return kept, share, (at, (x, y, z))
     way = _from(image_m, point)
     cross = crossing(mirror, image_m, way)
     shows = cross.between(np.float32(0), np.float32(1))
@@ -389,7 +391,7 @@ def _shown(
     share = share_around(cross, shows, around)
     kept = np.flatnonzero(share)
     x, y, z, at = (each[kept] for each in (*way, cross.at))
-    return kept, share[kept], ((x, y, z), at, _moved(image_m, (x * at, y * at, z * at)))
+    return kept, share[kept], (at, _moved(image_m, (x * at, y * at, z * at)))
 
 
 def _from(apex: Points, point: tuple[Plane, ...]) -> tuple[Plane, Plane, Plane]:
@@ -407,10 +409,8 @@ def _boxes(points: tuple[Plane, Plane, Plane]) -> NDArray[np.float32]:
     return boxes
 
 
-def _boxes_from(apex: Points, boxes: NDArray[np.float32] | None) -> NDArray[np.float32] | None:
+def _boxes_from(apex: Points, boxes: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the boxes of the ways from an apex to points, given those of the points."""
-    if boxes is None:
-        return None
     return boxes - np.tile(apex.astype(np.float32), 2)[:, None]
 
 

@@ -22,6 +22,8 @@ COMPILED: Final = (
     "light.compiled_tiles",
 )
 """Modules of lanes."""
+CHUNK: Final = 64
+"""Points or pixels that lanes take at a time, which are mostly beside each other in a row."""
 _log = logging.getLogger("transientcam_driver")
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from transientcam_driver.simulation.light.bundle import Region, inside, numbers
 from transientcam_driver.simulation.light.coverage import Plane, overlapped
 from transientcam_driver.simulation.light.ends import LitEnds
-from transientcam_driver.simulation.light.lanes import LANES
+from transientcam_driver.simulation.light.lanes import CHUNK, LANES
 from transientcam_driver.simulation.light.paths import Lit, scatter_of, sparse_image
 from transientcam_driver.simulation.light.still import StillLight
 from transientcam_driver.simulation.responses import Moments, Scatter, SparseResponses
@@ -26,7 +26,7 @@ class Layers:
     Each of the ``parts`` is one surface from one point, with each pixel once.
     """
 
-    places: NDArray[np.intp]
+    places: NDArray[np.int32]
     share: NDArray[np.float32]
     lit: LitEnds
     parts: tuple[slice, ...]
@@ -46,21 +46,48 @@ class Shadow:
 
 @dataclass(frozen=True, slots=True)
 class _Dimmed:
-    """Shares (h, w) of the light by a chain of mirrors that are left in pixels of a region.
-
-    ``dark``: whether any pixel of successive chunks of a row has less than all; lanes know it.
-    """
+    """Shares (h, w) of the light by a chain of mirrors that are left in pixels of a region."""
 
     chain: int
     region: Region
     light: Plane
-    dark: NDArray[np.bool_] | None = None
 
     @property
     def places(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Rows and columns in the region of pixels that have not all; rounding may add to it."""
         rows, columns = np.nonzero(self.light != 1)
         return rows, columns
+
+
+@dataclass(frozen=True, slots=True)
+class _Dark:
+    """What shadows (N) leave of light, as lanes take it.
+
+    Attributes
+    ----------
+    chains, regions
+        (N) chains of mirrors, and (N, 4) regions, as numbers.
+    light
+        (N, H, W) shares that are left, in the regions.
+    marks
+        (N, H, C) whether any pixel of successive chunks of a region's row has less than all.
+    """
+
+    chains: NDArray[np.intp]
+    regions: NDArray[np.intp]
+    light: NDArray[np.float32]
+    marks: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, shadows: list[Shadow], shape: tuple[int, int]) -> "_Dark":
+        """Make one of shadows, with nothing known of the light yet."""
+        height, width = shape
+        return cls(
+            np.array([each.chain for each in shadows], dtype=np.intp),
+            np.array([numbers(each.region) for each in shadows], dtype=np.intp).reshape(-1, 4),
+            np.empty((len(shadows), *shape), dtype=np.float32),
+            np.zeros((len(shadows), height, -(-width // CHUNK)), dtype=np.bool_),
+        )
 
 
 class MovingResponses:
@@ -93,14 +120,25 @@ class MovingResponses:
         self._shape = still.height, still.width
         self._layers = layers
         self._uncovered = uncovered
-        self._dimmed = tuple(self._dim(each) for each in shadows)
+        self._dark: _Dark | None = None
+        self._dimmed = self._dim_all(shadows)
+
+    def _dim_all(self, shadows: list[Shadow]) -> list[_Dimmed]:
+        """Return what shadows leave of the light on what is not covered."""
+        lane = LANES.find("dimmed")
+        if lane is None:
+            return [self._dim(each) for each in shadows]
+        dark = self._dark = _Dark.of(shadows, self._shape)
+        for k, each in enumerate(shadows):
+            planes = self._uncovered, each.left, dark.light[k], dark.marks[k]
+            lane(*planes, numbers(each.region))
+        return [
+            _Dimmed(each.chain, each.region, light[each.region])
+            for each, light in zip(shadows, dark.light, strict=True)
+        ]
 
     def _dim(self, shadow: Shadow) -> _Dimmed:
-        """Return what a shadow leaves of the light on what is not covered."""
-        lane = LANES.find("dimmed")
-        if lane is not None:
-            light, dark = lane(self._uncovered, shadow.left, numbers(shadow.region))
-            return _Dimmed(shadow.chain, shadow.region, light, dark)
+        """Return what a shadow leaves."""
         seen, left = self._uncovered[shadow.region], shadow.left[shadow.region]
         on = np.nonzero((left < 1) & (seen > 0))
         light = np.ones_like(left)
@@ -137,26 +175,36 @@ class MovingResponses:
         return self._found[frequency_hz]
 
     def _moments(self, frequency_hz: float) -> Moments:
-        each, total = self._still.phasors(frequency_hz)
-        region = self.region
-        moments = total[region].copy()
-        for dimmed in self._dimmed:
-            _darken(moments, region, dimmed, each[dimmed.chain])
+        moments = self._of_still(frequency_hz)
         if self._layers is None:
             return moments
         of_rays, places = self._of_layers(self._layers, frequency_hz), self._layers.places
-        top, left = (of.start for of in region)
+        top, left = (of.start for of in self.region)
         lane = LANES.find("layered")
         if lane is not None:
             numbers_of = of_rays.view(np.float32).reshape(len(of_rays), -1)
-            share = self._layers.share
-            lane(moments.view(np.float32), self._uncovered, places, numbers_of, share, top, left)
+            lane(moments.view(np.float32), places, numbers_of, self._layers.share, top, left)
             return moments
-        moments *= self._uncovered[region]
         of_rays *= self._layers.share
         for part in self._layers.parts:
             rows, columns = places[:, part]
             moments[rows - top, columns - left] += of_rays[part]
+        return moments
+
+    def _of_still(self, frequency_hz: float) -> Moments:
+        """Moments of the region, of what stands still and is not covered."""
+        each, total = self._still.phasors(frequency_hz)
+        lane, dark = LANES.find("remaining"), self._dark
+        if lane is not None and dark is not None:
+            of = dark.chains, dark.regions, dark.light, dark.marks
+            planes = total.view(np.float32), each.view(np.float32)
+            left: NDArray[np.float32] = lane(*planes, *of, self._uncovered, numbers(self.region))
+            return left.view(total.dtype)
+        moments = total[self.region].copy()
+        for dimmed in self._dimmed:
+            _darken(moments, self.region, dimmed, each[dimmed.chain])
+        if self._layers is not None:
+            moments *= self._uncovered[self.region]
         return moments
 
     def _of_layers(self, layers: Layers, frequency_hz: float) -> Moments:
@@ -226,7 +274,8 @@ class MovingResponses:
     def _pixel(self) -> NDArray[np.intp]:
         """Pixels of layers by index."""
         assert self._layers is not None  # noqa: S101  (who asks has some)
-        pixel: NDArray[np.intp] = self._layers.places[0] * self._shape[1] + self._layers.places[1]
+        rows, columns = self._layers.places.astype(np.intp)
+        pixel: NDArray[np.intp] = rows * self._shape[1] + columns
         return pixel
 
     @cached_property
@@ -288,13 +337,6 @@ def _phases(delay_s: NDArray[np.float64], angular_hz: float) -> NDArray[np.float
 
 def _darken(moments: Moments, region: Region, dimmed: _Dimmed, each: Moments) -> None:
     """Take what a shadow leaves out of light by one chain (H, W) from the moments of a region."""
-    lane = LANES.find("darkened")
-    if lane is not None and dimmed.dark is not None:
-        planes = moments.view(np.float32), each.view(np.float32), dimmed.light, dimmed.dark
-        top, left, *_extent = numbers(dimmed.region)
-        parts = planes[1].shape[1] // each.shape[1]
-        lane(*planes, parts, top, left, region[0].start, region[1].start)
-        return
     rows, columns = dimmed.places
     part = moments[inside(dimmed.region, region)]
     taken = (1 - dimmed.light[rows, columns]) * each[dimmed.region][rows, columns]

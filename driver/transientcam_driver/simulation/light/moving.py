@@ -19,7 +19,7 @@ from transientcam_driver.simulation.light.bundle import (
     overlap,
     union,
 )
-from transientcam_driver.simulation.light.coverage import Plane, overlapped
+from transientcam_driver.simulation.light.coverage import Plane
 from transientcam_driver.simulation.light.ends import Ends
 from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.light.layers import (
@@ -30,9 +30,9 @@ from transientcam_driver.simulation.light.layers import (
 )
 from transientcam_driver.simulation.light.paths import ImageLight, image_lights
 from transientcam_driver.simulation.light.shares import (
-    above,
     around,
     grown_tiles,
+    hide,
     seen,
     shade,
     shown_tiles,
@@ -41,7 +41,6 @@ from transientcam_driver.simulation.light.still import Sight, StillLight
 from transientcam_driver.simulation.scene.geometry import Points, Shape
 from transientcam_driver.simulation.scene.scene import Scene
 
-_TINY = np.float32(1e-9)
 _AWAY = np.array([0.0, 0.0, -1e6])  # where surfaces that move are put while the rest is traced
 
 
@@ -60,7 +59,7 @@ class _Seen:
         """How many pixels show it."""
         return int(np.count_nonzero(self.share))
 
-    def put_points(self, start: int, places: NDArray[np.intp], lines: NDArray[np.float32]) -> None:
+    def put_points(self, start: int, places: NDArray[np.int32], lines: NDArray[np.float32]) -> None:
         """Put what is known of its pixels into the columns from one on.
 
         Rows and columns (2, P); shares, distances, and points and ways by component (8, P).
@@ -144,12 +143,11 @@ class MovingLight:
                 if both is None:
                     continue
                 mine, its = inside(both, one.region), inside(both, other.region)
-                hidden = overlapped(one.share[mine], other.share[its])
-                if not hidden.any():
-                    continue
-                nearer = above(other.at_m[its] - one.at_m[mine], soft=self._soft)
-                share[its] *= 1 - nearer * hidden / np.maximum(other.share[its], _TINY)
-                left[k][mine] *= 1 - (1 - nearer) * hidden / np.maximum(one.share[mine], _TINY)
+                hide(
+                    (one.share[mine], one.at_m[mine], left[k][mine]),
+                    (other.share[its], other.at_m[its], share[its]),
+                    soft=self._soft,
+                )
         shown = zip(found, left, strict=True)
         return [replace(each, share=share) for each, share in shown if share.any()]
 
@@ -157,7 +155,7 @@ class MovingLight:
         """Light the parts of surfaces that are seen, all at once."""
         counts = [each.count for each in visible]
         ends = np.cumsum([0, *counts]).tolist()
-        places, lines = np.empty((2, ends[-1]), np.intp), np.empty((8, ends[-1]), np.float32)
+        places, lines = np.empty((2, ends[-1]), np.int32), np.empty((8, ends[-1]), np.float32)
         for start, each in zip(ends, visible, strict=False):
             each.put_points(start, places, lines)
         share, at_m, *components = lines
@@ -165,7 +163,7 @@ class MovingLight:
         lit = Ends(
             self.still.scene,
             scene.surfaces,
-            np.repeat([each.index for each in visible], counts),
+            np.repeat(np.array([each.index for each in visible], np.int32), counts),
             (components[0], components[1], components[2]),
             at_m,
             (components[3], components[4], components[5]),

@@ -104,7 +104,7 @@ class Lit:
         return scatter_of(scene, self.surface)
 
 
-def scatter_of(scene: Scene, surface: NDArray[np.intp]) -> Scatter | None:
+def scatter_of(scene: Scene, surface: NDArray[np.integer]) -> Scatter | None:
     """Return the spread of light by the surfaces given by their index; -1 means none."""
     spreads = [surface.scatter or Scatter(0.0, 0.0) for surface in scene.surfaces]
     if not any(spread.width_s or spread.decay_s for spread in spreads):

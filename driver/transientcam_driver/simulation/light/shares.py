@@ -22,6 +22,10 @@ from transientcam_driver.simulation.light.coverage import (
 from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Shape
 
+Hidden = tuple[Plane, Plane, Plane]
+"""Of a shape, its shares of pixels, the t of its front, and which shares are left to be seen."""
+_TINY = np.float32(1e-9)
+
 
 class Around:
     """Which points are above, below, left and right of each, by index (4, P); P is none."""
@@ -113,13 +117,24 @@ def shade(
     return blocking
 
 
-def above(values: Plane, *, soft: bool) -> Plane:
+def hide(one: Hidden, other: Hidden, *, soft: bool) -> None:
+    """Take from what is left of two shares what each shape hides of the other."""
+    lane = LANES.find("hide")
+    if lane is not None and soft:
+        lane(*one, *other)
+        return
+    (share, at, left), (its_share, its_at, rest) = one, other
+    hidden = overlapped(share, its_share)
+    if not hidden.any():
+        return
+    nearer = _above(its_at - at, soft=soft)
+    rest *= 1 - nearer * hidden / np.maximum(its_share, _TINY)
+    left *= 1 - (1 - nearer) * hidden / np.maximum(share, _TINY)
+
+
+def _above(values: Plane, *, soft: bool) -> Plane:
     """Return the share of each pixel (h, w) where values are above 0."""
-    if not soft:
-        return (values > 0).astype(np.float32)
-    lane = LANES.find("covered")
-    share: Plane = covered(values, rooted=False)[0] if lane is None else lane(values)
-    return share
+    return covered(values, rooted=False)[0] if soft else (values > 0).astype(np.float32)
 
 
 def share_around(cross: Crossing, counts: NDArray[np.bool_], around: Around | None) -> Plane:
@@ -133,7 +148,7 @@ def share_around(cross: Crossing, counts: NDArray[np.bool_], around: Around | No
     return _product([covered_among(each, around.beside) for each in values])
 
 
-def around(rows: NDArray[np.intp], columns: NDArray[np.intp], region: Region) -> Around:
+def around(rows: NDArray[np.int32], columns: NDArray[np.int32], region: Region) -> Around:
     """Return what is around points in a region of an image."""
     top, left, height, width = numbers(region)
     lane = LANES.find("around")
@@ -162,7 +177,7 @@ def among(on: NDArray[np.intp], around: Around) -> Around:
 def _share(cross: Crossing, *, soft: bool, rooted: bool = False) -> tuple[Plane, Plane]:
     """Share of each pixel that a shape covers; with the mean root that says where, if asked."""
     if not soft:
-        shares = [above(each, soft=False) for each in cross.inside]
+        shares = [_above(each, soft=False) for each in cross.inside]
         root = np.sqrt(np.maximum(cross.inside[0], 0)) if rooted else shares[0]
         return _product(shares), root
     parts = [covered(each, rooted=rooted) for each in cross.inside]
