@@ -120,6 +120,7 @@ async def interface_file(file: Annotated[str, PathParameter()]) -> FileResponse:
 def add_dashboard(app: FastAPI) -> None:
     """Serve the built dashboard at ``/``, or a page that says how to build it."""
     if (STATIC / "index.html").is_file():
+        app.get("/favicon.ico", include_in_schema=False)(_icon)
         # without a fallback page an unknown path stays an error, also under /api
         app.frontend("/", directory=STATIC, fallback=None)
         return
@@ -132,6 +133,11 @@ def add_dashboard(app: FastAPI) -> None:
             "Node.js 20 or newer and run <code>make dashboard</code>; then start again.</p>"
             '<p><a href="/docs">The interface</a> works without it.</p>',
         )
+
+
+async def _icon() -> FileResponse:
+    """Serve the icon that browsers ask for where no page names one, as beside a lone image."""
+    return FileResponse(STATIC / "icon.svg", media_type="image/svg+xml")
 
 
 def _page(title: str, body: str) -> HTMLResponse:

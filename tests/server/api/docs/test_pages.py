@@ -102,8 +102,10 @@ def test_a_built_dashboard_is_served_beside_the_interface(
     (tmp_path / "assets").mkdir()
     (tmp_path / "index.html").write_text("<p>dashboard</p>")
     (tmp_path / "assets" / "a.js").write_text("1;")
+    (tmp_path / "icon.svg").write_text("<svg/>")
     app = _app(tmp_path, monkeypatch)
 
+    assert _get(app, "/favicon.ico").text == "<svg/>"
     assert _get(app, "/").text == "<p>dashboard</p>"
     assert _get(app, "/assets/a.js").text == "1;"
     assert _get(app, "/api/v1/known").json() == {"known": True}
