@@ -229,5 +229,5 @@ def test_boundaries_of_memory_are_found() -> None:
 
     found = njit(kernel)
 
-    width = simd.REGISTER_BYTES // 4
+    width = simd.LINE_BYTES // 4
     assert [found(room[begin:], i) for i in (0, 1, width - 1, width)] == [0, width - 1, 1, 0]

@@ -24,6 +24,11 @@ from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 _BANK = 240  # pairs of registers of coefficients, which stay in the first cache for all phases
 _PAST_CACHES_BYTES = 1 << 24
+# four phases of a turn take 14 registers at a time, and twice as many where there are enough
+_TOGETHER = simd.REGISTERS // 16
+_LANES = _BANK * 2 // _TOGETHER
+# what fills a line in parts must do so at once: others may be written before it is whole
+_IN_PARTS = simd.REGISTER_BYTES < simd.LINE_BYTES
 _UNIT = 64  # pixels: a line of memory and more
 _PARTS_EACH = 4  # of a film for each thread: the other may be late
 
@@ -108,6 +113,28 @@ def _write(out: Any, place: int, value: Any, past_caches: bool) -> None:
 
 
 @njit(forceinline=True, error_model="numpy")
+def _put(out: Any, place: int, stage: Any, at: int, value: Any, how: tuple[bool, bool]) -> None:
+    """Write to ``at`` of the stage, if there is one, or else to ``place`` of the results."""
+    staged, past_caches = how
+    if staged:
+        simd.store_within(stage, at, value)
+    else:
+        _write(out, place, value, past_caches)
+
+
+@njit(forceinline=True, error_model="numpy")
+def _write_row(
+    out: Any, row: int, stage: Any, at: int, first: int, end: int, one: Any, step: int
+) -> None:
+    """Write what the stage holds from ``at`` on to the pixels first..end of a row, at once."""
+    for i in range(first, end, step):
+        p = max(0, min(i, end - step))
+        for part in range(0, step, simd.width(one)):
+            lanes = simd.load_within(stage, at + i - first + part)
+            _write(out, row + p + part, lanes, p == i)
+
+
+@njit(forceinline=True, error_model="numpy")
 def _fill(
     order: Any, polynomial: Any, reflection: Any, error: Any, centre: Any, turned: bool,
     one: Any, q: Any, pitch: int, shift: int, left: int, held: int,
@@ -153,16 +180,20 @@ def _density(
 
     ``past_caches``, whole lines of memory are written at a time: each row begins at its own first
     line, where all of a group begin alike. The bank is filled so that what is written to a line of
-    the first row lies in a line, too: loads across lines take twice as long.
+    the first row lies in a line, too: loads across lines take twice as long. Where a register is
+    less than a line, the rows of a group wait on a stage for the whole block and are then written
+    one after another.
     """
     m = len(order)
-    one = simd.ones(error, 2)
-    step = simd.width(one)
+    one = simd.ones(error, _TOGETHER)
+    step = 2 // _TOGETHER * simd.width(one)
     pitch = _BANK // (2 * m + 2) * step
     # rows that begin at a line of memory reach into the next block or part, which begins at its own
     block = pitch - 2 * step if past_caches else pitch
     pixels = error.shape[0]
-    q = simd.registers(one, (), _BANK)
+    q = simd.registers(one, (), _LANES)
+    stage = simd.registers(one, (), _LANES)
+    staged = past_caches and _IN_PARTS
     c0, s0 = simd.registers(one, order, 0), simd.registers(one, order, 0)
     c1, s1 = simd.registers(one, order, 0), simd.registers(one, order, 0)
     left = start
@@ -193,18 +224,24 @@ def _density(
                 first = begin - step if left == 0 and begin > 0 else begin
             for i in range(first, end, step):
                 p = max(0, min(i, end - step))
-                at = p + shift
-                stream = past_caches and p == i
-                if together == TURN:
-                    h0, h1, h2, h3 = _four_of_a_turn(order, q, pitch, at, c0, s0)
-                    _write(out, r3 + p, h3, stream)
-                    _write(out, r2 + p, h2, stream)
-                elif together == MIRRORED:
-                    h0, h1 = _mirrored_two(order, q, pitch, at, c0, s0)
-                else:
-                    h0, h1 = _any_two(order, q, pitch, at, c0, s0, c1, s1)
-                _write(out, r1 + p, h1, stream)
-                _write(out, r0 + p, h0, stream)
+                how = staged, past_caches and p == i
+                for part in range(0, step, simd.width(one)):
+                    at, to, x = p + shift + part, p + part, i - first + part
+                    if together == TURN:
+                        h0, h1, h2, h3 = _four_of_a_turn(order, q, pitch, at, c0, s0)
+                        _put(out, r3 + to, stage, x + 3 * pitch, h3, how)
+                        _put(out, r2 + to, stage, x + 2 * pitch, h2, how)
+                    elif together == MIRRORED:
+                        h0, h1 = _mirrored_two(order, q, pitch, at, c0, s0)
+                    else:
+                        h0, h1 = _any_two(order, q, pitch, at, c0, s0, c1, s1)
+                    _put(out, r1 + to, stage, x + pitch, h1, how)
+                    _put(out, r0 + to, stage, x, h0, how)
+            if staged:
+                # the first one last: it is right where the row of another is the same
+                for k in range(3 if together == TURN else 1, -1, -1):
+                    row = rows[group, k] * pixels + left
+                    _write_row(out, row, stage, k * pitch, first, end, one, step)
         left += size
     if past_caches:
         simd.fence()
@@ -240,7 +277,7 @@ def density_lane(m: int, precision: str) -> Callable[..., Any]:
         flat = out.reshape(-1)
         past_caches = out.nbytes > _PAST_CACHES_BYTES
         row = pixels * out.itemsize
-        alike = simd.REGISTER_BYTES // math.gcd(simd.REGISTER_BYTES, row) if past_caches else 1
+        alike = simd.LINE_BYTES // math.gcd(simd.LINE_BYTES, row) if past_caches else 1
         rows, waves, centre, together = grouped(phases, alike)
 
         def part(start: int, stop: int) -> None:

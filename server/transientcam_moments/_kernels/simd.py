@@ -32,12 +32,18 @@ _INDEX = ir.IntType(32)
 _FUSE = ("contract",)
 
 
+_FEATURES = binding.get_host_cpu_features()
+
+
 def _register_bytes() -> int:
-    features = binding.get_host_cpu_features()
-    return 64 if features.get("avx512f") else 32 if features.get("avx") else 16
+    return 64 if _FEATURES.get("avx512f") else 32 if _FEATURES.get("avx") else 16
 
 
 REGISTER_BYTES = _register_bytes()
+REGISTERS = 16 if _FEATURES.get("sse2") and not _FEATURES.get("avx512f") else 32
+"""What a kernel may hold before it has to put lanes aside into memory."""
+LINE_BYTES = min(64, 2 * REGISTER_BYTES)
+"""Of a line of memory, or the most of it that two registers fill."""
 
 
 class Lanes(types.Type):  # type: ignore[misc]  # numba is untyped
@@ -384,14 +390,14 @@ def store_within(typingctx: Any, bank: Any, index: Any, value: Any) -> Any:
 
 @intrinsic
 def before_boundary(typingctx: Any, array: Any, index: Any) -> Any:
-    """Return how many elements from ``index`` on lie before the next boundary of a register."""
+    """Return how many elements from ``index`` on lie before the next line of memory."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         size = array.dtype.bitwidth // 8
         struct = cgutils.create_struct_proxy(array)(context, builder, args[0])
         word = ir.IntType(64)
         address = builder.ptrtoint(builder.gep(struct.data, [args[1]]), word)
-        short = builder.and_(builder.neg(address), word(REGISTER_BYTES - 1))
+        short = builder.and_(builder.neg(address), word(LINE_BYTES - 1))
         return builder.udiv(short, word(size))
 
     return types.intp(array, types.intp), codegen
