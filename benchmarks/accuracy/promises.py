@@ -31,6 +31,7 @@ from transientcam_driver import Camera, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.camera.source import sensor_of
 from transientcam_server.errors.exceptions import Problem
+from transientcam_server.imaging.noise import moment_noise
 from transientcam_server.imaging.ranging import ranges_m
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning import Goal, Planner, SceneStatistics
@@ -116,10 +117,11 @@ def measured_by(
             random = np.random.default_rng(1)
             pixels = np.sort(random.choice(lit, min(PIXELS, lit.size), replace=False))
             full = float((raw.images.max(axis=0).ravel()[lit] >= sensor.highest_dn).mean())
-        b = tm.smooth(np.asarray(recipe.reconstruct(raw).measured), SETTINGS.smoothing_px)
-        part = b.reshape((len(b), -1))[:, pixels]
-        variance = _variance(part, recipe, sensor)
-        found_m = ranges_m(part, variance, estimator, recipe.base_frequency_hz, SETTINGS)
+        found = recipe.reconstruct(raw)
+        b = tm.smooth(np.asarray(found.measured), SETTINGS.smoothing_px)
+        variance = np.asarray(moment_noise(recipe, found).variance)
+        part, noise = (each.reshape((len(each), -1))[:, pixels] for each in (b, variance))
+        found_m = ranges_m(part, noise, estimator, recipe.base_frequency_hz, SETTINGS)
         errors_m.append(found_m - truth.range_m.ravel()[pixels])
     camera.stop()
     errors = pixel_errors(np.stack(errors_m), np.zeros_like(errors_m[0]))
@@ -130,21 +132,6 @@ def measured_by(
         "outliers": errors.outlier_share,
     }
     return values, device_s, full
-
-
-def _variance(b: _Array, recipe: Recipe, sensor: tm.noise.Sensor) -> _Array:
-    sequence = recipe.applied.sequence
-    gains = tm.nominal_calibration(
-        sequence.harmonics,
-        sequence.sub_phases.phases_rad,
-        sequence.sub_phases.weights,
-        zeroth=sequence.zeroth,
-    )
-    light = np.abs(b[1:]).max(axis=0).astype(float)
-    noise = tm.noise.moment_noise(
-        light, sensor, calibration=gains, zeroth=sequence.zeroth, takes=sequence.takes
-    )
-    return np.asarray(noise.variance) * tm.noise.smoothing_factor(SETTINGS.smoothing_px)
 
 
 def kept(scene: str, goals: dict[str, Goal], captures: int) -> Iterator[Kept | Refused]:

@@ -108,6 +108,9 @@ class FrameMeta(TypedDict):
     """Pixels from whose moments known harmonics of the modulation were taken out; None where the
     calibration knows none, and until computed."""
     pixels: PixelCounts | None
+    ambient_dn: NotRequired[float | None]
+    """Light in DN an image that is not the camera's, in the median pixel; 0 where it hardly adds
+    noise, None until computed and where no sensor is known; absent from older daemons."""
     predicted_range_std_m: PredictedStd | None
     """None until the range of this frame was computed."""
     accuracy: NotRequired[RangeAccuracy | None]

@@ -82,6 +82,10 @@ class Capabilities:
     delay_s
         What the light takes on its way inside of the camera, so that a moment at the frequency f
         comes with a phase of 2 pi f delay_s more; nominal gains take it away.
+    dark_dn
+        What an image holds where there is no light, if the camera's own format says so: images that
+        are differences are 0 there, and show no ambient light; None where it is a property of the
+        sensor.
     fifo_bytes
         Room for images in the camera; 0 where that is not known.
     heartbeat_s
@@ -118,6 +122,7 @@ class Capabilities:
     delay_s: float = 0.0
     fifo_bytes: int = 0
     heartbeat_s: float = 0.0
+    dark_dn: float | None = None
 
     @property
     def image_bytes(self) -> int:

@@ -39,6 +39,8 @@ class PassedReconstruction(Reconstruction):
         Where known harmonics were taken out; none are known, when left out.
     spread : callable, optional
         As of `Reconstruction`.
+    other_light : callable, optional
+        As of `Reconstruction`.
     """
 
     def __init__(
@@ -51,9 +53,16 @@ class PassedReconstruction(Reconstruction):
         calibration: Array | None = None,
         corrected: Array | None = None,
         spread: Spread = at_once,
+        other_light: Callable[[Array], Array | None] | None = None,
     ) -> None:
         super().__init__(
-            None, settings, kept=kept, repaired=repaired, calibration=calibration, spread=spread
+            None,
+            settings,
+            kept=kept,
+            repaired=repaired,
+            calibration=calibration,
+            spread=spread,
+            other_light=other_light,
         )
         self._measure = measure
         self.smoothed = planes.smoothed

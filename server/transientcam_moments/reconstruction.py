@@ -1,5 +1,6 @@
 """What follows from the moments of an image: each property computed once, when first read."""
 
+from collections.abc import Callable
 from functools import cached_property, partial
 from html import escape
 
@@ -71,6 +72,9 @@ class Reconstruction:
         What is taken out of the moments once they are smoothed.
     spread : callable, optional
         How the likelihood uses several threads, as `kernels.over` returns it.
+    other_light : callable, optional
+        Returns the light (...) that is not the camera's, of the brightness: it has noise, too. None
+        stands for none.
 
     Raises
     ------
@@ -92,6 +96,7 @@ class Reconstruction:
         calibration: Array | None = None,
         correction: HarmonicCorrection | None = None,
         spread: Spread = at_once,
+        other_light: Callable[[Array], Array | None] | None = None,
     ) -> None:
         if not (settings.consecutive or self._of_any_multiples):
             raise ParameterError("multiples", settings.multiples, "1 to m")
@@ -104,6 +109,7 @@ class Reconstruction:
         self._kept = kept
         self._repaired = repaired
         self._calibration = calibration
+        self._other_light = other_light
 
     @cached_property
     def measured(self) -> Array:
@@ -277,10 +283,19 @@ class Reconstruction:
             takes=takes,
             phases_rad=self.settings.sampled_rad,
         )
-        brightness = self._least_brightness
+        brightness, ambient = self._least_brightness, self.ambient
         if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
-            return smoothed_of(noise_of, brightness, self.settings.smoothing_sigma_px)
-        return noise_of(brightness)
+            sigma_px = self.settings.smoothing_sigma_px
+            return smoothed_of(noise_of, brightness, sigma_px, ambient=ambient)
+        return noise_of(brightness) if ambient is None else noise_of(brightness, ambient=ambient)
+
+    @cached_property
+    def ambient(self) -> Array | None:
+        """Light (...) in DN an image that is not the camera's, by `noise.ambient_light`.
+
+        None where there is hardly any, and without images or a sensor.
+        """
+        return None if self._other_light is None else self._other_light(self._least_brightness)
 
     @property
     def _least_brightness(self) -> Array:

@@ -3,6 +3,7 @@
 import math
 import threading
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,17 @@ from transientcam_moments._lanes.parallel import Spread, at_once, on_threads
 from transientcam_moments.bad_pixels import Replacement, checked_mask, fill_bad_pixels
 from transientcam_moments.calibration import calibrate, inverse_gains
 from transientcam_moments.errors import ParameterError, UnlabelledImages
-from transientcam_moments.four_bucket import harmonics_of, measure, saturated, takes_first
+from transientcam_moments.four_bucket import (
+    ZEROTH_IMAGES,
+    harmonics_of,
+    measure,
+    saturated,
+    takes_first,
+)
 from transientcam_moments.gapped import GappedReconstruction
 from transientcam_moments.harmonics import HarmonicCorrection, checked_waveform, matters
 from transientcam_moments.labels import Labels
+from transientcam_moments.noise.ambient import ambient_light
 from transientcam_moments.passed import PassedReconstruction
 from transientcam_moments.phase_steps import is_four_bucket
 from transientcam_moments.ranging import range_m
@@ -30,6 +38,7 @@ from transientcam_moments.takes import average_takes
 
 _BY_THE_PASS = ("pisarenko", "pisarenko-merged", *OF_ANY_MULTIPLES)
 """Estimators that follow from the pass's returns or moments."""
+_WHOLE = 1e-6  # sum of the phasors of phases that are spread evenly over a period, at most
 _SHAPES = 4  # of images that a reconstructor keeps prepared
 
 
@@ -134,6 +143,7 @@ class Reconstructor:
                 repaired=repaired,
                 calibration=self._calibration,
                 spread=spread,
+                other_light=self._other_light(takes, zeroth),
             )
         moments, kept = self._measured(takes, None if repaired is None else repaired.left_out)
         if saturated_pixels is None:
@@ -141,13 +151,15 @@ class Reconstructor:
             saturated_pixels = saturated(stack, full_scale=self.settings.full_scale)
             if self._bad is not None:  # their own values are not used
                 saturated_pixels = saturated_pixels & ~self._bad
-        return self._of_moments(moments, saturated_pixels, kept, spread, repaired)
+        other_light = self._other_light(takes, zeroth)
+        return self._of_moments(moments, saturated_pixels, kept, spread, repaired, other_light)
 
     def of_measured(
         self,
         moments: Array,
         *,
         saturated_pixels: Array | None = None,
+        ambient_dn: float = 0.0,
         spread: Spread = at_once,
     ) -> Reconstruction:
         """Go on from the moments that another reconstruction began with.
@@ -161,10 +173,15 @@ class Reconstructor:
             `Reconstruction.measured`: calibrated, and bad pixels replaced already.
         saturated_pixels : boolean array, shape (...), optional
             Pixels to be flagged; none, when left out.
+        ambient_dn : float
+            Light in DN an image that was not the camera's, the same for all pixels.
         spread : callable
             As of a call.
         """
-        return self._of_moments(moments, saturated_pixels, None, spread)
+        found = self._of_moments(moments, saturated_pixels, None, spread)
+        if ambient_dn > 0:
+            found.ambient = np.full(moments.shape[1:], ambient_dn, moments.real.dtype)
+        return found
 
     def _require_labels(self) -> tuple[str, int]:
         """Return how b_0 was measured and the number of takes, where raw images can be read."""
@@ -181,6 +198,7 @@ class Reconstructor:
         kept: Array | None,
         spread: Spread,
         repaired: Repair | None = None,
+        other_light: Callable[[Array], Array | None] | None = None,
     ) -> Reconstruction:
         """Go on from calibrated moments."""
         if not self.settings.consecutive:
@@ -192,6 +210,7 @@ class Reconstructor:
                 kept=kept,
                 calibration=self._calibration,
                 spread=spread,
+                other_light=other_light,
             )
         one_pass = self._pass_of_moments(moments)
         correction = self._correction(moments)
@@ -206,6 +225,7 @@ class Reconstructor:
                 calibration=self._calibration,
                 correction=correction,
                 spread=spread,
+                other_light=other_light,
             )
         smoothed = moments
         if moments.ndim == 3:
@@ -223,6 +243,7 @@ class Reconstructor:
             calibration=self._calibration,
             corrected=corrected,
             spread=spread,
+            other_light=other_light,
         )
 
     def _correction(self, moments: Array) -> HarmonicCorrection | None:
@@ -263,6 +284,24 @@ class Reconstructor:
             calibration=self._calibration,
             full_scale=self.settings.full_scale,
             previous=before,
+        )
+
+    def _other_light(self, takes: Array, zeroth: str) -> Callable[[Array], Array | None] | None:
+        """Return what tells light that is not the camera's, of the first take's first frequency.
+
+        It depends on values, which are not known yet where JAX traces a function.
+        """
+        sensor, phases_rad = self.settings.sensor, self.settings.sampled_rad
+        whole = abs(np.exp(1j * np.asarray(phases_rad)).sum()) < _WHOLE
+        if sensor is None or not whole or not isinstance(takes, np.ndarray):
+            return None
+        first = ZEROTH_IMAGES[zeroth] if zeroth == "on-off" else 0
+        return partial(
+            ambient_light,
+            takes[0, first : first + len(phases_rad)],
+            sensor=sensor,
+            sigma_px=self.settings.smoothing_sigma_px,
+            bad_pixels=self._bad,
         )
 
     def _measured(self, takes: Array, left_out: Array | None = None) -> tuple[Array, Array]:

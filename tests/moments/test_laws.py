@@ -13,6 +13,8 @@ import transientcam_moments as tm
 from tests.moments import oracles
 
 PHASE = np.linspace(0.0, 6.0, 9)
+_ROUNDED = {np.complex64: 2e-4, np.complex128: 1e-12}
+"""Of densities: beside a narrow return the differences that are squared cancel."""
 
 orders = st.integers(1, 6)
 seeds = st.integers(0, 2**32 - 1)
@@ -140,7 +142,10 @@ def test_shuffling_pixels_shuffles_results(stage: str, dtype: type) -> None:
     for straight, shuffled in zip(
         STAGES[stage](b), STAGES[stage](np.ascontiguousarray(b[:, order])), strict=True
     ):
-        assert np.array_equal(shuffled, straight[..., order], equal_nan=True)
+        if stage == "density":  # products of matrices, which some BLAS round by the place
+            np.testing.assert_allclose(shuffled, straight[..., order], rtol=_ROUNDED[dtype])
+        else:
+            assert np.array_equal(shuffled, straight[..., order], equal_nan=True)
 
 
 @pytest.mark.parametrize("dtype", [np.complex64, np.complex128])

@@ -21,6 +21,7 @@ from tests.moments.kernel_lanes import lanes
 from transientcam_driver import RawFrame, Sequence, SubPhases, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_moments import noise
+from transientcam_moments.noise.returns import direct_phase_noise
 
 Array = NDArray[Any]
 DRAWS = 2000
@@ -199,6 +200,17 @@ def test_ambient_light_adds_its_electrons_of_both_images() -> None:
 
 
 # -- returns -----------------------------------------------------------------------------------
+
+
+def test_the_deviation_of_the_direct_phase_alone_is_that_of_all_returns() -> None:
+    b, of_moments = random_pixels(4, 4, seed=5)
+    returns = tm.pisarenko(b)
+    of_all = noise.return_noise(returns, of_moments)
+
+    std_rad, holds = direct_phase_noise(returns, of_moments)
+
+    assert np.array_equal(std_rad, of_all.direct_phase_std_rad, equal_nan=True)
+    assert np.array_equal(holds, of_all.holds)
 
 
 @pytest.mark.parametrize("m", [1, 2, 3, 4, 6])

@@ -378,7 +378,7 @@ def test_moments_as_measured_give_what_their_images_gave(estimator: str) -> None
         estimator=estimator,
         full_scale=4095.0,
         spoilt_images="keep",
-        sensor=tm.noise.Sensor(),
+        sensor=tm.noise.Sensor(dark_dn=3000.0),  # so that there is no ambient light
     )
     reconstructor = tm.Reconstructor(settings, calibration=gains, bad_pixels=bad)
     ours = reconstructor(images)

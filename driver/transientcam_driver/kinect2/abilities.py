@@ -3,7 +3,7 @@
 from typing import Final
 
 from transientcam_driver.capabilities import Capabilities
-from transientcam_driver.kinect2.codes import BITS
+from transientcam_driver.kinect2.codes import BITS, ZERO_DN
 from transientcam_driver.kinect2.device import Identity
 from transientcam_driver.kinect2.layout import (
     BASE_FREQUENCY_HZ,
@@ -43,4 +43,5 @@ def capabilities_of(identity: Identity) -> Capabilities:
         max_takes=MOST_TAKES,
         sampling=SAMPLING,
         heartbeat_s=UNREAD_S,
+        dark_dn=float(ZERO_DN),
     )

@@ -237,6 +237,7 @@ class Opt8241:
             min_exposure_s=DUTY_S,
             max_exposure_s=MOST_DUTY * DUTY_S,
             exposure_step_s=DUTY_S,
+            dark_dn=float(ZERO_DN),
         )
 
 

@@ -15,7 +15,7 @@ from transientcam_driver.errors import CameraError, DeviceRefused, ProtocolError
 from transientcam_driver.sampling import MAX_HARMONICS, Sampling
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S, ImageLabel
 from transientcam_driver.tofcam660.control import ControlConnection
-from transientcam_driver.tofcam660.image import dcs_images, image_bytes
+from transientcam_driver.tofcam660.image import ZERO_DN, dcs_images, image_bytes
 from transientcam_driver.tofcam660.images import ImageConnection, TcpImages, UdpImages
 from transientcam_driver.tofcam660.region import FULL, Region
 from transientcam_driver.tofcam660.wire import (
@@ -289,6 +289,7 @@ class Tofcam660:
             exposure_step_s=1e-6,
             zeroths=("estimated", "low-frequency"),
             delay_s=2 * inside_m / SPEED_OF_LIGHT_M_S,
+            dark_dn=float(ZERO_DN),
         )
 
     @contextmanager

@@ -19,6 +19,8 @@ LONGEST_PACKET_BYTES: Final = 4096
 HEADER_VERSION: Final = 1
 FULL_SCALE_DN: Final = 4095
 """The highest code of the converter: in a `RawFrame` it says that there is no measurement."""
+ZERO_DN: Final = 2048
+"""What a difference of 0 is in an image."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +87,10 @@ def image_bytes(kind: ImageType, region: Region) -> int:
 
 
 def dcs_images(data: bytes, region: Region, integration_us: int) -> NDArray[np.uint16]:
-    """Return the four images (4, H, W) of a capture, 2048 DN for a difference of zero.
+    """Return the four images (4, H, W) of a capture, `ZERO_DN` for a difference of zero.
 
-    ``DCS_k = 2048 + A cos(phi - k pi / 2)``, so that image k has the phase k pi / 2. A pixel that
-    overflowed or is saturated has the highest code of the converter.
+    ``DCS_k = ZERO_DN + A cos(phi - k pi / 2)``, so that image k has the phase k pi / 2. A pixel
+    that overflowed or is saturated has the highest code of the converter.
 
     Raises
     ------

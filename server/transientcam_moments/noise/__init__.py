@@ -12,6 +12,7 @@ through the estimator itself. ::
     range_std_m = tm.range_m(deviation.direct_phase_std_rad, 23e6)
 """
 
+from transientcam_moments.noise.ambient import ambient_light
 from transientcam_moments.noise.cramer_rao import CramerRao, cramer_rao
 from transientcam_moments.noise.density import DensityNoise, density_noise, density_std
 from transientcam_moments.noise.draws import draw
@@ -33,6 +34,7 @@ __all__ = [
     "MomentNoise",
     "ReturnNoise",
     "Sensor",
+    "ambient_light",
     "cramer_rao",
     "density_noise",
     "density_std",

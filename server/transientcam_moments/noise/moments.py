@@ -205,7 +205,11 @@ def smoothed(noise: MomentNoise, sigma_px: float = SIGMA_PX) -> MomentNoise:
 
 
 def smoothed_of(
-    noise_of: Callable[[Array], MomentNoise], brightness: Array, sigma_px: float = SIGMA_PX
+    noise_of: Callable[..., MomentNoise],
+    brightness: Array,
+    sigma_px: float = SIGMA_PX,
+    *,
+    ambient: Array | None = None,
 ) -> MomentNoise:
     """Return what `smoothed` gives of an image, by smoothing its brightness alone.
 
@@ -214,11 +218,14 @@ def smoothed_of(
     noise_of : callable
         Returns the noise (m + 1, H, W) of each pixel by itself, of its brightness, as
         `moment_noise` does: its variance must be affine in a brightness above 0. Gains of single
-        pixels are taken for those of their neighbours.
+        pixels are taken for those of their neighbours. Called with ``ambient=`` where that is
+        given, to which the variance must be affine, too.
     brightness : array, shape (H, W)
         In DN.
     sigma_px : float
         Standard deviation of the Gaussian, 0 to 100.
+    ambient : array, shape (H, W), optional
+        Light that is not modulated, in DN an image.
 
     Returns
     -------
@@ -234,20 +241,27 @@ def smoothed_of(
     if brightness.ndim != 2:
         raise ShapeError("brightness", f"of shape {tuple(brightness.shape)}", "(H, W)")
     if sigma_px == 0:
-        return noise_of(brightness)
-    xp = namespace(brightness)
-    light = xp.maximum(brightness, 0)
-    variance = noise_of(smooth(light[None], sigma_px / math.sqrt(2))[0]).variance
+        return _of_light(noise_of, brightness, ambient)
+
+    def around(light: Array) -> Array:
+        """Return the mean of a pixel and its neighbours."""
+        return smooth(namespace(light).maximum(light, 0)[None], sigma_px / math.sqrt(2))[0]
+
+    other = None if ambient is None else around(ambient)
+    variance = _of_light(noise_of, around(brightness), other).variance
+    xp = namespace(variance)
     rows, columns = (_factors(sigma_px, length) for length in brightness.shape)
     left = xp.asarray(np.outer(rows, columns)).astype(variance.dtype)
     return MomentNoise(variance * left)
 
 
 def smoothed_at(
-    noise_of: Callable[[Array], MomentNoise],
+    noise_of: Callable[..., MomentNoise],
     brightness: Array,
     pixels: Array,
     sigma_px: float = SIGMA_PX,
+    *,
+    ambient: Array | None = None,
 ) -> MomentNoise:
     """Return what `smoothed` gives at some pixels, computed for their neighbours alone.
 
@@ -255,13 +269,16 @@ def smoothed_at(
     ----------
     noise_of : callable
         Returns the noise of each pixel by itself, of a brightness of any shape, as `moment_noise`
-        with scalar gains: its variance must be affine in a brightness above 0.
+        with scalar gains: its variance must be affine in a brightness above 0. Called with
+        ``ambient=`` as by `smoothed_of`.
     brightness : array, shape (H, W)
         In DN; NaN where there is none.
     pixels : array of int, shape (S,)
         Places in the flattened image.
     sigma_px : float
         Standard deviation of the Gaussian, 0 to 100.
+    ambient : array, shape (H, W), optional
+        Light that is not modulated, in DN an image.
 
     Returns
     -------
@@ -278,7 +295,9 @@ def smoothed_at(
     if brightness.ndim != 2:
         raise ShapeError("brightness", f"of shape {brightness.shape}", "(H, W)")
     if sigma_px == 0:
-        return noise_of(np.maximum(brightness.reshape(-1)[pixels], 0))
+        there = np.maximum(brightness.reshape(-1)[pixels], 0)
+        other = None if ambient is None else np.asarray(ambient).reshape(-1)[pixels]
+        return _of_light(noise_of, there, other)
     height, width = brightness.shape
     row, column = np.divmod(pixels, width)
     taps = gaussian_taps(sigma_px / math.sqrt(2))
@@ -286,17 +305,29 @@ def smoothed_at(
     shift = np.arange(-radius, radius + 1)
     rows, columns = (row[:, None] + shift)[:, :, None], (column[:, None] + shift)[:, None, :]
     inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-    near = brightness[rows.clip(0, height - 1), columns.clip(0, width - 1)]
-    present = inside & np.isfinite(near)
-    light = np.where(present, np.maximum(near, 0), 0)
+    places = rows.clip(0, height - 1), columns.clip(0, width - 1)
+    present = inside & np.isfinite(brightness[places])
     weight = np.outer(taps, taps).reshape(-1)
-    total, share = (each.reshape((-1, weight.size)) @ weight for each in (light, present))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        mean = total / share
-    # a pixel that is not finite stays as it is
-    variance = noise_of(np.where(present[:, radius, radius], mean, np.nan)).variance
+    share = present.reshape((-1, weight.size)) @ weight
+
+    def around(light: Array) -> Array:
+        """Return the mean of a pixel and its neighbours."""
+        near = np.where(present, np.maximum(light[places], 0), 0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = near.reshape((-1, weight.size)) @ weight / share
+        # a pixel that is not finite stays as it is
+        return np.where(present[:, radius, radius], mean, np.nan)
+
+    other = None if ambient is None else around(np.asarray(ambient))
+    variance = _of_light(noise_of, around(brightness), other).variance
     left = _factors(sigma_px, height)[row] * _factors(sigma_px, width)[column]
     return MomentNoise((variance * left).astype(variance.dtype))
+
+
+def _of_light(
+    noise_of: Callable[..., MomentNoise], brightness: Array, ambient: Array | None
+) -> MomentNoise:
+    return noise_of(brightness) if ambient is None else noise_of(brightness, ambient=ambient)
 
 
 def _taps(sigma_px: float) -> Array:

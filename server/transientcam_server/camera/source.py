@@ -17,16 +17,17 @@ _log = logging.getLogger(__name__)
 def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
     """Return the sensor of a camera: a simulated one has its own, a real one the settings'.
 
-    A relayed one has what its origin states.
+    A relayed one has what its origin states. The dark level is the camera's where it has one.
     """
     if isinstance(camera, RelayCamera):
         return camera.origin.sensor
     model = settings if camera.simulation is None else camera.simulation.sensor
+    dark_dn = camera.capabilities.dark_dn
     return tm.noise.Sensor(
         gain_e_per_dn=model.gain_e_per_dn,
         full_well_e=model.full_well_e,
         read_noise_e=model.read_noise_e,
-        dark_dn=model.dark_dn,
+        dark_dn=model.dark_dn if dark_dn is None else dark_dn,
         bits=camera.capabilities.bits,
     )
 

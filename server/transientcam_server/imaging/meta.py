@@ -46,6 +46,7 @@ def frame_meta(
         **_of_images(raw, found),
         "corrected_pixels": None if found is None else found.corrected_pixels,
         "pixels": computed.pixels,
+        "ambient_dn": computed.ambient_dn,
         "predicted_range_std_m": computed.range_noise,
         "accuracy": None if accuracy is None else accuracy.to_document(),
     }

@@ -27,11 +27,15 @@ class MomentFrame(RawFrame):
         bool (H, W): pixels that were saturated in an image.
     treated
         What was done to the images, under the names `OF_IMAGES`.
+    ambient_dn
+        Light in DN an image that is not the camera's, of the median pixel: all are taken to have
+        that.
     """
 
     moments: NDArray[np.complex64]
     saturated: NDArray[np.bool_]
     treated: Mapping[str, Any]
+    ambient_dn: float = 0.0
 
     @property
     def size_bytes(self) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from transientcam_moments.noise.returns import direct_phase_noise
 from transientcam_moments.settings import OF_ANY_MULTIPLES
 from transientcam_server.imaging.recipe import Recipe
 
@@ -58,6 +59,7 @@ def moment_noise(recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoi
         partial(_of_pixels, recipe),
         np.asarray(found.smoothed[0].real),
         recipe.settings.smoothing_px,
+        ambient=found.ambient,
     )
 
 
@@ -82,13 +84,14 @@ def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
     pixels; of another estimator it is that of Pisarenko's returns in a sample of pixels, which is
     cheap enough for every frame.
     """
-    if not np.asarray(found.has_range).any():
+    has_range = np.asarray(found.has_range)  # compared anew whenever it is read
+    if not has_range.any():
         return None
     if recipe.technique in OF_ANY_MULTIPLES:
         std_m = np.asarray(found.range_std_m)
-        first_order = np.asarray(found.estimate.explained())[np.asarray(found.has_range)]
+        first_order = np.asarray(found.estimate.explained())[has_range]
     else:
-        std_m, first_order = _of_pisarenko(recipe, found)
+        std_m, first_order = _of_pisarenko(recipe, found, has_range)
     known = std_m[np.isfinite(std_m)]
     if not known.size:
         return None
@@ -96,9 +99,11 @@ def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
     return RangeNoise(median_m, p90_m, float(first_order.mean()))
 
 
-def _of_pisarenko(recipe: Recipe, found: tm.Reconstruction) -> tuple[_Array, _Array]:
+def _of_pisarenko(
+    recipe: Recipe, found: tm.Reconstruction, has_range: _Array
+) -> tuple[_Array, _Array]:
     """Return the deviation of the range in m in a sample of pixels, and where first order holds."""
-    sample = _sample(np.asarray(found.has_range).ravel())
+    sample = _sample(has_range.ravel())
 
     def sampled(planes: _Array) -> _Array:
         return np.asarray(planes).reshape((planes.shape[0], -1))[:, sample]
@@ -114,10 +119,10 @@ def _of_pisarenko(recipe: Recipe, found: tm.Reconstruction) -> tuple[_Array, _Ar
         np.asarray(found.smoothed[0].real),
         sample,
         recipe.settings.smoothing_px,
+        ambient=found.ambient,
     )
-    deviation = tm.noise.return_noise(returns, noise, threshold=recipe.settings.return_threshold)
-    std_m = tm.range_m(deviation.direct_phase_std_rad, recipe.base_frequency_hz)
-    return np.asarray(std_m), np.asarray(deviation.holds)
+    std_rad, holds = direct_phase_noise(returns, noise, threshold=recipe.settings.return_threshold)
+    return np.asarray(tm.range_m(std_rad, recipe.base_frequency_hz)), np.asarray(holds)
 
 
 def _sample(seen: _Array) -> _Array:
@@ -127,12 +132,14 @@ def _sample(seen: _Array) -> _Array:
     return np.arange(0, count, step) if count == seen.size else np.flatnonzero(seen)[::step]
 
 
-def _of_pixels(recipe: Recipe, brightness: _Array) -> tm.noise.MomentNoise:
-    """Return the noise of moments with this brightness, each pixel by itself."""
+def _of_pixels(
+    recipe: Recipe, brightness: _Array, ambient: _Array | float = 0.0
+) -> tm.noise.MomentNoise:
+    """Return the noise of moments with this brightness and other light, each pixel by itself."""
     light = np.maximum(brightness, 0)
-    column = (-1, *(1,) * light.ndim)
-    dark, slope = (each.astype(light.dtype).reshape(column) for each in recipe.moment_variance)
-    return tm.noise.MomentNoise(dark + slope * light)
+    variance = recipe.moment_variance.astype(light.dtype)
+    dark, slope, other = variance.reshape((3, -1, *(1,) * light.ndim))
+    return tm.noise.MomentNoise(dark + slope * light + other * ambient)
 
 
 def contradictions(recipe: Recipe, found: tm.Reconstruction) -> _Array | None:
@@ -152,18 +159,18 @@ def contradictions(recipe: Recipe, found: tm.Reconstruction) -> _Array | None:
         return None
     if not sequence.sampling.consecutive:
         return None
-    dark, slope = (float(each.sum()) for each in recipe.moment_variance)
+    dark, slope, other = recipe.moment_variance.sum(axis=1).tolist()
 
-    def of_all(light: _Array) -> tm.noise.MomentNoise:
+    def of_all(light: _Array, ambient: _Array | float = 0.0) -> tm.noise.MomentNoise:
         """Return the variance of all moments together, which grows linearly with the light."""
-        return tm.noise.MomentNoise((dark + slope * light)[None])
+        return tm.noise.MomentNoise((dark + slope * light + other * ambient)[None])
 
     return beyond_noise(found, of_all, recipe.settings.smoothing_px)
 
 
 def beyond_noise(
     found: tm.Reconstruction,
-    noise_of: Callable[[_Array], tm.noise.MomentNoise],
+    noise_of: Callable[..., tm.noise.MomentNoise],
     smoothing_px: float,
 ) -> _Array:
     """Return which lit pixels have moments that noise alone does not explain.
@@ -177,7 +184,8 @@ def beyond_noise(
         The frame, (m + 1, H, W).
     noise_of
         Returns the noise of moments with a brightness above 0 before smoothing, to which its
-        variance is affine: of each moment (m + 1, ...), or of all together (1, ...).
+        variance is affine: of each moment (m + 1, ...), or of all together (1, ...). Called with
+        ``ambient=`` where there is other light than the camera's.
     smoothing_px
         What the frame was smoothed with.
 
@@ -191,11 +199,14 @@ def beyond_noise(
         return beyond
     brightness = np.asarray(found.smoothed[0].real)
     eigenvalue = np.asarray(found.validity).flat[doubtful] * brightness.flat[doubtful]
+    ambient = found.ambient
     if doubtful.size > _FEW * beyond.size:
-        noise = tm.noise.smoothed_of(noise_of, brightness, smoothing_px).variance
+        noise = tm.noise.smoothed_of(noise_of, brightness, smoothing_px, ambient=ambient).variance
         noise = noise.reshape((len(noise), -1))[:, doubtful]
     else:
-        noise = tm.noise.smoothed_at(noise_of, brightness, doubtful, smoothing_px).variance
+        noise = tm.noise.smoothed_at(
+            noise_of, brightness, doubtful, smoothing_px, ambient=ambient
+        ).variance
     std = np.sqrt(noise.sum(axis=0))
     beyond.flat[doubtful] = eigenvalue < -EXPLAINED_DEVIATIONS * std
     return beyond
@@ -203,13 +214,14 @@ def beyond_noise(
 
 def _beyond_own_share(
     found: tm.Reconstruction,
-    noise_of: Callable[[_Array], tm.noise.MomentNoise],
+    noise_of: Callable[..., tm.noise.MomentNoise],
     smoothing_px: float,
 ) -> _Array:
     """Return where the part of the noise that is a pixel's own does not explain its moments.
 
-    Noise moves no eigenvalue by more than the norm of its own Toeplitz matrix, and a pixel's own
-    share of it settles most pixels without a look at their neighbours.
+    That of other light than the camera's is left for later: most frames have none. Noise moves no
+    eigenvalue by more than the norm of its own Toeplitz matrix, and a pixel's own share of it
+    settles most pixels without a look at their neighbours.
     """
     limit = EXPLAINED_DEVIATIONS**2 * tm.noise.own_share(smoothing_px)
     beyond = _lit(found)

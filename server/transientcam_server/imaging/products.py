@@ -338,7 +338,7 @@ PRODUCTS: Final[dict[str, Product]] = {
             over_time=True,
             of_noise=True,
             of_toeplitz=True,
-            reads=("smoothed",),
+            reads=("smoothed", "ambient"),
         ),
         Product(
             _WIRE["cumulative"],

@@ -210,23 +210,25 @@ class Recipe:
         return self.gains.sizes if factory and self.gains is not None else self.nominal_gains
 
     @cached_property
-    def moment_variance(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Variance (m + 1,) of the moments of a dark pixel, and how it grows with b_0 in DN.
+    def moment_variance(self) -> NDArray[np.float64]:
+        """Variance of the moments of a dark pixel, and how it grows with light: (3, m + 1).
 
-        Only with a sensor, whose noise is an affine function of the light.
+        For each DN of b_0, and for each DN an image of light that is not the camera's. Only with a
+        sensor, whose noise is an affine function of both.
         """
         assert self.sensor is not None  # noqa: S101 - callers have one, or no noise to predict
         sequence = self.applied.sequence
         noise = tm.noise.moment_noise(
-            np.array([0.0, 1.0]),
+            np.array([0.0, 1.0, 0.0]),
             self.sensor,
             calibration=self.noise_gains,
             zeroth=sequence.zeroth,
             takes=sequence.takes,
+            ambient=np.array([0.0, 0.0, 1.0]),
             phases_rad=sequence.sampling.phases_rad,
         )
-        dark, lit = np.asarray(noise.variance).T
-        return dark, lit - dark
+        dark, lit, other = np.asarray(noise.variance).T
+        return np.stack([dark, lit - dark, other - dark])
 
     def reconstruct(
         self,
@@ -242,7 +244,10 @@ class Recipe:
         """
         if isinstance(raw, MomentFrame):
             return self._reconstructor.of_measured(
-                raw.moments, saturated_pixels=raw.saturated, spread=spread
+                raw.moments,
+                saturated_pixels=raw.saturated,
+                ambient_dn=raw.ambient_dn,
+                spread=spread,
             )
         before = None if previous is None or previous.epoch != raw.epoch else _in_turn(previous)
         return self._reconstructor(_in_turn(raw), previous=before, spread=spread)

@@ -4,7 +4,7 @@ import logging
 import math
 from collections.abc import Iterable
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -43,6 +43,8 @@ class Computed:
         Of the stages that were requested last.
     pixels
         How many pixels carry each flag.
+    ambient_dn
+        Light in DN an image that is not the camera's, in the median pixel; None without a sensor.
     range_noise
         Predicted deviation of the range, as the metadata have it; None before the returns.
     """
@@ -50,6 +52,7 @@ class Computed:
     reconstruction: tm.Reconstruction | None = None
     failures: dict[str, Exception] = field(default_factory=dict)
     pixels: dict[str, int] | None = None
+    ambient_dn: float | None = None
     range_noise: dict[str, float] | None = None
 
 
@@ -66,13 +69,14 @@ def compute(
     ``spread`` is how compiled lanes use several threads.
     """
     requested = set(stages)
-    computed = Computed(before.reconstruction, {}, before.pixels, before.range_noise)
+    computed = replace(before, failures={})
     try:
         if computed.reconstruction is None:
             computed.reconstruction = found = recipe.reconstruct(raw, previous, spread=spread)
             _read(found, FIRST)
             _flag_contradictions(recipe, found)
             computed.pixels = pixel_counts(found)
+            computed.ambient_dn = _ambient_dn(recipe, found)
         else:
             found = computed.reconstruction
     except Exception as error:
@@ -113,6 +117,12 @@ def pixel_counts(found: tm.Reconstruction) -> dict[str, int]:
     flags = np.asarray(found.flags)
     counts = {"total": flags.size, "valid": flags.size - int(np.count_nonzero(flags))}
     return counts | {name: int(np.count_nonzero(flags & bit)) for name, bit in _BITS.items()}
+
+
+def _ambient_dn(recipe: Recipe, found: tm.Reconstruction) -> float | None:
+    if recipe.sensor is None:
+        return None
+    return 0.0 if found.ambient is None else float(np.median(found.ambient))
 
 
 def _range_noise(recipe: Recipe, found: tm.Reconstruction, number: int) -> dict[str, float] | None:

@@ -89,6 +89,7 @@ def capture_of(
         moments=_checked(parts[MOMENTS], (moments, *pixels), np.complex64),
         saturated=(flags & np.uint8(tm.Flags.SATURATED)) > 0,
         treated={name: meta[name] for name in OF_IMAGES},
+        ambient_dn=meta.get("ambient_dn") or 0.0,
         **given,
     )
 

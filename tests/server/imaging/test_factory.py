@@ -99,7 +99,8 @@ def test_moments_are_divided_by_them() -> None:
 def test_noise_grows_where_they_are_small() -> None:
     sensor = tm.noise.Sensor()
     brightness = np.full((HEIGHT, WIDTH), 500.0)
-    found = cast("tm.Reconstruction", SimpleNamespace(smoothed=np.stack([brightness + 0j] * 3)))
+    smoothed = np.stack([brightness + 0j] * 3)
+    found = cast("tm.Reconstruction", SimpleNamespace(ambient=None, smoothed=smoothed))
     settings = ReconstructionSettings(smoothing_px=0.0)
     nominal = Recipe(APPLIED, settings, 4095.0, sensor=sensor)
 

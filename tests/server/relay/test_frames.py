@@ -54,6 +54,17 @@ def test_what_lacks_a_product_is_dropped_and_never_mixed_with_another_frame() ->
     assert {each.frame for each in parts.values()} == {9}
 
 
+@pytest.mark.parametrize(("stated", "ambient_dn"), [({"ambient_dn": 80.5}, 80.5), ({}, 0.0)])
+def test_moments_keep_the_light_that_is_not_the_cameras(
+    stated: dict[str, float], ambient_dn: float
+) -> None:
+    first = message(MOMENTS, array=moments())
+    first.meta.update(cast("Any", stated))  # older daemons state none
+    found = captured({MOMENTS: first, "flags": message("flags")})
+    assert isinstance(found, MomentFrame)
+    assert found.ambient_dn == ambient_dn
+
+
 def test_moments_keep_what_was_done_to_their_images() -> None:
     flags = np.zeros((HEIGHT, WIDTH), np.uint8)
     flags[0, 1] = tm.Flags.SATURATED | tm.Flags.BIASED

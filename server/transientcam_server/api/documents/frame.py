@@ -103,6 +103,9 @@ class FrameDocument(Document):
     the calibration knows none, and until computed."""
     pixels: PixelCountsDocument | None = None
     """Null until something was computed."""
+    ambient_dn: float | None = None
+    """Light in DN an image that is not the camera's, in the median pixel; 0 where it hardly adds
+    noise, null until something was computed and where no sensor is known."""
     predicted_range_std_m: PredictedStdDocument | None = None
     """Null until the range was computed."""
     accuracy: RangeAccuracyDocument | None = None

@@ -51,7 +51,7 @@ class ChosenFrame:
         number = int(self.name)
         if self.wait_s and number > (history.last or 0):
             await hub.newest(after=number - 1, wait_s=self.wait_s)
-        return history.frame(number)
+        return hub.partly_sent(number) or history.frame(number)
 
     async def pipeline(self) -> Pipeline:
         """Return the pipeline of the camera."""
