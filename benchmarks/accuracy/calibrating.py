@@ -81,7 +81,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=int, default=32)
     parser.add_argument("--seed", type=int, default=SEED, help="of the scenes")
-    parser.add_argument("--captures", type=int, default=12, help="of each plan")
+    parser.add_argument("--captures", type=int, default=30, help="of each plan")
     parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--write", action="store_true", help="write to docs/plans.md")
     arguments = parser.parse_args()

@@ -65,7 +65,7 @@ class Choice:
         return figure.median
 
     def error_with_margin(self, target: str) -> float:
-        """Return what 80 % of the captures stay below."""
+        """Return what most of the captures stay below."""
         if target == "range_error_m":
             return self.predicted.range_error.with_margin
         if target == "range_std_m":
