@@ -8,11 +8,12 @@ import pytest
 from transientcam_driver.sensor import Sensor
 from transientcam_driver.sequence import Sequence
 from transientcam_driver.simulation.light import GivenScenery
-from transientcam_driver.simulation.light.lanes import LANES
+from transientcam_driver.simulation.light.lanes import LANES, Lanes
 from transientcam_driver.simulation.responses import SparseResponses
 from transientcam_driver.simulation.world import World
 
 SEQUENCE = Sequence(harmonics=1, zeroth="estimated", exposure_s=1e-3)
+NO_NOISE = {"shot-noise": "off", "read-noise": "off"}
 
 
 @pytest.fixture(autouse=True)
@@ -39,7 +40,7 @@ def codes(effects: dict[str, str], seed: int) -> bytes:
         {"saturation": "on"},
         {"read-noise": "off"},
         {"shot-noise": "off"},
-        {"shot-noise": "off", "read-noise": "off"},
+        NO_NOISE,
         {"modulation-harmonics": "on"},
     ],
 )
@@ -50,3 +51,18 @@ def test_codes_are_those_of_the_effects_one_by_one(effects: dict[str, str], seed
     LANES.compile_now()
 
     assert codes(effects, seed) == expected
+
+
+@pytest.mark.parametrize(("effects", "expected"), [({}, 4 * 200_000), (NO_NOISE, 0)])
+def test_pixels_whose_noise_numpy_draws_count_towards_lanes(
+    effects: dict[str, str], expected: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counted = []
+    monkeypatch.setattr(Lanes, "want_for_images", lambda _self, pixels: counted.append(pixels))
+
+    codes(effects, 1)
+    assert sum(counted) == expected
+
+    LANES.compile_now()
+    codes(effects, 1)
+    assert sum(counted) == expected

@@ -74,6 +74,11 @@ class Facts(Protocol):
         """The pixels judged, at several times of the scene's life; once where it stands still."""
         ...
 
+    @property
+    def too_thin(self) -> tuple[str, ...]:
+        """Names of surfaces that move and may be thinner than a pixel."""
+        ...
+
     def changes(
         self, effect: str, frequencies_hz: tuple[float, ...], *, during_s: float = 0.0
     ) -> tuple[Values, ...]:

@@ -20,4 +20,7 @@ class MixedPixels(LightEffect):
             return Call(False, "the scene has no edges", 0.0, 0.0)
         cost_s = conditions.pixels * _COST_S_PER_PIXEL if conditions.moves else 0.0
         reason = "an edge crosses {share} of the pixels"
+        if conditions.facts is not None and conditions.facts.too_thin:
+            names = ", ".join(conditions.facts.too_thin).replace("{", "{{").replace("}", "}}")
+            reason += f"; too thin for a share, as it moves: {names}"
         return weigh(conditions, changes, reason, cost_s)

@@ -134,14 +134,30 @@ def _mark(inside: Plane, row: int, start: int, end: int, border: Any) -> None:
 
 
 @inner
-def _share_among(values: Any, around: Any, i: int) -> Any:
-    """Return share of one of some pixels, as `coverage.covered_among`; the last value is NaN."""
-    value = values[i]
+def _at_rim(values: Any, around: Any, i: int) -> Any:
+    """Return share of one of some pixels at a border; the last value is NaN."""
     up, down = values[around[0, i]], values[around[1, i]]
     left, right = values[around[2, i]], values[around[3, i]]
-    if _alike(value, up, down, left, right):
-        return _ONE if value > _ZERO else _ZERO
-    return _at_border(value, up, down, left, right)[0]
+    return _at_border(values[i], up, down, left, right)[0]
+
+
+@inner
+def _shares_among(values: Any, around: Any, start: int, share: Any, border: Any) -> None:
+    """Put shares of a chunk of pixels, as `coverage.covered_among`; the last value is NaN.
+
+    Borders are marked in loops that a compiler makes vectors of: few pixels are at one.
+    """
+    on = values[start : start + len(share)]
+    for i in range(len(share)):
+        share[i] = _ONE if on[i] > _ZERO else _ZERO
+        border[i] = False
+    for side in range(4):
+        places = around[side, start : start + len(share)]
+        for i in range(len(share)):
+            border[i] |= (values[places[i]] > _ZERO) != (on[i] > _ZERO)
+    for i in range(len(share)):
+        if border[i]:
+            share[i] = _at_rim(values, around, start + i)
 
 
 @inner
@@ -671,6 +687,12 @@ def _any_beside(values: Any, around: Any, counts: Any, reach: Any, c: int) -> bo
     return found
 
 
+@inner
+def _take_shares(clear: Any, share: Any) -> None:
+    for i in range(len(share)):
+        clear[i] *= _ONE - share[i]
+
+
 @lane(
     PLANES,
     DOUBLES,
@@ -698,6 +720,7 @@ def dim_softly(
     count, chunks = len(x), len(reach)
     values, counts = np.full(count + 1, _NAN, float32), np.zeros(chunks + 1, int64)
     known, stale = np.ones(chunks + 1, np.bool_), np.zeros(chunks, np.bool_)
+    share, border = np.empty(CHUNK, float32), np.empty(CHUNK, np.bool_)
     corner = float32(apex[0]), float32(apex[1]), float32(apex[2])
     lines = corner, x, y, z, near, touching, index
     low, high = (boxes[0], boxes[1], boxes[2]), (boxes[3], boxes[4], boxes[5])
@@ -718,8 +741,9 @@ def dim_softly(
                 continue
             if _any_beside(values, around, counts, reach, c):
                 _cross_beside(ball, c, around, lines, owns[n], values, known)
-                for i in range(a, b):
-                    clear[i] *= _ONE - _share_among(values, around, i)
+                part = share[: b - a]
+                _shares_among(values, around, a, part, border)
+                _take_shares(clear[a:b], part)
         stale[:] = known[:chunks]
 
 
@@ -750,17 +774,34 @@ def _meet(axes: Any, apex: Any, x: Any, y: Any, z: Any, touching: Any, put: Any)
 
 
 @inner
+def _shares_at_rim(values: Any, around: Any, start: int, rim: Any, share: Any) -> None:
+    """Put shares of a chunk of pixels that are above 0, as all beside them that are there."""
+    for i in range(len(share)):
+        share[i] = _ONE
+    for i in range(len(share)):
+        if rim[i]:
+            share[i] = _at_rim(values, around, start + i)
+
+
+@inner
+def _times(one: Any, other: Any) -> None:
+    for i in range(len(one)):
+        one[i] *= other[i]
+
+
+@inner
 def _show_points(values: Any, around: Any, reach: Any, rim: Any, share: Any) -> Any:
     """Put shares of the pixels around points that a mirror shows the light to; count them."""
     first, second = values
     found, count, chunks = 0, len(rim), len(reach)
     along, across = np.zeros(chunks + 1, int64), np.zeros(chunks + 1, int64)
-    both = np.zeros(chunks + 1, int64)
+    whole, wide = np.zeros(chunks + 1, int64), np.zeros(chunks + 1, int64)
+    other, border = np.empty(CHUNK, float32), np.empty(CHUNK, np.bool_)
     for c in range(chunks):
         a, b = c * CHUNK, min((c + 1) * CHUNK, count)
         on, beside = _above(first[a:b]), _above(second[a:b])
         along[c + 1], across[c + 1] = along[c] + (on > 0), across[c] + (beside > 0)
-        both[c + 1] = both[c] + (on == b - a and beside == b - a)
+        whole[c + 1], wide[c + 1] = whole[c] + (on == b - a), wide[c] + (beside == b - a)
     for c in range(chunks):
         a, b = c * CHUNK, min((c + 1) * CHUNK, count)
         if not (
@@ -771,32 +812,43 @@ def _show_points(values: Any, around: Any, reach: Any, rim: Any, share: Any) -> 
         ):
             share[a:b] = _ZERO
             continue
-        amid = _reaches_none_but(both, reach, c)
-        share[a:b] = _ONE
-        for i in range(a, b):
-            if rim[i] or not amid:
-                share[i] = _share_among(first, around, i) * _share_among(second, around, i)
+        if _reaches_none_but(whole, reach, c):
+            _shares_at_rim(first, around, a, rim[a:b], share[a:b])
+        else:
+            _shares_among(first, around, a, share[a:b], border)
+        if _reaches_none_but(wide, reach, c):
+            _shares_at_rim(second, around, a, rim[a:b], other[: b - a])
+        else:
+            _shares_among(second, around, a, other[: b - a], border)
+        _times(share[a:b], other[: b - a])
         found += _above(share[a:b])
     return found
 
 
 @inner
 def _gather(share: Any, kept: Any) -> None:
-    """Put the places where shares are above 0."""
+    """Put the places where shares are above 0, and one more."""
     k = 0
     for i in range(len(share)):
-        if share[i] > _ZERO:
-            kept[k] = i
-            k += 1
+        kept[k] = i
+        k += share[i] > _ZERO
 
 
 @inner
-def _lines_to(x: Any, y: Any, z: Any, at: Any, apex: Any, lines: Any) -> None:
-    """Put the t where lines from an apex to points meet a mirror, and the points there."""
+def _chosen(values: Any, kept: Any, put: Any) -> None:
+    for k in range(len(kept)):
+        put[k] = values[kept[k]]
+
+
+@inner
+def _lines_to(x: Any, y: Any, z: Any, apex: Any, lines: Any) -> None:
+    """Put the points where lines from an apex to some points meet a mirror, given their t."""
     a, b, c = apex[0], apex[1], apex[2]
-    for k in range(len(x)):
-        u, v, w, t = x[k] - a, y[k] - b, z[k] - c, at[k]
-        lines[0, k], lines[1, k], lines[2, k], lines[3, k] = t, u * t + a, v * t + b, w * t + c
+    t = lines[0]
+    for k in range(len(t)):
+        lines[1, k] = (x[k] - a) * t[k] + a
+        lines[2, k] = (y[k] - b) * t[k] + b
+        lines[3, k] = (z[k] - c) * t[k] + c
 
 
 @lane(WHOLE, LINE, LINE, LINE, LINE, float32, AROUND, NUMBERS, FLAGS)
@@ -805,7 +857,8 @@ def shown(
 ) -> Any:
     """Return the points that a mirror shows the light to, and its shares of their pixels.
 
-    Then the t where lines to them from the light's image meet the mirror, and the points there.
+    Then the t where lines to them from the light's image meet the mirror, the points there, and,
+    unless all are, the points that are kept.
     """
     axes, corner, count = _axes(plate), (apex[0], apex[1], apex[2]), len(x)
     first, second = np.empty(count + 1, float32), np.empty(count + 1, float32)
@@ -814,12 +867,19 @@ def shown(
     found = 0
     if _meet(axes, corner, x, y, z, touching, (first[:count], second[:count], at)):
         found = _show_points((first, second), around, reach, rim, share)
-    lines = np.empty((4, found), float32)
     if found == count:
-        _lines_to(x, y, z, at, corner, lines)
+        lines = np.empty((4, count), float32)
+        lines[0] = at
+        _lines_to(x, y, z, corner, lines)
         return np.arange(count), share, lines
-    kept = np.empty(found, np.int64)
+    lines, room = np.empty((7, found), float32), np.empty(found + 1, np.int64)
     if found:
-        _gather(share, kept)
-        _lines_to(x[kept], y[kept], z[kept], at[kept], corner, lines)
-    return kept, share[kept], lines
+        _gather(share, room)
+    kept, part = room[:found], np.empty(found, float32)
+    _chosen(share, kept, part)
+    _chosen(at, kept, lines[0])
+    _chosen(x, kept, lines[4])
+    _chosen(y, kept, lines[5])
+    _chosen(z, kept, lines[6])
+    _lines_to(lines[4], lines[5], lines[6], corner, lines)
+    return kept, part, lines

@@ -69,8 +69,8 @@ class Segment:
         return self.apex + np.minimum(low, 0.0), self.apex + np.maximum(high, 0.0)
 
 
-_Lines = tuple[Plane, tuple[Plane, Plane, Plane]]
-"""The t where ways to points meet a mirror, and the points there."""
+_Lines = tuple[Plane, tuple[Plane, Plane, Plane], tuple[Plane, Plane, Plane]]
+"""The t where ways to points meet a mirror, the points there, and the points."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,22 +124,23 @@ class Ends:
         normal = self._normals()
         facing, reflectance = self._returned(normal)
         glossy = any(surface.gloss for surface in self.surfaces)
-        every, whole = np.arange(len(self.index)), np.ones(len(self.index), dtype=np.float32)
-        boxes = _boxes(self.point)
+        every, boxes = np.arange(len(self.index)), _boxes(self.point)
         ways: list[tuple[int, Way]] = []
         for k, light in enumerate(lights):
-            on, shown, beside, segments = _ways(light, (every, whole, boxes), self.point, around)
+            on, shown, beside, segments = _ways(light, (every, boxes), self.point, around)
             if not on.size:
                 continue
             sent = reflectance
             if glossy:
                 sent = sent + self._highlight(light, normal, facing)
             length_m, irradiance = self._irradiance(light, normal, on)
-            irradiance *= shown
+            if shown is not None:
+                irradiance *= shown
             for mirror in light.mirrors:
                 irradiance *= np.float32(mirror.reflectivity)
+            index = self.index if len(on) == len(self.index) else self.index[on]
             for segment in segments:
-                irradiance *= self._clear(segment, on, movers, beside)
+                irradiance *= self._clear(segment, index, movers, beside)
             if len(on) < len(sent) or irradiance.any():
                 ways.append((k, self._way(on, length_m, irradiance, sent)))
         return LitEnds(self, reflectance, len(lights), tuple(ways))
@@ -209,14 +210,16 @@ class Ends:
     def _clear(
         self,
         segment: Segment,
-        on: NDArray[np.intp],
+        mine: NDArray[np.int32],
         movers: tuple[int, ...],
         around: Around | None,
     ) -> Plane:
-        """Share of the light that all surfaces let through on a segment of its way."""
-        clear = np.ones(len(on), dtype=np.float32)
+        """Share of the light that all surfaces let through on a segment of its way.
+
+        To points on ``mine``, surfaces by index.
+        """
+        clear = np.ones(len(mine), dtype=np.float32)
         low, high = segment.box
-        mine = self.index if len(on) == len(self.index) else self.index[on]
         near = ((self.boxes[:, 0] <= high) & (self.boxes[:, 1] >= low)).all(axis=1)
         left = np.flatnonzero(near).tolist()
         if around is not None:
@@ -336,29 +339,31 @@ def _dimmed(
 
 def _ways(
     light: ImageLight,
-    every: tuple[NDArray[np.intp], Plane, NDArray[np.float32]],
+    every: tuple[NDArray[np.intp], NDArray[np.float32]],
     point: tuple[Plane, Plane, Plane],
     around: Around | None,
-) -> tuple[NDArray[np.intp], Plane, Around | None, list[Segment]]:
+) -> tuple[NDArray[np.intp], Plane | None, Around | None, list[Segment]]:
     """Return the points that a chain of mirrors shows the light to, and its ways to them.
 
-    Between the two, the share of the pixel around each point to which it does, and what is around.
-    ``every``: all points, all of the pixels around them, and boxes around chunks of them.
+    Between the two, the share of the pixel around each point to which it does (None: all), and
+    what is around. ``every``: all points, and boxes around chunks of them.
     """
-    on, share, boxes = every
+    on, boxes = every
+    share: Plane | None = None
     segments: list[Segment] = []
     start, last = point, None
     for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
-        kept, part, (at, met) = _shown(mirror.mirror, image_m, start, around)
+        kept, part, (at, met, ends) = _shown(mirror.mirror, image_m, start, around)
         if not kept.size:
             return kept, part, around, []
         if len(kept) < len(on):  # mostly few points, or all
-            on, share = on[kept], share[kept]
+            on = on[kept] if segments else kept
+            share = None if share is None else share[kept]
             around = around if around is None else among(kept, around)
             segments = [each.of(kept) for each in segments]
-            start = start[0][kept], start[1][kept], start[2][kept]
+            start = ends
             boxes = _boxes(start)
-        share = share * part
+        share = part if share is None else share * part
         segments.append(Segment(image_m, start, at, last, _boxes_from(image_m, boxes)))
         start, boxes = met, _boxes(met)
         last = mirror
@@ -380,8 +385,8 @@ def _shown(
         apex = image_m.astype(np.float32)
         beside = around.beside, *around.reach
         kept, share, lines = lane(plate_of(mirror, image_m), apex, *point, TOUCHING, *beside)
-        at, x, y, z = lines
-        return kept, share, (at, (x, y, z))
+        ends = (lines[4], lines[5], lines[6]) if len(lines) > 4 else point
+        return kept, share, (lines[0], (lines[1], lines[2], lines[3]), ends)
     way = _from(image_m, point)
     cross = crossing(mirror, image_m, way)
     shows = cross.between(np.float32(0), np.float32(1))
@@ -391,7 +396,8 @@ def _shown(
     share = share_around(cross, shows, around)
     kept = np.flatnonzero(share)
     x, y, z, at = (each[kept] for each in (*way, cross.at))
-    return kept, share[kept], (at, _moved(image_m, (x * at, y * at, z * at)))
+    ends = point[0][kept], point[1][kept], point[2][kept]
+    return kept, share[kept], (at, _moved(image_m, (x * at, y * at, z * at)), ends)
 
 
 def _from(apex: Points, point: tuple[Plane, ...]) -> tuple[Plane, Plane, Plane]:
@@ -411,7 +417,8 @@ def _boxes(points: tuple[Plane, Plane, Plane]) -> NDArray[np.float32]:
 
 def _boxes_from(apex: Points, boxes: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the boxes of the ways from an apex to points, given those of the points."""
-    return boxes - np.tile(apex.astype(np.float32), 2)[:, None]
+    corners = boxes.reshape(2, 3, -1) - apex.astype(np.float32)[:, None]
+    return corners.reshape(6, -1)
 
 
 def _moved(apex: Points, way: tuple[Plane, ...]) -> tuple[Plane, Plane, Plane]:

@@ -13,16 +13,18 @@ from transientcam_driver.simulation.imperfections import PINHOLE
 from transientcam_driver.simulation.light.exchange import Exchange
 from transientcam_driver.simulation.light.paths import Lit, light_rays
 from transientcam_driver.simulation.light.radiosity import Interreflection
-from transientcam_driver.simulation.light.rays import rays_through
+from transientcam_driver.simulation.light.rays import places_within, rays_through
 from transientcam_driver.simulation.light.recent import Recent
+from transientcam_driver.simulation.light.thin import PIXELS, may_be_thin
 from transientcam_driver.simulation.light.variants import without_gloss, without_mirrors
 from transientcam_driver.simulation.scene.geometry import Points, Rectangle
-from transientcam_driver.simulation.scene.scene import Scene, Viewpoint
+from transientcam_driver.simulation.scene.scene import Scene, Surface, Viewpoint
 
 _PIXELS = 20_000  # judged of a still scene, about; of larger images every second pixel a side, ...
 _PIXELS_MOVING = 1_500  # the same at each time
 _TIMES = 8  # of the longest period, at which a moving scene is judged
 _WITHIN = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))  # of a pixel
+_WITHIN_AT_THIN = 16  # places, where something may be so thin that these four miss it
 _FREQUENCIES = 8  # judged at most; the highest one always
 _ROUNDING = 1e-9
 _KEPT = 32  # changes by effects, for the last few sequences
@@ -121,7 +123,7 @@ class SceneFacts:
             ),
             "mixed-pixels": (
                 True,
-                lambda: [[self._look(each.scene, camera, _WITHIN) for each in there]],
+                lambda: [[self._look(each.scene, camera, self._within) for each in there]],
             ),
             "distortion": (
                 camera.lens.bends,
@@ -157,15 +159,47 @@ class SceneFacts:
     def _later(self, by_s: float) -> list[_Seen]:
         return [self._look(self._scene.at(t + by_s), self._camera) for t in self._times_s]
 
+    @property
+    def too_thin(self) -> tuple[str, ...]:
+        """Names of surfaces that move and may be thinner than a pixel."""
+        return tuple(each.name for each in self._thin(1.0) if each.motions)
+
+    @cached_property
+    def _within(self) -> tuple[tuple[float, float], ...]:
+        """Places in a pixel at which light is looked for that differs."""
+        if not self._thin(PIXELS):
+            return _WITHIN
+        right, down = places_within(_WITHIN_AT_THIN)
+        return tuple(zip(right.tolist(), down.tolist(), strict=True))
+
+    def _thin(self, pixels: float) -> list[Surface]:
+        """Surfaces that may be thinner than so many pixels, seen by camera or light."""
+        apexes = self._camera.position_m, self._scene.light.position_m
+        return [
+            each
+            for k, each in enumerate(self._scene.surfaces)
+            if each.opaque is None
+            and any(
+                may_be_thin(
+                    there.surfaces[k].shape, apex, self._pixel_rad, pixels=pixels, aslant=False
+                )
+                for there in map(self._scene.at, self._times_s)
+                for apex in apexes
+            )
+        ]
+
+    @property
+    def _pixel_rad(self) -> float:
+        return math.radians(self._camera.field_of_view_deg) / self._size[0]
+
     @cached_property
     def _fastest_pixels_per_s(self) -> float:
         """Highest speed of any surface, at the place where it stands, in pixels."""
-        pixel_rad = math.radians(self._camera.field_of_view_deg) / self._size[0]
         speeds = [0.0]
         for each in self._scene.surfaces:
             away_m = np.linalg.norm(each.shape.extent() - self._camera.position_m, axis=-1).min()
             speed_m_s = sum(motion.speed_m_s for motion in each.motions)
-            speeds.append(speed_m_s / (pixel_rad * max(float(away_m), 1e-3)))
+            speeds.append(speed_m_s / (self._pixel_rad * max(float(away_m), 1e-3)))
         return max(speeds)
 
     @cached_property

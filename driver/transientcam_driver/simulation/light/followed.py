@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.simulation.light.exchange import Exchange
 from transientcam_driver.simulation.light.paths import Lit, light_rays
-from transientcam_driver.simulation.light.rays import camera_rays, rays_within
+from transientcam_driver.simulation.light.rays import RAYS, camera_rays, rays_within
 from transientcam_driver.simulation.scene.scene import Scene
 
 
@@ -44,19 +44,21 @@ class FollowedRays:
         """Light that surfaces give each other."""
         return Exchange.of(self.scene, self.scene.transport.patches)
 
-    def within(self, pixel: NDArray[np.intp]) -> Lit:
+    def within(self, pixel: NDArray[np.intp], count: int = RAYS) -> Lit:
         """Return the light of several rays in each pixel: for each place, all pixels.
 
         Parameters
         ----------
         pixel
             (P) by index, rising, none twice; at least one.
+        count
+            Of rays in each pixel; the same in all calls.
         """
         with self._adding:
             more = np.setdiff1d(pixel, self._pixel, assume_unique=True)
             if more.size:
                 size = {"width": self.width, "height": self.height}
-                added = light_rays(self.scene, rays_within(self._camera, more, **size))
+                added = light_rays(self.scene, rays_within(self._camera, more, count, **size))
                 self._insert(more, added)
             assert self._within is not None  # noqa: S101  (what was missing was added)
             if pixel.size == self._pixel.size:

@@ -37,8 +37,8 @@ from transientcam_driver.simulation.light.shares import (
     shade,
     shown_tiles,
 )
-from transientcam_driver.simulation.light.still import Sight, StillLight
-from transientcam_driver.simulation.scene.geometry import Points, Shape
+from transientcam_driver.simulation.light.still import Sight, StillLight, segments
+from transientcam_driver.simulation.scene.geometry import Shape
 from transientcam_driver.simulation.scene.scene import Scene
 
 _AWAY = np.array([0.0, 0.0, -1e6])  # where surfaces that move are put while the rest is traced
@@ -199,20 +199,10 @@ class MovingLight:
 
     def _light_segments(self, chain: int, light: ImageLight) -> list[Bundle]:
         """Ways of light to what stands still, where it arrives, one bundle a segment."""
-        shape = self.still.height, self.still.width
         on, point = self.still.lit_by(chain)
         if not on.any():
             return []
-        return [
-            Bundle.of(
-                apex,
-                (start - apex).reshape(*shape, 3),
-                on.reshape(shape),
-                near=near.reshape(shape) if np.ndim(near) else near,
-                far=1.0,
-            )
-            for apex, start, near in _segments(light, point)
-        ]
+        return segments(light, point, on.reshape(self.still.height, self.still.width))
 
 
 def still_scene(scene: Scene) -> Scene:
@@ -222,21 +212,3 @@ def still_scene(scene: Scene) -> Scene:
         for each in scene.surfaces
     )
     return replace(scene, surfaces=surfaces)
-
-
-def _segments(
-    light: ImageLight, point: Points
-) -> list[tuple[Points, Points, NDArray[np.float32] | np.float32]]:
-    """Ways of light to points: of each segment its apex, its end, and the t where it begins.
-
-    A segment's line goes on to the light's image in the mirrors that are left.
-    """
-    segments: list[tuple[Points, Points, NDArray[np.float32] | np.float32]] = []
-    start = point
-    for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
-        fraction = mirror.shape.hit(start, np.broadcast_to(image_m, start.shape))
-        fraction = np.where(fraction < 1, fraction, 0.0)
-        segments.append((image_m, start, (1 - fraction).astype(np.float32)))
-        start = start + fraction[:, None] * (image_m - start)
-    segments.append((light.positions_m[-1], start, np.float32(0)))
-    return segments

@@ -20,6 +20,7 @@ from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Vi
 
 _BLOCK = 8192  # rays at a time, so that what is computed for them stays in the cache
 FAR_M = 1e3  # longer than any path in a scene
+_BESIDE = 1.5  # sizes of a mirror, up to which pixels at its edge may see beside it
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,8 +258,42 @@ def image_lights(scene: Scene) -> Iterator[ImageLight]:
             for mirror in mirrors
             if not any(mirror is last for last in light.mirrors[:1])
             and mirror.mirror.in_front(light.positions_m[0])
+            and _may_reach(light, mirror.mirror)
         ]
         yield from lights
+
+
+def _may_reach(light: ImageLight, mirror: Rectangle) -> bool:
+    """Whether a chain of mirrors may show the light to a further one: if not, no point gets any.
+
+    Both mirrors count half as large again, so that pixels at their edges have their share.
+    """
+    if not light.mirrors:
+        return True
+    apex, last = light.positions_m[0], light.mirrors[0].mirror
+    away = last.centre - apex
+    across, along = (_BESIDE * size / 2 * last.normal for size in (last.width, last.height))
+    depth = float(away @ last.normal)
+    ways = mirror.centre - apex + _BESIDE * (mirror.extent() - mirror.centre)
+    ways = _clipped(ways, last.normal, depth)  # of those that get to the last mirror's front
+    for half, side in ((across, last.right), (along, last.up)):
+        for sign in (1, -1):
+            # |depth (way . side) - (way . normal) (away . side)| < (way . normal) size / 2
+            axis = half + sign * ((away @ side) * last.normal - depth * side)
+            ways = _clipped(ways, axis, 0.0)
+    return len(ways) > 0
+
+
+def _clipped(corners: Points, axis: Points, least: float) -> Points:
+    """Return the corners (N, 3) of the part of a polygon that is at least so far along an axis."""
+    over = corners @ axis - least
+    kept: list[Points] = []
+    for k, (corner, before) in enumerate(zip(corners, np.roll(corners, 1, axis=0), strict=True)):
+        if over[k - 1] * over[k] < 0:
+            kept.append(corner + over[k] / (over[k] - over[k - 1]) * (before - corner))
+        if over[k] >= 0:
+            kept.append(corner)
+    return np.array(kept).reshape(-1, 3)
 
 
 def light_on(

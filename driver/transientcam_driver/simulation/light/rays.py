@@ -10,8 +10,10 @@ from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Viewpoint
 
 _LENS_STEPS = 20
-_RAYS = 32
+RAYS = 32
 """Into a pixel that light differs in."""
+RAYS_AT_THIN = 128
+"""In scenes with something thinner than two pixels, which few of a pixel's rays meet."""
 _GOLDEN = (5**0.5 - 1) / 2
 
 
@@ -22,7 +24,7 @@ def camera_rays(view: Viewpoint, *, width: int, height: int) -> Points:
 
 
 def rays_within(
-    view: Viewpoint, pixel: NDArray[np.intp], count: int = _RAYS, *, width: int, height: int
+    view: Viewpoint, pixel: NDArray[np.intp], count: int = RAYS, *, width: int, height: int
 ) -> Points:
     """Return unit vectors, so many each, through some pixels: for each place, all pixels.
 
@@ -30,11 +32,15 @@ def rays_within(
     as of most things that are built, is resolved as finely as others.
     """
     rows, columns = np.divmod(pixel, width)
-    place = np.arange(count)[:, None]
-    right = (place + 0.5) / count - 0.5
-    down = (place * _GOLDEN + 0.5 / count) % 1.0 - 0.5
-    through = (columns + right).ravel(), (rows + down).ravel()
+    right, down = places_within(count)
+    through = (columns + right[:, None]).ravel(), (rows + down[:, None]).ravel()
     return rays_through(view, *through, width=width, height=height)
+
+
+def places_within(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return places in a pixel, right of and below its centre."""
+    place = np.arange(count, dtype=np.float64)
+    return (place + 0.5) / count - 0.5, (place * _GOLDEN + 0.5 / count) % 1.0 - 0.5
 
 
 def rays_through(

@@ -12,12 +12,15 @@ from transientcam_driver.simulation.light.coverage import Plane, covered, crossi
 from transientcam_driver.simulation.light.followed import FollowedRays
 from transientcam_driver.simulation.light.paths import (
     FAR_M,
+    ImageLight,
     Lit,
     hit,
+    image_lights,
     scatter_of,
     sparse_image,
 )
-from transientcam_driver.simulation.light.rays import rays_within
+from transientcam_driver.simulation.light.rays import RAYS, RAYS_AT_THIN, rays_within
+from transientcam_driver.simulation.light.thin import PIXELS, crossed, may_be_thin
 from transientcam_driver.simulation.responses import Moments, Scatter, SparseResponses
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
@@ -71,10 +74,13 @@ class StillLight:
         self._camera = scene.camera
         self._followed = followed or FollowedRays(scene, width=width, height=height)
         self.rays, self.lit = self._followed.centres, self._followed.lit
-        self.mixed = np.zeros(0, dtype=np.intp)
+        self.mixed, self._rays_a_pixel = np.zeros(0, dtype=np.intp), RAYS
         """Pixels, by index, that are the mean over several rays."""
         if noise is not None:
-            self.mixed = np.flatnonzero(self._differs(noise, highest_hz))
+            thin = self._thinly_crossed()
+            self.mixed = np.flatnonzero(self._differs(noise, highest_hz) | thin)
+            if thin.any() and self._holds_thin():
+                self._rays_a_pixel = RAYS_AT_THIN
         self._phasors: dict[float, tuple[Moments, Moments]] = {}
 
     @property
@@ -99,7 +105,7 @@ class StillLight:
     @cached_property
     def fine(self) -> Lit:
         """Light of several rays in each of the pixels ``mixed``."""
-        return self._followed.within(self.mixed)
+        return self._followed.within(self.mixed, self._rays_a_pixel)
 
     def lit_by(self, chain: int) -> tuple[NDArray[np.bool_], Points]:
         """Return which pixels (H W) a chain of mirrors lights, and a point (H W, 3) that it does.
@@ -215,6 +221,38 @@ class StillLight:
                 follow.append((bounces + 1, index[on], image_m, end, turned, share, left))
         return sights
 
+    def _holds_thin(self) -> bool:
+        """Whether anything is thin in itself, and not only where it shows its side."""
+        eye = self._camera.position_m
+        return any(
+            may_be_thin(each.shape, eye, self.pixel_rad, pixels=PIXELS, aslant=False)
+            for each in self.scene.surfaces
+            if each.opaque is None
+        )
+
+    def _thinly_crossed(self) -> NDArray[np.bool_]:
+        """Pixels (H W) that something thin crosses, or its shadow; centres may have missed it."""
+        marked = np.zeros((self.height, self.width), dtype=bool)
+        scene, eye = self.scene, self._camera.position_m
+        lights = tuple(image_lights(scene))
+        apexes = [eye, *(apex for light in lights for apex in light.positions_m)]
+        thin = [
+            each.shape
+            for each in scene.surfaces
+            if each.opaque is None  # a stencil's own edge is that of nothing
+            and any(may_be_thin(each.shape, apex, self.pixel_rad) for apex in apexes)
+        ]
+        if not thin:
+            return marked.ravel()
+        bundles = [(each.bundle, each.bundle.far > 0) for each in self.lines_of_sight(soft=True)]
+        on = (self.lit.surface >= 0).reshape(marked.shape)
+        for light in lights:
+            bundles += [(each, on) for each in segments(light, self.lit.point, on)]
+        for bundle, counts in bundles:
+            for shape in thin:
+                marked |= crossed(shape, bundle, counts)
+        return marked.ravel()
+
     def _differs(self, noise: Noise, highest_hz: float) -> NDArray[np.bool_]:
         """Pixels in which light may differ, (H W): where it does between neighbours.
 
@@ -247,3 +285,25 @@ def grown(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
     more[:, 1:] |= marked[:, :-1]
     more[:, :-1] |= marked[:, 1:]
     return more
+
+
+def segments(light: ImageLight, point: Points, on: NDArray[np.bool_]) -> list[Bundle]:
+    """Return the ways of light by a chain of mirrors to points (H W, 3), one bundle a segment.
+
+    ``on`` (H, W) are the points that count. A segment's line goes on to the light's image in the
+    mirrors that are left, and counts from where it begins.
+    """
+    found: list[Bundle] = []
+    start = point
+
+    def add(apex: Points, near: NDArray[np.float32] | np.float32) -> None:
+        near = near.reshape(on.shape) if np.ndim(near) else near
+        found.append(Bundle.of(apex, (start - apex).reshape(*on.shape, 3), on, near=near, far=1.0))
+
+    for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
+        fraction = mirror.shape.hit(start, np.broadcast_to(image_m, start.shape))
+        fraction = np.where(fraction < 1, fraction, 0.0)
+        add(image_m, (1 - fraction).astype(np.float32))
+        start = start + fraction[:, None] * (image_m - start)
+    add(light.positions_m[-1], np.float32(0))
+    return found

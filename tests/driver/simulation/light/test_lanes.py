@@ -14,7 +14,14 @@ from transientcam_driver import Sequence
 from transientcam_driver.simulation.build import find_scene, world_of
 from transientcam_driver.simulation.light.coverage import covered, overlapped
 from transientcam_driver.simulation.light.ends import Ends
-from transientcam_driver.simulation.light.lanes import COMPILED, LANES, THREAD, Lanes
+from transientcam_driver.simulation.light.lanes import (
+    COMPILED,
+    LANES,
+    OF_IMAGES,
+    THREAD,
+    WORTH_PIXELS,
+    Lanes,
+)
 from transientcam_driver.simulation.light.paths import image_lights
 from transientcam_driver.simulation.light.shares import Around, hide
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Rectangle
@@ -187,9 +194,9 @@ def test_no_call_starts_the_compiler() -> None:
         LANES._ready["shown_tiles"](np.ones((3, 3)), 1)  # of double precision
 
 
-def finished(lanes: Lanes) -> None:
+def finished(lanes: Lanes, modules: tuple[str, ...] = COMPILED) -> None:
     """Want lanes, and wait until their thread has ended."""
-    lanes.want()
+    lanes.want(modules)
     for thread in threading.enumerate():
         if thread.name == THREAD:
             thread.join()
@@ -205,6 +212,26 @@ def test_lanes_are_made_ready_once_in_the_background() -> None:
     ready = lanes._ready
     finished(lanes)
     assert lanes._ready is ready
+
+
+def test_lanes_of_images_are_made_ready_once_numpy_has_computed_many(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    lanes, made = Lanes({}), list[tuple[str, ...]]()
+    monkeypatch.setattr(lanes, "compile_now", made.append)
+
+    lanes.want_for_images(WORTH_PIXELS - 1)
+    assert not made
+
+    lanes.want_for_images(1)
+    finished(lanes, OF_IMAGES)
+    assert made == [OF_IMAGES]
+
+    # a scene that moves wants the others, too, and none twice
+    finished(lanes)
+    lanes.want_for_images(1)
+    finished(lanes, OF_IMAGES)
+    assert made == [OF_IMAGES, COMPILED[len(OF_IMAGES) :]]
 
 
 @pytest.mark.parametrize("setting", ["off", "0", "no", "false", "manual", " OFF "])

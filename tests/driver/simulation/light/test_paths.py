@@ -1,5 +1,6 @@
 """Light transport against closed forms."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -10,7 +11,12 @@ from numpy.typing import NDArray
 from transientcam_driver.sensor import Sensor
 from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.imperfections import Lens
-from transientcam_driver.simulation.light.paths import light_rays
+from transientcam_driver.simulation.light.paths import (
+    ImageLight,
+    image_lights,
+    light_on,
+    light_rays,
+)
 from transientcam_driver.simulation.light.rays import rays_through
 from transientcam_driver.simulation.light.still import StillLight
 from transientcam_driver.simulation.responses import SparseResponses
@@ -309,3 +315,29 @@ def test_gloss_is_a_lobe_around_the_direction_of_reflection() -> None:
     cosine = directions[:, 1]
     expected = 0.2 * (40 + 8) / 8 * cosine**40 * cosine / (2 / cosine) ** 2
     assert weights[1] - weights[0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_chains_of_mirrors_that_are_left_out_light_nothing() -> None:
+    random = np.random.default_rng(1)
+    left_out = 0
+    for _ in range(20):
+        mirrors = tuple(
+            surface("mirror", random.uniform(-2, 2, 3), random.normal(size=3), size=(1.2, 0.8))
+            for _ in range(3)
+        )
+        of = scene(*mirrors, light=random.uniform(-1, 1, 3))
+        point, towards = random.uniform(-4, 4, (2, 5_000, 3))
+        towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+        found = {tuple(map(id, light.mirrors)): light for light in image_lights(of)}
+
+        for last, further in itertools.permutations(mirrors, 2):
+            before = found.get((id(last),))
+            if before is None or not further.mirror.in_front(before.positions_m[0]):
+                continue
+            if (id(further), id(last)) not in found:
+                image_m = further.mirror.mirrored(before.positions_m[0])
+                axis = further.mirror.mirrored_direction(before.axis)
+                chain = ImageLight((further, last), (image_m, *before.positions_m), axis)
+                assert not light_on(of, chain, point, towards)[1].any()
+                left_out += 1
+    assert left_out > 10

@@ -1,16 +1,20 @@
 """The area of a pixel: silhouettes, shadows, edges of colour, and which pixels need more rays."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.build import find_scene
+from transientcam_driver import Sequence
+from transientcam_driver.simulation.build import find_scene, world_of
 from transientcam_driver.simulation.effects.glimpses import Noise
 from transientcam_driver.simulation.light.followed import FollowedRays
 from transientcam_driver.simulation.light.paths import Lit, light_rays
 from transientcam_driver.simulation.light.still import StillLight
-from transientcam_driver.simulation.scene.geometry import Rectangle
-from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Viewpoint
+from transientcam_driver.simulation.scene.geometry import Ellipsoid, Rectangle
+from transientcam_driver.simulation.scene.motion import Motion
+from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Transport, Viewpoint
 
 WIDTH, HEIGHT = 60, 44
 NOISE = Noise(1e5, 0.0, 900.0, 1)
@@ -106,3 +110,68 @@ def test_rays_followed_for_other_pixels_before_change_nothing() -> None:
         alone = light_rays(of, still.rays_in(pixel))
         for name in Lit.__slots__:
             np.testing.assert_array_equal(getattr(shared_light, name), getattr(alone, name))
+
+
+def rod(x: float, z: float, size: tuple[float, float], y: float = 1.0) -> Surface:
+    """A plate that is thinner than a pixel, of 12 mm at 1 m."""
+    return Surface("rod", "diffuse", Rectangle.facing(v(x, y, z), v(0, -1, 0.02), size=size), 0.9)
+
+
+SPINDLE = Surface("spindle", "diffuse", Ellipsoid(v(0.1, 1, 0.0), v(0.002, 0.002, 0.2)), 0.9)
+MIRROR = Surface(
+    "mirror", "mirror", Rectangle.facing(v(0.3, 1.6, 0), v(-0.6, -1, 0), size=(0.5, 0.9)), 0.9
+)
+THIN = {
+    "level, before a wall": scene(WALL, rod(0.0, 0.031, (0.4, 0.003))),
+    "upright, before nothing": scene(rod(0.007, 0.0, (0.003, 0.3))),
+    "tapered": scene(WALL, SPINDLE),
+    "its shadow alone": scene(WALL, rod(0.27, 0.1, (0.003, 0.3), y=0.4)),
+    "in a mirror": scene(WALL, MIRROR, rod(-0.25, 0.0, (0.003, 0.3), y=1.2)),
+    "a plate from its side": scene(
+        WALL,
+        Surface(
+            "plate",
+            "diffuse",
+            Rectangle.facing(v(0.05, 1.0, 0), v(-1, 0.06, 0), size=(0.1, 0.3)),
+            1.0,
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", list(THIN))
+def test_what_is_thinner_than_a_pixel_takes_its_share_of_those_it_crosses(name: str) -> None:
+    of = THIN[name]
+    still = StillLight(of, width=WIDTH, height=HEIGHT, noise=NOISE, highest_hz=69e6)
+    every = light_rays(of, still.rays_in(np.arange(WIDTH * HEIGHT), 1024))
+    expected = every.moments(0.0, None).real.reshape(-1, WIDTH * HEIGHT).mean(axis=0)
+    bare = light_rays(replace(of, surfaces=of.surfaces[:-1]), still.rays)
+    crossed = np.abs(bare.moments(0.0, None).real - expected)
+
+    found = still.phasors(0.0)[1].ravel()
+    assert crossed.sum() > 0
+    assert np.abs(found - expected).sum() < 0.07 * crossed.sum()
+    centres = still.lit.moments(0.0, None).real
+    assert np.abs(centres - expected).sum() > 0.2 * crossed.sum()
+
+
+def test_what_is_thin_but_far_behind_takes_no_more_rays() -> None:
+    hidden = scene(WALL, rod(0.0, 0.031, (0.4, 0.003), y=3.0))
+    still = StillLight(hidden, width=WIDTH, height=HEIGHT, noise=NOISE, highest_hz=69e6)
+    assert still.mixed.size == 0
+
+
+def test_explanations_name_what_moves_and_is_thinner_than_a_pixel() -> None:
+    motion = Motion(np.array([[0.0, 0, 0], [0.1, 0, 0.05]]), 8.0, "back")
+    thin = replace(rod(0.0, 0.1, (0.4, 0.003)), motions=(motion,))
+    wide = replace(board(0.1, 1.5, 0.4, 0.5), motions=(motion,))
+    sequence = Sequence(harmonics=1, zeroth="estimated", exposure_s=5e-4)
+
+    def reason(*surfaces: Surface) -> str:
+        of = replace(scene(*surfaces), transport=Transport(diffuse_bounces=0))
+        world = world_of(of, width=WIDTH, height=HEIGHT, readout_s=4e-3)
+        effects = {each.effect: each for each in world.explain("test", sequence).effects}
+        return effects["mixed-pixels"].reason
+
+    assert reason(WALL, wide, thin).endswith("too thin for a share, as it moves: rod")
+    assert "thin" not in reason(WALL, wide)
