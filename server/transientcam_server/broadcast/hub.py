@@ -90,6 +90,14 @@ class Hub:
         """Outboxes of the clients that have subscribed."""
         return tuple(outbox for outbox in self._outboxes if outbox.channels)
 
+    def partly_sent(self, number: int) -> Frame | None:
+        """Return a frame that some client has a region of and may request more of; None if none.
+
+        What was computed of it is not computed anew then.
+        """
+        found = (outbox.partly_sent(number) for outbox in self._outboxes)
+        return next((frame for frame in found if frame is not None), None)
+
     async def newest(self, *, after: int, wait_s: float) -> Frame:
         """Return the newest frame once its number is greater than ``after``.
 

@@ -15,6 +15,8 @@ from transientcam_server.imaging.frame import Frame
 
 MAX_WAITING_MESSAGES: Final = 64
 """A client that lets more than this many notices and answers wait is not there any more."""
+_PARTLY_SENT: Final = 2
+"""Unacknowledged frames that a client got a part of, and may request more of."""
 
 
 class Past(Protocol):
@@ -82,6 +84,7 @@ class Outbox:
         self._channels: tuple[Channel, ...] = ()
         self._credits: int | None = None
         self._unacknowledged: deque[int] = deque()
+        self._partly_sent: deque[Frame] = deque(maxlen=_PARTLY_SENT)
         self._waiting: deque[Item] = deque()
         self._resuming: tuple[Past, int] | None = None
         self._changed = asyncio.Event()
@@ -97,6 +100,8 @@ class Outbox:
         self._credits = credit
         self._resuming = None
         self._unacknowledged.clear()
+        if credit is None:  # nothing is acknowledged; else requests may still be on their way
+            self._partly_sent.clear()
         self._waiting = deque(item for item in self._waiting if not isinstance(item, Delivery))
 
     def resume(self, past: Past, *, start: int) -> None:
@@ -112,7 +117,13 @@ class Outbox:
         """Note that the client is done with this frame and all before it."""
         while self._unacknowledged and self._unacknowledged[0] <= number:
             self._unacknowledged.popleft()
+        while self._partly_sent and self._partly_sent[0].number <= number:
+            self._partly_sent.popleft()
         self._changed.set()
+
+    def partly_sent(self, number: int) -> Frame | None:
+        """Return a frame that the client has a region of and did not acknowledge; None if none."""
+        return next((frame for frame in self._partly_sent if frame.number == number), None)
 
     def put_frame(self, frame: Frame) -> int:
         """Let a frame wait; where too many do, drop the oldest and return how many."""
@@ -182,6 +193,8 @@ class Outbox:
     def _under_way(self, delivery: Delivery) -> Delivery:
         if self._credits is not None:
             self._unacknowledged.append(delivery.frame.number)
+            if any(channel.crop.region is not None for channel in delivery.channels):
+                self._partly_sent.append(delivery.frame)
         return replace(delivery, lost=tuple(channel.take_lost() for channel in delivery.channels))
 
     def _due(self, frame: Frame) -> tuple[Channel, ...]:

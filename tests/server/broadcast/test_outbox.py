@@ -1,4 +1,5 @@
 import asyncio
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -16,6 +17,7 @@ from transientcam_server.broadcast.outbox import (
     Outbox,
 )
 from transientcam_server.imaging.frame import Frame
+from transientcam_server.imaging.view import Crop
 
 
 def test_the_newest_frames_wait_and_the_dropped_ones_are_counted() -> None:
@@ -378,5 +380,40 @@ def test_whatever_happens_a_resuming_client_knows_of_every_frame(
         assert past.last is not None
         assert len(seen) + lost(items)[0] == past.last - start + 1
         assert numbers(items) == sorted(numbers(items))
+
+    run(test)
+
+
+def test_a_frame_that_parts_were_sent_of_is_kept_until_it_is_acknowledged() -> None:
+    def test() -> None:
+        outbox = Outbox(depth=1)
+        part = replace(channel(), crop=Crop((0, 0, 1, 1)))
+        outbox.subscribe((part,), credit=3)
+        frames = [fake_frame(number) for number in (1, 2, 3)]
+        for frame in frames:
+            outbox.put_frame(frame)
+            waiting(outbox)
+
+        assert [outbox.partly_sent(number) for number in (1, 2, 3)] == [None, *frames[1:]]
+        outbox.acknowledge(2)
+        assert outbox.partly_sent(2) is None
+        assert outbox.partly_sent(3) is frames[2]
+        outbox.subscribe((part,), credit=3)
+        assert outbox.partly_sent(3) is frames[2]  # a request for it may be on its way
+        outbox.subscribe((part,), credit=None)
+        assert outbox.partly_sent(3) is None
+
+    run(test)
+
+
+def test_of_frames_that_were_sent_whole_or_need_no_acknowledgement_none_is_kept() -> None:
+    def test() -> None:
+        whole = subscribed(credit=3)
+        unlimited = Outbox(depth=1)
+        unlimited.subscribe((replace(channel(), crop=Crop((0, 0, 1, 1))),), credit=None)
+        for outbox in (whole, unlimited):
+            outbox.put_frame(fake_frame(1))
+            waiting(outbox)
+            assert outbox.partly_sent(1) is None
 
     run(test)

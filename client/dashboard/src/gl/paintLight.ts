@@ -3,9 +3,11 @@ import { densityImage } from "../physics/densityImage";
 import type { Coefficients } from "../physics/maximumEntropy";
 import { colourTable, LEVELS, type ColourMapName } from "../ui/colourMaps";
 import type { Backdrop, Exposure } from "./renderer";
-import { backdropGrey, strength, toned } from "./tone";
+import { backdropGrey, strength, toned, type ToneKind } from "./tone";
 
 const OPAQUE = 0xff000000;
+/** Steps of the place on the colour map, many to each colour: what light adds to the scene is within 0.07 of 255 there. */
+const STEPS = 64 * LEVELS;
 
 /** Paints pictures of one size, one after another: what two of them have in common is computed once. */
 export class LightPainter {
@@ -27,18 +29,15 @@ export class LightPainter {
     const density = this.density(coefficients, phase_rad);
     this.#take(backdrop, density.length);
     const free = this.#free;
-    const [reds, greens, blues] = channelsOf(colours);
-    const fades = backdrop !== null;
+    placesOf(kind, white, density);
+    const table = freeOf(colours, backdrop !== null);
     for (let pixel = 0; pixel < density.length; pixel++) {
-      const share = density[pixel] / white;
-      const place = share > 0 ? toned(kind, share) : 0; // NaN: no density, no light
-      const level = (place * LEVELS) | 0;
-      const added = fades ? strength(place) : 1;
+      const at = 4 * ((density[pixel] * STEPS) | 0);
       const dark = free[pixel];
       // 255 (1 - (1 - grey) (1 - light)), rounded
-      const red = (255.5 - dark * (255 - added * reds[level])) | 0;
-      const green = (255.5 - dark * (255 - added * greens[level])) | 0;
-      const blue = (255.5 - dark * (255 - added * blues[level])) | 0;
+      const red = (255.5 - dark * table[at]) | 0;
+      const green = (255.5 - dark * table[at + 1]) | 0;
+      const blue = (255.5 - dark * table[at + 2]) | 0;
       pixels[pixel] = OPAQUE | (blue << 16) | (green << 8) | red;
     }
   }
@@ -53,15 +52,35 @@ export class LightPainter {
   }
 }
 
-const channels = new Map<ColourMapName, readonly Float64Array[]>();
+/** Makes places on the colour map of densities, one loop for each tone; 0 where there is none. */
+function placesOf(kind: ToneKind, white: number, density: Float32Array): void {
+  if (kind === "logarithmic") {
+    for (let pixel = 0; pixel < density.length; pixel++) density[pixel] = density[pixel] > 0 ? toned(kind, density[pixel] / white) : 0;
+    return;
+  }
+  const root = kind === "root";
+  for (let pixel = 0; pixel < density.length; pixel++) {
+    const share = density[pixel] / white;
+    const bounded = share > 0 ? (share < 1 ? share : 1) : 0; // NaN: no density, no light
+    density[pixel] = root ? Math.sqrt(bounded) : bounded;
+  }
+}
 
-/** Red, green and blue of every level; the end of the last one has its colour. */
-function channelsOf(colours: ColourMapName): readonly Float64Array[] {
-  let known = channels.get(colours);
+const tables = new Map<string, Float32Array>();
+
+/** What light leaves of white in red, green, blue (and nothing), at every step of its place; over a still scene dim light fades in. */
+function freeOf(colours: ColourMapName, fades: boolean): Float32Array {
+  const name = `${colours} ${fades}`;
+  let known = tables.get(name);
   if (known === undefined) {
+    known = new Float32Array(4 * (STEPS + 1));
     const table = colourTable(colours);
-    known = [0, 1, 2].map((channel) => Float64Array.from({ length: LEVELS + 1 }, (_, level) => table[4 * Math.min(level, LEVELS - 1) + channel]));
-    channels.set(colours, known);
+    for (let step = 0; step <= STEPS; step++) {
+      const level = Math.min(LEVELS - 1, Math.floor((step * LEVELS) / STEPS));
+      const added = fades ? strength((step + 0.5) / STEPS) : 1;
+      for (let channel = 0; channel < 3; channel++) known[4 * step + channel] = 255 - added * table[4 * level + channel];
+    }
+    tables.set(name, known);
   }
   return known;
 }

@@ -73,12 +73,18 @@ export function whole(data: Numbers, shape: readonly number[], { region: [x0, y0
   const planes = data.length / (cutRows * cutColumns);
   const made = data.constructor as new (length: number) => Numbers;
   const all = new made(planes * width * height);
-  if (all instanceof Float32Array || all instanceof Float64Array) all.fill(NaN);
+  const covered = columns === width && rows === height;
+  if (!covered && (all instanceof Float32Array || all instanceof Float64Array)) all.fill(NaN);
+  const column = Uint16Array.from({ length: columns }, (_, x) => Math.floor(x / decimation));
   for (let plane = 0; plane < planes; plane++) {
     for (let y = 0; y < rows; y++) {
-      const from = (plane * cutRows + Math.floor(y / decimation)) * cutColumns;
       const to = (plane * height + y0 + y) * width + x0;
-      for (let x = 0; x < columns; x++) all[to + x] = data[from + Math.floor(x / decimation)];
+      if (y % decimation > 0) {
+        all.copyWithin(to, to - width, to - width + columns);
+        continue;
+      }
+      const from = (plane * cutRows + y / decimation) * cutColumns;
+      for (let x = 0; x < columns; x++) all[to + x] = data[from + column[x]];
     }
   }
   return all;

@@ -3,15 +3,18 @@
  *
  * Knows no worker and no page. The socket, the clock, chance and the probe are arguments.
  */
+import { Announced, type Announcement } from "./announced";
 import { codesFor } from "./compact";
 import { type Demand, DemandControl, EVERYTHING } from "./demand";
 import type { FluencyReport } from "./fluency";
 import { PaceControl } from "./pace";
 import {
+  ANNOUNCING,
   type CameraDocument,
   decodeMessage,
   encodeAck,
   encodeSubscribe,
+  type Hello,
   LEAST_PRODUCTS,
   ProtocolError,
   type ServerMessage,
@@ -39,6 +42,8 @@ export interface Surroundings {
   random(): number;
   /** Asks the service whether it is there; resolves to what it says of the camera, rejects if it is not. */
   probe(): Promise<CameraDocument>;
+  /** Requests a product of a frame as a message, of the part that the query names; rejects where it cannot be had. */
+  bring(announcement: Announcement, query: string): Promise<ArrayBuffer>;
 }
 
 /** What is asked for, and why less than everything; null for what is no reason. */
@@ -63,6 +68,8 @@ export type ConnectionEvent =
 /** Frames the service may send ahead of what was drawn. */
 export const CREDITS = 2;
 
+/** Frames of so many pixels are announced by the stream, and requested: smaller ones come sooner as messages. */
+const LARGE_PIXELS = 2 ** 16;
 /** So long after the last report light may still move; it comes every 2 s. */
 const MOVING_S = 4;
 const FIRST_RETRY_S = 0.5;
@@ -94,11 +101,24 @@ export class StreamConnection {
   #sight: readonly number[] | null = null;
   /** In which codes each product can be sent that came once. */
   readonly #codes = new Map<string, string | null>();
+  readonly #announced: Announced;
+  /** The camera's frames are large, and requests for them were not refused. */
+  #large = false;
+  #refusesRequests = false;
 
   constructor(url: string, around: Surroundings, emit: (event: ConnectionEvent) => void) {
     this.#url = url;
     this.#around = around;
     this.#emit = emit;
+    this.#announced = new Announced(
+      (announcement) => around.bring(announcement, queryOf(this.#cut)),
+      (body) => {
+        this.#receive(body);
+      },
+      ({ frame }, error) => {
+        this.#missed(frame, error);
+      },
+    );
   }
 
   /** Sets what is streamed, connecting if there is no connection. */
@@ -118,7 +138,7 @@ export class StreamConnection {
   /** Sets which part of the picture is in sight. */
   look(sight: readonly number[] | null): void {
     this.#sight = sight;
-    if (this.#open && this.#link.demand.part) this.#subscribe();
+    if (this.#open && this.#demand.part) this.#subscribe();
   }
 
   /** Shows this token from now on; a service that refused the one before is asked anew. */
@@ -133,9 +153,11 @@ export class StreamConnection {
 
   /** Frame `frame` and all before it were drawn: the service may send on. */
   acknowledge(frame: number): void {
-    for (const number of this.#inFlight) if (number <= frame) this.#inFlight.delete(number);
+    const done = Math.min(frame, this.#announced.done); // the service keeps a frame whose products are still requested
+    const known = this.#inFlight.size;
+    for (const number of this.#inFlight) if (number <= done) this.#inFlight.delete(number);
     if (this.#inFlight.size === 0) this.#link.drewAll(this.#around.now_s());
-    if (this.#open) this.#socket?.send(encodeAck(frame));
+    if (this.#open && (done === frame || this.#inFlight.size < known)) this.#socket?.send(encodeAck(done));
   }
 
   /** How fluently light moved on the page over a while. */
@@ -164,6 +186,7 @@ export class StreamConnection {
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
       this.#open = true;
+      this.#refusesRequests = false;
       this.#inFlight.clear();
       this.#subscribe();
       this.#emit({ type: "open" });
@@ -185,22 +208,52 @@ export class StreamConnection {
   #subscribe(): void {
     const products = this.#products.length === 0 ? LEAST_PRODUCTS : this.#products;
     this.#inFlight.clear(); // the service forgets them too
+    this.#announced.clear();
     this.#link.restart();
     this.#socket?.send(encodeSubscribe(products.map((product) => this.#subscriptionOf(product)), CREDITS, this.#token));
   }
 
   #subscriptionOf(product: string): Subscription {
-    const { maxRate_hz, coded, part } = this.#demand;
+    const { maxRate_hz, coded } = this.#demand;
+    if (this.#announces) return { product, max_rate_hz: maxRate_hz, region: ANNOUNCING };
     const encoding = coded ? this.#codes.get(product) : null;
-    const cut = !part ? {} : this.#sight === null ? { decimation: 2 } : { region: this.#sight };
-    return { product, max_rate_hz: maxRate_hz, ...(encoding == null ? {} : { encoding }), ...cut };
+    return { product, max_rate_hz: maxRate_hz, ...(encoding == null ? {} : { encoding }), ...this.#cut };
+  }
+
+  /** Whether frames are announced; only the stream has codes. */
+  get #announces(): boolean {
+    return this.#large && !this.#refusesRequests && !this.#demand.coded;
+  }
+
+  /** Which pixels are asked for. */
+  get #cut(): Pick<Subscription, "region" | "decimation"> {
+    if (!this.#demand.part) return {};
+    return this.#sight === null ? { decimation: 2 } : { region: this.#sight };
+  }
+
+  /** Large frames are announced from now on. */
+  #greeted({ channels }: Hello): void {
+    if (this.#large || !(channels ?? []).some(({ shape }) => shape.slice(-2).reduce((a, b) => a * b, 1) >= LARGE_PIXELS)) return;
+    this.#large = true;
+    if (this.#announces) this.#subscribe();
+  }
+
+  /** A request was in vain: that of a frame that is gone is left out, else the stream sends all frames itself. */
+  #missed(frame: number, error: unknown): void {
+    if (error instanceof FrameGone) {
+      this.acknowledge(frame);
+      return;
+    }
+    this.#refusesRequests = true;
+    if (this.#open) this.#subscribe();
   }
 
   /** What link and page can take. */
   get #demand(): Demand {
     const { demand } = this.#link;
     const limit_hz = this.#pace.maxRate_hz;
-    return limit_hz === null ? demand : { ...demand, maxRate_hz: Math.min(limit_hz, demand.maxRate_hz ?? Infinity) };
+    if (limit_hz === null) return demand;
+    return { ...demand, maxRate_hz: Math.min(limit_hz, demand.maxRate_hz ?? Infinity), part: demand.part || this.#pace.part };
   }
 
   #askForAll(): void {
@@ -241,8 +294,14 @@ export class StreamConnection {
     try {
       const message = decodeMessage(data);
       if (message === null) return;
+      if (message.type === "announcement") {
+        this.#inFlight.add(message.frame);
+        if (this.#announces) this.#announced.add(message, Math.max(1, this.#products.length));
+        return;
+      }
       if (message.type === "frame") this.#inFlight.add(message.meta.frame);
       this.#emit({ type: "message", message });
+      if (message.type === "hello") this.#greeted(message);
       this.#weigh(message, bytes);
     } catch (error) {
       if (!(error instanceof ProtocolError)) throw error;
@@ -295,6 +354,7 @@ export class StreamConnection {
     const socket = this.#socket;
     this.#socket = null;
     this.#open = false;
+    this.#announced.clear();
     if (socket === null) return;
     socket.onopen = socket.onmessage = socket.onclose = null;
     socket.close();
@@ -309,6 +369,17 @@ export class StreamConnection {
     if (this.#timer !== null) this.#around.clearTimer(this.#timer);
     this.#timer = null;
   }
+}
+
+/** A frame is not kept any more. */
+export class FrameGone extends Error {
+  override readonly name = "FrameGone";
+}
+
+/** The query for part of a frame. */
+function queryOf({ region, decimation }: Pick<Subscription, "region" | "decimation">): string {
+  if (region !== undefined) return `?region=${region.join()}`;
+  return decimation === undefined ? "" : `?decimation=${decimation}`;
 }
 
 const CLOSE_REASONS: Record<number, string> = {

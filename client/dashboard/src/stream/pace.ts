@@ -1,8 +1,9 @@
 /**
  * How many frames a second a browser can take that is to move light fluently, too.
  *
- * Where light moves at fewer than 30 pictures a second while frames come, fewer of them are asked for, and more again
- * where there is room. Where fewer frames give no more pictures, something else is slow, and all are asked for.
+ * Where light moves at fewer than 30 pictures a second while frames come, fewer of them are asked for, then parts of
+ * them, and more again where there is room. Where that gives no more pictures, something else is slow, and all are
+ * asked for.
  */
 import type { FluencyReport } from "./fluency";
 
@@ -30,6 +31,7 @@ const MOST_PATIENCE = 16;
 
 export class PaceControl {
   #maxRate_hz: number | null = null;
+  #part = false;
   /** The camera's frames a second; those that were taken, and pictures, while all frames were asked for. */
   #camera_hz = 0;
   #taken_hz = 0;
@@ -46,6 +48,11 @@ export class PaceControl {
   /** Most frames a second to ask for; null for all. */
   get maxRate_hz(): number | null {
     return this.#maxRate_hz;
+  }
+
+  /** Whether part of each frame is asked for: what is in sight, or of a whole picture every second pixel. */
+  get part(): boolean {
+    return this.#part;
   }
 
   /** The last window was slow, and something is still to be done about it. */
@@ -66,7 +73,7 @@ export class PaceControl {
     if (this.#maxRate_hz === null) this.#taken_hz = frames_hz;
     if (pictures_hz >= FLUENT_HZ) return this.#fluent(pictures_hz);
     this.#calm = 0;
-    this.#acts = this.#maxRate_hz === null ? pictures_hz < this.#vain_hz : this.#maxRate_hz > this.#least_hz;
+    this.#acts = this.#maxRate_hz === null ? pictures_hz < this.#vain_hz : !this.#part;
     this.#slow += 1;
     if (this.#slow < (this.#raised ? 1 : SLOW_WINDOWS)) return false;
     this.#slow = 0;
@@ -80,7 +87,7 @@ export class PaceControl {
       if (pictures_hz >= this.#vain_hz) return false;
       this.#before_hz = pictures_hz;
     }
-    if (this.#maxRate_hz !== null && this.#maxRate_hz <= this.#least_hz) return pictures_hz < HELPS * this.#before_hz && this.#giveUp();
+    if (this.#maxRate_hz !== null && this.#maxRate_hz <= this.#least_hz) return this.#smaller(pictures_hz);
     const step = Math.min(MOST_STEP, Math.max(LEAST_STEP, pictures_hz / FLUENT_HZ));
     this.#maxRate_hz = Math.max(this.#least_hz, step * Math.min(frames_hz, this.#maxRate_hz ?? Infinity));
     return true;
@@ -90,9 +97,17 @@ export class PaceControl {
     return Math.min(ENOUGH_HZ, this.#camera_hz / 2, OF_TAKEN * this.#taken_hz);
   }
 
+  /** There are no fewer frames to be asked for. */
+  #smaller(pictures_hz: number): boolean {
+    if (this.#part) return pictures_hz < HELPS * this.#before_hz && this.#giveUp();
+    this.#part = true;
+    return true;
+  }
+
   #giveUp(): boolean {
     this.#vain_hz = MUCH_SLOWER * this.#before_hz;
     this.#maxRate_hz = null;
+    this.#part = false;
     return true;
   }
 
@@ -110,6 +125,10 @@ export class PaceControl {
     if (this.#calm < this.#patience) return false;
     this.#calm = 0;
     this.#raised = true;
+    if (this.#part) {
+      this.#part = false;
+      return true;
+    }
     const more_hz = RAISE * this.#maxRate_hz;
     this.#maxRate_hz = more_hz >= this.#camera_hz ? null : more_hz;
     return true;

@@ -163,8 +163,15 @@ export interface Tradeoff {
   readonly summary: string;
 }
 
+/** What the frames of one subscription are like. */
+export interface Channel {
+  readonly product: string;
+  readonly shape: readonly number[];
+}
+
 export interface Hello {
   readonly type: "hello";
+  readonly channels?: readonly Channel[];
   readonly session: string;
   readonly server: { readonly name: string; readonly version: string };
   readonly sequence: AppliedSequence | null;
@@ -235,7 +242,17 @@ export interface Problem {
   readonly takes?: readonly { readonly takes: number; readonly capture_s: number; readonly range_std_m: number }[];
 }
 
-export type ServerMessage = Hello | FrameMessage | Notice | ErrorMessage;
+/** A frame has this product: of its array one pixel came, and the rest is to be requested. */
+export interface AnnouncementMessage {
+  readonly type: "announcement";
+  readonly frame: number;
+  readonly product: string;
+}
+
+export type ServerMessage = Hello | FrameMessage | AnnouncementMessage | Notice | ErrorMessage;
+
+/** The part of a picture that announces the whole of it. */
+export const ANNOUNCING: readonly number[] = [0, 0, 1, 1];
 
 /** The service sent something this page cannot read. */
 export class ProtocolError extends Error {
@@ -267,8 +284,10 @@ export function decodeMessage(buffer: ArrayBuffer): ServerMessage | null {
   }
 }
 
-/** A frame whose array has every pixel, whichever way it was sent. */
-function frameOf(message: Record<string, unknown>): FrameMessage {
+/** A frame whose array has every pixel, whichever way it was sent; or that there is one. */
+function frameOf(message: Record<string, unknown>): FrameMessage | AnnouncementMessage {
+  const announced = announcementOf(message);
+  if (announced !== null) return announced;
   const axes = Array.isArray(message["axes"]) ? message["axes"] : [];
   const frame = { ...message, axes, array: decoded(message, ndArray(message["array"])) } as unknown as FrameMessage;
   const { meta, array } = frame;
@@ -277,6 +296,12 @@ function frameOf(message: Record<string, unknown>): FrameMessage {
   if (array.shape.length < 2 || (region[2] === width && region[3] === height && decimation === 1)) return frame;
   const shape = [...array.shape.slice(0, -2), height, width];
   return { ...frame, array: { ...array, shape, data: whole(array.data, array.shape, { region, decimation }, width, height) } };
+}
+
+function announcementOf({ meta, product }: Record<string, unknown>): AnnouncementMessage | null {
+  const { region, decimation, width, height, frame }: Partial<FrameMeta> = isMap(meta) ? meta : {};
+  const announces = region !== undefined && region.join() === ANNOUNCING.join() && decimation === 1 && width !== 1 && height !== 1;
+  return announces && typeof product === "string" && frame !== undefined ? { type: "announcement", frame, product } : null;
 }
 
 /** The array that codes stand for; the array itself where it has none. */

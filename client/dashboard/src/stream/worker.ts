@@ -1,7 +1,8 @@
 /** The worker: owns the socket, decodes, summarises, and hands buffers to the page without copying. */
 import type { FluencyReport } from "./fluency";
 import { frameUrl } from "./frameUrl";
-import { StreamConnection, type ConnectionEvent } from "./connection";
+import type { Announcement } from "./announced";
+import { FrameGone, StreamConnection, type ConnectionEvent } from "./connection";
 import { type CameraDocument, decodeMessage, type Problem, ProtocolError } from "./protocol";
 import { type FrameReport, summarised } from "./summary";
 
@@ -34,6 +35,9 @@ interface WorkerScope {
   postMessage(report: Report, transfer: Transferable[]): void;
 }
 
+/** Answers about a frame that is not there, or not any more. */
+const GONE: readonly number[] = [404, 410];
+
 const scope = self as unknown as WorkerScope;
 let connection: StreamConnection | null = null;
 let token: string | null = null;
@@ -54,6 +58,14 @@ async function askForCamera(): Promise<CameraDocument> {
   const answer = await fetch("/api/v1/camera", { headers: authorization(), signal: AbortSignal.timeout(4000) });
   if (!answer.ok) throw new Error(`the service answered ${answer.status}`);
   return (await answer.json()) as CameraDocument;
+}
+
+/** What the stream announced. */
+async function requestFrame({ frame, product }: Announcement, query: string): Promise<ArrayBuffer> {
+  const answer = await fetch(`/api/v1/frames/${frame}/${product}.msgpack${query}`, { headers: authorization(), cache: "no-store" });
+  if (GONE.includes(answer.status)) throw new FrameGone();
+  if (!answer.ok) throw new Error(`the service answered ${answer.status}`);
+  return answer.arrayBuffer();
 }
 
 /** One product of a frame by REST, or why it cannot be had. */
@@ -94,6 +106,7 @@ scope.onmessage = ({ data: command }) => {
           now_s: () => performance.now() / 1000,
           random: Math.random,
           probe: askForCamera,
+          bring: requestFrame,
         },
         onEvent,
       );

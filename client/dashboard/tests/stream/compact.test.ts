@@ -43,6 +43,14 @@ describe("coefficients in codes", () => {
 });
 
 describe("part of a picture", () => {
+  test("has each of its pixels in the place of those that were left out, also at the ends", () => {
+    const codes = Float32Array.from([1, 2, 3, 4, 5, 6, 7, 8]); // two planes of 2 x 2
+    const [one, other] = [[1, 1, 2, 1, 1, 2, 3, 3, 4], [5, 5, 6, 5, 5, 6, 7, 7, 8]];
+    expect([...whole(codes, [2, 2, 2], { region: [0, 0, 3, 3], decimation: 2 }, 3, 3)]).toEqual([...one, ...other]);
+    const within = [...whole(codes.slice(0, 4), [2, 2], { region: [1, 0, 3, 3], decimation: 2 }, 4, 4)];
+    expect(within.map((value) => (Number.isNaN(value) ? 0 : value))).toEqual([0, 1, 1, 2, 0, 1, 1, 2, 0, 3, 3, 4, 0, 0, 0, 0]);
+  });
+
   test("fills each plane; flags outside of it are none", () => {
     const cut = { region: [1, 1, 2, 1], decimation: 1 } as const;
     expect([...whole(Uint8Array.from([7, 8, 9, 10]), [2, 1, 2], cut, 3, 2)]).toEqual([0, 0, 0, 0, 7, 8, 0, 0, 0, 0, 9, 10]);

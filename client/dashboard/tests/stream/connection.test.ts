@@ -2,7 +2,7 @@ import { decode, encode } from "@msgpack/msgpack";
 import { beforeEach, describe, expect, test } from "vitest";
 
 import type { CameraDocument, CameraState } from "../../src/stream/protocol";
-import { type ConnectionEvent, CREDITS, type Socket, StreamConnection } from "../../src/stream/connection";
+import { type ConnectionEvent, CREDITS, FrameGone, type Socket, StreamConnection } from "../../src/stream/connection";
 
 class FakeSocket implements Socket {
   binaryType: BinaryType = "blob";
@@ -41,6 +41,9 @@ class World {
   readonly events: ConnectionEvent[] = [];
   answer: () => Promise<CameraDocument> = () => Promise.resolve(camera("streaming"));
   probes = 0;
+  /** What was requested, and what a request is answered with. */
+  readonly requested: string[] = [];
+  brings: (frame: number, product: string) => Promise<ArrayBuffer> = (frame, product) => Promise.resolve(large(frame, product));
   #now_s = 0;
   #timers = new Map<number, { due_s: number; action: () => void }>();
   #next = 1;
@@ -64,6 +67,10 @@ class World {
       probe: () => {
         this.probes += 1;
         return this.answer();
+      },
+      bring: ({ frame, product }, query) => {
+        this.requested.push(`${frame} ${product}${query}`);
+        return this.brings(frame, product);
       },
     },
     (event) => this.events.push(event),
@@ -99,6 +106,15 @@ const frame = (number: number): unknown => ({
   meta: { frame: number },
   array: { dtype: "|u1", shape: [1], data: new Uint8Array(1) },
 });
+
+/** The message of all of a large frame. */
+const large = (frame: number, product: string): ArrayBuffer => encode({
+  type: "frame",
+  product,
+  axes: ["y", "x"],
+  meta: { frame, width: 640, height: 480, region: [0, 0, 640, 480], decimation: 1 },
+  array: { dtype: "|u1", shape: [480, 640], data: new Uint8Array(480 * 640) },
+}).slice().buffer;
 
 let world: World;
 beforeEach(() => {
@@ -176,6 +192,16 @@ describe("with a slow browser", () => {
     expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
   });
 
+  test("asks for the part in sight where fewer frames do not do, whichever way they come", () => {
+    world.socket.opens();
+    for (let window = 0; window < 5; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: 1, camera_hz: 16 });
+    world.connection.look([3, 4, 50, 60]);
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: expect.closeTo(0.7, 6) as number, region: [3, 4, 50, 60] }]);
+    world.socket.receives({ type: "hello", channels: [{ product: "range", shape: [480, 640] }] });
+    world.socket.receives({ type: "frame", product: "range", meta: { frame: 7, width: 640, height: 480, region: [0, 0, 1, 1], decimation: 1 }, array: { dtype: "|u1", shape: [1, 1], data: new Uint8Array(1) } });
+    expect(world.requested).toEqual(["7 range?region=3,4,50,60"]);
+  });
+
   test("does not take frames that it is late for to be lost on the way, while it can ask for fewer and light moves", async () => {
     world.socket.opens();
     const late = async (frame: number, report: boolean): Promise<void> => {
@@ -207,6 +233,84 @@ describe("with a slow browser", () => {
     const event = world.events.at(-1);
     expect(event).toMatchObject({ type: "demand", pictures_hz: 14.5, demand: { maxRate_hz: expect.closeTo(0.7 * linked_hz, 6) as number } });
     expect(event).not.toMatchObject({ carried_bytes_s: null });
+  });
+});
+
+describe("of large frames", () => {
+  const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.["subscriptions"];
+  const acknowledged = (): unknown[] => world.socket.sent.filter(({ type }) => type === "ack").map((message) => message["frame"]);
+  const greets = (...shape: number[]): void => {
+    world.socket.receives({ type: "hello", channels: [{ product: "range", shape }] });
+  };
+  const announces = (frame: number, product = "range"): void => {
+    world.socket.receives({
+      type: "frame",
+      product,
+      meta: { frame, width: 640, height: 480, region: [0, 0, 1, 1], decimation: 1 },
+      array: { dtype: "|u1", shape: [1, 1], data: new Uint8Array(1) },
+    });
+  };
+  const frames = (): unknown[] => world.events.flatMap((event) => (event.type === "message" && event.message.type === "frame" ? [event.message.meta.frame] : []));
+  const passed = (): Promise<void> => world.passes(0.01).then(() => new Promise((done) => setTimeout(done)));
+
+  beforeEach(() => {
+    world.socket.opens();
+    greets(480, 640);
+  });
+
+  test("one pixel is streamed, and all of them are requested", async () => {
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null, region: [0, 0, 1, 1] }]);
+    announces(7);
+    await passed();
+    expect(world.requested).toEqual(["7 range"]);
+    expect(frames()).toEqual([7]);
+    greets(1, 1);
+    expect(world.socket.sent.filter(({ type }) => type === "subscribe")).toHaveLength(2); // and no third
+  });
+
+  test("small ones are streamed whole", () => {
+    const before = world.socket.sent.length;
+    const small = new World();
+    small.connection.want(["range"]);
+    small.socket.opens();
+    small.socket.receives({ type: "hello", channels: [{ product: "coefficients", shape: [17, 120, 163] }] });
+    expect(small.socket.sent).toHaveLength(1);
+    expect(world.socket.sent).toHaveLength(before);
+  });
+
+  test("what was drawn is acknowledged once all products of the frame came", async () => {
+    world.connection.want(["light", "range"]);
+    announces(7, "light");
+    await passed();
+    world.connection.acknowledge(7);
+    expect(acknowledged()).toEqual([]);
+    announces(7, "range");
+    await passed();
+    world.connection.acknowledge(7);
+    expect(acknowledged()).toEqual([7]);
+  });
+
+  test("one that is gone is left out, and where requests are refused the stream sends all again until it is opened anew", async () => {
+    world.brings = () => Promise.reject(new FrameGone());
+    announces(7);
+    await passed();
+    expect(acknowledged()).toEqual([7]);
+    expect(asked()).toMatchObject([{ region: [0, 0, 1, 1] }]);
+    world.brings = () => Promise.reject(new Error("the service answered 429"));
+    announces(8);
+    await passed();
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+    world.socket.closes(1006);
+    await world.passes(1);
+    world.socket.opens();
+    expect(asked()).toMatchObject([{ region: [0, 0, 1, 1] }]);
+  });
+
+  test("what was requested before something else was wanted is not handed on", async () => {
+    announces(7);
+    world.connection.want(["direct"]);
+    await passed();
+    expect(frames()).toEqual([]);
   });
 });
 

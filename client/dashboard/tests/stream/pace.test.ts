@@ -14,14 +14,17 @@ class Watched {
   readonly control = new PaceControl();
   /** What was asked for in each window. */
   readonly asked: (number | null)[] = [];
+  readonly parts: boolean[] = [];
   pictures_hz = 0;
 
   plays(windows: number, { camera_hz, frame_s, picture_s, display_hz = 60 }: Browser): this {
     for (let n = 0; n < windows; n++) {
       const frames_hz = Math.min(camera_hz, this.control.maxRate_hz ?? Infinity);
-      this.pictures_hz = Math.min(display_hz, Math.max(1, (1 - frames_hz * frame_s) / picture_s));
+      const taken_s = this.control.part ? frame_s / 4 : frame_s;
+      this.pictures_hz = Math.min(display_hz, Math.max(1, (1 - frames_hz * taken_s) / picture_s));
       this.control.judge({ pictures_hz: this.pictures_hz, frames_hz, camera_hz });
       this.asked.push(this.control.maxRate_hz);
+      this.parts.push(this.control.part);
     }
     return this;
   }
@@ -62,6 +65,19 @@ describe("of the frames", () => {
     expect(slower.control.acts).toBe(false); // it has done all that it can
   });
 
+  test("parts are taken where 5 whole ones are too many, and whole ones again once there is room", () => {
+    const watched = new Watched().plays(5, SLOW);
+    expect(watched.parts.includes(true)).toBe(false); // fewer will do
+    const large: Browser = { camera_hz: 12, frame_s: 0.12, picture_s: 0.022 };
+    const slow = new Watched().plays(6, large);
+    expect([slow.control.part, slow.control.maxRate_hz]).toEqual([true, 5]);
+    expect(slow.plays(1, large).pictures_hz).toBeGreaterThanOrEqual(29);
+    slow.plays(300, large);
+    expect(slow.changes(30)).toBeLessThanOrEqual(4); // tried, but seldom
+    slow.plays(100, FAST);
+    expect([slow.control.part, slow.control.maxRate_hz]).toEqual([false, null]);
+  });
+
   test("a browser that takes hardly 5 of all is asked to take some fewer", () => {
     const control = new PaceControl();
     for (let n = 0; n < 8; n++) control.judge({ pictures_hz: n < 2 ? 10 : 20, frames_hz: 4, camera_hz: 18 });
@@ -93,7 +109,7 @@ describe("of the frames", () => {
     const starved: Browser = { camera_hz: 18, frame_s: 0, picture_s: 0.05 };
     const watched = new Watched().plays(20, starved);
     expect(Math.min(...watched.asked.map((rate_hz) => rate_hz ?? Infinity))).toBe(5);
-    expect(watched.control.maxRate_hz).toBeNull();
+    expect([watched.control.part, watched.control.maxRate_hz]).toEqual([false, null]);
     watched.plays(100, starved);
     expect(watched.changes(100)).toBe(0);
     watched.plays(4, { ...starved, picture_s: 0.1 });

@@ -40,6 +40,15 @@ describe("messages of the service", () => {
     expect(decodeMessage(recorded("error"))).toMatchObject({ problem: { status: 422, field: "v" } });
   });
 
+  test("one pixel of a frame announces all of them, and of the frame of a single pixel it is all", () => {
+    const meta = { frame: 3, width: 640, height: 480, region: [0, 0, 1, 1], decimation: 1 };
+    const array = { dtype: "<f4", shape: [7, 1, 1], data: new Uint8Array(28) };
+    const announcement = decodeMessage(encode({ type: "frame", product: "coefficients", meta, array }).slice().buffer);
+    expect(announcement).toEqual({ type: "announcement", frame: 3, product: "coefficients" });
+    const single = { ...meta, width: 1, height: 1 };
+    expect(decodeMessage(encode({ type: "frame", product: "coefficients", meta: single, array }).slice().buffer)).toMatchObject({ type: "frame" });
+  });
+
   test("data that is not aligned is copied to where it is", () => {
     const values = new Float32Array([3.5, -7]);
     for (const pad of ["", "a", "ab", "abc"]) {

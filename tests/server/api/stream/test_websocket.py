@@ -215,6 +215,28 @@ def test_a_region_and_a_decimation_send_the_pixels_that_rest_answers(served: Ser
     np.testing.assert_array_equal(frame.array, whole.array[:, 30:51:2, 40:90:2])
 
 
+def test_a_frame_that_one_pixel_was_streamed_of_can_be_requested_until_it_is_acknowledged() -> None:
+    with (
+        serving("sim:mirrors?noise=off", history={"seconds": 0.0}) as daemon,
+        streaming(daemon.stream_url) as client,
+        httpx.Client(base_url=f"{daemon.url}/api/v1/frames") as http,
+    ):
+        client.subscribe({"product": "range", "region": [0, 0, 1, 1]}, credits=1)
+        pixel = client.frame()
+        http.get("/latest", params={"wait_s": 10.0, "after": pixel.frame + 1})
+        held = daemon.service.hub.partly_sent(pixel.frame)
+        whole = wire.parse_frame(http.get(f"/{pixel.frame}/range").content)
+        client.send({"type": "ack", "frame": pixel.frame})
+        client.frame()
+        gone = http.get(f"/{pixel.frame}/range")
+
+    assert held is not None
+    assert not held.past  # computed once, for stream and request
+    assert whole.frame == pixel.frame
+    np.testing.assert_array_equal(whole.array[:1, :1], pixel.array)
+    assert gone.status_code == 410
+
+
 def test_thin_encodings_arrive_as_the_same_arrays_within_their_error(served: Served) -> None:
     with streaming(served.stream_url) as client:
         hello = client.subscribe(
