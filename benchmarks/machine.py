@@ -5,6 +5,10 @@ import platform
 import subprocess
 from importlib.metadata import version
 from pathlib import Path
+from typing import Final
+
+_KIND: Final = {"family": "cpu family", "model": "model"}
+_VECTORS: Final = {"AVX-512": "avx512f", "AVX2": "avx2", "AVX": "avx"}
 
 
 def machine() -> str:
@@ -24,7 +28,14 @@ def commit_of(checkout: Path) -> str:
 
 
 def _processor() -> str:
+    """Name the processor, and its family and vectors: one name is sold with several of both."""
+    facts: dict[str, str] = {}
     for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-        if line.startswith("model name"):
-            return line.partition(":")[2].strip()
-    return platform.machine()
+        name, _, value = line.partition(":")
+        facts.setdefault(name.strip(), value.strip())
+    if "model name" not in facts:
+        return platform.machine()
+    kind = [f"{word} {facts[key]}" for word, key in _KIND.items() if key in facts]
+    flags = facts.get("flags", "").split()
+    kind += next(([name] for name, flag in _VECTORS.items() if flag in flags), [])
+    return f"{facts['model name']} ({', '.join(kind)})" if kind else facts["model name"]
