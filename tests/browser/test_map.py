@@ -24,6 +24,8 @@ pytestmark = pytest.mark.shared_daemon
 NAMES = {"viridis": "viridis", "cividis": "cividis", "grey": "gray", "coolwarm": "coolwarm"}
 # The page's maps are straight lines between every fifteenth colour of matplotlib's.
 TOLERANCE = {"viridis": 6, "cividis": 12, "grey": 1, "coolwarm": 6}
+# as they are written below a map
+LONG = ("7.345\u202fm", "±\u202f123\u202fmm", "1234\u202fDN", "±\u202f123\u202fDN", "163, 120")
 
 
 def stop(served: Served) -> int:
@@ -60,6 +62,22 @@ def test_each_map_has_the_colours_of_the_values_the_daemon_serves(
         np.testing.assert_allclose(painted, expected, atol=TOLERANCE[chosen], err_msg=name)
         assert len(np.unique(painted.reshape(-1, 4), axis=0)) > 20, "a picture, not a plane"
     expect(page.locator("[data-field=state]")).to_have_text("Stopped")
+
+
+def test_a_picture_keeps_its_size_whatever_is_read_below_it(page: Page, served: Served) -> None:
+    open_page(page)
+    stop(served)
+    point_at(page, "map", 40, 50, click=True)
+    figures = page.locator(".panel-map .readout [data-field]")
+    for width in range(1100, 1500, 16):
+        page.set_viewport_size({"width": width, "height": 800})
+        sizes = []
+        for texts in (("–", "no value", "–", "", "0, 0"), LONG):
+            figures.evaluate_all(
+                "(each, texts) => each.forEach((one, n) => (one.textContent = texts[n]))", texts
+            )
+            sizes.append(map_canvas(page).bounding_box())
+        assert sizes[0] == sizes[1], width
 
 
 def test_the_scale_holds_nearly_all_values_and_the_pointer_reads_them(

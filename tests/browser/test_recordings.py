@@ -136,7 +136,8 @@ def test_all_views_show_the_frame_that_is_scrubbed_to(page: Page, served: Served
     recording = record(served, frames=6)
     open_page(page)
     choose(page, "sequence", "Recordings")
-    page.locator(".panel-recordings").wait_for()  # the pictures beside it have their size then
+    # the pictures beside it have their size then
+    page.get_by_role("button", name="Play corner").wait_for()
     point_at(page, "map", 40, 50, click=True)
     page.get_by_role("button", name="Play corner").click()
     expect(page.locator("[data-field=state]")).to_have_text("Replay")

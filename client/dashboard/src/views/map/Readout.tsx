@@ -36,22 +36,21 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
         <output class="readout-value" data-field="value">
           {value}
         </output>{" "}
-        <span class="quiet" data-field="scatter" title={`Standard deviation (1 σ) over the last ${WINDOW} frames, as measured at this pixel`}>
-          {scatter}
+        <span class="quiet readout-scatter" data-field="scatter" title={`Standard deviation (1 σ) over the last ${WINDOW} frames, as measured at this pixel`}>
+          {value.value === NOTHING ? "no value" : scatter}
         </span>
       </span>
       {shown.product !== ofLight && (
         <span>
-          <span class="quiet">{ofLight}</span> <span data-field="amplitude">{light}</span>{" "}
-          <span class="quiet" data-field="amplitude-scatter">
+          <span class="quiet">{ofLight}</span> <span class="readout-light" data-field="amplitude">{light}</span>{" "}
+          <span class="quiet readout-scatter" data-field="amplitude-scatter">
             {lightScatter}
           </span>
         </span>
       )}
-      <span class="quiet">
-        pixel <span data-field="pixel">{place}</span>
+      <span class="quiet readout-pixel" data-field="pixel" title="Column and row of the pixel">
+        {place}
       </span>
-      {value.value === NOTHING && <span class="quiet">no value here</span>}
     </p>
   );
 }
