@@ -102,19 +102,21 @@ def _numbers(values: list[float | None]) -> NDArray[np.float64]:
 def point_at(page: Page, picture: str, x: int, y: int, *, click: bool = False) -> None:
     """Move the pointer to the middle of a pixel of a view's picture.
 
-    Again where the page was laid out anew in between: the pointer was at another pixel then.
+    The pointer follows where the page is laid out anew meanwhile.
     """
     canvas = page.locator(f".panel-{picture} .stage canvas")
-    act = page.mouse.click if click else page.mouse.move
     before = None
     while (box := canvas.bounding_box()) != before:
         assert box is not None
         width, height = canvas.evaluate("(each) => [each.width, each.height]")
-        act(
+        at = (
             box["x"] + (x + 0.5) / width * box["width"],
             box["y"] + (y + 0.5) / height * box["height"],
         )
+        page.mouse.move(*at)
         before = box
+    if click:
+        page.mouse.click(*at)
 
 
 def drop(page: Page, name: str, content: str | bytes) -> None:

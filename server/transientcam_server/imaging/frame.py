@@ -439,8 +439,20 @@ def _array_key(product: Product, view: View) -> Hashable:
 
 
 async def _shared(future: "asyncio.Future[_T]") -> _T:
-    """Wait for what others may wait for too: a caller that stops waiting does not stop it."""
-    return future.result() if future.done() else await asyncio.shield(future)
+    """Wait for what others may wait for too: a caller that stops waiting does not stop it.
+
+    Raises
+    ------
+    Problem
+        ``shutting-down`` where the workers were closed meanwhile.
+    """
+    try:
+        return future.result() if future.done() else await asyncio.shield(future)
+    except asyncio.CancelledError:
+        task = asyncio.current_task()
+        if future.cancelled() and task is not None and not task.cancelling():
+            raise Problem(kinds.SHUTTING_DOWN, "The service is shutting down.") from None
+        raise
 
 
 def _made(

@@ -16,6 +16,7 @@ from tests.moments.kernel_lanes import without_lanes
 from transientcam import wire
 from transientcam_driver import AppliedSequence, Camera, RawFrame, Sampling, Sequence, open_camera
 from transientcam_moments._lanes.registry import REGISTRY, Key
+from transientcam_server.errors import kinds
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging import frame as module
 from transientcam_server.imaging import stages
@@ -158,6 +159,42 @@ def test_a_region_is_that_of_the_whole_whichever_is_requested_first(
         assert whole.shape[-2:] == (120, 163)
         np.testing.assert_array_equal(region, whole[..., 20:33:3, 30:71:3])
         np.testing.assert_array_equal(again, region)
+
+    with_frame(camera, raw, test)
+
+
+def test_requests_that_wait_when_the_workers_close_are_answered(
+    camera: Camera, raw: RawFrame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, end = threading.Event(), threading.Event()
+
+    def compute(*arguments: Any) -> stages.Computed:
+        begun.set()
+        end.wait()
+        return stages.compute(*arguments)
+
+    monkeypatch.setattr(module, "compute", compute)
+
+    async def test(pipeline: Pipeline, frame: Frame) -> None:
+        requests = [
+            asyncio.ensure_future(work)
+            for work in (
+                frame.encoded(pipeline.product("range"), MSGPACK),
+                frame.product(pipeline.product("direct")),
+                frame.reconstruction("returns"),
+            )
+        ]
+        left = asyncio.ensure_future(frame.encoded(pipeline.product("direct"), MSGPACK))
+        await asyncio.to_thread(begun.wait)
+        left.cancel()  # by its own client
+        closed = asyncio.ensure_future(frame._workers.close(within_s=30.0))
+        *answers, cancelled = await asyncio.gather(*requests, left, return_exceptions=True)
+        end.set()
+        assert await closed
+        assert isinstance(cancelled, asyncio.CancelledError)
+        for answer in answers:
+            assert isinstance(answer, Problem)
+            assert answer.kind is kinds.SHUTTING_DOWN
 
     with_frame(camera, raw, test)
 

@@ -24,6 +24,7 @@ _MISSING: Final = (
     kinds.UNKNOWN_FRAME,
     kinds.RECORDING_UNFINISHED,
     kinds.RECORDING_DAMAGED,
+    kinds.SHUTTING_DOWN,
 )
 
 

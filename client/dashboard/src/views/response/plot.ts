@@ -136,18 +136,20 @@ function powersOfTen(_plot: uPlot, _axis: number, low: number, high: number): nu
 
 const all = (_plot: uPlot, splits: number[]): number[] => splits;
 
-/** Least room of a number on a bent axis, in shares of its height. */
+/** Least room of a number on a bent axis: in shares of its height, and in pixels. */
 const BENT_ROOM = 0.1;
+const BENT_ROOM_PX = 20;
 
 /** Round numbers of an axis that bends at its end over `share`, as close as they can be read. */
 function bentSplits(share: number): (plot: uPlot, axis: number, low: number, high: number) => number[] {
-  return (_plot, _axis, _low, high) => {
+  return (plot, _axis, _low, high) => {
+    const room = Math.max(BENT_ROOM, (BENT_ROOM_PX * uPlot.pxRatio) / plot.bbox.height);
     const place = (value: number): number => Math.asinh((share * value) / high) / Math.asinh(share);
     const kept = [0];
     for (let power = decade(high / share); power <= decade(high); power++) {
       for (const factor of [1, 2, 5]) {
         const value = factor * 10 ** power;
-        if (value <= high && place(value) - place(kept[kept.length - 1]) >= BENT_ROOM) kept.push(value);
+        if (value <= high && place(value) - place(kept[kept.length - 1]) >= room) kept.push(value);
       }
     }
     return kept;
