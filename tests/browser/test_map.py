@@ -69,7 +69,7 @@ def test_a_picture_keeps_its_size_whatever_is_read_below_it(page: Page, served: 
     stop(served)
     point_at(page, "map", 40, 50, click=True)
     figures = page.locator(".panel-map .readout [data-field]")
-    for width in range(1100, 1500, 16):
+    for width in range(1100, 1500, 32):
         page.set_viewport_size({"width": width, "height": 800})
         sizes = []
         for texts in (("–", "no value", "–", "", "0, 0"), LONG):
