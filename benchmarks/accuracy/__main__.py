@@ -19,6 +19,7 @@ from benchmarks.accuracy.opening import draw_prices
 from benchmarks.accuracy.page import report
 from benchmarks.accuracy.pictures import drawn
 from benchmarks.accuracy.promises import BUILT_IN
+from benchmarks.accuracy.stated import stated_and_observed
 from benchmarks.measured_scenes import composite_scene
 from transientcam_experiments import tradeoff
 from transientcam_experiments.tradeoff.report import file_name
@@ -43,12 +44,12 @@ def main() -> None:
         if composite is not None:
             scenes["composite"] = composite
         records = measured(scenes, folder, "quick" if arguments.quick else "paper")
-        noise = predicted_and_observed()
+        noise, stated = predicted_and_observed(), stated_and_observed()
         figures = DOCS / "figures" if arguments.write else folder
         figures.mkdir(exist_ok=True)
         drawings = dict(drawn(name, figures) for name in BUILT_IN)
         draw_prices(drawings, figures)
-        page = report(scenes, records, noise, drawings)
+        page = report(scenes, records, noise, stated, drawings)
         print(page)
         if arguments.write:
             (DOCS / "accuracy.md").write_text(page, encoding="utf-8")

@@ -16,12 +16,12 @@ def known_scenes() -> set[str]:
 
 
 def captured(
-    camera: Camera, sequence: Sequence, frames: int
+    camera: Camera, sequence: Sequence, frames: int, settings: ReconstructionSettings = SETTINGS
 ) -> tuple[Recipe, list[tm.Reconstruction]]:
     """Capture and reconstruct frames with a sequence."""
     applied = camera.configure(sequence)
     sensor = sensor_of(camera, SensorSettings())
-    recipe = Recipe(applied, SETTINGS, 2.0**camera.capabilities.bits - 1.0, sensor=sensor)
+    recipe = Recipe(applied, settings, 2.0**camera.capabilities.bits - 1.0, sensor=sensor)
     camera.start()
     found = [recipe.reconstruct(camera.read_frame()) for _ in range(frames)]
     camera.stop()

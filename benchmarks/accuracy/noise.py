@@ -15,6 +15,7 @@ from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.measuring import spec_of
 from transientcam_server.imaging.noise import moment_noise
+from transientcam_server.settings import ReconstructionSettings
 
 
 @dataclass(frozen=True)
@@ -42,14 +43,15 @@ NOISE = (
     Sequence(harmonics=3, takes=16),
 )
 FRAMES = 60
+_PISARENKO = ReconstructionSettings(estimator="pisarenko")
 
 
 def predicted_and_observed() -> list[Compared]:
-    """Predict the deviation of the range of `mirrors` from its mean frame, and observe it."""
+    """Predict the deviation of Pisarenko's range of `mirrors` from its mean frame; observe it."""
     compared = []
     with open_camera(spec_of("mirrors", seed=SEED), clock=VirtualClock()) as camera:
         for sequence in NOISE:
-            recipe, found = captured(camera, sequence, FRAMES)
+            recipe, found = captured(camera, sequence, FRAMES, _PISARENKO)
             noise = moment_noise(recipe, found[0])
             mean = np.mean([each.smoothed for each in found], axis=0)
             predicted = tm.noise.return_noise(tm.pisarenko(mean), noise)
@@ -96,7 +98,7 @@ def draw_noise(compared: list[Compared], path: Path) -> None:
         ylim=ends,
         xlabel="predicted standard deviation of the range / m",
         ylabel=f"observed in {FRAMES} captures / m",
-        title="Noise of single pixels, where first order holds",
+        title="Noise of single pixels by Pisarenko, where first order holds",
     )
     panel.legend(fontsize="small", markerscale=5)
     panel.grid(alpha=0.25)

@@ -5,16 +5,20 @@ import numpy as np
 from benchmarks.accuracy.capturing import short
 from benchmarks.accuracy.noise import FRAMES, Compared
 from benchmarks.accuracy.opening import Documents, opening
+from benchmarks.accuracy.stated import FRAMES as OF_FRAMES
+from benchmarks.accuracy.stated import Stated
 from benchmarks.machine import machine
 from transientcam_driver import Sequence
 from transientcam_experiments import tradeoff
 from transientcam_experiments.tradeoff.report import file_name
+from transientcam_moments.likelihood import MODEL_ERROR
 
 
 def report(
     scenes: dict[str, str],
     records: tradeoff.Records,
     noise: list[Compared],
+    stated: list[Stated],
     prices: Documents,
 ) -> str:
     """Return the page."""
@@ -39,7 +43,7 @@ def report(
     ]
     for name, spec in scenes.items():
         lines += _scene(name, spec, records)
-    lines += [*_computing(records), *_noise(noise), *_time(scenes, records)]
+    lines += [*_computing(records), *_noise(noise), *_stated(stated), *_time(scenes, records)]
     return "\n".join(lines) + "\n"
 
 
@@ -278,7 +282,7 @@ def _noise(noise: list[Compared]) -> list[str]:
     return [
         "## Is the noise predicted?",
         "",
-        f"On `mirrors`, from sensor and mean moments to the deviation of the range of each pixel, "
+        f"Pisarenko's on `mirrors`, from sensor and mean moments to each pixel's deviation, "
         f"against {FRAMES} captures, which know a pixel's deviation to 9 % (so that a perfect "
         "prediction has 89 % of the pixels within 15 %). First order holds with as many returns as "
         "harmonics, all clear of the noise and of each other.",
@@ -288,6 +292,29 @@ def _noise(noise: list[Compared]) -> list[str]:
         *rows,
         "",
         "![Observed against predicted noise](figures/noise-prediction.png)",
+        "",
+    ]
+
+
+def _stated(stated: list[Stated]) -> list[str]:
+    rows = [
+        f"| {each.scene} | {each.sequence} | {each.observed_m * 1e3:.3g} "
+        f"| {each.product_m * 1e3:.3g} ({each.product_m / each.observed_m:.2f}) "
+        f"| {each.metadata_m * 1e3:.3g} ({each.metadata_m / each.observed_m:.2f}) |"
+        for each in stated
+    ]
+    return [
+        "## Does a frame know its noise?",
+        "",
+        f"The default estimator, median pixel: what one frame states, and how {OF_FRAMES} frames "
+        "scatter; behind each figure, how often it is the scatter. `range_std` draws the noise of "
+        "the sensor. `predicted_range_std_m` is the likelihood's own: it takes "
+        f"{MODEL_ERROR:.1%} of the light for errors of calibration, which frames repeat, so that "
+        "it stays larger than the scatter however many takes there are.",
+        "",
+        "| scene | sequence | scatter mm | `range_std` mm | `predicted_range_std_m` mm |",
+        "|---|---|---|---|---|",
+        *rows,
         "",
     ]
 

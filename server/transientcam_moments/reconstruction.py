@@ -345,7 +345,11 @@ class Reconstruction:
 
     @cached_property
     def range_std_m(self) -> Array:
-        """Standard deviation in m of the range of `estimate`; NaN where there is none."""
+        """Standard deviation in m of the range of `estimate`; NaN where there is none.
+
+        With the noise of a sensor, errors of calibration (`MODEL_ERROR`) are in it, too: frames
+        scatter less.
+        """
         xp = namespace(self.smoothed)
         estimate = self.estimate
         if isinstance(estimate, Unwrapped):

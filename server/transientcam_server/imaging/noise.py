@@ -31,6 +31,9 @@ _FEW: Final = 1 / 16
 class RangeNoise:
     """Predicted standard deviation of a frame's range.
 
+    By the likelihood, errors of calibration are in it, which frames repeat; `range_accuracy` has
+    noise alone.
+
     Attributes
     ----------
     median_m, p90_m
