@@ -19,7 +19,6 @@ from transientcam_driver.simulation.light.compiling import (
     int32,
     int64,
     lane,
-    without_nan,
 )
 from transientcam_driver.simulation.light.lanes import CHUNK
 
@@ -124,13 +123,23 @@ def reach(beside: Any) -> Any:
     return reached, rim
 
 
-@without_nan
-def _bounds(values: Any) -> Any:
-    """Return the least and the greatest of a chunk."""
-    least = greatest = values[0]
-    for i in range(len(values)):
-        least, greatest = min(least, values[i]), max(greatest, values[i])
-    return least, greatest
+@inner
+def _ordered(bits: Any) -> Any:
+    """Return a number that is ordered as the float32 that has these bits; again, they return."""
+    return bits ^ ((bits >> np.int32(31)) & np.int32(0x7FFFFFFF))
+
+
+@inner
+def _bounds(bits: Any) -> Any:
+    """Return the bits of the least and the greatest of a chunk of numbers, none of them NaN.
+
+    Compilers make vectors of such loops over integers, which have an order of all values.
+    """
+    least = greatest = _ordered(bits[0])
+    for i in range(len(bits)):
+        each = _ordered(bits[i])
+        least, greatest = min(least, each), max(greatest, each)
+    return _ordered(least), _ordered(greatest)
 
 
 @lane(LINE, LINE, LINE)
@@ -139,9 +148,11 @@ def boxes(x: Any, y: Any, z: Any) -> Any:
     count = len(x)
     chunks = (count + CHUNK - 1) // CHUNK
     found = np.empty((6, chunks), float32)
+    bits = found.view(int32)
+    u, v, w = x.view(int32), y.view(int32), z.view(int32)
     for c in range(chunks):
         a, b = c * CHUNK, min((c + 1) * CHUNK, count)
-        found[0, c], found[3, c] = _bounds(x[a:b])
-        found[1, c], found[4, c] = _bounds(y[a:b])
-        found[2, c], found[5, c] = _bounds(z[a:b])
+        bits[0, c], bits[3, c] = _bounds(u[a:b])
+        bits[1, c], bits[4, c] = _bounds(v[a:b])
+        bits[2, c], bits[5, c] = _bounds(w[a:b])
     return found

@@ -77,6 +77,13 @@ def _darken(moments: Any, each: Any, light: Any) -> None:
 
 
 @inner
+def _copy(values: Any, copied: Any) -> None:
+    """Copy a row in a loop that a compiler makes vectors of, unlike an assignment to a slice."""
+    for i in range(len(copied)):
+        copied[i] = values[i]
+
+
+@inner
 def _leave(moments: Any, rest: Any) -> None:
     """Leave a share of the moments in a row of pixels."""
     if len(moments) == len(rest):
@@ -102,7 +109,7 @@ def remaining(
     moments = np.empty((height, parts * width), float32)
     for row in range(height):
         r, line = top + row, moments[row]
-        line[:] = total[r, parts * start : parts * (start + width)]
+        _copy(total[r, parts * start : parts * (start + width)], line)
         for k in range(len(chains)):
             first, after = regions[k, 1], regions[k, 1] + regions[k, 3]
             for c in range((regions[k, 3] + CHUNK - 1) // CHUNK):
@@ -237,15 +244,16 @@ def blended(
     for row in range(height):
         r = top + row
         still = total[r, parts * left : parts * (left + width)]
-        then[:], later[:] = still, still
+        _copy(still, then)
+        _copy(still, later)
         place = r - of_first[0]
         if 0 <= place < of_first[2]:
             shift = parts * (of_first[1] - left)
-            then[shift : shift + parts * of_first[3]] = first[place]
+            _copy(first[place], then[shift : shift + parts * of_first[3]])
         place = r - of_second[0]
         if 0 <= place < of_second[2]:
             shift = parts * (of_second[1] - left)
-            later[shift : shift + parts * of_second[3]] = second[place]
+            _copy(second[place], later[shift : shift + parts * of_second[3]])
         line = mixed[row]
         for c in range(len(line)):
             line[c] = one * then[c] + other * later[c]

@@ -94,7 +94,8 @@ def shown_tiles(shown: Plane, side: int) -> Any:
     rows, columns = (height + side - 1) // side, (width + side - 1) // side
     line, tiles = np.empty(columns * side, float32), np.zeros((rows, columns), np.bool_)
     for row in range(rows):
-        line[:] = _ZERO
+        for i in range(len(line)):
+            line[i] = _ZERO
         for r in range(row * side, min((row + 1) * side, height)):
             part = shown[r]
             for i in range(width):
