@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_moments.settings import least_harmonics
-from transientcam_server.imaging.noise import moment_noise, typical_deviation
+from transientcam_server.imaging.deviation import typical_deviation
+from transientcam_server.imaging.noise import moment_noise
 from transientcam_server.imaging.ranging import ranges_m
 from transientcam_server.imaging.recipe import Recipe
 

@@ -1,6 +1,5 @@
 """The noise of frames: of their moments and of their range, and what it does not explain."""
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -17,8 +16,6 @@ from transientcam_server.imaging.recipe import Recipe
 _Array = NDArray[Any]
 SAMPLED_PIXELS: Final = 256
 """Pixels of each frame whose deviation is predicted."""
-MEDIAN_OF_NORMAL: Final = 0.674490
-"""Median of the absolute value of a standard normal variable."""
 EXPLAINED_DEVIATIONS: Final = 4.0
 """Standard deviations of a negative eigenvalue that noise explains."""
 _UNLIT: Final = np.uint8(tm.Flags.NO_SIGNAL | tm.Flags.NON_FINITE | tm.Flags.SATURATED)
@@ -64,20 +61,6 @@ def moment_noise(recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoi
         recipe.settings.smoothing_px,
         ambient=found.ambient,
     )
-
-
-def typical_deviation(values: _Array) -> _Array:
-    """Return the deviation (P) between captures (D, P), which outliers do not blow up.
-
-    It is the typical difference of two captures, as the deviation of the normal variable that has
-    the same (decision 0521); NaN where there are not two.
-    """
-    first, second = np.triu_indices(len(values), 1)
-    apart = np.abs(values[first] - values[second])
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of pixels without two
-        deviation: _Array = np.nanmedian(apart, axis=0) / (np.sqrt(2) * MEDIAN_OF_NORMAL)
-    return deviation
 
 
 def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
