@@ -144,7 +144,8 @@ def _around(plane: _Array, has_range: _Array, every_px: int) -> _Array:
 
 def _of_gaps(found: tm.Reconstruction) -> RangeAccuracy:
     """Return what an estimate of any multiples says of itself; nothing disagrees with it."""
-    std_m = np.asarray(found.range_std_m, dtype=np.float32)
+    shape = np.shape(found.range_m)
+    std_m = np.asarray(found.range_scatter_m(), dtype=np.float32).reshape(shape)
     return RangeAccuracy(std_m, np.full_like(std_m, np.nan), None)
 
 
