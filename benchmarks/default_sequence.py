@@ -17,7 +17,8 @@ from benchmarks.tables import Table
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.camera.source import sensor_of
-from transientcam_server.imaging.noise import MEDIAN_OF_NORMAL, contradictions
+from transientcam_server.imaging.deviation import MEDIAN_OF_NORMAL
+from transientcam_server.imaging.noise import contradictions
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.settings import ReconstructionSettings, SensorSettings, SequenceSettings
 

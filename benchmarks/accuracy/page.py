@@ -11,7 +11,6 @@ from benchmarks.machine import machine
 from transientcam_driver import Sequence
 from transientcam_experiments import tradeoff
 from transientcam_experiments.tradeoff.report import file_name
-from transientcam_moments.likelihood import MODEL_ERROR
 
 
 def report(
@@ -308,9 +307,8 @@ def _stated(stated: list[Stated]) -> list[str]:
         "",
         f"The default estimator, median pixel: what one frame states, and how {OF_FRAMES} frames "
         "scatter; behind each figure, how often it is the scatter. `range_std` draws the noise of "
-        "the sensor. `predicted_range_std_m` is the likelihood's own: it takes "
-        f"{MODEL_ERROR:.1%} of the light for errors of calibration, which frames repeat, so that "
-        "it stays larger than the scatter however many takes there are.",
+        "the sensor. `predicted_range_std_m` is that of the likelihood's returns to first order: "
+        "that noise changes their number, or makes a tail of them, is not in it.",
         "",
         "| scene | sequence | scatter mm | `range_std` mm | `predicted_range_std_m` mm |",
         "|---|---|---|---|---|",

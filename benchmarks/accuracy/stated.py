@@ -10,7 +10,8 @@ from transientcam_driver import open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.measuring import spec_of
 from transientcam_server.imaging.accuracy import range_accuracy
-from transientcam_server.imaging.noise import range_noise, typical_deviation
+from transientcam_server.imaging.deviation import typical_deviation
+from transientcam_server.imaging.noise import range_noise
 
 SCENES = ("wall", "corner", "mirrors")
 FRAMES = 40

@@ -31,10 +31,10 @@ class PixelCounts(TypedDict):
 
 
 class PredictedStd(TypedDict):
-    """Standard deviation of a frame's range in m, by the sensor's noise.
+    """Standard deviation of a frame's range in m between frames, by the sensor's noise.
 
-    By the likelihood, errors of calibration of 0.4 % of the light are in it, too, which frames
-    repeat: they scatter less (docs/accuracy.md). The product ``range_std`` is noise alone.
+    To first order, of the returns that the frame shows (docs/accuracy.md); the product
+    ``range_std`` draws the noise.
     """
 
     median: float

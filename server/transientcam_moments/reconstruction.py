@@ -27,6 +27,7 @@ from transientcam_moments.likelihood.pairs import fitted_pairs
 from transientcam_moments.maximum_entropy import density
 from transientcam_moments.merging import merge_returns
 from transientcam_moments.noise.moments import MomentNoise, moment_noise, smoothed_of
+from transientcam_moments.noise.scatter import scatter
 from transientcam_moments.peaks import Peaks, peaks
 from transientcam_moments.pisarenko import (
     Returns,
@@ -348,7 +349,7 @@ class Reconstruction:
         """Standard deviation in m of the range of `estimate`; NaN where there is none.
 
         With the noise of a sensor, errors of calibration (`MODEL_ERROR`) are in it, too: frames
-        scatter less.
+        scatter less, by `range_scatter_m`.
         """
         xp = namespace(self.smoothed)
         estimate = self.estimate
@@ -358,6 +359,29 @@ class Reconstruction:
             std = estimate.direct_phase_std_rad(self.settings.threshold)
         found = range_m(std, self._base_frequency_hz)
         return xp.where(self.has_range, found, np.nan).astype(std.dtype)
+
+    def range_scatter_m(self, pixels: Array | slice = slice(None)) -> Array:
+        """Return the standard deviation in m of that range between frames: `range_std_m` by noise.
+
+        Parameters
+        ----------
+        pixels
+            Which of the flat pixels, all by default.
+
+        Returns
+        -------
+        array, shape (P)
+            To first order, as `tm.noise.scatter` has it; NaN where there is no range.
+        """
+        moments, noise, harmonics, error = self._evidence
+        std = self.range_std_m.reshape(-1)[pixels]
+        if noise is None or not error:
+            return std
+        multiples = range(len(moments)) if harmonics is None else harmonics
+        flat = moments.reshape((len(moments), -1))[:, pixels]
+        variance = namespace(flat).broadcast_to(noise.variance, moments.shape)
+        of_them = MomentNoise(variance.reshape((len(moments), -1))[:, pixels])
+        return (std * scatter(flat, of_them, multiples, error)).astype(std.dtype)
 
     @cached_property
     def _separation(self) -> Separation:

@@ -26,6 +26,7 @@ from transientcam_moments.noise.moments import (
     smoothing_factor,
 )
 from transientcam_moments.noise.returns import ReturnNoise, return_noise
+from transientcam_moments.noise.scatter import scatter
 from transientcam_moments.noise.sensor import Sensor
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "moment_noise",
     "own_share",
     "return_noise",
+    "scatter",
     "smoothed",
     "smoothed_at",
     "smoothed_of",

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_moments.settings import least_harmonics
-from transientcam_server.imaging.noise import moment_noise, typical_deviation
+from transientcam_server.imaging.deviation import typical_deviation
+from transientcam_server.imaging.noise import moment_noise
 from transientcam_server.imaging.ranging import ranges_m
 from transientcam_server.imaging.recipe import Recipe
 
@@ -143,7 +144,8 @@ def _around(plane: _Array, has_range: _Array, every_px: int) -> _Array:
 
 def _of_gaps(found: tm.Reconstruction) -> RangeAccuracy:
     """Return what an estimate of any multiples says of itself; nothing disagrees with it."""
-    std_m = np.asarray(found.range_std_m, dtype=np.float32)
+    shape = np.shape(found.range_m)
+    std_m = np.asarray(found.range_scatter_m(), dtype=np.float32).reshape(shape)
     return RangeAccuracy(std_m, np.full_like(std_m, np.nan), None)
 
 

@@ -1,6 +1,5 @@
 """The noise of frames: of their moments and of their range, and what it does not explain."""
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -16,9 +15,9 @@ from transientcam_server.imaging.recipe import Recipe
 
 _Array = NDArray[Any]
 SAMPLED_PIXELS: Final = 256
-"""Pixels of each frame whose deviation is predicted."""
-MEDIAN_OF_NORMAL: Final = 0.674490
-"""Median of the absolute value of a standard normal variable."""
+"""Pixels of each frame whose deviation is predicted by Pisarenko's returns."""
+FITTED_PIXELS: Final = 1 << 14
+"""And whose deviation is taken from an estimate that has it of all of them."""
 EXPLAINED_DEVIATIONS: Final = 4.0
 """Standard deviations of a negative eigenvalue that noise explains."""
 _UNLIT: Final = np.uint8(tm.Flags.NO_SIGNAL | tm.Flags.NON_FINITE | tm.Flags.SATURATED)
@@ -29,10 +28,9 @@ _FEW: Final = 1 / 16
 
 @dataclass(frozen=True, slots=True)
 class RangeNoise:
-    """Predicted standard deviation of a frame's range.
+    """Predicted standard deviation of a frame's range between frames, by noise alone.
 
-    By the likelihood, errors of calibration are in it, which frames repeat; `range_accuracy` has
-    noise alone.
+    To first order, of the returns that the frame shows; `range_accuracy` draws noise.
 
     Attributes
     ----------
@@ -66,32 +64,18 @@ def moment_noise(recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoi
     )
 
 
-def typical_deviation(values: _Array) -> _Array:
-    """Return the deviation (P) between captures (D, P), which outliers do not blow up.
-
-    It is the typical difference of two captures, as the deviation of the normal variable that has
-    the same (decision 0521); NaN where there are not two.
-    """
-    first, second = np.triu_indices(len(values), 1)
-    apart = np.abs(values[first] - values[second])
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of pixels without two
-        deviation: _Array = np.nanmedian(apart, axis=0) / (np.sqrt(2) * MEDIAN_OF_NORMAL)
-    return deviation
-
-
 def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
     """Predict the deviation of a frame's range from its own returns.
 
-    None where no pixel has a range. That of `OF_ANY_MULTIPLES` is the estimate's own, of all
-    pixels; of another estimator it is that of Pisarenko's returns in a sample of pixels, which is
-    cheap enough for every frame.
+    None where no pixel has a range. That of `OF_ANY_MULTIPLES` is the estimate's own; of another
+    estimator it is that of Pisarenko's returns in a sample of pixels, which is cheap enough for
+    every frame.
     """
     has_range = np.asarray(found.has_range)  # compared anew whenever it is read
     if not has_range.any():
         return None
     if recipe.technique in OF_ANY_MULTIPLES:
-        std_m = np.asarray(found.range_std_m)
+        std_m = np.asarray(found.range_scatter_m(_sample(has_range.ravel(), FITTED_PIXELS)))
         first_order = np.asarray(found.estimate.explained())[has_range]
     else:
         std_m, first_order = _of_pisarenko(recipe, found, has_range)
@@ -128,10 +112,10 @@ def _of_pisarenko(
     return np.asarray(tm.range_m(std_rad, recipe.base_frequency_hz)), np.asarray(holds)
 
 
-def _sample(seen: _Array) -> _Array:
-    """Return the places of about `SAMPLED_PIXELS` of the pixels that are seen, evenly."""
+def _sample(seen: _Array, pixels: int = SAMPLED_PIXELS) -> _Array:
+    """Return the places of at least so many of the pixels that are seen, if there are, evenly."""
     count = int(np.count_nonzero(seen))
-    step = max(1, count // SAMPLED_PIXELS)
+    step = max(1, count // pixels)
     return np.arange(0, count, step) if count == seen.size else np.flatnonzero(seen)[::step]
 
 

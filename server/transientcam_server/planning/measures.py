@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_server.imaging.accuracy import OUTLIER_DEVIATIONS
-from transientcam_server.imaging.noise import typical_deviation
+from transientcam_server.imaging.deviation import typical_deviation
 
 _Array = NDArray[Any]
 _LEAST_ERROR_M: Final = 1e-6

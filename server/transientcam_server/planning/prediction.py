@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import Sequence
-from transientcam_server.imaging.noise import MEDIAN_OF_NORMAL
+from transientcam_server.imaging.deviation import MEDIAN_OF_NORMAL
 from transientcam_server.imaging.ranging import ranges_m
 from transientcam_server.planning.estimation import MOST_HARMONICS
 from transientcam_server.planning.intervals import (

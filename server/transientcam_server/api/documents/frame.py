@@ -22,10 +22,9 @@ class PixelCountsDocument(Document):
 
 
 class PredictedStdDocument(Document):
-    """Standard deviation of a frame's range in m, by the noise of the sensor.
+    """Standard deviation of a frame's range in m between frames, by the noise of the sensor.
 
-    By the likelihood, errors of calibration of 0.4 % of the light are in it, too, which frames
-    repeat; `range_std` of `accuracy` is noise alone.
+    To first order, of the returns that the frame shows; `range_std` of `accuracy` draws the noise.
     """
 
     median: float
