@@ -29,6 +29,21 @@ def test_true_cumulative_light_steps_up_at_each_return() -> None:
     np.testing.assert_allclose(share[:, 0], [0, 0, 0.75, 0.75, 1, 1])
 
 
+def test_a_pixel_with_hardly_any_light_is_not_compared() -> None:
+    brightness = np.array([[100.0, 80.0, 2.0], [0.5, 0.0, 120.0]])
+    responses = SparseResponses(np.full((1, 2, 3), 10e-9), brightness[None])
+    truth = Truth(*responses.returns(), "sparse", responses.of_pixel, 1.0)
+
+    sample = sample_pixels(truth, pixels=10, seed=0)
+
+    assert set(zip(sample.y.tolist(), sample.x.tolist(), strict=True)) == {
+        (0, 0),
+        (0, 1),
+        (0, 2),
+        (1, 2),
+    }
+
+
 def test_returns_are_counted_from_a_share_of_the_strongest() -> None:
     weight = np.array([[1.0, 0.0, 0.05], [0.2, 0.0, 1.0], [0.05, 0.0, 0.2]])
 
