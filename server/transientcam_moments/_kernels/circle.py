@@ -54,10 +54,10 @@ def circle_roots(
         wr[k], wi[k] = c * turns[k] - s * turns[m + k], c * turns[m + k] + s * turns[k]
     near = simd.nearly(middle)
     moving = middle == middle
-    for _ in range(steps):
+    for step in range(steps):
         for i in range(m):
             move[i] = middle * 0.0
-        for i in range(m):
+        for i in range(m if step > 0 else 0):  # equidistant at first: the sums are 0
             for k in range(i):
                 cosine = wr[i] * wr[k] + wi[i] * wi[k]
                 sine = wi[i] * wr[k] - wr[i] * wi[k]

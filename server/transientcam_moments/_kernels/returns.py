@@ -56,7 +56,7 @@ def singular(
     fewer = error < error
     for k in range(1, m + 1):
         inverse[k - 1] = 1.0 / error
-        x, y = toeplitz.reflect(k, re, im, ar, ai, error)
+        x, y = toeplitz.reflect(k, re, im, ar, ai, inverse[k - 1])
         if k < m:
             error = error * toeplitz.below_one(x, y)
             fewer = fewer | ~(error > floor)
@@ -88,8 +88,9 @@ def weigh(order: Any, gr: Any, gi: Any, inverse: Any, x: Any, y: Any) -> Any:
     a, b = gr[m - 1], gi[m - 1]
     er, ei = simd.select(a >= 0.0, 1.0 + a, -b), simd.select(a >= 0.0, -b, 1.0 - a)
     real, imag = er * tr + ei * ti, er * ti - ei * tr  # conj(eta) t, imaginary at a root
-    turn = -(real / imag) * (tr * tr + ti * ti) * inverse[m - 1] / total
-    return 1.0 / total, x - y * turn, y + x * turn
+    w = 1.0 / total
+    turn = -(real / imag) * (tr * tr + ti * ti) * inverse[m - 1] * w
+    return w, x - y * turn, y + x * turn
 
 
 @njit(nogil=True, error_model="numpy")
@@ -98,7 +99,7 @@ def _returns(
     turns: Any,
     b: Any,
     zeroth: Any,
-    apart: bool,
+    apart: int,
     uniform: Any,
     phase: Any,
     weight: Any,
@@ -183,7 +184,7 @@ def find_returns(
     turns: Any,
     b: Any,
     zeroth: Any,
-    apart: bool,
+    apart: int,
     uniform: Any,
     phase: Any,
     weight: Any,
