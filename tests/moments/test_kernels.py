@@ -91,7 +91,7 @@ def test_a_lane_is_compiled_where_nothing_can_be_written() -> None:
 
 def test_the_second_process_loads_what_the_first_compiled(tmp_path: Path) -> None:
     code = (
-        "from transientcam_moments._kernels.eigenvalue import _smallest_eigenvalue as kernel\n"
+        "from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue as kernel\n"
         "from transientcam_moments._kernels.compiler import compile_lane\n"
         "from transientcam_moments._lanes.registry import Key\n"
         "compile_lane(Key('smallest_eigenvalue', 1, 'f'))\n"

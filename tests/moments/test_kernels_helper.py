@@ -40,7 +40,7 @@ def test_a_lane_is_compiled_by_another_process_and_loaded_by_this_one(tmp_path: 
         "tm.smallest_eigenvalue(np.ones((2, 4096), np.complex64))\n"
         "import threading\n"
         "[each.join() for each in threading.enumerate() if each.name == tm.kernels.THREAD]\n"
-        "from transientcam_moments._kernels.eigenvalue import _smallest_eigenvalue as kernel\n"
+        "from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue as kernel\n"
         "print(tm.kernels.state()['compiled'], sum(kernel.stats.cache_hits.values()))\n"
     )
 

@@ -21,9 +21,7 @@ _INTERLEAVE = 4
 
 
 @njit(nogil=True, error_model="numpy")
-def _smallest_eigenvalue(
-    order: Any, b: Any, without: bool, out: Any, start: int, stop: int
-) -> None:
+def smallest_eigenvalue(order: Any, b: Any, without: bool, out: Any, start: int, stop: int) -> None:
     """Write the smallest eigenvalues of the pixels start..stop, with or ``without`` b_0."""
     one = simd.ones(out, _INTERLEAVE)
     step = simd.width(one)
@@ -42,7 +40,7 @@ def _smallest_eigenvalue(
 def eigenvalue_entry(m: int, precision: str) -> Callable[..., Any]:
     """Compile the kernel of order m."""
     real, cplx = real_arrays(precision), complex_arrays(precision)
-    return entry(_smallest_eigenvalue, order_type(m), cplx[2], PIXELS, real[1], PIXELS, PIXELS)
+    return entry(smallest_eigenvalue, order_type(m), cplx[2], PIXELS, real[1], PIXELS, PIXELS)
 
 
 def smallest_eigenvalue_lane(m: int, precision: str) -> Callable[..., Any]:

@@ -40,6 +40,18 @@ def smooth_entry() -> Callable[..., Any]:
     return entry(inputs.smooth, planes, plane, plane, plane, planes, PIXELS, PIXELS, PIXELS)
 
 
+def measure_and_smooth_entry(m: int) -> Callable[..., Any]:
+    """Compile the kernel of order m."""
+    measure_entry(m)  # which are linked
+    smooth_entry()
+    plane, planes = _REAL[1], _REAL[2]
+    return entry(
+        inputs.measure_and_smooth,
+        order_type(m), IMAGES, PIXELS, _COMPLEX[2], PIXELS, REAL, _COMPLEX[2], BYTES,
+        plane, plane, plane, planes, planes, PIXELS, PIXELS, PIXELS,
+    )  # fmt: skip
+
+
 def separate_entry(m: int) -> Callable[..., Any]:
     """Compile the kernel of order m."""
     plane, planes = _REAL[1], _REAL[2]

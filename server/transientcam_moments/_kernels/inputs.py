@@ -7,6 +7,7 @@ from numba import njit
 from transientcam_moments._kernels import simd
 
 LOW_FREQUENCY, ON_OFF, ESTIMATED = 0, 1, 2
+_ROWS = 8  # that are smoothed before they leave the caches
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -97,3 +98,29 @@ def smooth(
                 p = y * length + x
                 simd.store(smoothed, p, total * simd.load(one, weight, p))
     return not simd.some(~(poison >= 0.0))
+
+
+@njit(nogil=True, error_model="numpy")
+def measure_and_smooth(
+    order: Any, images: Any, zeroth: int, inverse: Any, stride: int, full_scale: float,
+    moments: Any, flags: Any, taps: Any, weight: Any, rows: Any, planes: Any, out: Any, width: int,
+    start: int, stop: int,
+) -> None:  # fmt: skip
+    """Write the smoothed moments of rows, each few of them as soon as they are measured.
+
+    ``moments`` (m + 1, H W) are what `measure` writes and ``planes`` the same memory, as `smooth`
+    reads it. The rows beside start..stop are measured, too: threads whose parts lie beside each
+    other write the same there.
+    """
+    radius = taps.shape[0] // 2
+    height = weight.shape[0] // (2 * width)
+    measured = max(0, start - radius)
+    for top in range(start, stop, _ROWS):
+        bottom = min(stop, top + _ROWS)
+        needed = min(height, bottom + radius)
+        measure(
+            order, images, zeroth, inverse, stride, full_scale, moments, flags, measured * width,
+            needed * width,
+        )  # fmt: skip
+        smooth(planes, taps, weight, rows, out, width, top, bottom)
+        measured = needed

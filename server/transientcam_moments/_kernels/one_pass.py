@@ -12,15 +12,15 @@ import numpy as np
 from transientcam_moments._kernels.padding import normalisation, row_length
 from transientcam_moments._kernels.pool import empty
 from transientcam_moments._kernels.refine import Found
-from transientcam_moments._lanes.parallel import BLOCK, Spread, blocks
+from transientcam_moments._lanes.parallel import BLOCK, Spread
 from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 if TYPE_CHECKING:  # it brings along the compiler
     from transientcam_moments._kernels.wide import WideReturns
 
 _ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
-_ROOM = 1024  # pixels that are redone in double precision at a time
-_ROWS = 64  # that are smoothed before they leave the caches; fewer are more calls
+_ROOM = 2048  # pixels that are redone in double precision at a time
+_ROWS = 64  # of a part at least: each measures some rows beside its own
 _EPS = float(np.finfo(np.float32).eps)
 _SATURATED, _REPLACED = 4, 32  # transientcam_moments.Flags
 
@@ -32,9 +32,8 @@ class Stages(NamedTuple):
     turns: Any
     measure: Callable[..., Any]
     smooth: Callable[..., Any]
-    eigenvalue: Callable[..., Any]
-    flag_and_bias: Callable[..., Any]
-    returns: Callable[..., Any]
+    measure_and_smooth: Callable[..., Any]
+    analyse: Callable[..., Any]
     steps: int
     separate: Callable[..., Any]
     wide: "WideReturns"
@@ -174,19 +173,14 @@ class OnePass:
     def _measure_and_smooth(
         self, raw: Any, smoothed: Any, scratch: "_Scratch", start: int, stop: int
     ) -> None:
-        """Write the smoothed moments of rows, each few of them as soon as they are measured.
-
-        The rows beside a part are measured by both of its threads, which write the same.
-        """
-        height, width = self._shape
-        radius = self._radius
-        measured = max(0, start - radius)
-        for top in range(start, stop, _ROWS):
-            bottom = min(stop, top + _ROWS)
-            needed = min(height, bottom + radius)
-            self._measure(raw, scratch.calibrated, scratch, measured * width, needed * width)
-            self._smooth(smoothed, scratch, top, bottom)
-            measured = needed
+        """Write the smoothed moments of rows."""
+        settings = self._constants.settings
+        self._stages.measure_and_smooth(
+            self._stages.order, raw, _ZEROTH[settings.zeroth], self._inverse, self._stride,
+            settings.full_scale, scratch.calibrated, scratch.saturated, self._taps, self._weight,
+            scratch.row(start), scratch.calibrated.view(np.float32), smoothed.view(np.float32),
+            self._shape[1], start, stop,
+        )  # fmt: skip
 
     def moments(self, smoothed: Any, saturated: Any, spread: Spread) -> Planes:
         """Reconstruct calibrated and smoothed moments (m + 1, ...), complex64.
@@ -209,29 +203,20 @@ class OnePass:
         redone: list[int] = []
 
         def analyse(start: int, stop: int) -> None:
+            s.analyse(
+                s.order, s.turns, int(self._estimated), smoothed, scratch.saturated,
+                scratch.eigenvalue, planes.brightness, planes.uniform, planes.validity,
+                planes.flags, settings.epsilon, settings.minimum_brightness, planes.phase_rad,
+                planes.weight, planes.count, scratch.residual, _EPS, s.steps, start, stop,
+            )  # fmt: skip
             room = scratch.take_wide()
-            for left, right in blocks(start, stop):
-                s.eigenvalue(
-                    s.order, smoothed, int(self._estimated), scratch.eigenvalue, left, right
-                )
-                s.flag_and_bias(
-                    s.order, int(self._estimated), smoothed, scratch.saturated, scratch.eigenvalue,
-                    planes.brightness, planes.uniform, planes.validity, planes.flags,
-                    settings.epsilon, settings.minimum_brightness, left, right,
-                )  # fmt: skip
-                s.returns(
-                    s.order, s.turns, smoothed, planes.brightness, 1, planes.uniform,
-                    planes.phase_rad, planes.weight, planes.count, scratch.residual, _EPS,
-                    s.steps, left, right,
-                )  # fmt: skip
-                # by blocks, so that the same pixels are redone together for any number of parts
-                redone.append(s.wide(smoothed, planes.brightness, found, room, left, right))
-                s.separate(
-                    s.order, planes.phase_rad, planes.weight, planes.flags, planes.direct,
-                    planes.indirect, planes.range_m, settings.threshold, constants.range_per_rad_m,
-                    left, right,
-                )  # fmt: skip
+            redone.append(s.wide(smoothed, planes.brightness, found, room, start, stop))
             scratch.give_wide(room)
+            s.separate(
+                s.order, planes.phase_rad, planes.weight, planes.flags, planes.direct,
+                planes.indirect, planes.range_m, settings.threshold, constants.range_per_rad_m,
+                start, stop,
+            )  # fmt: skip
 
         spread(analyse, self._pixels, BLOCK)
         if constants.bad is not None:
@@ -277,7 +262,6 @@ class OnePass:
         """
         taps = self._constants.taps
         self._taps = None if taps is None else taps.astype(np.float32)
-        self._radius = 0 if taps is None else taps.size // 2
         self._stride = 0 if inverse.ndim == 1 else 1
         length = self._pixels if self._stride else LEAST_PIXELS
         planes = inverse.reshape((len(inverse), -1)).astype(np.complex64)
