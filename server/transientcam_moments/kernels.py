@@ -74,6 +74,7 @@ LANES = (
     "pairs",
     "harmonics",
     "covariance",
+    "direct_noise",
 )
 WHEN_NEEDED = ("likelihood", "pairs", "harmonics")
 """Those that `compile_in_background` leaves out, but for one of them of its first order."""

@@ -1,5 +1,7 @@
 """Smoothing moment images over neighbouring pixels (Sec. 6)."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from transientcam_moments._arrays import Array, as_array, in_range, namespace, real_type
@@ -55,13 +57,19 @@ def _smooth(moments: Array, taps: Array) -> Array:
     return xp.where(present, smoothed * inverse, moments).astype(moments.dtype)
 
 
+@lru_cache(maxsize=64)
 def gaussian_taps(sigma_px: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Return the weights along one axis, shape (2 R + 1,), R = ceil(4 sigma_px), of sum 1."""
-    if sigma_px == 0:
-        return np.ones(1)
-    radius = int(np.ceil(4 * sigma_px))
-    taps = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma_px) ** 2)
-    return np.asarray(taps / taps.sum())
+    """Return the weights along one axis, shape (2 R + 1,), R = ceil(4 sigma_px), of sum 1.
+
+    They cannot be written to: all calls share them.
+    """
+    taps = np.ones(1)
+    if sigma_px > 0:
+        radius = int(np.ceil(4 * sigma_px))
+        taps = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma_px) ** 2)
+        taps /= taps.sum()
+    taps.flags.writeable = False
+    return taps
 
 
 def _blur(images: Array, taps: np.ndarray[tuple[int], np.dtype[np.float64]]) -> Array:

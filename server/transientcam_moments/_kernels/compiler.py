@@ -10,6 +10,7 @@ from numba.core import event
 from transientcam_moments._kernels.cache import cache_directory, digest_of_sources
 from transientcam_moments._kernels.covariance import covariance_lane
 from transientcam_moments._kernels.density import density_lane
+from transientcam_moments._kernels.direct_noise import direct_noise_lane
 from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue_lane
 from transientcam_moments._kernels.frames import measure_lane, separate_lane, smooth_lane
 from transientcam_moments._kernels.harmonics import harmonics_lane
@@ -33,6 +34,7 @@ LANES: dict[str, Callable[[int, str], Lane]] = {
     "pairs": pairs_lane,
     "harmonics": harmonics_lane,
     "covariance": covariance_lane,
+    "direct_noise": direct_noise_lane,
 }
 
 

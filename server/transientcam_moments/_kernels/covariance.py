@@ -12,7 +12,7 @@ from transientcam_moments._lanes.parallel import Spread, at_once
 
 
 @njit(nogil=True, error_model="numpy")
-def _covariance(
+def covariance(
     order: Any, both: Any, basis: Any, turned: Any, variance: Any, out: Any, start: int, stop: int
 ) -> None:
     """Write (4 m^2, P) of the pixels start..stop; ``both`` is a tuple of length 2m.
@@ -80,27 +80,38 @@ def _covariance(
                 simd.store(out[2 * m * column + row], p, total)
 
 
-def covariance_lane(m: int, precision: str) -> Callable[..., Any]:
-    """Compile the covariance of order m; see the table in ``_kernels``."""
-    order, both = (0,) * m, (0,) * (2 * m)
-    planes = real_arrays(precision)[2]
-    run = entry(
-        _covariance,
+def covariance_entry(m: int) -> Callable[..., Any]:
+    """Compile the kernel of order m, in double precision."""
+    planes = real_arrays("d")[2]
+    return entry(
+        covariance,
         order_type(m), order_type(2 * m), planes, planes, planes, planes, PIXELS, PIXELS,
     )  # fmt: skip
+
+
+def interpolation(m: int) -> Any:
+    """Return the ``basis`` of the kernel of order m."""
     node = 2 * np.pi / (2 * m + 1) * np.arange(2 * m + 1)
     harmonic = np.outer(node, np.arange(1, m + 1))
     polynomial = np.concatenate(
         [np.full((2 * m + 1, 1), 0.5), np.cos(harmonic), np.sin(harmonic)], 1
     )
-    basis = np.column_stack([polynomial * (2 / len(node)), np.cos(node), np.sin(node)])
+    return np.column_stack([polynomial * (2 / len(node)), np.cos(node), np.sin(node)])
+
+
+def half_turned(phase: Any) -> Any:
+    """Return cos and sin (2m, P) of half the phases (m, P)."""
+    half = 0.5 * phase
+    return np.concatenate([np.cos(half), np.sin(half)])
+
+
+def covariance_lane(m: int, precision: str) -> Callable[..., Any]:
+    """Compile the covariance of order m; see the table in ``_kernels``."""
+    order, both = (0,) * m, (0,) * (2 * m)
+    run, basis = covariance_entry(m), interpolation(m)
 
     def lane(phase: Any, variance: Any, *, spread: Spread = at_once) -> Any:
-        half = 0.5 * phase
-        turned, planes = (
-            np.concatenate([np.cos(half), np.sin(half)]),
-            np.ascontiguousarray(variance),
-        )
+        turned, planes = half_turned(phase), np.ascontiguousarray(variance)
         out = np.empty((4 * m * m, phase.shape[1]))
         spread(
             lambda start, stop: run(order, both, basis, turned, planes, out, start, stop),

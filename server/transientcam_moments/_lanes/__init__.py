@@ -20,6 +20,10 @@ The lanes and their signatures, each that of the planar statement it stands besi
 
 ``covariance(phase (m, P), variance (m, P)) -> (2m, 2m, P)``, of returns, in double precision
 
+``direct_noise(phase (m, P), weight (m, P), variance (m, P), threshold, clear, coincide_rad) ->
+deviation of the direct phase, whether first order holds, whether all m returns are there (P)``, in
+double precision; the first two say nothing where they are not
+
 For whole frames in single precision:
 
 ``measure(images (N, ...) uint16, zeroth) -> moments (m+1, ...)``
@@ -125,9 +129,9 @@ def find(name: str, planes: object) -> Callable[..., Any] | None:
     return None if precision is None else _of(name, len(planes) - 1, planes[0].size, precision)
 
 
-def lookup(name: str, m: int, pixels: int) -> Callable[..., Any] | None:
-    """Return a lane of order m for so many pixels in single precision, or None, as `find` does."""
-    return _of(name, m, pixels, "f")
+def lookup(name: str, m: int, pixels: int, precision: str = "f") -> Callable[..., Any] | None:
+    """Return a lane of order m for so many pixels in a precision, or None, as `find` does."""
+    return _of(name, m, pixels, precision)
 
 
 def _of(name: str, m: int, pixels: int, precision: str) -> Callable[..., Any] | None:

@@ -21,13 +21,14 @@ _SINGLE_ONLY: Final = (
     "pairs",
     "harmonics",
 )
-_DOUBLE_ONLY: Final = ("covariance",)
+_DOUBLE_ONLY: Final = ("covariance", "direct_noise")
 _FEW_ROOTS: Final = (
     "pisarenko",
     "smallest_eigenvalue",
     "reconstruct",
     "likelihood",
     "covariance",
+    "direct_noise",
 )
 _log = logging.getLogger("transientcam_moments")
 

@@ -10,7 +10,7 @@ from transientcam_moments.errors import ShapeError
 from transientcam_moments.noise.interpolation import determined_covariance
 from transientcam_moments.noise.moments import MomentNoise
 
-_COINCIDE_RAD = 1e-5
+COINCIDE_RAD = 1e-5
 """Returns closer than that cannot be resolved in double precision: the bound is infinite."""
 
 
@@ -73,11 +73,11 @@ def cramer_rao(phase_rad: Array, weight: Array, noise: MomentNoise) -> CramerRao
     weight = xp.asarray(weight, dtype=float).reshape((count, -1))
     variance = xp.asarray(noise.variance, dtype=float).reshape((m + 1, -1))[1:]
     used = (weight > 0) & xp.isfinite(phase)
-    clear = _apart(xp.where(used, phase, np.nan)) > _COINCIDE_RAD
+    clear = _apart(xp.where(used, phase, np.nan)) > COINCIDE_RAD
     usable = used & clear
     with np.errstate(all="ignore"):
         covariance = _covariance(xp.where(usable, phase, 0), usable, variance)
-        each = xp.sqrt(xp.stack([covariance[k, k] for k in range(2 * count)]))
+        each = xp.sqrt(covariance.reshape((4 * count * count, -1))[:: 2 * count + 1])
         lost = xp.where(used, np.inf, np.nan)
         weight_std = xp.where(usable, each[:count], lost)
         phase_std = xp.where(usable, each[count:] / xp.where(usable, weight, 1), lost)

@@ -303,23 +303,25 @@ def smoothed_at(
     taps = gaussian_taps(sigma_px / math.sqrt(2))
     radius = len(taps) // 2
     shift = np.arange(-radius, radius + 1)
-    rows, columns = (row[:, None] + shift)[:, :, None], (column[:, None] + shift)[:, None, :]
-    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-    places = rows.clip(0, height - 1), columns.clip(0, width - 1)
-    present = inside & np.isfinite(brightness[places])
+    rows, columns = row[:, None] + shift, column[:, None] + shift
+    inside = ((rows >= 0) & (rows < height))[:, :, None]
+    inside = inside & ((columns >= 0) & (columns < width))[:, None, :]
+    places = rows.clip(0, height - 1)[:, :, None], columns.clip(0, width - 1)[:, None, :]
     weight = np.outer(taps, taps).reshape(-1)
+    near = brightness[places]
+    present = inside & np.isfinite(near)
     share = present.reshape((-1, weight.size)) @ weight
 
-    def around(light: Array) -> Array:
-        """Return the mean of a pixel and its neighbours."""
-        near = np.where(present, np.maximum(light[places], 0), 0)
+    def around(near: Array) -> Array:
+        """Return the mean of a pixel and its neighbours (S, 2 R + 1, 2 R + 1)."""
+        light = np.where(present, np.maximum(near, 0), 0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            mean = near.reshape((-1, weight.size)) @ weight / share
+            mean = light.reshape((-1, weight.size)) @ weight / share
         # a pixel that is not finite stays as it is
         return np.where(present[:, radius, radius], mean, np.nan)
 
-    other = None if ambient is None else around(np.asarray(ambient))
-    variance = _of_light(noise_of, around(brightness), other).variance
+    other = None if ambient is None else around(np.asarray(ambient)[places])
+    variance = _of_light(noise_of, around(near), other).variance
     left = _factors(sigma_px, height)[row] * _factors(sigma_px, width)[column]
     return MomentNoise((variance * left).astype(variance.dtype))
 

@@ -1,12 +1,14 @@
 """First-order noise of Pisarenko's returns, and of what is derived from them."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from transientcam_moments._arrays import Array, in_range, namespace
+from transientcam_moments._lanes import lookup
 from transientcam_moments._shown import summary
-from transientcam_moments.noise.cramer_rao import CramerRao, cramer_rao
+from transientcam_moments.noise.cramer_rao import COINCIDE_RAD, CramerRao, cramer_rao
 from transientcam_moments.noise.moments import MomentNoise
 from transientcam_moments.pisarenko import DIRECT_THRESHOLD, Returns
 
@@ -104,6 +106,33 @@ def direct_phase_noise(
 ) -> tuple[Array, Array]:
     """Return `direct_phase_std_rad` and `holds` of `return_noise` alone, in less time."""
     in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
+    count, pixels = returns.phase_rad.shape[0], returns.phase_rad.shape[1:]
+    lane = None
+    if isinstance(returns.phase_rad, np.ndarray) and count == noise.variance.shape[0] - 1:
+        lane = lookup("direct_noise", count, math.prod(pixels), "d")
+    if lane is None:
+        return _planar_direct_phase_noise(returns, noise, threshold)
+    phase, weight, variance = (
+        np.asarray(planes, float).reshape((count, -1))
+        for planes in (returns.phase_rad, returns.weight, noise.variance[1:])
+    )
+    std_rad, holds, whole = lane(phase, weight, variance, threshold, CLEAR, COINCIDE_RAD)
+    if not whole.all():
+        others = ~whole
+        some = Returns(
+            phase[:, others],
+            weight[:, others],
+            np.asarray(returns.uniform).reshape(-1)[others],
+            np.asarray(returns.count).reshape(-1)[others],
+        )
+        of_some = MomentNoise(noise.variance.reshape((count + 1, -1))[:, others])
+        std_rad[others], holds[others] = _planar_direct_phase_noise(some, of_some, threshold)
+    return std_rad.reshape(pixels), holds.reshape(pixels)
+
+
+def _planar_direct_phase_noise(
+    returns: Returns, noise: MomentNoise, threshold: float
+) -> tuple[Array, Array]:
     bound = cramer_rao(returns.phase_rad, returns.weight, noise)
     used = returns.weight > 0
     first = _first(returns, used, threshold)
