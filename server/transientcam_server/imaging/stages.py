@@ -115,8 +115,12 @@ def _read(found: tm.Reconstruction, stage: str) -> None:
 def pixel_counts(found: tm.Reconstruction) -> dict[str, int]:
     """Return how many pixels carry each flag."""
     flags = np.asarray(found.flags)
+    there = np.bitwise_or.reduce(flags, axis=None)  # of most flags there are none
     counts = {"total": flags.size, "valid": flags.size - int(np.count_nonzero(flags))}
-    return counts | {name: int(np.count_nonzero(flags & bit)) for name, bit in _BITS.items()}
+    return counts | {
+        name: int(np.count_nonzero(flags & bit)) if there & bit else 0
+        for name, bit in _BITS.items()
+    }
 
 
 def _ambient_dn(recipe: Recipe, found: tm.Reconstruction) -> float | None:
