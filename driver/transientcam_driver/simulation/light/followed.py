@@ -1,7 +1,9 @@
 """Rays of a camera into a scene that stands still, each followed once whatever sequence asks."""
 
 import threading
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,31 @@ from transientcam_driver.simulation.light.exchange import Exchange
 from transientcam_driver.simulation.light.paths import Lit, light_rays
 from transientcam_driver.simulation.light.rays import RAYS, camera_rays, rays_within
 from transientcam_driver.simulation.scene.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Within:
+    """The light of several rays in each of some pixels.
+
+    Attributes
+    ----------
+    pixel
+        (P) by index, rising.
+    rays
+        For each place in a pixel, all pixels.
+    """
+
+    pixel: NDArray[np.intp]
+    rays: Lit
+
+    def of_pixels(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return what belongs to the rays (..., R P) by place and pixel (..., R, P)."""
+        return values.reshape((*values.shape[:-1], -1, self.pixel.size))
+
+    def part(self, place: NDArray[np.intp]) -> "Within":
+        """Return the rays in some of the pixels, by their places among these."""
+        rays = np.arange(0, len(self.rays.surface), self.pixel.size)[:, None] + place
+        return Within(self.pixel[place], self.rays.part(rays.ravel()))
 
 
 class FollowedRays:
@@ -31,8 +58,7 @@ class FollowedRays:
         self._camera = scene.camera
         self.centres = camera_rays(self._camera, width=width, height=height)
         self._adding = threading.Lock()
-        self._pixel = np.zeros(0, dtype=np.intp)
-        self._within: Lit | None = None
+        self._kept: dict[int, Within] = {}
 
     @cached_property
     def lit(self) -> Lit:
@@ -44,42 +70,37 @@ class FollowedRays:
         """Light that surfaces give each other."""
         return Exchange.of(self.scene, self.scene.transport.patches)
 
-    def within(self, pixel: NDArray[np.intp], count: int = RAYS) -> Lit:
-        """Return the light of several rays in each pixel: for each place, all pixels.
+    def within(self, pixel: NDArray[np.intp], count: int = RAYS) -> Within:
+        """Return the light of several rays in each pixel.
 
         Parameters
         ----------
         pixel
             (P) by index, rising, none twice; at least one.
         count
-            Of rays in each pixel; the same in all calls.
+            Of rays in each pixel.
         """
         with self._adding:
-            more = np.setdiff1d(pixel, self._pixel, assume_unique=True)
+            kept = self._kept.get(count)
+            more = pixel
+            if kept is not None:
+                more = np.setdiff1d(pixel, kept.pixel, assume_unique=True)
             if more.size:
                 size = {"width": self.width, "height": self.height}
-                added = light_rays(self.scene, rays_within(self._camera, more, count, **size))
-                self._insert(more, added)
-            assert self._within is not None  # noqa: S101  (what was missing was added)
-            if pixel.size == self._pixel.size:
-                return self._within
-            return _of_pixels(self._within, np.searchsorted(self._pixel, pixel), self._pixel.size)
-
-    def _insert(self, pixel: NDArray[np.intp], added: Lit) -> None:
-        """Keep the light of more pixels, by rising index."""
-        if self._within is None:
-            self._pixel, self._within = pixel, added
-            return
-        order = np.argsort(np.concatenate([self._pixel, pixel]), kind="stable")
-        both = _side_by_side(self._within, self._pixel.size, added, pixel.size)
-        self._within = _of_pixels(both, order, order.size)
-        self._pixel = np.concatenate([self._pixel, pixel])[order]
+                rays = rays_within(self._camera, more, count, **size)
+                added = Within(more, light_rays(self.scene, rays))
+                kept = self._kept[count] = added if kept is None else _both(kept, added)
+            assert kept is not None  # noqa: S101  (what was missing was added)
+            if pixel.size == kept.pixel.size:
+                return kept
+            return kept.part(np.searchsorted(kept.pixel, pixel))
 
 
-def _of_pixels(lit: Lit, place: NDArray[np.intp], pixels: int) -> Lit:
-    """Return the rays in some of the pixels, by their places among so many."""
-    rays = np.arange(0, len(lit.surface), pixels)[:, None] + place
-    return lit.part(rays.ravel())
+def _both(one: Within, other: Within) -> Within:
+    """Join the rays in some pixels and those in others, by rising index."""
+    pixel = np.concatenate([one.pixel, other.pixel])
+    joined = _side_by_side(one.rays, one.pixel.size, other.rays, other.pixel.size)
+    return Within(pixel, joined).part(np.argsort(pixel, kind="stable"))
 
 
 def _side_by_side(one: Lit, pixels: int, other: Lit, more: int) -> Lit:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_driver.simulation.light.exchange import Exchange
+from transientcam_driver.simulation.light.followed import Within
 from transientcam_driver.simulation.light.patches import Patches
 from transientcam_driver.simulation.light.paths import Lit
 from transientcam_driver.simulation.responses import BIN_S, Responses
@@ -32,8 +33,8 @@ class Interreflection:
     ----------
     scene, lit
         A scene, and the light that the camera's rays see of it.
-    mixed
-        Pixels by index that are the mean over several rays, and the light of these.
+    fine
+        The light of several rays in each of the pixels that are the mean over these.
     tolerance
         Brightness that light may lack, where the scene does not say how far it is followed.
     exchange
@@ -47,19 +48,18 @@ class Interreflection:
         *,
         width: int,
         height: int,
-        mixed: tuple[NDArray[np.intp], Lit] | None = None,
+        fine: tuple[Within, ...] = (),
         tolerance: float = 1e-4,
         exchange: Exchange | None = None,
     ) -> None:
         self._scene = scene
         self._lit = lit
         self._shape = (height, width)
-        self._mixed = mixed
+        self._fine = fine
         self._exchange = exchange or Exchange.of(scene, scene.transport.patches)
         self._bounces = self._exchange.bounces(tolerance)
         self._places = self._between(self._exchange.patches, lit)
-        if mixed is not None:
-            self._mixed_places = self._between(self._exchange.patches, mixed[1])
+        self._places_of_fine = [self._between(self._exchange.patches, each.rays) for each in fine]
 
     @property
     def patches(self) -> int:
@@ -78,10 +78,9 @@ class Interreflection:
     def _moments(self, frequency_hz: float) -> NDArray[np.complex128]:
         irradiance = self._exchange.irradiance(frequency_hz, self._bounces)
         moments = self._gathered(irradiance, frequency_hz, self._lit, self._places)
-        if self._mixed is not None:
-            pixel, fine = self._mixed
-            of_rays = self._gathered(irradiance, frequency_hz, fine, self._mixed_places)
-            moments[pixel] = of_rays.reshape(-1, len(pixel)).mean(axis=0)
+        for each, places in zip(self._fine, self._places_of_fine, strict=True):
+            of_rays = self._gathered(irradiance, frequency_hz, each.rays, places)
+            moments[each.pixel] = each.of_pixels(of_rays).mean(axis=0)
         return moments.reshape(self._shape)
 
     def error(self, frequency_hz: float) -> float:

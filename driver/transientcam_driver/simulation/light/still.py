@@ -9,23 +9,23 @@ from numpy.typing import NDArray
 from transientcam_driver.simulation.effects.glimpses import Noise
 from transientcam_driver.simulation.light.bundle import Bundle, plane_of
 from transientcam_driver.simulation.light.coverage import Plane, covered, crossing
-from transientcam_driver.simulation.light.followed import FollowedRays
+from transientcam_driver.simulation.light.followed import FollowedRays, Within
 from transientcam_driver.simulation.light.paths import (
     FAR_M,
     ImageLight,
-    Lit,
     hit,
     image_lights,
     scatter_of,
     sparse_image,
 )
-from transientcam_driver.simulation.light.rays import RAYS, RAYS_AT_THIN, rays_within
+from transientcam_driver.simulation.light.rays import RAYS, RAYS_AT_EDGES, RAYS_AT_THIN, rays_within
 from transientcam_driver.simulation.light.thin import PIXELS, crossed, may_be_thin
 from transientcam_driver.simulation.responses import Moments, Scatter, SparseResponses
 from transientcam_driver.simulation.scene.geometry import Points
 from transientcam_driver.simulation.scene.scene import Scene
 
 _DIFFERS_ABOVE = 0.25  # of the noise
+_COUNTS_ABOVE = 0.5  # of the noise, what one ray more or less changes
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +81,7 @@ class StillLight:
             self.mixed = np.flatnonzero(self._differs(noise, highest_hz) | thin)
             if thin.any() and self._holds_thin():
                 self._rays_a_pixel = RAYS_AT_THIN
+        self._noise, self._highest_hz = noise, highest_hz
         self._phasors: dict[float, tuple[Moments, Moments]] = {}
 
     @property
@@ -97,15 +98,42 @@ class StillLight:
     def reflectance(self) -> NDArray[np.float32]:
         """(H W) of what the pixels see."""
         reflectance = self.lit.reflectance.astype(np.float32)
-        if self.mixed.size:
-            of_rays = self.fine.reflectance.reshape(-1, len(self.mixed))
-            reflectance[self.mixed] = of_rays.mean(axis=0)
+        for each in self.fine:
+            reflectance[each.pixel] = each.of_pixels(each.rays.reflectance).mean(axis=0)
         return reflectance
 
     @cached_property
-    def fine(self) -> Lit:
-        """Light of several rays in each of the pixels ``mixed``."""
-        return self._followed.within(self.mixed, self._rays_a_pixel)
+    def fine(self) -> tuple[Within, ...]:
+        """Light of several rays in each of the pixels ``mixed``; of most where an edge is sharp."""
+        if not self.mixed.size:
+            return ()
+        few = self._followed.within(self.mixed, self._rays_a_pixel)
+        unresolved = self._unresolved(few)
+        if not unresolved.any():
+            return (few,)
+        many = self._followed.within(self.mixed[unresolved], RAYS_AT_EDGES)
+        if unresolved.all():
+            return (many,)
+        return few.part(np.flatnonzero(~unresolved)), many
+
+    def _unresolved(self, few: Within) -> NDArray[np.bool_]:
+        """Pixels of which an edge cuts off so much light that one ray more or less counts.
+
+        The mean over rays of a lattice is wrong by some half a ray at a straight edge.
+        """
+        rays, counts = few.rays, self._rays_a_pixel
+        assert self._noise is not None  # noqa: S101  (or no pixel was mixed)
+        surface, ways = few.of_pixels(rays.surface), few.of_pixels(rays.weight > 0)
+        edge = (surface != surface[0]).any(axis=0) | (ways != ways[:, :1]).any(axis=(0, 1))
+        brightness = few.of_pixels(rays.weight.sum(axis=0)).mean(axis=0)
+        reflectance = few.of_pixels(rays.reflectance).mean(axis=0)
+        limit = _COUNTS_ABOVE * counts * self._noise.deviation(brightness, reflectance)
+        scatter, counting = rays.scatter(self.scene), np.zeros(len(edge), dtype=bool)
+        for frequency_hz in {0.0, self._highest_hz}:
+            moments = few.of_pixels(rays.moments(frequency_hz, scatter))
+            counting |= np.abs(moments - moments.mean(axis=0)).max(axis=0) > limit
+        unresolved: NDArray[np.bool_] = edge & counting
+        return unresolved
 
     def lit_by(self, chain: int) -> tuple[NDArray[np.bool_], Points]:
         """Return which pixels (H W) a chain of mirrors lights, and a point (H W, 3) that it does.
@@ -113,22 +141,23 @@ class StillLight:
         Of pixels that it lights in part, one where one of several rays ends.
         """
         on, point = self.lit.weight[chain] > 0, self.lit.point
-        if self.mixed.size:
-            fine = self.fine.weight[chain].reshape(-1, len(self.mixed)) > 0
-            more = np.flatnonzero(fine.any(axis=0) & ~on[self.mixed])
-            of_ray = fine[:, more].argmax(axis=0) * len(self.mixed) + more
+        if self.fine:
             on, point = on.copy(), point.copy()
-            on[self.mixed[more]] = True
-            point[self.mixed[more]] = self.fine.point[of_ray]
+        for each in self.fine:
+            lit = each.of_pixels(each.rays.weight[chain]) > 0
+            more = np.flatnonzero(lit.any(axis=0) & ~on[each.pixel])
+            of_ray = lit[:, more].argmax(axis=0) * each.pixel.size + more
+            on[each.pixel[more]] = True
+            point[each.pixel[more]] = each.rays.point[of_ray]
         return on, point
 
     def phasors(self, frequency_hz: float) -> tuple[Moments, Moments]:
         """Moments (K, H, W) by chain of mirrors, and (H, W) in all."""
         if frequency_hz not in self._phasors:
             each = self.lit.phasors(frequency_hz, self.lit.scatter(self.scene))
-            if self.mixed.size:
-                fine = self.fine.phasors(frequency_hz, self.fine.scatter(self.scene))
-                each[:, self.mixed] = fine.reshape(len(each), -1, len(self.mixed)).mean(axis=1)
+            for fine in self.fine:
+                of_rays = fine.rays.phasors(frequency_hz, fine.rays.scatter(self.scene))
+                each[:, fine.pixel] = fine.of_pixels(of_rays).mean(axis=1)
             each = each.reshape(-1, self.height, self.width)
             total = each.sum(axis=0)
             self._phasors[frequency_hz] = (
@@ -149,18 +178,18 @@ class StillLight:
         surfaces = [np.broadcast_to(lit.surface, lit.weight.shape)]
         if self.mixed.size:
             weight[0][:, self.mixed] = 0
-            shape = (len(lit.weight), -1, len(self.mixed))
-            fine_s, fine = self.fine.delay_s.reshape(shape), self.fine.weight.reshape(shape)
-            of = self.fine.surface.reshape(shape[1:])
-            for surface in np.unique(of[of >= 0]):
-                mine = np.where(of == surface, fine, 0)
-                total = mine.sum(axis=1)
-                mean_s = (mine * fine_s).sum(axis=1) / np.where(total > 0, total, 1)
+            present = {int(k) for each in self.fine for k in np.unique(each.rays.surface)}
+            for surface in sorted(present - {-1}):
                 delay_s.append(np.zeros_like(lit.delay_s))
                 weight.append(np.zeros_like(lit.weight))
                 surfaces.append(np.full(lit.weight.shape, surface))
-                delay_s[-1][:, self.mixed] = mean_s
-                weight[-1][:, self.mixed] = total / fine.shape[1]
+                for each in self.fine:
+                    fine = each.of_pixels(each.rays.weight)
+                    mine = np.where(each.of_pixels(each.rays.surface) == surface, fine, 0)
+                    total = mine.sum(axis=1)
+                    late_s = (mine * each.of_pixels(each.rays.delay_s)).sum(axis=1)
+                    delay_s[-1][:, each.pixel] = late_s / np.where(total > 0, total, 1)
+                    weight[-1][:, each.pixel] = total / fine.shape[1]
         spread = scatter_of(scene, np.concatenate(surfaces))
         return np.concatenate(delay_s), np.concatenate(weight), spread
 

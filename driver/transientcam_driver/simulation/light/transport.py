@@ -271,13 +271,12 @@ class SurfaceScenery:
         shape = self._size["height"], self._size["width"]
         responses: Responses = still.responses()
         if tolerance is not None:
-            mixed = (still.mixed, still.fine) if still.mixed.size else None
             light = Interreflection(
                 still.scene,
                 still.lit,
                 width=still.width,
                 height=still.height,
-                mixed=mixed,
+                fine=still.fine,
                 tolerance=tolerance,
                 exchange=followed.exchange,
             )
