@@ -1,13 +1,29 @@
 """The share of noise in a deviation that holds errors of calibration, against drawn captures."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments import oracles
 
+Array = NDArray[Any]
 DRAWS = 4000
 ERROR = 0.01
+
+
+def stated_over_measured(b: Array, variance: Array, returns: int, seed: int) -> float:
+    """Return the deviation that one capture of moments (m + 1, 1) states over that of many."""
+    noise = tm.noise.MomentNoise(variance)
+    drawn = tm.noise.draw(b, noise, np.random.default_rng(seed), draws=DRAWS)[:, :, 0]
+    repeated = tm.noise.MomentNoise(np.broadcast_to(variance, drawn.shape))
+    found = tm.likelihood(drawn, repeated, returns=returns, tail_shape=0, model_error=ERROR)
+    share = tm.noise.scatter(drawn, repeated, range(len(b)), ERROR)
+    assert (share < 1).all()
+    stated = np.median(share * found.direct_phase_std_rad())
+    return float(stated / found.separate().phase_rad.std())
 
 
 @pytest.mark.parametrize("noise_std", [2.0, 10.0, 50.0])
@@ -15,29 +31,14 @@ ERROR = 0.01
 def test_captures_of_one_return_scatter_by_the_noise_alone(noise_std: float, slope: float) -> None:
     b = 1000.0 * oracles.moments_of_returns([[1.3]], [[1.0]], 4)
     std = noise_std * (1 + slope * np.arange(5))[:, None]
-    noise = tm.noise.MomentNoise(std**2)
-    drawn = tm.noise.draw(b, noise, np.random.default_rng(3), draws=DRAWS)[:, :, 0]
 
-    repeated = tm.noise.MomentNoise(np.broadcast_to(noise.variance, drawn.shape))
-    found = tm.likelihood(drawn, repeated, returns=1, tail_shape=0, model_error=ERROR)
-    share = tm.noise.scatter(drawn, repeated, range(5), ERROR)
-
-    measured = found.separate().phase_rad.std()
-    assert np.median(share * found.direct_phase_std_rad()) == pytest.approx(measured, rel=0.05)
-    assert (share < 1).all()
+    assert stated_over_measured(b, std**2, 1, seed=3) == pytest.approx(1, rel=0.05)
 
 
 def test_captures_of_two_returns_scatter_by_the_noise_alone() -> None:
     b = 1000.0 * oracles.moments_of_returns([[1.0], [3.0]], [[0.6], [0.4]], 5)
-    noise = tm.noise.MomentNoise(np.full((6, 1), 3.0**2))
-    drawn = tm.noise.draw(b, noise, np.random.default_rng(4), draws=DRAWS)[:, :, 0]
-    repeated = tm.noise.MomentNoise(np.broadcast_to(noise.variance, drawn.shape))
 
-    found = tm.likelihood(drawn, repeated, returns=2, tail_shape=0, model_error=ERROR)
-    share = tm.noise.scatter(drawn, repeated, range(6), ERROR)
-
-    measured = found.separate().phase_rad.std()
-    assert np.median(share * found.direct_phase_std_rad()) == pytest.approx(measured, rel=0.1)
+    assert stated_over_measured(b, np.full((6, 1), 9.0), 2, seed=4) == pytest.approx(1, rel=0.1)
 
 
 def test_what_was_not_measured_has_no_share() -> None:
