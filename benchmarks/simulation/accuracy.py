@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.simulation.reference import COARSE, FINE, reference_moments
+from benchmarks.simulation.reference import COARSE, FINE_MOVING, FINE_STILL, reference_moments
 from benchmarks.simulation.scenes import scene_named
 from transientcam_driver import Sequence
 from transientcam_driver.sequence import ImageLabel
@@ -76,10 +76,11 @@ def measure(name: str, sequence_name: str) -> Accuracy:
     pixel = np.arange(SIZE[0] * SIZE[1])
     if scene.moves:
         pixel = np.sort(np.random.default_rng(1).choice(pixel, DRAWN, replace=False))
-    reference = _reference(scene, automatic, sequence, pixel)
+    fine = FINE_MOVING if scene.moves else FINE_STILL
+    reference = _reference(scene, automatic, sequence, pixel, fine=fine)
     finer = None
     if scene.moves:
-        finer = _reference(scene, automatic, sequence, pixel[::_FINER_IN], fine=_FINER_IN * FINE)
+        finer = _reference(scene, automatic, sequence, pixel[::_FINER_IN], fine=_FINER_IN * fine)
     brightness = automatic.truth(device_time_s=START_S).brightness.ravel()
     gain_e = sequence.exposure_s * scene.light.electrons_per_s / automatic.sensor.gain_e_per_dn
     conditions = automatic.conditions(sequence)
@@ -152,7 +153,7 @@ def _difference(
 
 
 def _reference(
-    scene: Scene, world: World, sequence: Sequence, pixel: NDArray[np.intp], *, fine: int = FINE
+    scene: Scene, world: World, sequence: Sequence, pixel: NDArray[np.intp], *, fine: int
 ) -> Moments | None:
     """Moments of some pixels by many rays in each image; None for scenes without geometry."""
     if scene.camera is None or scene.device.name != "ideal":
@@ -186,13 +187,14 @@ def accuracy_lines(results: list[Accuracy]) -> list[str]:
         "## What is left out",
         "",
         "Automatic against everything that the scene has anything for, against none of it, and",
-        f"rays into the pixels of every image, {COARSE} in each and {FINE} in those at an edge:",
+        f"rays into the pixels of every image, {COARSE} in each, and in those at an edge",
+        f"{FINE_STILL}, or {FINE_MOVING} where something moves:",
         f"differences of the moments of {SIZE[0]} x {SIZE[1]} pixels in units of the noise, as",
         "root mean square, largest, and share of the lit pixels beyond half the noise. Where",
         f"something moves, rays are followed into {DRAWN} pixels. Of many takes the first, the",
         "middle and the last are compared, with the noise of all. The last column is what the rays",
         f"themselves leave out: their difference from {_FINER_IN} times as many at edges. The more",
-        "takes, the smaller the noise, until no count of rays resolves an edge to half of it.",
+        "takes, the smaller the noise that edges have to be resolved to.",
         "",
         "| scene | sequence | called for | automatic - everything | automatic - nothing "
         "| automatic - rays | rays - more rays |",

@@ -1,4 +1,4 @@
-"""Moments of pixels by many rays: 16 in each, 256 in those whose rays differ.
+"""Moments of pixels by many rays: 16 in each, hundreds or thousands in those whose rays differ.
 
 Nothing here is taken from how the simulation finds edges. A pixel is followed more finely where
 its own rays or its corners end on different surfaces, get light by different ways, or differ in
@@ -11,12 +11,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.simulation.light.exchange import Exchange
 from transientcam_driver.simulation.light.paths import Lit, light_rays
 from transientcam_driver.simulation.light.radiosity import Interreflection
 from transientcam_driver.simulation.light.rays import rays_through
 from transientcam_driver.simulation.scene.scene import Scene
 
-COARSE, FINE = 16, 256  # rays
+COARSE = 16  # rays
+FINE_MOVING, FINE_STILL = 256, 4096
+_ROOM = 1 << 19  # rays at a time
 BOUNCES = 60
 _CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)])
 _UNEVEN_ABOVE = 0.1  # standard deviation of a pixel's rays over their mean
@@ -32,17 +35,27 @@ def reference_moments(
     size: tuple[int, int],
     frequencies_hz: tuple[float, ...],
     *,
-    fine: int = FINE,
+    fine: int,
 ) -> Moments:
     """Return mean moments (F, P) over the rays of some pixels, by index, of a scene at a time."""
+    further = _followed_further(scene)
     coarse = _rays(scene, pixel, size, _hammersley(COARSE))
-    moments = _means(scene, coarse, len(pixel), frequencies_hz)
+    moments = _means(scene, further, coarse, len(pixel), frequencies_hz)
     corners = _rays(scene, pixel, size, _CORNERS)
     edge = np.flatnonzero(_differ(coarse, corners, len(pixel)))
-    if edge.size:
-        many = _rays(scene, pixel[edge], size, _hammersley(fine))
-        moments[:, edge] = _means(scene, many, len(edge), frequencies_hz)
+    for first in range(0, edge.size, _ROOM // fine):
+        some = edge[first : first + _ROOM // fine]
+        many = _rays(scene, pixel[some], size, _hammersley(fine))
+        moments[:, some] = _means(scene, further, many, len(some), frequencies_hz)
     return moments
+
+
+def _followed_further(scene: Scene) -> tuple[Scene, Exchange] | None:
+    """Return the scene with so many bounces, and the light that its surfaces exchange, if any."""
+    if scene.transport.diffuse_bounces == 0 or sum(each.scatters for each in scene.surfaces) < 2:
+        return None
+    every = replace(scene, transport=replace(scene.transport, diffuse_bounces=BOUNCES))
+    return every, Exchange.of(every, every.transport.patches)
 
 
 def _rays(scene: Scene, pixel: Pixels, size: tuple[int, int], places: Places) -> Lit:
@@ -62,12 +75,19 @@ def _hammersley(count: int) -> Places:
     return places
 
 
-def _means(scene: Scene, lit: Lit, pixels: int, frequencies_hz: tuple[float, ...]) -> Moments:
+def _means(
+    scene: Scene,
+    further: tuple[Scene, Exchange] | None,
+    lit: Lit,
+    pixels: int,
+    frequencies_hz: tuple[float, ...],
+) -> Moments:
     scatter = lit.scatter(scene)
     of_rays = [lit.moments(frequency_hz, scatter) for frequency_hz in frequencies_hz]
-    if scene.transport.diffuse_bounces != 0 and sum(each.scatters for each in scene.surfaces) > 1:
-        every = replace(scene, transport=replace(scene.transport, diffuse_bounces=BOUNCES))
-        light = Interreflection(every, lit, width=len(lit.surface), height=1)
+    if further is not None:
+        every, exchange = further
+        width = len(lit.surface)
+        light = Interreflection(every, lit, width=width, height=1, exchange=exchange)
         for moments, frequency_hz in zip(of_rays, frequencies_hz, strict=True):
             moments += light.moments(frequency_hz).ravel()
     means: Moments = np.array(of_rays).reshape(len(of_rays), -1, pixels).mean(axis=1)

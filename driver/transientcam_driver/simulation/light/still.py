@@ -105,23 +105,26 @@ class StillLight:
     @cached_property
     def fine(self) -> tuple[Within, ...]:
         """Light of several rays in each of the pixels ``mixed``; of most where an edge is sharp."""
-        if not self.mixed.size:
-            return ()
-        few = self._followed.within(self.mixed, self._rays_a_pixel)
-        unresolved = self._unresolved(few)
-        if not unresolved.any():
-            return (few,)
-        many = self._followed.within(self.mixed[unresolved], RAYS_AT_EDGES)
-        if unresolved.all():
-            return (many,)
-        return few.part(np.flatnonzero(~unresolved)), many
+        found: list[Within] = []
+        pixel = self.mixed
+        for count in (self._rays_a_pixel, *RAYS_AT_EDGES):
+            if not pixel.size:
+                break
+            rays = self._followed.within(pixel, count)
+            unresolved = np.zeros(pixel.size, dtype=bool)
+            if count != RAYS_AT_EDGES[-1]:
+                unresolved = self._unresolved(rays, count)
+            if not unresolved.all():
+                found.append(rays.part(np.flatnonzero(~unresolved)) if unresolved.any() else rays)
+            pixel = pixel[unresolved]
+        return tuple(found)
 
-    def _unresolved(self, few: Within) -> NDArray[np.bool_]:
+    def _unresolved(self, few: Within, counts: int) -> NDArray[np.bool_]:
         """Pixels of which an edge cuts off so much light that one ray more or less counts.
 
         The mean over rays of a lattice is wrong by some half a ray at a straight edge.
         """
-        rays, counts = few.rays, self._rays_a_pixel
+        rays = few.rays
         assert self._noise is not None  # noqa: S101  (or no pixel was mixed)
         surface, ways = few.of_pixels(rays.surface), few.of_pixels(rays.weight > 0)
         edge = (surface != surface[0]).any(axis=0) | (ways != ways[:, :1]).any(axis=(0, 1))
