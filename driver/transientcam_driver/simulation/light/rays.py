@@ -14,8 +14,10 @@ RAYS = 32
 """Into a pixel that light differs in."""
 RAYS_AT_THIN = 128
 """In scenes with something thinner than two pixels, which few of a pixel's rays meet."""
-RAYS_AT_EDGES = (256, 1024)
+RAYS_AT_EDGES = (256, 2048)
 """Into a pixel in which a ray more or less would count, and where it still does."""
+MOST_RAYS = 1 << 22
+"""Into all of these pixels: some ten seconds of processor time. Large images take fewer in each."""
 _GOLDEN = (5**0.5 - 1) / 2
 
 

@@ -18,7 +18,13 @@ from transientcam_driver.simulation.light.paths import (
     scatter_of,
     sparse_image,
 )
-from transientcam_driver.simulation.light.rays import RAYS, RAYS_AT_EDGES, RAYS_AT_THIN, rays_within
+from transientcam_driver.simulation.light.rays import (
+    MOST_RAYS,
+    RAYS,
+    RAYS_AT_EDGES,
+    RAYS_AT_THIN,
+    rays_within,
+)
 from transientcam_driver.simulation.light.thin import PIXELS, crossed, may_be_thin
 from transientcam_driver.simulation.responses import Moments, Scatter, SparseResponses
 from transientcam_driver.simulation.scene.geometry import Points
@@ -110,21 +116,21 @@ class StillLight:
         for count in (self._rays_a_pixel, *RAYS_AT_EDGES):
             if not pixel.size:
                 break
-            rays = self._followed.within(pixel, count)
+            rays = self._followed.within(pixel, _affordable(count, pixel.size))
             unresolved = np.zeros(pixel.size, dtype=bool)
             if count != RAYS_AT_EDGES[-1]:
-                unresolved = self._unresolved(rays, count)
+                unresolved = self._unresolved(rays)
             if not unresolved.all():
                 found.append(rays.part(np.flatnonzero(~unresolved)) if unresolved.any() else rays)
             pixel = pixel[unresolved]
         return tuple(found)
 
-    def _unresolved(self, few: Within, counts: int) -> NDArray[np.bool_]:
+    def _unresolved(self, few: Within) -> NDArray[np.bool_]:
         """Pixels of which an edge cuts off so much light that one ray more or less counts.
 
         The mean over rays of a lattice is wrong by some half a ray at a straight edge.
         """
-        rays = few.rays
+        rays, counts = few.rays, len(few.rays.surface) // few.pixel.size
         assert self._noise is not None  # noqa: S101  (or no pixel was mixed)
         surface, ways = few.of_pixels(rays.surface), few.of_pixels(rays.weight > 0)
         edge = (surface != surface[0]).any(axis=0) | (ways != ways[:, :1]).any(axis=(0, 1))
@@ -307,6 +313,13 @@ class StillLight:
                 bend = np.abs(np.diff(np.moveaxis(plane, axis, 0), 2, axis=0))
                 of[1:-1] |= bend > np.moveaxis(limit, axis, 0)[1:-1]
         return grown(differs).ravel()
+
+
+def _affordable(count: int, pixels: int) -> int:
+    """Return how many rays are followed into each of so many pixels, of so many that would be."""
+    while count > RAYS and count * pixels > MOST_RAYS:
+        count //= 2
+    return count
 
 
 def grown(marked: NDArray[np.bool_]) -> NDArray[np.bool_]:

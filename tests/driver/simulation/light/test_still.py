@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from transientcam_driver import Sequence
 from transientcam_driver.simulation.build import find_scene, world_of
 from transientcam_driver.simulation.effects.glimpses import Noise
+from transientcam_driver.simulation.light import still as module
 from transientcam_driver.simulation.light.followed import FollowedRays
 from transientcam_driver.simulation.light.paths import Lit, light_rays
 from transientcam_driver.simulation.light.rays import RAYS, RAYS_AT_EDGES
@@ -75,6 +76,20 @@ def test_only_edges_that_a_ray_counts_at_take_more_rays() -> None:
 
     assert rays_a_pixel(Noise(1e5, 0.0, 9e6, 1)) == [RAYS]
     assert rays_a_pixel(NOISE) == [RAYS, RAYS_AT_EDGES[0]]
+
+
+def test_large_images_take_fewer_rays_in_each_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
+    def rays_in_all() -> list[int]:
+        of = SCENES["two colours side by side"]
+        quiet = Noise(1e9, 0.0, 0.0, 20)
+        still = StillLight(of, width=WIDTH, height=HEIGHT, noise=quiet, highest_hz=69e6)
+        return [len(each.rays.surface) for each in still.fine]
+
+    *_, every = rays_in_all()
+    monkeypatch.setattr(module, "MOST_RAYS", every // 3)
+    *_, fewer = rays_in_all()
+
+    assert fewer == every // 4
 
 
 def test_edges_along_a_pixel_are_resolved_as_finely_as_it_has_rays() -> None:
