@@ -24,9 +24,8 @@ from transientcam_moments._kernels.eigenvalue import eigenvalue_entry, smallest_
 from transientcam_moments._kernels.outputs import flag_and_bias
 from transientcam_moments._kernels.returns import find_returns, returns_entry
 
-_BLOCK: Final = (
-    4096  # pixels, of which a thread's own cache holds all that a block reads and writes
-)
+_BLOCK: Final = 4096
+"""Pixels, of which a thread's own cache holds all that the kernels read and write."""
 
 
 @njit(nogil=True, error_model="numpy")
@@ -35,9 +34,9 @@ def _analyse(
     brightness: Any, uniform: Any, validity: Any, flags: Any, epsilon: float, least: float,
     phase: Any, weight: Any, count: Any, residual: Any, noise: float, steps: int, start: int,
     stop: int,
-) -> int:  # fmt: skip
+) -> None:  # fmt: skip
     """Do as `smallest_eigenvalue`, `flag_and_bias` and `find_returns` do one after the other."""
-    ill, left = 0, start
+    left = start
     while left < stop:
         right = left + _BLOCK if stop - left >= 2 * _BLOCK else stop
         smallest_eigenvalue(order, b, estimated, eigenvalue, left, right)
@@ -45,12 +44,11 @@ def _analyse(
             order, estimated, b, saturated, eigenvalue, brightness, uniform, validity, flags,
             epsilon, least, left, right,
         )  # fmt: skip
-        ill += find_returns(
+        find_returns(
             order, turns, b, brightness, 1, uniform, phase, weight, count, residual, noise, steps,
             left, right,
         )  # fmt: skip
         left = right
-    return ill
 
 
 def analysis_entry(m: int) -> Callable[..., Any]:

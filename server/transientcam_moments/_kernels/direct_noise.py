@@ -46,7 +46,7 @@ def _direct_noise(
         found[2, p] = there
         if not there:
             continue
-        first, holds, before = -1, True, 0.0
+        is_first, holds, before = True, True, 0.0
         for k in range(m):  # of the strongest, by which it is decided which return is direct
             if weight[k, p] == strongest:
                 spread = max(spread, threshold * math.sqrt(out[(2 * m + 1) * k, p]))
@@ -62,11 +62,11 @@ def _direct_noise(
                 apart = phase[k, p] - phase[k - 1, p]
                 holds = holds and apart > clear * math.sqrt(variance_apart)
             before = of_phase
-            if first < 0:
+            if is_first:
                 decided = abs(w - threshold * strongest) > clear * (of_weight + spread)
                 holds = holds and (decided or w == strongest)
                 if w >= threshold * strongest:
-                    first = k
+                    is_first = False
                     found[0, p] = of_phase
         found[1, p] = holds
 
