@@ -19,6 +19,7 @@ from typing import Any, Final, TypeAlias
 
 import h5py
 import numpy as np
+from h5py._objects import phil
 from isal import isal_zlib
 from numpy.typing import NDArray
 
@@ -56,7 +57,9 @@ def open_unfinished(path: Path) -> File:
     """
     access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
     access.set_file_locking(False, True)
-    if _set_read_attempts(access.id, _READ_ATTEMPTS) < 0:
+    with phil:  # two threads inside HDF5 end the process; h5py's own functions take its lock
+        refused = _set_read_attempts(access.id, _READ_ATTEMPTS) < 0
+    if refused:
         raise OSError(5, "HDF5 takes no number of attempts", str(path))
     flags = h5py.h5f.ACC_RDONLY | h5py.h5f.ACC_SWMR_READ
     return open_file(h5py.h5f.open(os.fsencode(path), flags, access))

@@ -7,6 +7,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from h5py._objects import phil
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as of_numpy
@@ -102,6 +103,23 @@ def test_an_unfinished_recording_can_be_read_while_it_is_written(tmp_path: Path)
             assert recording.end == {}
     finally:
         writer.close({})
+
+
+def test_hdf5_is_never_called_past_the_lock_of_h5py(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # two threads inside HDF5 make it fail or crash
+    set_read_attempts, locked = swmr._set_read_attempts, list[bool]()
+
+    def call(*arguments: int) -> Any:
+        locked.append(phil._is_owned())
+        return set_read_attempts(*arguments)
+
+    monkeypatch.setattr(swmr, "_set_read_attempts", call)
+
+    swmr.open_unfinished(record(tmp_path / "a.h5", 1)).close()
+
+    assert locked == [True]
 
 
 def test_a_flipped_byte_in_a_chunk_is_found(tmp_path: Path) -> None:
