@@ -11,6 +11,7 @@ are byte-shuffled deflate, which every HDF5 reads with its own two filters.
 """
 
 import ctypes
+import itertools
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -37,6 +38,7 @@ _LEVEL: Final = 1
 _FSYNC_EVERY_S: Final = 1.0
 _READ_ATTEMPTS: Final = 25
 """Of a block whose checksum does not hold: 34 ms in all."""
+_IMAGE_NUMBERS: Final = itertools.count()
 # h5py has no method for it; looked up through the module, which knows where its libhdf5 is
 _set_read_attempts = ctypes.CDLL(h5py.h5p.__file__).H5Pset_metadata_read_attempts
 _set_read_attempts.argtypes = ctypes.c_int64, ctypes.c_uint
@@ -75,7 +77,8 @@ def image_of(make: Callable[[File], None]) -> bytes:
 
     It is made in memory: HDF5 cannot close a file that it failed to write, as on a full disk.
     """
-    with open_file("new", "w", driver="core", backing_store=False, libver=LIBVER) as file:
+    name = f"image {next(_IMAGE_NUMBERS)}"  # by which HDF5 tells open files in memory apart
+    with open_file(name, "w", driver="core", backing_store=False, libver=LIBVER) as file:
         make(file)
         file.flush()
         image: bytes = file.id.get_file_image()

@@ -122,6 +122,20 @@ def test_hdf5_is_never_called_past_the_lock_of_h5py(
     assert locked == [True]
 
 
+def test_two_files_may_be_made_in_memory_at_a_time() -> None:
+    inner: list[bytes] = []
+
+    def make(file: swmr.File) -> None:
+        inner.append(swmr.image_of(lambda other: other.attrs.update(which="inner")))
+        file.attrs["which"] = "outer"
+
+    outer = swmr.image_of(make)
+
+    assert b"outer" in outer
+    assert b"inner" in inner[0]
+    assert b"inner" not in outer
+
+
 def test_a_flipped_byte_in_a_chunk_is_found(tmp_path: Path) -> None:
     path = record(tmp_path / "a.h5", 3)
     with h5py.File(path) as file:
