@@ -1,6 +1,7 @@
 """Files as answers: whole, or the parts that a broken download still lacks."""
 
 import asyncio
+import os
 import re
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -51,10 +52,18 @@ async def answer(
     ------
     Problem
         ``range-not-satisfiable``.
+    FileNotFoundError
+        If it was deleted since it was found.
     """
-    usable = _is_usable(wanted, (await asyncio.to_thread(path.stat)).st_size)
-    headers = None if tag is None else {"ETag": tag}
-    return _File(path, headers, media_type=media_type, filename=filename, ranges=usable)
+    status = await asyncio.to_thread(path.stat)
+    return _File(
+        path,
+        status,
+        headers=None if tag is None else {"ETag": tag},
+        media_type=media_type,
+        filename=filename,
+        ranges=_is_usable(wanted, status.st_size),
+    )
 
 
 def part(data: bytes, wanted: str | None, *, media_type: str, tag: str) -> Response:
@@ -102,13 +111,16 @@ class _File(FileResponse):
     def __init__(
         self,
         path: Path,
-        headers: dict[str, str] | None,
+        status: os.stat_result,
         *,
+        headers: dict[str, str] | None,
         media_type: str,
         filename: str | None,
         ranges: bool,
     ) -> None:
-        super().__init__(path, headers=headers, media_type=media_type, filename=filename)
+        super().__init__(
+            path, headers=headers, media_type=media_type, filename=filename, stat_result=status
+        )
         self._ranges = ranges
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

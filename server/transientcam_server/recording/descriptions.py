@@ -49,6 +49,8 @@ class Descriptions:
         except FileNotFoundError:  # deleted, or recovered, this moment
             return None
         document = self._of_content(path, status) | {"size_bytes": status.st_size}
+        if document["state"] == "damaged" and not path.exists():  # while it was read
+            return None
         if document["state"] == "interrupted" and lock.is_taken(path):
             document["state"] = "recording"  # by another service
         return document

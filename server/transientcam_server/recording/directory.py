@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Final
 
 from transientcam_server.recording import layout, lock, swmr
-from transientcam_server.recording.recovery import SCRATCH_SUFFIX
 
 _ID: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,127}")
 
@@ -82,7 +81,7 @@ class Directory:
             with contextlib.suppress(FileNotFoundError):
                 held.enter_context(lock.take(part))
             # the finished one last: of an unfinished one the next start would make it anew
-            for each in (part, path.with_name(path.name + SCRATCH_SUFFIX), path):
+            for each in (part, path.with_suffix(layout.SCRATCH_SUFFIX), path):
                 each.unlink(missing_ok=True)
             swmr.synchronise(self.path)
 

@@ -28,6 +28,8 @@ FORMAT: Final = "transientcam recording"
 FORMAT_VERSION: Final = 1
 SUFFIX: Final = ".h5"
 PART_SUFFIX: Final = ".h5.part"
+SCRATCH_SUFFIX: Final = ".h5.scratch"
+"""Of what is being made and is no recording yet; deleted where no process makes it."""
 ANNOTATIONS_BYTES: Final = 16 * 1024
 END_BYTES: Final = 4 * 1024
 MAX_DEPTH: Final = 64

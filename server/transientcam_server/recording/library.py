@@ -360,8 +360,7 @@ class Library:
         recorder = self._recorder_of(recording_id)
         if recorder is not None:
             return self._describe_active(recorder)
-        path = self._directory.find(recording_id)
-        document = None if path is None else self._descriptions.of_file(path)
+        document = self._of_file(recording_id)
         if document is None:
             return self._removed.get(recording_id)
         if recording_id in self._recovering:
@@ -369,6 +368,16 @@ class Library:
         if recording_id in self._problems:
             document |= self._problems[recording_id]
         return document
+
+    def _of_file(self, recording_id: str) -> dict[str, Any] | None:
+        for _ in range(2):  # one that was unfinished may have been finished, and renamed, since
+            path = self._directory.find(recording_id)
+            if path is None:
+                return None
+            document = self._descriptions.of_file(path)
+            if document is not None:
+                return document
+        return None
 
     def _describe_active(self, recorder: Recorder) -> dict[str, Any]:
         part = self.directory / (recorder.header.recording_id + layout.PART_SUFFIX)

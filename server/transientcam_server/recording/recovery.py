@@ -4,7 +4,6 @@ import logging
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
 
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording, RecordingInUse
 from transientcam_server.recording import layout, lock, swmr
@@ -14,7 +13,6 @@ from transientcam_server.recording.salvage import rebuild, salvage
 from transientcam_server.recording.seal import sealed_frames
 
 _log = logging.getLogger(__name__)
-SCRATCH_SUFFIX: Final = ".recovering"
 
 
 def recover(part: Path) -> Path:
@@ -67,10 +65,12 @@ def recover_all(parts: list[Path], *, stop: Callable[[], bool] = lambda: False) 
 def unfinished(directory: Path) -> list[Path]:
     """Return the unfinished recordings of a directory that no process writes.
 
-    Copies that a recovery left unfinished are deleted where the recording itself is gone.
+    What a writer or a recovery left half made is deleted where the recording itself is gone.
     """
-    for scratch in directory.glob("*" + layout.SUFFIX + SCRATCH_SUFFIX):
-        if not scratch.with_name(scratch.name.removesuffix(SCRATCH_SUFFIX) + ".part").exists():
+    for scratch in directory.glob("*" + layout.SCRATCH_SUFFIX):
+        id_ = scratch.name.removesuffix(layout.SCRATCH_SUFFIX)
+        part = scratch.with_name(id_ + layout.PART_SUFFIX)
+        if not part.exists() and not lock.is_taken(scratch):
             scratch.unlink(missing_ok=True)
     parts = sorted(each for each in directory.glob("*" + layout.PART_SUFFIX) if each.is_file())
     return [part for part in parts if not lock.is_taken(part)]
@@ -78,7 +78,7 @@ def unfinished(directory: Path) -> list[Path]:
 
 def _copied(part: Path) -> Path:
     """Copy what is whole of an unfinished recording; the copy is on the disk."""
-    copy = part.with_name(part.name.removesuffix(".part") + SCRATCH_SUFFIX)
+    copy = part.with_name(part.name.removesuffix(layout.PART_SUFFIX) + layout.SCRATCH_SUFFIX)
     try:
         _require_room(part)
         with part.open("rb") as stream:

@@ -1,4 +1,8 @@
-"""Writes one recording: ``<file>.part`` while it grows, ``<file>`` once it is finished."""
+"""Writes one recording: ``<file>.part`` while it grows, ``<file>`` once it is finished.
+
+It gets the first of these names when HDF5 has it open to write. HDF5 refuses that of a file that it
+has open to read, as when another thread lists the recordings meanwhile.
+"""
 
 import os
 from collections.abc import Mapping
@@ -30,18 +34,19 @@ class RecordingWriter:
     ) -> None:
         self.path = path
         self.part = path.with_name(path.name + ".part")
-        if path.exists():
-            raise FileExistsError(17, "there is a recording already", str(path))
         empty = layout.image(header, annotations or {})
-        self._lock = lock.create(self.part)
+        made = path.with_suffix(layout.SCRATCH_SUFFIX)
+        self._lock = lock.create(made)
         try:
+            _require_none(path, self.part)
             _write(self._lock.descriptor, empty)
-            swmr.synchronise(path.parent)
-            file = swmr.open_to_append(self.part)
+            file = swmr.open_to_append(made)
             self._rows = swmr.Appender(file, ["raw"], list(layout.SERIES), seal=seal)
-            swmr.synchronise(self.part)  # or a power cut left it marked as open otherwise
+            swmr.synchronise(made)  # or a power cut left it marked as open otherwise
+            made = made.rename(self.part)
+            swmr.synchronise(path.parent)
         except BaseException:
-            self.part.unlink(missing_ok=True)
+            made.unlink(missing_ok=True)
             self._lock.close()
             raise
 
@@ -126,6 +131,12 @@ def annotate(path: Path, annotations: Mapping[str, Any]) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def _require_none(*paths: Path) -> None:
+    for path in paths:
+        if path.exists():
+            raise FileExistsError(17, "there is a recording already", str(path))
 
 
 def _write(descriptor: int, data: bytes) -> None:

@@ -66,10 +66,11 @@ def traced(path: Path, *, frames: int) -> list[Event]:
         stdout=subprocess.DEVNULL,
         check=True,
     )
-    return list(_events(log.read_text(encoding="ascii").splitlines(), path.name + ".part"))
+    return list(_events(log.read_text(encoding="ascii").splitlines(), path.name))
 
 
 def _events(lines: list[str], name: str) -> Iterator[Event]:
+    part, names = name + ".part", (name + ".scratch", name + ".part")
     position = 0
     for line in lines:
         call = _CALL.match(line)
@@ -79,12 +80,13 @@ def _events(lines: list[str], name: str) -> Iterator[Event]:
         place = _PATH.match(arguments)
         there = "" if place is None else _bytes(place[1]).decode()
         rest = "" if place is None else arguments[place.end() :]
-        if what in ("rename", "renameat2") and name in _bytes(arguments).decode("latin-1"):
-            yield Renamed()
+        if what in ("rename", "renameat2"):
+            if _bytes(arguments).decode("latin-1").partition('", ')[0].endswith(part):
+                yield Renamed()
         elif what == "write" and arguments.startswith("1<"):
             if (said := _bytes(rest.split('"')[1]).strip()).isdigit():  # not by a child of NumPy's
                 yield Acknowledged(int(said))
-        elif not there.endswith(name):
+        elif not there.endswith(names):
             continue
         elif what == "fsync":
             yield Synchronised()

@@ -4,14 +4,16 @@ import shutil
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.server.recording.made import APPLIED, frame, header, record
 from tests.server.recording.test_recovery import abandoned
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.recording import Header, layout
+from transientcam_server.recording import Header, descriptions, layout
 from transientcam_server.recording.descriptions import Descriptions
+from transientcam_server.recording.directory import Directory
 from transientcam_server.recording.library import Library, RecordingOptions
 from transientcam_server.settings import RecordingSettings
 
@@ -48,6 +50,40 @@ def test_what_others_deleted_is_forgotten(library: Library, tmp_path: Path) -> N
     assert not len(library._descriptions)
     with pytest.raises(Problem, match=IDS[0]):
         library.describe(IDS[0])
+
+
+def test_what_is_deleted_while_it_is_described_is_unknown(
+    library: Library, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = descriptions._read
+
+    def deleted(path: Path) -> dict[str, Any]:
+        path.unlink()
+        return read(path)
+
+    monkeypatch.setattr(descriptions, "_read", deleted)
+
+    with pytest.raises(Problem, match=IDS[0]):
+        library.describe(IDS[0])
+    assert library.describe_all() == []
+
+
+def test_what_is_finished_while_it_is_described_is_described(
+    library: Library, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = tmp_path / f"{IDS[0]}{layout.SUFFIX}"
+    whole.rename(tmp_path / f"{IDS[0]}{layout.PART_SUFFIX}")
+    find = Directory.find
+
+    def finished(self: Directory, recording_id: str) -> Path | None:
+        found = find(self, recording_id)
+        if found is not None and found != whole:
+            found.rename(whole)
+        return found
+
+    monkeypatch.setattr(Directory, "find", finished)
+
+    assert library.describe(IDS[0])["state"] == "complete"
 
 
 class Busy(frozenset[str]):
@@ -123,7 +159,7 @@ def test_what_a_killed_service_left_is_recovered_while_another_one_records(
 
 def test_a_deleted_recording_never_comes_back(library: Library, tmp_path: Path) -> None:
     abandoned(tmp_path / f"{IDS[0]}.h5", 3)  # as a recovery of an earlier version left it
-    (tmp_path / f"{IDS[0]}.h5.recovering").write_bytes(b"half")
+    (tmp_path / f"{IDS[0]}.h5.scratch").write_bytes(b"half")
 
     library.delete(IDS[0])
     library.open()

@@ -18,6 +18,7 @@ from transientcam_driver import RawFrame
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
 from transientcam_server.recording import Recording, RecordingWriter, swmr
 from transientcam_server.recording import layout as recording_layout
+from transientcam_server.recording.directory import Directory
 
 SHAPE = (APPLIED.images, HEIGHT, WIDTH)
 
@@ -134,6 +135,41 @@ def test_two_files_may_be_made_in_memory_at_a_time() -> None:
     assert b"outer" in outer
     assert b"inner" in inner[0]
     assert b"inner" not in outer
+
+
+def test_a_recording_may_begin_while_all_that_is_there_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    open_to_append, read = swmr.open_to_append, list[Recording]()
+
+    def listed_meanwhile(path: Path) -> swmr.File:
+        # HDF5 opens no file to write that it has open to read
+        read.extend(Recording(each) for each in Directory(tmp_path).files())
+        return open_to_append(path)
+
+    monkeypatch.setattr(swmr, "open_to_append", listed_meanwhile)
+    record(tmp_path / "a.h5", 1)
+
+    record(tmp_path / "b.h5", 2)
+
+    assert [each.path.name for each in read] == ["a.h5"]
+    read[0].close()
+    with Recording(tmp_path / "b.h5") as recording:
+        assert recording.frames == 2
+
+
+def test_a_recording_never_replaces_one_that_is_written(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "a.h5", header())
+    with pytest.raises(FileExistsError, match=r"a\.h5\.part"):
+        RecordingWriter(tmp_path / "a.h5", header())
+    writer.append(frame(0))
+    writer.close({})
+    with pytest.raises(FileExistsError, match=r"a\.h5"):
+        RecordingWriter(tmp_path / "a.h5", header())
+
+    assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]
+    with Recording(tmp_path / "a.h5") as recording:
+        assert_same(recording.frame(0), frame(0))
 
 
 def test_a_flipped_byte_in_a_chunk_is_found(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ import pytest
 from tests.conftest import ROOT
 from tests.server.recording.made import HEIGHT, WIDTH, assert_same, frame, header, record
 from transientcam_server.errors.exceptions import NotARecording, RecordingInUse
-from transientcam_server.recording import Recording, RecordingWriter, layout, lock, recover
+from transientcam_server.recording import Recording, RecordingWriter, layout, lock, recover, swmr
 from transientcam_server.recording.recovery import recover_all, unfinished
 
 KILLS = 20
@@ -179,10 +179,26 @@ def test_a_recovery_that_is_killed_between_any_two_steps_leaves_nothing_behind(
 def test_a_copy_that_a_killed_recovery_left_is_removed_with_its_recording_gone(
     tmp_path: Path,
 ) -> None:
-    (tmp_path / "a.h5.recovering").write_bytes(b"half")
+    (tmp_path / "a.h5.scratch").write_bytes(b"half")
 
     assert unfinished(tmp_path) == []
     assert not list(tmp_path.iterdir())
+
+
+def test_what_another_service_begins_is_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    open_to_append = swmr.open_to_append
+
+    def started_meanwhile(path: Path) -> swmr.File:
+        assert unfinished(tmp_path) == []  # as another service does when it starts
+        return open_to_append(path)
+
+    monkeypatch.setattr(swmr, "open_to_append", started_meanwhile)
+
+    record(tmp_path / "a.h5", 1)
+
+    assert [path.name for path in tmp_path.iterdir()] == ["a.h5"]
 
 
 def test_what_is_being_written_is_not_recovered(tmp_path: Path) -> None:

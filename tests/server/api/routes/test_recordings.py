@@ -352,6 +352,27 @@ def test_what_clients_call_a_recording_never_becomes_a_path(
     assert [each["id"] for each in http.get(RECORDINGS).json()["recordings"]] == ["a"]
 
 
+def test_a_file_that_is_deleted_while_it_is_asked_for_is_unknown(
+    daemon: Served, http: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = recorded(http)["id"]
+    library = daemon.service.recordings
+    find = library.path
+
+    def deleted(recording_id: str) -> Path:
+        path = find(recording_id)
+        monkeypatch.setattr(library, "download_name", lambda of: f"{of}.h5")
+        path.unlink()
+        return path
+
+    monkeypatch.setattr(library, "path", deleted)
+
+    answer = http.get(f"{RECORDINGS}/{recording}/file")
+
+    assert answer.status_code == 404
+    assert answer.json()["type"] == "/problems/unknown-recording"
+
+
 def test_a_file_that_is_no_recording_is_listed_as_damaged_and_can_be_deleted(
     http: httpx.Client, directory: Path
 ) -> None:
