@@ -8,7 +8,7 @@ import httpx
 import pytest
 from fsspec.implementations.http import HTTPFileSystem
 from fsspec.implementations.reference import ReferenceFileSystem
-from zarr.core.sync import cleanup_resources
+from zarr.core.sync import cleanup_resources, loop
 
 from tests.server.contract import client_of
 from tests.serving import Served, serving
@@ -48,6 +48,8 @@ def zarr_clients() -> Iterator[None]:
     """Clients that compute on the thread that asks, and keep no connection afterwards."""
     with dask.config.set(scheduler="synchronous"):
         yield
+    if loop[0] is not None:  # reads that a failed one beside them left behind
+        asyncio.run_coroutine_threadsafe(_others_are_done(), loop[0]).result()
     # what fsspec keeps for the life of the process belongs to the loop that ends below
     for each in (HTTPFileSystem, ReferenceFileSystem):
         for system in each._cache.values():
@@ -56,6 +58,12 @@ def zarr_clients() -> Iterator[None]:
                 asyncio.run_coroutine_threadsafe(session.close(), session._loop).result()
         each.clear_instance_cache()
     cleanup_resources()
+
+
+async def _others_are_done() -> None:
+    others = asyncio.all_tasks() - {asyncio.current_task()}
+    if others:
+        await asyncio.wait(others)
 
 
 @pytest.fixture

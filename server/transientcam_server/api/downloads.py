@@ -8,9 +8,10 @@ from typing import Annotated, Any, Final
 
 from fastapi import Header
 from fastapi.responses import FileResponse, Response
-from starlette.types import Receive, Scope, Send
+from starlette.types import Message, Receive, Scope, Send
 
 from transientcam_server.errors import Problem, kinds
+from transientcam_server.errors.kinds import ProblemKind
 
 _RANGES: Final = re.compile(
     r"bytes=\s*({0}-{0}?|-{0})(\s*,\s*({0}-{0}?|-{0}))*\s*".replace("{0}", r"(\d{1,18})"), re.ASCII
@@ -33,6 +34,7 @@ async def answer(
     path: Path,
     wanted: str | None,
     *,
+    gone: ProblemKind,
     media_type: str,
     filename: str | None = None,
     tag: str | None = None,
@@ -43,6 +45,8 @@ async def answer(
 
     Parameters
     ----------
+    gone
+        What a file that was deleted since it was found is answered with.
     filename
         What to keep it as; None for what is no download.
     tag
@@ -51,14 +55,16 @@ async def answer(
     Raises
     ------
     Problem
-        ``range-not-satisfiable``.
-    FileNotFoundError
-        If it was deleted since it was found.
+        ``range-not-satisfiable``, or ``gone``; the latter also while the answer is sent.
     """
-    status = await asyncio.to_thread(path.stat)
+    try:
+        status = await asyncio.to_thread(path.stat)
+    except FileNotFoundError:
+        raise _deleted(gone) from None
     return _File(
         path,
         status,
+        gone=gone,
         headers=None if tag is None else {"ETag": tag},
         media_type=media_type,
         filename=filename,
@@ -90,6 +96,10 @@ def part(data: bytes, wanted: str | None, *, media_type: str, tag: str) -> Respo
     return Response(data[begin:end], 206, media_type=media_type, headers=headers)
 
 
+def _deleted(gone: ProblemKind) -> Problem:
+    return Problem(gone, "It was deleted meanwhile.")
+
+
 def _is_usable(wanted: str | None, size: int) -> bool:
     """Return whether a Range header is one; refuse one that lies beyond the end."""
     if wanted is None or not _RANGES.fullmatch(wanted.strip()):
@@ -113,6 +123,7 @@ class _File(FileResponse):
         path: Path,
         status: os.stat_result,
         *,
+        gone: ProblemKind,
         headers: dict[str, str] | None,
         media_type: str,
         filename: str | None,
@@ -121,11 +132,27 @@ class _File(FileResponse):
         super().__init__(
             path, headers=headers, media_type=media_type, filename=filename, stat_result=status
         )
-        self._ranges = ranges
+        self._gone, self._ranges = gone, ranges
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer; the framework would refuse a header that is no range."""
+        """Answer; the framework would refuse a header that is no range.
+
+        It also begins an answer before it opens the file, which may be gone by then.
+        """
         if not self._ranges:
             headers = [each for each in scope["headers"] if each[0] != b"range"]
             scope = {**scope, "headers": headers}
-        await super().__call__(scope, receive, send)
+        begun: list[Message] = []
+
+        async def send_once_open(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                begun.append(message)
+                return
+            while begun:
+                await send(begun.pop())
+            await send(message)
+
+        try:
+            await super().__call__(scope, receive, send_once_open)
+        except FileNotFoundError:
+            raise _deleted(self._gone) from None

@@ -13,6 +13,7 @@ from transientcam_driver import RawFrame
 from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
 from transientcam_server.recording import layout, lock, swmr
 from transientcam_server.recording.heaps import CheckedReader, require_sound_heaps
+from transientcam_server.recording.readers import READERS
 from transientcam_server.recording.storage import Storage, read_rows
 
 
@@ -53,6 +54,8 @@ class Recording:
             unfinished = source is None and path.name.endswith(".part")
             if unfinished and not lock.is_taken(path):  # nor is it read by a recovery
                 require_sound_heaps(stream)
+            if unfinished:
+                self._open.enter_context(READERS.reading(path))
             opened = swmr.open_unfinished(path) if unfinished else swmr.open_file(checked, "r")
             self._file = self._open.enter_context(opened)
             storage = Storage(self._file, checked.size_bytes)
@@ -69,6 +72,9 @@ class Recording:
                 self._file = self._open.enter_context(swmr.open_file(path, "r"))
                 storage = Storage(self._file, checked.size_bytes)
             self._raw = storage.dataset("raw", axes=4)
+        except FileNotFoundError:  # it was finished, or deleted, this moment
+            self.close()
+            raise
         except Exception as error:  # h5py raises anything of a damaged file
             self.close()
             raise NotARecording(str(path), _reason(error)) from error

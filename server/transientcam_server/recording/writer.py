@@ -12,6 +12,7 @@ from typing import Any
 from transientcam_driver import RawFrame
 from transientcam_server.recording import layout, lock, swmr
 from transientcam_server.recording.layout import Header
+from transientcam_server.recording.readers import READERS
 from transientcam_server.recording.seal import seal
 
 
@@ -92,7 +93,8 @@ class RecordingWriter:
         OSError
             If it cannot be finished; ``.part`` stays, and recovery makes a recording of it.
         """
-        with self._lock:  # also while it gets its name
+        # the lock is held also while it gets its name
+        with self._lock, READERS.ending(self._lock.descriptor):
             try:
                 self._rows.overwrite("end", layout.encoded(end))
             finally:

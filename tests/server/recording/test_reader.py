@@ -1,4 +1,5 @@
 import json
+import threading
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -156,6 +157,22 @@ def test_a_recording_may_begin_while_all_that_is_there_is_read(
     read[0].close()
     with Recording(tmp_path / "b.h5") as recording:
         assert recording.frames == 2
+
+
+def test_a_recording_ends_when_nobody_reads_what_there_is(tmp_path: Path) -> None:
+    writer = RecordingWriter(tmp_path / "a.h5", header())
+    writer.append(frame(0))
+    reading = Recording(writer.part)
+    ending = threading.Thread(target=writer.close, args=({"reason": "stopped"},))
+    ending.start()
+
+    assert_same(reading.frame(0), frame(0))
+    assert writer.part.exists()
+    reading.close()
+    ending.join()
+
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.end == {"reason": "stopped"}
 
 
 def test_a_recording_never_replaces_one_that_is_written(tmp_path: Path) -> None:

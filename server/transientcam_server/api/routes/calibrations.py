@@ -230,7 +230,13 @@ async def read_calibration_file(
 ) -> FileResponse:
     """Download a calibration as .npz: to `import` it elsewhere, or for `serve --calibration`."""
     stored = await asyncio.to_thread(service.calibrations.store.get, calibration)
-    return await downloads.answer(stored.path, wanted, media_type=NPZ, filename=f"{stored.id}.npz")
+    return await downloads.answer(
+        stored.path,
+        wanted,
+        gone=kinds.UNKNOWN_CALIBRATION,
+        media_type=NPZ,
+        filename=f"{stored.id}.npz",
+    )
 
 
 def _harmonics(stored: StoredCalibration) -> HarmonicsDocument | None:

@@ -138,7 +138,9 @@ async def _answer(
     if etags.names(if_none_match, tag):
         return Response(status_code=304, headers={"ETag": tag})
     media_type = _JSON if key.endswith(METADATA) else _BYTES
-    return await downloads.answer(path, wanted, media_type=media_type, tag=tag)
+    return await downloads.answer(
+        path, wanted, gone=kinds.NOT_FOUND, media_type=media_type, tag=tag
+    )
 
 
 def _find(stores: ProductStores, store_id: str, key: str) -> tuple[pathlib.Path, str]:

@@ -21,7 +21,6 @@ from transientcam_server.api.documents.recording import (
 from transientcam_server.api.problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.recording import Limits, RecordingOptions
-from transientcam_server.recording.problems import unknown
 
 router = APIRouter(tags=["recordings"])
 
@@ -157,7 +156,6 @@ async def read_recording_file(
     """Download a recording as HDF5; h5py, xarray and MATLAB open it."""
     path = await asyncio.to_thread(service.recordings.path, recording)
     name = await asyncio.to_thread(service.recordings.download_name, recording)
-    try:
-        return await downloads.answer(path, wanted, media_type=HDF5, filename=name)
-    except FileNotFoundError:  # deleted meanwhile
-        raise unknown(recording) from None
+    return await downloads.answer(
+        path, wanted, gone=kinds.UNKNOWN_RECORDING, media_type=HDF5, filename=name
+    )

@@ -16,6 +16,7 @@ from tests.server.recording.test_recovery import abandoned
 from tests.serving import Served, serving
 from transientcam import wire
 from transientcam_driver import RawFrame
+from transientcam_server.api import downloads
 from transientcam_server.camera.events import Captured
 from transientcam_server.recording import Recording
 
@@ -366,6 +367,24 @@ def test_a_file_that_is_deleted_while_it_is_asked_for_is_unknown(
         return path
 
     monkeypatch.setattr(library, "path", deleted)
+
+    answer = http.get(f"{RECORDINGS}/{recording}/file")
+
+    assert answer.status_code == 404
+    assert answer.json()["type"] == "/problems/unknown-recording"
+
+
+def test_a_file_that_is_deleted_as_its_answer_begins_is_unknown(
+    http: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = recorded(http)["id"]
+    answer_with = downloads._File.__call__
+
+    async def deleted(self: downloads._File, *channel: Any) -> None:
+        Path(self.path).unlink()
+        await answer_with(self, *channel)
+
+    monkeypatch.setattr(downloads._File, "__call__", deleted)
 
     answer = http.get(f"{RECORDINGS}/{recording}/file")
 
