@@ -258,12 +258,14 @@ class Calibrator:
                 job.id, lambda camera, go_on: _capture(camera, job, options, takes, sweep, go_on)
             )
             capture = await asyncio.wrap_future(measuring)
+            # the sequence may have been changed since the request, and may be while this goes on
+            measured = self._camera.validate(capture.sequence)
             job.report(_EVALUATING, "evaluating")
             calibration, _ = await self._pipeline.workers.run_long(evaluate, capture)
             share, _ = await self._pipeline.workers.run_long(
-                self._share_of_takes, calibration, takes, once
+                self._share_of_takes, calibration, takes, measured
             )
-            verdict = await self._judged(calibration, applied())
+            verdict = await self._judged(calibration, measured)
             if verdict.word == "scene" and capture.waveform is not None:
                 capture = replace(capture, waveform=None)
                 sweep.reason = SWEEP_ON_A_SCENE

@@ -396,6 +396,22 @@ def test_meanwhile_the_camera_is_for_the_job_alone(http: httpx.Client) -> None:
     http.post(f"{job}/cancel")
 
 
+def test_it_is_of_the_sequence_that_there_is_when_it_begins(
+    bench: Served, http: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def changed() -> None:
+        assert http.put("/api/v1/sequence", json=QUICK).status_code == 200
+
+    # the last moment at which it has not the camera for itself
+    monkeypatch.setattr(bench.service.calibrations.store, "require_room", changed)
+
+    job = measured(http, activate=True)
+
+    assert (job["state"], job["problem"]) == ("done", None)
+    assert job["result"]["images"] == 3 * http.get("/api/v1/sequence").json()["images"]
+    assert job["result"]["activated"]
+
+
 def test_it_is_cancelled_and_frames_come_again(http: httpx.Client) -> None:
     sequence = http.get("/api/v1/sequence").json()
     job = started(http)
