@@ -205,7 +205,17 @@ class FoxgloveBridge:
     def _noticed(self, notice: Notice) -> None:
         if notice.kind in _PARAMETERS_CHANGE:
             with suppress(TransientcamError):  # the stream reports what is wrong with the camera
-                self._server.publish_parameter_values(parameters_of(self._controls))
+                parameters = parameters_of(self._controls)
+                self._while_it_serves(partial(self._server.publish_parameter_values, parameters))
 
     def _publish(self, report: Report) -> None:
-        self._server.publish_status(report.text, _LEVELS[report.level], report.about)
+        status = report.text, _LEVELS[report.level], report.about
+        self._while_it_serves(partial(self._server.publish_status, *status))
+
+    def _while_it_serves(self, publish: Callable[[], None]) -> None:
+        """Publish something, unless `close` stops the server, which cannot be called meanwhile."""
+        try:
+            publish()
+        except RuntimeError:  # "Already mutably borrowed"
+            if not self._source.closed:
+                raise

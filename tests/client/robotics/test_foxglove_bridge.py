@@ -246,6 +246,30 @@ def test_dropped_frames_are_counted_for_viewers_every_few_seconds(silent: Camera
     assert [report.text.split()[0] for report in reports] == ["1", "3"]
 
 
+def test_what_is_reported_while_it_stops_is_let_go(silent: Camera) -> None:
+    reporting, ended = threading.Event(), threading.Event()
+    failed: list[RuntimeError] = []
+
+    def report() -> None:
+        while not ended.is_set():
+            try:
+                bridge._source.report(Report("info", "connection", "still here"))
+            except RuntimeError as error:
+                failed.append(error)
+            reporting.set()
+
+    for _ in range(5):  # each hit the server as it stopped
+        with FoxgloveBridge(silent, port=0) as bridge:
+            thread = threading.Thread(target=report, name="reporting")
+            thread.start()
+            reporting.wait()
+        ended.set()
+        thread.join()
+        reporting.clear()
+        ended.clear()
+    assert failed == []
+
+
 @pytest.mark.parametrize("product", ["raw", "transient", "moments", "nothing"])
 def test_what_is_no_image_and_no_points_is_refused(silent: Camera, product: str) -> None:
     with pytest.raises(ParameterError, match="pointcloud"):
