@@ -17,11 +17,8 @@ from transientcam_moments._kernels.reconstruct import reconstruct_stages
 _ORDERS = (3, 4, 8)
 _FRAMES = 15
 _STAGES = {
-    "measure": "four-bucket, calibration",
-    "smooth": "smoothing",
-    "eigenvalue": "smallest eigenvalue",
-    "flag_and_bias": "flags, biasing",
-    "returns": "returns",
+    "measure_and_smooth": "four-bucket, calibration, smoothing",
+    "analyse": "smallest eigenvalue, flags, biasing, returns",
     "wide": "redone in float64",
     "separate": "direct, indirect, range",
 }
