@@ -2,6 +2,7 @@
 
 import itertools
 import threading
+import weakref
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -485,6 +486,29 @@ def test_an_image_is_cut_into_as_many_parts_as_asked_for_each_thread(total: int,
     assert seen[-1][1] == total
     assert min(end - begin for begin, end in seen) >= 64
     assert total >= LARGE or len(seen) == min(2 * each, total // 64)
+
+
+def test_threads_hold_nothing_of_an_image_that_is_done() -> None:
+    """The memory of its results would come back late, and the next image take other memory."""
+
+    kept: list[object] = []
+
+    class Keeping(ThreadPoolExecutor):
+        """Holds for good what its threads hold until they run again."""
+
+        def submit(self, *work: Any) -> Any:
+            kept.append(work)
+            return super().submit(*work)
+
+    result = np.zeros(5000)
+    gone = weakref.ref(result)
+    with Keeping(1) as executor:
+        spread = tm.kernels.over(executor, 2)
+        spread(lambda begin, end, result=result: result[begin:end].fill(1.0), 5000)
+        assert result.all()
+        assert kept
+        del result
+        assert gone() is None
 
 
 @pytest.mark.parametrize("total", [19560, 307200])

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from typing import Protocol
 
 from transientcam_moments.errors import ParameterError
@@ -49,15 +50,18 @@ def over(executor: Executor, parts: int) -> Spread:
         if total >= LARGE:
             size = min(size, max(unit, BLOCK // unit * unit))
         cuts = [0, *range(size, total - unit + 1, size), total]
-        waiting = deque(itertools.pairwise(cuts))
+        # a thread still holds what it was submitted after it is done: of the part, and so of the
+        # results, nothing but this queue may be there
+        waiting = deque(partial(part, *cut) for cut in itertools.pairwise(cuts))
+        del part
 
         def work() -> None:
             while waiting:
                 try:
-                    pair = waiting.popleft()
+                    do = waiting.popleft()
                 except IndexError:  # another thread was quicker
                     return
-                part(*pair)
+                do()
 
         others = [executor.submit(work) for _ in range(min(parts, len(waiting)) - 1)]
         work()
