@@ -3,10 +3,10 @@
 import json
 import math
 import os
+import statistics
 import subprocess
 import sys
 from collections.abc import Iterator
-from typing import Any
 
 from benchmarks.ceiling import measured
 from benchmarks.data import CORES, PAPER
@@ -15,6 +15,7 @@ from benchmarks.timing import duration
 
 _FRAMES = 256
 _ORDERS = (3, 4)
+_PAIRS = 5
 _DENSITY_BAR = 12.0
 _PISARENKO_BAR_S = 1e-3
 _PROGRAM = """
@@ -38,18 +39,18 @@ def lane_of(name):
     return f"{name} m={m} float32" in tm.kernels.state()["compiled"]
 
 def program(name, call):
-    with numpy_alone():
-        call()
-        numpy_s = min(timed(call) for _ in range(3))
     first_s = timed(call)
     start_s = time.perf_counter()
-    while not lane_of(name):  # a user reads the first result meanwhile
-        time.sleep(0.01)
-    ready_s = time.perf_counter() - start_s
+    if tm.kernels.state()["enabled"]:
+        while not lane_of(name):  # a user reads the first result meanwhile
+            time.sleep(0.01)
+        ready_s = time.perf_counter() - start_s
+    else:
+        time.sleep(0.5)  # as a user reads the first result here, too
+        ready_s = 0.0
     second_s = timed(call)
     later_s = statistics.median(timed(call) for _ in range(15))
-    return {"numpy": numpy_s, "first": first_s, "ready": ready_s, "second": second_s,
-            "later": later_s}
+    return {"first": first_s, "ready": ready_s, "second": second_s, "later": later_s}
 
 print(json.dumps({
     "density": program("density", lambda: tm.density(coefficients, phase_rad)),
@@ -57,17 +58,32 @@ print(json.dumps({
     "levinson": program("levinson", lambda: tm.levinson(b)),
 }))
 """
+_Times = dict[str, dict[str, float]]
+"""Seconds of each call's steps: first, ready, second, later."""
 
 
 def tables() -> Iterator[Table]:
-    """Run fresh processes, whose cache holds what former ones compiled."""
+    """Run fresh processes in turn, with lanes from a warm cache and with NumPy alone."""
     table = Table(
         f"Fresh processes that ask for nothing, 163 x 120, float32, {CORES} cores",
-        ("call", "NumPy", "first call", "lane after", "second call", "later", "gain"),
+        (
+            "call",
+            "NumPy: first",
+            "second",
+            "later",
+            "lanes: first",
+            "ready after",
+            "second",
+            "later",
+            "gain: second",
+            "later",
+        ),
         notes=[
-            f"density: {_FRAMES} times. NumPy: with BLAS, all cores, the quickest of three calls "
-            "of the same process; gain: NumPy over later calls. The first call computes with NumPy "
-            "while the lane is loaded from the cache beside it.",
+            f"density: {_FRAMES} times. NumPy: with BLAS, all cores, `TRANSIENTCAM_KERNELS=off`. "
+            f"Medians of {_PAIRS} processes of either kind, in turn; later: the median of fifteen "
+            "calls. A gain holds the same call of both kinds of processes against each other. "
+            "The first call computes with NumPy; then the lane is loaded from the cache, beside "
+            "what the program does next.",
         ],
     )
     # processes compute in memory that has been written before, as does the ceiling
@@ -77,30 +93,57 @@ def tables() -> Iterator[Table]:
         f"the caches from all cores, takes {duration(write_s)}."
     )
     for m in _ORDERS:
-        _fresh(m)  # warms the cache
-        for name, found in _fresh(m).items():
-            gain = found["numpy"] / found["later"]
-            times = [found[key] for key in ("numpy", "first", "ready", "second", "later")]
+        _fresh(m, "on")  # warms the cache
+        pairs = [(_fresh(m, "off"), _fresh(m, "on")) for _ in range(_PAIRS)]
+        numpy, lanes = (_medians([pair[kind] for pair in pairs]) for kind in (0, 1))
+        for name, found in lanes.items():
+            alone = numpy[name]
+            gain = {step: alone[step] / found[step] for step in ("second", "later")}
+            times = [alone[step] for step in ("first", "second", "later")]
+            times += [found[step] for step in ("first", "ready", "second", "later")]
             table.rows.append(
-                (f"{name}, m = {m}", *(duration(each) for each in times), f"{gain:.1f}")
+                (
+                    f"{name}, m = {m}",
+                    *(duration(each) for each in times),
+                    *(f"{each:.1f}" for each in gain.values()),
+                )
             )
             if name == "density":
-                second = found["numpy"] / found["second"]
-                table.notes.append(verdict(gain, _DENSITY_BAR, f"m = {m}, density, later calls"))
-                table.notes.append(verdict(second, _DENSITY_BAR, f"m = {m}, density, second call"))
+                for step, each in gain.items():
+                    table.notes.append(verdict(each, _DENSITY_BAR, f"m = {m}, density, {step}"))
+                seconds = [pair[kind][name]["second"] for kind in (0, 1) for pair in pairs]
+                table.notes.append(
+                    f"m = {m}, density, second calls: NumPy {_span(seconds[:_PAIRS])}, lanes "
+                    f"{_span(seconds[_PAIRS:])}; NumPy's later calls over the second one with "
+                    f"lanes: {alone['later'] / found['second']:.1f}."
+                )
             if name == "pisarenko" and m == _ORDERS[-1]:
                 quick = _PISARENKO_BAR_S / found["later"]
                 table.notes.append(verdict(quick, 1.0, f"m = {m}, pisarenko, 1 ms over its time"))
     yield table
 
 
-def _fresh(m: int) -> dict[str, Any]:
+def _medians(runs: list[_Times]) -> _Times:
+    """Return the median of each time over several processes."""
+    return {
+        name: {step: statistics.median(run[name][step] for run in runs) for step in steps}
+        for name, steps in runs[0].items()
+    }
+
+
+def _span(seconds: list[float]) -> str:
+    """Return the least and the largest of some times."""
+    return f"{duration(min(seconds))} to {duration(max(seconds))}"
+
+
+def _fresh(m: int, kernels: str) -> _Times:
+    """Run the program in a process of its own, with TRANSIENTCAM_KERNELS as given."""
     result = subprocess.run(
         [sys.executable, "-c", _PROGRAM, json.dumps([m, _FRAMES])],
-        env={**os.environ, "TRANSIENTCAM_KERNELS": "on"},
+        env={**os.environ, "TRANSIENTCAM_KERNELS": kernels},
         capture_output=True,
         text=True,
         check=True,
     )
-    measured: dict[str, Any] = json.loads(result.stdout)
-    return measured
+    times: _Times = json.loads(result.stdout)
+    return times

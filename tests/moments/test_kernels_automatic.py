@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import CACHE, lanes, without_lanes
-from transientcam_moments._lanes import automatic, parallel
+from transientcam_moments._lanes import accelerated, automatic, parallel
 from transientcam_moments._lanes.helper import Helper
 from transientcam_moments._lanes.parallel import _cores, on_threads
+from transientcam_moments._lanes.pool import Pool
 from transientcam_moments._lanes.registry import HEAVY_PIXELS, REGISTRY, Key
 
 
@@ -103,6 +104,58 @@ def test_one_line_says_so_once(compiler: Compiler, caplog: pytest.LogCaptureFixt
 
     assert len(caplog.records) == 1
     assert "TRANSIENTCAM_KERNELS=off" in caplog.text
+
+
+def test_loading_begins_when_the_first_call_has_returned(
+    compiler: Compiler, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It would take the interpreter's lock from that call."""
+    waits = threading.Event()
+
+    class Noticed(threading.Event):
+        def wait(self, timeout: float | None = None) -> bool:
+            waits.set()
+            return super().wait(None)
+
+    monkeypatch.setattr(automatic._WANTED, "may_load", Noticed())
+    compiler.go_on.set()
+    loaded_meanwhile: list[Key] = []
+
+    @accelerated("levinson")
+    def planar(b: NDArray[np.complex64]) -> NDArray[np.complex64]:
+        assert waits.wait(10)
+        loaded_meanwhile.extend(compiler.keys)
+        return b
+
+    planar(moments(3))
+
+    assert compiler.finish() == [Key("levinson", 3, "f")]
+    assert loaded_meanwhile == []
+
+
+def test_memory_for_the_results_of_the_next_call_is_there_with_its_lane(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pool, loaded = Pool(), threading.Event()
+
+    def make(key: Key, helper: Helper | None) -> Callable[..., object]:
+        assert loaded.wait(10)
+        return lambda *planes: None  # leaves everything to NumPy
+
+    monkeypatch.setattr(automatic, "_WANTED", automatic._Wanted())
+    monkeypatch.setattr(automatic, "POOL", pool)
+    monkeypatch.setattr(REGISTRY, "automatic", True)
+    monkeypatch.setattr(REGISTRY, "make", make)
+    b = moments(3, 20_000)
+    with without_lanes():
+        first = tm.levinson(b)
+        loaded.set()
+        for thread in threading.enumerate():
+            if thread.name == automatic.THREAD:
+                thread.join()
+        assert tm.kernels.state()["compiled"] == ["levinson m=3 float32"]
+
+    assert pool.size_bytes == first.error.nbytes + first.polynomial.nbytes + first.reflection.nbytes
 
 
 def in_fresh_process(setting: str) -> str:

@@ -14,7 +14,7 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._kernels.pool import empty
+from transientcam_moments._lanes.pool import empty
 from transientcam_moments._lanes.parallel import Spread, at_once
 
 _INTERLEAVE = 4

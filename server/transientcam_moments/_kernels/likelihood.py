@@ -21,7 +21,7 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.packing import PIXELS_AT_ONCE, ROW
-from transientcam_moments._kernels.pool import empty
+from transientcam_moments._lanes.pool import empty
 from transientcam_moments._kernels.stages import (
     TAIL_ROUNDS,
     bring_back,

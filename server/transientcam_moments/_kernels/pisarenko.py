@@ -7,7 +7,7 @@ import numpy as np
 
 from transientcam_moments._kernels.circle import half_turns
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
-from transientcam_moments._kernels.pool import empty
+from transientcam_moments._lanes.pool import empty
 from transientcam_moments._kernels.refine import Found, redo
 from transientcam_moments._kernels.returns import returns_entry, usual_steps
 from transientcam_moments._kernels.wide import WideReturns

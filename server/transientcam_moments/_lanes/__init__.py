@@ -53,7 +53,7 @@ from typing import Any
 
 import numpy as np
 
-from transientcam_moments._lanes.automatic import want
+from transientcam_moments._lanes.automatic import returned, want
 from transientcam_moments._lanes.parallel import Spread
 from transientcam_moments._lanes.registry import (
     HEAVY_PIXELS,
@@ -91,14 +91,19 @@ def accelerated(
     def decorate(planar: Planar) -> Planar:
         @wraps(planar)
         def run(planes: Any, *rest: Any, spread: Spread | None = None) -> Any:
-            lane = None
+            lane = key = None
             if isinstance(planes, np.ndarray) and planes.ndim:
                 precision = PRECISIONS.get(planes.dtype.char) if of is None else "f"
                 if precision is not None and of in (None, planes.dtype.char):
-                    lane = _of(name, order(planes, *rest), planes[0].size, precision)
+                    key = Key(name, order(planes, *rest), precision)
+                    lane = _of(key, planes[0].size, computing=True)
             how = {} if spread is None else {"spread": spread}
             found = None if lane is None else lane(planes, *rest, **how)
-            return planar(planes, *rest) if found is None else found
+            if found is None:
+                found = planar(planes, *rest)
+                if lane is None and key is not None and REGISTRY.automatic:
+                    returned(key, found)
+            return found
 
         return run
 
@@ -126,19 +131,18 @@ def find(name: str, planes: object) -> Callable[..., Any] | None:
     if not isinstance(planes, np.ndarray) or planes.ndim == 0:
         return None
     precision = PRECISIONS.get(planes.dtype.char)
-    return None if precision is None else _of(name, len(planes) - 1, planes[0].size, precision)
+    return None if precision is None else lookup(name, len(planes) - 1, planes[0].size, precision)
 
 
 def lookup(name: str, m: int, pixels: int, precision: str = "f") -> Callable[..., Any] | None:
     """Return a lane of order m for so many pixels in a precision, or None, as `find` does."""
-    return _of(name, m, pixels, precision)
+    return _of(Key(name, m, precision), pixels)
 
 
-def _of(name: str, m: int, pixels: int, precision: str) -> Callable[..., Any] | None:
+def _of(key: Key, pixels: int, *, computing: bool = False) -> Callable[..., Any] | None:
     if pixels < LEAST_PIXELS:
         return None
-    key = Key(name, m, precision)
     lane = REGISTRY.compiled.get(key)
     if lane is None and pixels >= HEAVY_PIXELS:
-        want(key)
+        want(key, computing=computing)
     return lane

@@ -2,16 +2,21 @@
 
 import logging
 import threading
-from typing import Final
+from typing import Any, Final
+
+from numpy.typing import NDArray
 
 from transientcam_moments._lanes.helper import Helper, program
 from transientcam_moments._lanes.parallel import start_threads
+from transientcam_moments._lanes.pool import POOL
 from transientcam_moments._lanes.registry import REGISTRY, Key
 
 THREAD: Final = "transientcam-compile"
 """Name of every thread that compiles."""
 MOST_ROOTS: Final = 8
 """The largest m with lanes for eigenvalues and returns."""
+LATEST_S: Final = 0.3
+"""How long loading waits for the call that wants a lane, which may take longer than loading."""
 _SINGLE_ONLY: Final = (
     "smooth",
     "measure",
@@ -40,6 +45,8 @@ class _Wanted:
         self.lock = threading.Lock()
         self.seen: set[Key] = set()
         self.waiting: list[Key] = []
+        self.results_bytes: dict[Key, list[int]] = {}
+        self.may_load = threading.Event()
         self.thread: threading.Thread | None = None
         self.said = False
 
@@ -47,13 +54,25 @@ class _Wanted:
 _WANTED = _Wanted()
 
 
-def want(key: Key) -> None:
-    """Have a lane made ready in the background; returns at once, also where it cannot be."""
+def want(key: Key, *, computing: bool = False) -> None:
+    """Have a lane made ready in the background; returns at once, also where it cannot be.
+
+    Parameters
+    ----------
+    computing
+        NumPy computes the same on this thread now, and `returned` is called after it. Loading
+        begins then, or after `LATEST_S`: it would take the interpreter's lock from the call again
+        and again, and make it several times as long.
+    """
     if not REGISTRY.automatic or key in _WANTED.seen:
         return
     with _WANTED.lock:
         if key in _WANTED.seen:
             return
+        if computing:
+            _WANTED.may_load.clear()
+        else:
+            _WANTED.may_load.set()
         _WANTED.seen.add(key)
         if not is_offered(key):
             return
@@ -69,6 +88,18 @@ def want(key: Key) -> None:
             # doesn't survive
             _WANTED.thread = threading.Thread(target=_work, name=THREAD)
             _WANTED.thread.start()
+
+
+def returned(key: Key, results: NDArray[Any] | tuple[NDArray[Any], ...]) -> None:
+    """Note what NumPy returned in the place of a lane that is being made ready.
+
+    The lane finds memory for as much: the next call is likely the same, and the system takes three
+    times as long to clear new memory for the density of a film as the lane takes to compute it.
+    """
+    _WANTED.may_load.set()
+    if _WANTED.thread is not None and key in _WANTED.seen:
+        arrays = results if isinstance(results, tuple) else (results,)
+        _WANTED.results_bytes[key] = [each.nbytes for each in arrays]
 
 
 def is_offered(key: Key) -> bool:
@@ -94,6 +125,7 @@ def _work() -> None:
     start_threads()
     with Helper(program()) as helper:
         while True:
+            _WANTED.may_load.wait(LATEST_S)
             with _WANTED.lock:
                 if not _WANTED.waiting or not main.is_alive():
                     _WANTED.thread = None
@@ -115,6 +147,7 @@ def compile_one(key: Key, helper: Helper | None = None) -> None:
         try:
             lane = REGISTRY.make(key, helper)
             if lane is not None:
+                POOL.prepare(_WANTED.results_bytes.pop(key, ()))
                 REGISTRY.compiled[key] = lane
         except Exception as error:
             # whatever stops a compiler (a missing one, a full disk, an unknown processor) must

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from transientcam_moments._kernels.pool import LEAST_BYTES, Pool
+from transientcam_moments._lanes.pool import LEAST_BYTES, Pool
 
 SHAPE = (2, LEAST_BYTES)
 
@@ -60,6 +60,23 @@ def test_memory_of_another_size_is_not_taken() -> None:
     larger = pool.empty(SHAPE, np.float64)
     assert larger.nbytes == 16 * LEAST_BYTES
     assert pool.size_bytes == 8 * LEAST_BYTES
+
+
+def test_prepared_memory_is_what_arrays_of_its_size_take() -> None:
+    pool = Pool()
+    pool.prepare([2 * LEAST_BYTES, LEAST_BYTES, 2 * LEAST_BYTES])
+    assert pool.size_bytes == 5 * LEAST_BYTES
+    arrays = [pool.empty(SHAPE, np.uint8), pool.empty(SHAPE, np.uint8)]
+    assert pool.size_bytes == LEAST_BYTES
+    for array in arrays:
+        array[:] = 1
+
+
+def test_what_is_kept_is_not_prepared_again_nor_what_is_never_kept() -> None:
+    pool = Pool(most_bytes=4 * LEAST_BYTES)
+    pool.empty(SHAPE, np.uint8)
+    pool.prepare([2 * LEAST_BYTES, LEAST_BYTES - 1, 5 * LEAST_BYTES])
+    assert pool.size_bytes == 2 * LEAST_BYTES
 
 
 def test_no_more_is_kept_than_stated_and_the_newest_of_it() -> None:

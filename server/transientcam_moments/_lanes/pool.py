@@ -7,6 +7,7 @@ long as writing it. The results of a frame of 640 x 480 pixels and m = 4 take 54
 import math
 import threading
 from collections import deque
+from collections.abc import Iterable
 from typing import Any, Final
 
 import numpy as np
@@ -14,6 +15,8 @@ from numpy.typing import DTypeLike, NDArray
 
 LEAST_BYTES: Final = 1 << 16
 """Smaller arrays are made afresh: the allocator has their memory at hand."""
+PAGE_BYTES: Final = 4096
+"""The smallest page of any system."""
 MOST_BYTES: Final = 96 << 20
 """What is kept between frames: the results of one frame of 640 x 480 pixels and m = 8."""
 
@@ -50,6 +53,18 @@ class Pool:
         if block is None:
             block = np.empty(size_bytes, np.uint8)
         return np.asarray(_Owner(block, self)).view(kind).reshape(shape)
+
+    def prepare(self, sizes_bytes: Iterable[int]) -> None:
+        """Keep memory of these sizes, each of its pages written once; what is kept counts."""
+        with self._lock:
+            kept = [block.nbytes for block in self._blocks]
+        for size_bytes in sizes_bytes:
+            if size_bytes in kept:
+                kept.remove(size_bytes)
+            elif LEAST_BYTES <= size_bytes <= self._most_bytes:
+                block = np.empty(size_bytes, np.uint8)
+                block[::PAGE_BYTES] = 0
+                self.put(block)
 
     def put(self, block: NDArray[np.uint8]) -> None:
         """Keep memory that nothing refers to any more, unless it is more than may be kept."""
@@ -94,6 +109,6 @@ class _Owner:
         self._pool.put(self._block)
 
 
-_POOL: Final = Pool()
-empty: Final = _POOL.empty
-"""`Pool.empty` of the pool that all lanes of a process share."""
+POOL: Final = Pool()
+"""What all lanes of a process share."""
+empty: Final = POOL.empty
