@@ -4,7 +4,8 @@ import itertools
 import threading
 import weakref
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -496,15 +497,18 @@ def test_threads_hold_nothing_of_an_image_that_is_done() -> None:
     class Keeping(ThreadPoolExecutor):
         """Holds for good what its threads hold until they run again."""
 
-        def submit(self, *work: Any) -> Any:
-            kept.append(work)
-            return super().submit(*work)
+        def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+            kept.append((fn, args, kwargs))
+            return super().submit(fn, *args, **kwargs)
+
+    def fill(begin: int, end: int, filled: Array) -> None:
+        filled[begin:end] = 1.0
 
     result = np.zeros(5000)
     gone = weakref.ref(result)
     with Keeping(1) as executor:
         spread = tm.kernels.over(executor, 2)
-        spread(lambda begin, end, result=result: result[begin:end].fill(1.0), 5000)
+        spread(partial(fill, filled=result), 5000)
         assert result.all()
         assert kept
         del result

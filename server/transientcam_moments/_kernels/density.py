@@ -18,8 +18,8 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.phase_groups import ANY, MIRRORED, TURN, grouping
-from transientcam_moments._lanes.pool import empty
 from transientcam_moments._lanes.parallel import Spread, at_once
+from transientcam_moments._lanes.pool import empty
 from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 _BANK = 240  # pairs of registers of coefficients, which stay in the first cache for all phases

@@ -17,8 +17,8 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.padding import LEAST_WIDTH, normalisation, row_length
-from transientcam_moments._lanes.pool import empty
 from transientcam_moments._lanes.parallel import Spread, at_once
+from transientcam_moments._lanes.pool import empty
 from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}

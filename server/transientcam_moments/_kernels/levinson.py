@@ -14,8 +14,8 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._lanes.pool import empty
 from transientcam_moments._lanes.parallel import Spread, at_once
+from transientcam_moments._lanes.pool import empty
 
 _INTERLEAVE = 2
 

@@ -21,7 +21,6 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.packing import PIXELS_AT_ONCE, ROW
-from transientcam_moments._lanes.pool import empty
 from transientcam_moments._kernels.stages import (
     TAIL_ROUNDS,
     bring_back,
@@ -35,6 +34,7 @@ from transientcam_moments._kernels.stages import (
     take_three,
 )
 from transientcam_moments._lanes.parallel import Spread, at_once
+from transientcam_moments._lanes.pool import empty
 from transientcam_moments.likelihood import choice
 from transientcam_moments.likelihood.choice import MOST_RETURNS, TAIL_SHAPE
 
