@@ -11,7 +11,7 @@ from transientcam_server.imaging.calibration import nominal_gains
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.planning.estimation import direct_range
 from transientcam_server.planning.plausible import plausible_ranges
-from transientcam_server.planning.sampling import typical_pixels
+from transientcam_server.planning.sampling import STRATUM, one_of_each, typical_pixels
 from transientcam_server.planning.scene import PIXELS, SceneStatistics
 from transientcam_server.settings import ReconstructionSettings
 
@@ -129,7 +129,7 @@ def describe(
     variance = seen.variance(mean_dn) / seen.frames
     base_hz = seen.recipe.base_frequency_hz
     direct_m, uncertainty_m = direct_range(b, variance, base_hz, settings)
-    earliest_m, latest_m = plausible_ranges(b, variance, base_hz, direct_m, uncertainty_m)
+    earliest_m, latest_m = _plausible_by_kind(b, variance, base_hz, direct_m, uncertainty_m)
     light_dn = _brightness(b if coarse is None else coarse.at(pixels)[0], b)
     checked = coarse is not None
     if coarse is not None:
@@ -163,6 +163,20 @@ def describe(
         moving_share=moving_share(seen, lit),
         ambiguity_checked=checked,
     )
+
+
+def _plausible_by_kind(
+    b: _Array, variance: _Array, base_hz: float, direct_m: _Array, uncertainty_m: _Array
+) -> tuple[_Array, _Array]:
+    """Return `plausible_ranges` (P), looked for in one pixel of each kind."""
+    few = one_of_each(direct_m.size)
+    bounds_m = plausible_ranges(
+        b[:, few], variance[:, few], base_hz, direct_m[few], uncertainty_m[few]
+    )
+    earliest_m, latest_m = (
+        direct_m + np.repeat(each - direct_m[few], STRATUM) for each in bounds_m
+    )
+    return earliest_m, latest_m
 
 
 def lit_pixels(seen: Seen) -> _Array:

@@ -133,10 +133,10 @@ def plan(
         if not goal.reached_by(best):
             raise unreachable(goal, search, best)
     progress.at(0.7, "half the time")
-    half_time = search.finest(leading, best.applied.capture_s / 2, contenders=1)
+    half_time = search.finest(leading, best.applied.capture_s / 2)
     while targets and half_time is not None and _as_good(half_time, best, goal):
         best = half_time
-        half_time = search.finest(leading, best.applied.capture_s / 2, contenders=1)
+        half_time = search.finest(leading, best.applied.capture_s / 2)
     progress.at(0.8, "twice the accuracy")
     half = {leading: best.error(leading) / 2}
     twice = search.without_budgets().quickest(half, contenders=1)

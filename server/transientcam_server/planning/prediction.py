@@ -9,7 +9,7 @@ number of takes.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from statistics import NormalDist
 from typing import Any, Final
 
@@ -91,6 +91,8 @@ class Predictor:
         Of all draws: the same arguments give the same result.
     go_on
         Called several times a second while this computes; whatever it raises ends that.
+    closely
+        Predict with all pixels of the scene, and not with few of them.
     """
 
     def __init__(
@@ -101,9 +103,11 @@ class Predictor:
         *,
         seed: int = 0,
         go_on: Callable[[], None] = lambda: None,
+        closely: bool = False,
     ) -> None:
         self._go_on = go_on
-        self.scene = scene
+        self._whole = scene
+        self.scene = scene if closely else scene.few()
         self.sensor = sensor
         self.settings = settings
         self._seed = seed
@@ -111,7 +115,7 @@ class Predictor:
         self._nominal = self.relative_noise(NOMINAL)
         self._column = lru_cache(maxsize=None)(self._drawn_column)
         self._exact = lru_cache(maxsize=None)(self._bias_without_noise)
-        self.resolving = Resolving(scene, settings, seed=seed, go_on=go_on)
+        self.resolving = Resolving(self.scene, settings, seed=seed, go_on=go_on)
 
     def longest_exposure_s(self) -> float:
         """Exposure at which the scene's bright pixels just do not saturate."""
@@ -167,8 +171,13 @@ class Predictor:
         # noise of the look itself is in this, and in the direct range
         return _HARDLY * float(np.median(np.nan_to_num(bias_m, nan=math.inf)))
 
-    def predict(self, estimator: str, sequence: Sequence) -> Prediction:
-        """Predict the errors of a sequence and an estimator, with intervals."""
+    def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
+        """Predict the errors of a sequence and an estimator, with intervals.
+
+        ``closely``, with all pixels of the scene: several times the work, and narrower intervals.
+        """
+        if closely:
+            return self._closer.predict(estimator, sequence)
         harmonics = self._harmonics(estimator, sequence)
         noise = self.relative_noise(sequence)
         errors = self._errors(
@@ -224,6 +233,11 @@ class Predictor:
         )
         relative: _Array = np.sqrt(noise.variance[1] * self._left) / b0
         return relative
+
+    @cached_property
+    def _closer(self) -> "Predictor":
+        arguments = self._whole, self.sensor, self.settings
+        return Predictor(*arguments, seed=self._seed, go_on=self._go_on, closely=True)
 
     def _harmonics(self, estimator: str, sequence: Sequence) -> int:
         """How many harmonics the estimator looks at."""

@@ -1,7 +1,7 @@
 """The scene as predictions see it: light, returns and true range of typical pixels."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any, Final
 
 import numpy as np
@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_moments.pisarenko import DIRECT_THRESHOLD
+from transientcam_server.planning.sampling import STRATUM, one_of_each
 
 _Array = NDArray[Any]
-PIXELS: Final = 128
-"""How many lit pixels stand for a scene, a multiple of `sampling.STRATUM`."""
+PIXELS: Final = 1024
+"""How many lit pixels stand for a scene, a multiple of `sampling.STRATUM` squared."""
+FEW_PIXELS: Final = PIXELS // STRATUM
+"""How many of them nearly all is predicted with."""
 MOSTLY_DIM: Final = 0.25
 """Share of dim pixels from which on it matters to the median one."""
 AMBIGUOUS_SHARE: Final = 0.02
@@ -74,6 +77,20 @@ class SceneStatistics:
     dim_share: float = 0.0
     moving_share: float = 0.0
     ambiguity_checked: bool = True
+
+    def few(self) -> "SceneStatistics":
+        """Return what fewer pixels show, `FEW_PIXELS` of them."""
+        count = self.direct_m.size
+        if count <= FEW_PIXELS:
+            return self
+        chosen = one_of_each(count)
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        of_pixels = {
+            name: value[..., chosen]
+            for name, value in values.items()
+            if isinstance(value, np.ndarray)
+        }
+        return replace(self, **of_pixels)
 
     def to_document(self) -> dict[str, Any]:
         """Return what was seen, as JSON."""
@@ -148,17 +165,17 @@ def uniform_scene(
         As in `SceneStatistics`.
     """
     range_m, weight = np.array(list(returns), dtype=float).T
-    repeated = (len(range_m), PIXELS)
+    repeated = (len(range_m), FEW_PIXELS)
     delay_s = np.broadcast_to(2 * range_m[:, None] / tm.SPEED_OF_LIGHT_M_S, repeated)
     share = np.broadcast_to(weight[:, None] / weight.sum(), repeated)
     counts = weight >= DIRECT_THRESHOLD * weight.max()
-    direct_m = np.full(PIXELS, range_m[counts].min())
+    direct_m = np.full(FEW_PIXELS, range_m[counts].min())
     return SceneStatistics(
-        brightness_dn_per_s=np.full(PIXELS, brightness_dn_per_s),
-        ambient_dn_per_s=np.full(PIXELS, ambient_dn_per_s),
+        brightness_dn_per_s=np.full(FEW_PIXELS, brightness_dn_per_s),
+        ambient_dn_per_s=np.full(FEW_PIXELS, ambient_dn_per_s),
         brightest_dn_per_s=brightness_dn_per_s + ambient_dn_per_s,
         direct_m=direct_m,
-        uncertainty_m=np.zeros(PIXELS),
+        uncertainty_m=np.zeros(FEW_PIXELS),
         earliest_m=direct_m,
         latest_m=direct_m,
         delay_s=delay_s,

@@ -99,17 +99,17 @@ class Search:
         goal = replace(self._goal, capture_s=None, frame_rate_hz=None, computing_share=None)
         return Search(goal, self.families, self.predictor, self.timed)
 
-    def choice(self, family: Family, member: Member) -> Choice:
-        """Predict a member with many draws."""
+    def choice(self, family: Family, member: Member, *, closely: bool = False) -> Choice:
+        """Predict a member with many draws, and closely with many pixels, too."""
         applied = family.applied(member)
         key = (family.estimator, applied.sequence)
-        if key not in self._choices:
+        if closely or key not in self._choices:
             sequence, goal, predictor = applied.sequence, self._goal, self.predictor
             distance_m = goal.separation_m
             self._choices[key] = Choice(
                 applied,
                 family.estimator,
-                predictor.predict(family.estimator, sequence),
+                predictor.predict(family.estimator, sequence, closely=closely),
                 predictor.beyond_scene(sequence),
                 lambda: self.timed(sequence, family.estimator),
                 predictor.bound_width(sequence) if goal.bound_width is not None else None,
@@ -336,9 +336,13 @@ class Search:
             if member.capture_s >= limit_s or not self._affords(family, member):
                 break
             choice = self.choice(family, member)
+            if _hangs_on_the_margin(choice, targets):
+                choice = self.choice(family, member, closely=True)
             over = max(choice.error_with_margin(name) / limit for name, limit in targets.items())
-            # few draws were wrong by that factor: on to where they predict as much less, or more
-            wrong = max(over, _LEAST_WRONG)
+            missed = max(choice.error(name) / limit for name, limit in targets.items())
+            # few draws were wrong by that factor: on to where they predict as much less, or more;
+            # where even the error is too large, the margin of few pixels says nothing
+            wrong = max(missed if missed > 1 else over, _LEAST_WRONG)
             wanted = {name: self._quick(family, place, name) / wrong for name in targets}
             if over <= 1:
                 best, last = choice, place - 1
@@ -355,6 +359,13 @@ class Search:
 
     def _within(self, family: Family, limits: dict[str, float], place: int) -> bool:
         return all(self._quick(family, place, name) <= limit for name, limit in limits.items())
+
+
+def _hangs_on_the_margin(choice: Choice, targets: dict[str, float]) -> bool:
+    """Return whether a choice reaches all targets, but for the margin."""
+    return all(choice.error(name) <= limit for name, limit in targets.items()) and any(
+        choice.error_with_margin(name) > limit for name, limit in targets.items()
+    )
 
 
 def _coarse_to_fine(count: int) -> list[int]:

@@ -41,6 +41,7 @@ from transientcam_server.planning.plan import plan
 from transientcam_server.planning.prediction import Prediction, Predictor
 from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.resolving import both_found
+from transientcam_server.planning.sampling import one_of_each
 from transientcam_server.planning.search import Search
 from transientcam_server.planning.timing import ReconstructionTimer
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
@@ -88,7 +89,7 @@ class ClosedForm:
         bias_m = self.least_bias_m(estimator, sequence)
         return std_m, bias_m, math.hypot(std_m, bias_m)
 
-    def predict(self, estimator: str, sequence: Sequence) -> Prediction:
+    def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
         each = self.quick(estimator, sequence, self.noise_scale(sequence))
         std, bias, error = (
             Figure(value, value / SPREAD, value * SPREAD, 2 * value, value * MARGIN)
@@ -190,7 +191,7 @@ class Doubtful(ClosedForm):
         super().__init__()
         self.scene = dataclasses.replace(self.scene, dim_share=dim_share)
 
-    def predict(self, estimator: str, sequence: Sequence) -> Prediction:
+    def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
         found = super().predict(estimator, sequence)
         return dataclasses.replace(found, most_bias_m=0.04, bias_known=False)
 
@@ -218,7 +219,7 @@ class Hasty(ClosedForm):
         part = 1 / 3 if estimator == "maximum-entropy" else 1.0
         return std_m, bias_m, part * error_m
 
-    def predict(self, estimator: str, sequence: Sequence) -> Prediction:
+    def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
         exact = super().quick(estimator, sequence, self.noise_scale(sequence))
         std, bias, error = (Figure(each, each, each, each, each) for each in exact)
         return Prediction(std, bias, error, 0.0, bias.median, bias_known=True)
@@ -270,6 +271,32 @@ def test_an_error_that_rises_again_with_time_hides_no_quicker_sequence(
 
     expected_s = quickest_s(goal, predictor, capabilities)
     assert found.recommended.applied.capture_s == pytest.approx(expected_s)
+
+
+class Sampled(ClosedForm):
+    """Few pixels leave an error uncertain by a third; all that there are do not."""
+
+    def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
+        found = super().predict(estimator, sequence)
+        if closely:
+            return found
+        error = found.range_error
+        uncertain = dataclasses.replace(error, with_margin=1.33 * error.median)
+        return dataclasses.replace(found, range_error=uncertain)
+
+
+@pytest.mark.parametrize("target_m", [0.02, 0.008, 0.005, 0.003])
+def test_what_few_pixels_leave_undecided_is_decided_by_more(
+    target_m: float, capabilities: Capabilities
+) -> None:
+    goal = Goal(range_error_m=target_m)
+
+    found = plan(goal, cast(Predictor, Sampled()), capabilities, timed=lambda *_: 1e-3)
+
+    expected_s = quickest_s(goal, ClosedForm(), capabilities)
+    assert found.recommended.applied.capture_s == pytest.approx(expected_s)
+    error = found.recommended.predicted.range_error
+    assert error.with_margin == pytest.approx(MARGIN * error.median)
 
 
 def test_a_plan_shows_what_it_recommends(capabilities: Capabilities) -> None:
@@ -652,6 +679,42 @@ def test_deviation_of_one_return_at_one_frequency_is_the_closed_form() -> None:
     assert predictor.least_noise_m(
         "single-frequency", sequence, predictor.noise_scale(sequence)
     ) == pytest.approx(expected_m, rel=1e-3)
+
+
+def test_more_pixels_know_an_error_more_closely() -> None:
+    """Each has a second return of its own."""
+    one = uniform_scene(1e6, [(2.0, 1.0)])
+    random = np.random.default_rng(4)
+    pixels = 1024
+    full = {
+        each.name: np.repeat(value, pixels // value.shape[-1], axis=-1)
+        for each in dataclasses.fields(one)
+        if isinstance(value := getattr(one, each.name), np.ndarray)
+    }
+    delay_s = 2 * random.uniform(2.2, 4.0, (1, pixels)) / tm.SPEED_OF_LIGHT_M_S
+    share = np.linspace(0, 0.5, pixels)[None]
+    scene = dataclasses.replace(
+        one,
+        **full
+        | {
+            "delay_s": np.concatenate([full["delay_s"], delay_s]),
+            "share": np.concatenate([full["share"] - share, share]),
+        },
+    )
+    predictor = Predictor(scene, tm.noise.Sensor(), SETTINGS)
+    sequence = Sequence(harmonics=1, exposure_s=0.002, takes=100, zeroth="estimated")
+
+    few = predictor.predict("single-frequency", sequence).range_error
+    many = predictor.predict("single-frequency", sequence, closely=True).range_error
+
+    turn = 4 * np.pi * sequence.base_frequency_hz / tm.SPEED_OF_LIGHT_M_S
+    mixed = (1 - share) * np.exp(2j * turn) + share * np.exp(
+        1j * turn * delay_s * tm.SPEED_OF_LIGHT_M_S / 2
+    )
+    bias_m = np.abs(np.remainder(np.angle(mixed) / turn - 2.0 + np.pi, 2 * np.pi) - np.pi)
+    assert many.median == pytest.approx(np.median(bias_m), rel=0.02)
+    assert few.median == pytest.approx(np.median(bias_m[:, one_of_each(pixels)]), rel=0.02)
+    assert few.median != pytest.approx(np.median(bias_m), rel=0.1)
 
 
 def test_the_bias_of_a_second_return_is_that_of_the_phase_of_the_sum() -> None:

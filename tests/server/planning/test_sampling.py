@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from transientcam_server.planning.sampling import (
     STRATUM,
     coherence,
+    one_of_each,
     resampled,
     typical_pixels,
 )
@@ -40,6 +41,16 @@ def test_dim_and_bright_pixels_are_as_frequent_as_in_the_scene() -> None:
     chosen = light[typical_pixels(b, COUNT)]
     for part in (0.1, 0.5, 0.9):
         assert (chosen < np.quantile(light, part)).mean() == pytest.approx(part, abs=0.03)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.42, 0.5, 0.77])
+def test_few_of_them_have_each_kind_as_frequently_and_are_dim_and_bright(share: float) -> None:
+    b, two = moments(share, 20_000)
+    many = typical_pixels(b, COUNT * STRATUM)
+    few = one_of_each(many.size)
+    assert np.array_equal(few // STRATUM, np.arange(COUNT))
+    assert np.bincount(few % STRATUM).tolist() == [COUNT // STRATUM] * STRATUM
+    assert two[many[few]].mean() == pytest.approx(share, abs=2 / COUNT)
 
 
 @pytest.mark.parametrize("pixels", [1, 5, 100, 129])
