@@ -140,9 +140,11 @@ def every_family(
 ) -> Iterator[Family]:
     """Yield all that the camera can run without saturating or ambiguity, with any estimator.
 
-    Ambiguity is judged by the true ranges (P) of lit pixels, and not by what the look found.
+    Ambiguity is judged by the true ranges (N) of lit pixels, and not by what the look found.
     """
-    known = replace(scene, direct_m=true_m, share=0 * scene.share)
+    few = scene.few()
+    place = (np.arange(few.direct_m.size) + 0.5) / few.direct_m.size
+    known = replace(few, direct_m=np.quantile(true_m, place), share=0 * few.share)
     for estimator in ESTIMATORS:
         yield from planner.families(replace(goal, estimator=estimator), known)
 
