@@ -85,7 +85,7 @@ class SceneStatistics:
             return self
         chosen = one_of_each(count)
         values = {each.name: getattr(self, each.name) for each in fields(self)}
-        of_pixels = {
+        of_pixels: dict[str, Any] = {
             name: value[..., chosen]
             for name, value in values.items()
             if isinstance(value, np.ndarray)

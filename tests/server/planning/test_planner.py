@@ -686,7 +686,7 @@ def test_more_pixels_know_an_error_more_closely() -> None:
     one = uniform_scene(1e6, [(2.0, 1.0)])
     random = np.random.default_rng(4)
     pixels = 1024
-    full = {
+    full: dict[str, Any] = {
         each.name: np.repeat(value, pixels // value.shape[-1], axis=-1)
         for each in dataclasses.fields(one)
         if isinstance(value := getattr(one, each.name), np.ndarray)
