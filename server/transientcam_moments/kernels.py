@@ -19,16 +19,19 @@ each of these, and `use_all_cores` for what is urgent.
 """
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TypedDict
 
 from transientcam_moments._arrays import MAX_HARMONICS, chosen
+from transientcam_moments._lanes import lookup
 from transientcam_moments._lanes.automatic import (
     MOST_ROOTS,
     THREAD,
     compile_one,
     is_offered,
     want,
+    work_on_wanted,
 )
 from transientcam_moments._lanes.helper import Helper, program
 from transientcam_moments._lanes.parallel import (
@@ -39,7 +42,13 @@ from transientcam_moments._lanes.parallel import (
     use_all_cores,
     use_one_thread,
 )
-from transientcam_moments._lanes.registry import PRECISION_NAMES, REGISTRY, Key, Lane
+from transientcam_moments._lanes.registry import (
+    LEAST_PIXELS,
+    PRECISION_NAMES,
+    REGISTRY,
+    Key,
+    Lane,
+)
 from transientcam_moments.errors import ParameterError
 
 __all__ = [
@@ -53,9 +62,12 @@ __all__ = [
     "at_once",
     "compile",
     "compile_in_background",
+    "make_ready",
+    "only_note",
     "over",
     "over_all_cores",
     "ready",
+    "settled",
     "state",
     "use_all_cores",
     "use_one_thread",
@@ -69,6 +81,7 @@ LANES = (
     "separate",
     "levinson",
     "density",
+    "peaks",
     "reconstruct",
     "likelihood",
     "pairs",
@@ -76,7 +89,7 @@ LANES = (
     "covariance",
     "direct_noise",
 )
-WHEN_NEEDED = ("likelihood", "pairs", "harmonics")
+WHEN_NEEDED = ("likelihood", "pairs", "harmonics", "peaks")
 """Those that `compile_in_background` leaves out, but for one of them of its first order."""
 Progress = Callable[[int, int, str], None]
 """Takes lanes done, lanes in all, and the name of the lane that is next ("" after the last)."""
@@ -183,10 +196,10 @@ def compile_in_background(
 ) -> threading.Thread:
     """Start compiling on a thread and return it; arguments and errors as in `compile`.
 
-    Leaves out "harmonics" and "pairs", which few cameras need, and "likelihood", which takes long
-    to compile: they are prepared by themselves when they are first needed. ``also`` names one of
-    them that is compiled for the first order all the same; "pairs" before all others, since a
-    camera whose frequencies have gaps needs little else.
+    Leaves out "harmonics", "pairs" and "peaks", which few cameras need, and "likelihood", which
+    takes long to compile: they are prepared by themselves when they are first needed. ``also``
+    names one of them that is compiled for the first order all the same; "pairs" before all others,
+    since a camera whose frequencies have gaps needs little else.
 
     The thread is named "transientcam-compile", and can be joined.
     """
@@ -207,6 +220,49 @@ def compile_in_background(
     thread = threading.Thread(target=work, name=THREAD)
     thread.start()
     return thread
+
+
+@contextmanager
+def only_note() -> Iterator[None]:
+    """Only note, inside the block, what calls would have made ready in the background.
+
+    For a process that has to answer in seconds: importing what loads lanes takes half of one.
+    `make_ready` begins with what was noted. Nothing is noted where ``TRANSIENTCAM_KERNELS`` is
+    "off" or "manual".
+    """
+    before, REGISTRY.noting = REGISTRY.noting, True
+    try:
+        yield
+    finally:
+        REGISTRY.noting = before
+
+
+def make_ready() -> None:
+    """Load or compile in the background what calls since `only_note` would have used."""
+    work_on_wanted()
+
+
+def settled(names: Sequence[str], harmonics: int) -> bool:
+    """Say whether calls in single precision already use all lanes that they will get by themselves.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Which of `LANES`; those that are not offered for this order do not count.
+    harmonics : int
+        The order m, 1 to 32.
+
+    Raises
+    ------
+    ParameterError
+        For another order or lane.
+    """
+    for name in names:
+        chosen("names", name, LANES)
+    keys = [key for key in _keys([harmonics], ["float32"]) if key.name in names]
+    return not REGISTRY.automatic or all(
+        lookup(key.name, key.harmonics, LEAST_PIXELS) or key in REGISTRY.failed for key in keys
+    )
 
 
 def _require_order(harmonics: int) -> None:

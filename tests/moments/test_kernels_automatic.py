@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import CACHE, lanes, without_lanes
-from transientcam_moments._lanes import accelerated, automatic, parallel
+from transientcam_moments._lanes import accelerated, automatic, parallel, registry
 from transientcam_moments._lanes.helper import Helper
 from transientcam_moments._lanes.parallel import _cores, on_threads
 from transientcam_moments._lanes.pool import Pool
@@ -95,6 +95,33 @@ def test_what_takes_long_to_compile_comes_last(compiler: Compiler) -> None:
         "smooth",
         "reconstruct",
     ]
+
+
+def test_a_process_may_note_what_calls_want_and_make_it_ready_later(compiler: Compiler) -> None:
+    compiler.go_on.set()
+
+    with tm.kernels.only_note():
+        tm.levinson(moments(3, registry.LEAST_PIXELS))
+        tm.levinson(moments(4, registry.LEAST_PIXELS - 1))
+    assert automatic.THREAD not in {thread.name for thread in threading.enumerate()}
+    tm.kernels.make_ready()
+
+    assert compiler.finish() == [Key("levinson", 3, "f")]
+
+
+def test_lanes_are_settled_once_those_there_are_serve_or_have_failed(
+    compiler: Compiler, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(REGISTRY, "failed", {})
+
+    assert not tm.kernels.settled(["levinson", "pisarenko"], 3)
+    REGISTRY.compiled[Key("levinson", 3, "f")] = lambda b: b
+    assert not tm.kernels.settled(["levinson", "pisarenko"], 3)
+    REGISTRY.failed[Key("pisarenko", 3, "f")] = "no compiler"
+    assert tm.kernels.settled(["levinson", "pisarenko"], 3)
+    assert tm.kernels.settled(["pisarenko"], 9), "there is none for so many"
+    monkeypatch.setattr(REGISTRY, "automatic", False)
+    assert tm.kernels.settled(["levinson"], 4), "nothing changes by itself"
 
 
 def test_one_line_says_so_once(compiler: Compiler, caplog: pytest.LogCaptureFixture) -> None:

@@ -17,6 +17,7 @@ from transientcam_moments._kernels.harmonics import harmonics_lane
 from transientcam_moments._kernels.levinson import levinson_lane
 from transientcam_moments._kernels.likelihood import likelihood_lane
 from transientcam_moments._kernels.pairs import pairs_lane
+from transientcam_moments._kernels.peaks import peaks_lane
 from transientcam_moments._kernels.pisarenko import pisarenko_lane
 from transientcam_moments._kernels.reconstruct import reconstruct_lane
 from transientcam_moments._lanes.registry import Key, Lane
@@ -26,6 +27,7 @@ LANES: dict[str, Callable[[int, str], Lane]] = {
     "smallest_eigenvalue": smallest_eigenvalue_lane,
     "levinson": levinson_lane,
     "density": density_lane,
+    "peaks": peaks_lane,
     "measure": measure_lane,
     "smooth": smooth_lane,
     "separate": separate_lane,

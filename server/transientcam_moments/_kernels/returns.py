@@ -169,7 +169,7 @@ def _returns(
         worst = simd.select(lit, worst, 0.0)
         simd.store(residual, p, worst)
         ill += simd.count(worst > tolerance)
-        _sort(order, wr, move)
+        sort(order, wr, move)
         simd.store(count, p, found)
         for i in range(m):
             unused = wr[i] > 7.0
@@ -250,7 +250,7 @@ def find_returns(
 
 
 @njit(forceinline=True, error_model="numpy")
-def _sort(order: Any, keys: Any, values: Any) -> None:
+def sort(order: Any, keys: Any, values: Any) -> None:
     """Sort two banks by the first, ascending."""
     m = len(order)
     for i in range(m - 1):

@@ -549,6 +549,9 @@ nan = _constant(lambda limits: np.nan)
 infinity = _constant(lambda limits: np.inf)
 # A step this small leaves an error of rounding where it converges with the third power.
 nearly = _constant(lambda limits: limits.eps**0.5)
+# A step this small that shrinks no more is what close roots are known to.
+close = _constant(lambda limits: float(limits.eps) ** (2 / 3))
+largest = _constant(lambda limits: limits.max)
 # The powers of two between which a number and its reciprocal are far from the ends of the range.
 large = _constant(lambda limits: 2.0 ** (limits.maxexp * 3 // 4))
 small = _constant(lambda limits: 2.0 ** -(limits.maxexp * 3 // 4))

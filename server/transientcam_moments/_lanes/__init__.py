@@ -14,6 +14,9 @@ The lanes and their signatures, each that of the planar statement it stands besi
 
 ``density(polynomial, reflection, error, phase_rad (T,)) -> (T, ...)``, also into ``out``
 
+``peaks(polynomial (m+1, P), reflection (m, P), error (P), threshold) -> first, strongest (P),
+phase, density (m, P)``
+
 ``smallest_eigenvalue(b) -> (...)``
 
 ``pisarenko(b, eigenvalue (...) or None) -> phase_rad, weight (m, ...), uniform, count (...)``
@@ -143,6 +146,6 @@ def _of(key: Key, pixels: int, *, computing: bool = False) -> Callable[..., Any]
     if pixels < LEAST_PIXELS:
         return None
     lane = REGISTRY.compiled.get(key)
-    if lane is None and pixels >= HEAVY_PIXELS:
+    if lane is None and (pixels >= HEAVY_PIXELS or REGISTRY.noting):
         want(key, computing=computing)
     return lane

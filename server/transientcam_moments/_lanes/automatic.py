@@ -76,18 +76,31 @@ def want(key: Key, *, computing: bool = False) -> None:
         _WANTED.seen.add(key)
         if not is_offered(key):
             return
-        if not _WANTED.said:
-            _WANTED.said = True
-            _log.info(
-                "kernels are loaded from the cache, or compiled in the background; until then "
-                "NumPy computes the same (TRANSIENTCAM_KERNELS=off leaves everything to it)"
-            )
         _WANTED.waiting.append(key)
-        if _WANTED.thread is None:
-            # not a daemon: those are frozen at exit wherever they are, which a compiler
-            # doesn't survive
-            _WANTED.thread = threading.Thread(target=_work, name=THREAD)
-            _WANTED.thread.start()
+        if not REGISTRY.noting:
+            _start_to_work()
+
+
+def work_on_wanted() -> None:
+    """Make ready in the background what calls wanted so far; returns at once."""
+    with _WANTED.lock:
+        if _WANTED.waiting:
+            _WANTED.may_load.set()
+            _start_to_work()
+
+
+def _start_to_work() -> None:
+    """Start the thread, unless it works; under the lock."""
+    if not _WANTED.said:
+        _WANTED.said = True
+        _log.info(
+            "kernels are loaded from the cache, or compiled in the background; until then "
+            "NumPy computes the same (TRANSIENTCAM_KERNELS=off leaves everything to it)"
+        )
+    if _WANTED.thread is None:
+        # not a daemon: those are frozen at exit wherever they are, which a compiler doesn't survive
+        _WANTED.thread = threading.Thread(target=_work, name=THREAD)
+        _WANTED.thread.start()
 
 
 def returned(key: Key, results: NDArray[Any] | tuple[NDArray[Any], ...]) -> None:
@@ -116,7 +129,7 @@ def is_offered(key: Key) -> bool:
 
 def _is_long(key: Key) -> bool:
     """Say whether a lane takes many times as long to compile as the others."""
-    return key.name == "reconstruct"
+    return key.name in ("reconstruct", "likelihood")
 
 
 def _work() -> None:

@@ -39,6 +39,8 @@ class Registry:
 
     Attributes
     ----------
+    noting
+        What calls want is made ready only when that is asked for.
     make
         Returns the lane of a key: loaded from the cache or compiled, by another process where one
         is given. None where the program ends meanwhile.
@@ -52,6 +54,7 @@ class Registry:
         setting = environ.get("TRANSIENTCAM_KERNELS", "on").strip().lower()
         self.enabled = setting not in ("off", "0", "no", "false")
         self.automatic = self.enabled and setting != "manual"
+        self.noting = False
         self.lock = threading.Lock()
         self.compiled: dict[Key, Lane] = {}
         self.compiling: Key | None = None
