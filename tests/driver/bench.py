@@ -33,6 +33,9 @@ class NumberedImages:
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
         pass
 
+    def prepare(self) -> None:
+        pass
+
     def image(self, label: ImageLabel, *, number: int, device_time_s: float) -> NDArray[np.uint16]:
         self.labels[number] = label
         return numbered_pixels(number)

@@ -31,17 +31,22 @@ class SwitchableWorld:
         while True:
             configured = self._configured
             if configured is not None:
-                world.configure(*configured)  # may take seconds
+                world.configure(*configured)
+                world.prepare()  # may take seconds
             with self._changing:
                 if configured == self._configured:  # else the sequence was changed meanwhile
                     self.world = world
                     return
 
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
-        """Prepare for the images of a sequence."""
+        """Set the sequence of the images."""
         with self._changing:
             self._configured = sequence, labels
             self.world.configure(sequence, labels)
+
+    def prepare(self) -> None:
+        """Compute what images of the sequence need; may take seconds."""
+        self.world.prepare()
 
     def image(self, label: ImageLabel, *, number: int, device_time_s: float) -> NDArray[np.uint16]:
         """Expose and read one image."""

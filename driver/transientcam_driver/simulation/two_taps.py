@@ -114,6 +114,7 @@ class DifferentialPixels:
         if sequence not in self._worlds:
             world = copy.copy(base)  # the same light; what is planned for a sequence is its own
             world.configure(sequence, sequence.labels)
+            world.prepare()
             self._worlds[sequence] = world
             if len(self._worlds) > _MOST_WORLDS:
                 self._worlds.popitem(last=False)

@@ -1,7 +1,8 @@
 """A scene in front of the simulated sensor: from impulse responses to images."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,14 +44,15 @@ _AMBIENT_C = 25.0
 class _Plan:
     """Everything that is the same for all images of a sequence.
 
-    ``time_s`` is that of the last image. ``quadratures`` are planes of ``view`` by harmonic, and
-    ``canvases`` such planes over a background.
+    ``trace`` returns ``views``, which may take seconds. ``time_s`` is that of the last image.
+    ``quadratures`` are planes of ``view`` by harmonic, and ``canvases`` such planes over a
+    background.
     """
 
     sequence: Sequence
     frequencies_hz: dict[int, float]
     conditions: Conditions
-    views: Views
+    trace: Callable[[], Views]
     per_image: bool
     waveform: ModulationHarmonics | None
     on_light: tuple[PlaneEffect, ...]
@@ -60,6 +62,14 @@ class _Plan:
     time_s: float = 0.0
     quadratures: dict[int, Quadratures] = field(default_factory=dict)
     canvases: dict[int, Canvas] = field(default_factory=dict)
+    traced: Views | None = None
+
+    @property
+    def views(self) -> Views:
+        """What pixels see, traced when it is first needed."""
+        if self.traced is None:
+            self.traced = self.trace()
+        return self.traced
 
     @property
     def local(self) -> bool:
@@ -118,7 +128,7 @@ class World:
         return self._sensor
 
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
-        """Build the effects that the sequence calls for."""
+        """Build the effects that the sequence calls for; `prepare` traces their light."""
         sequence = replace(sequence, phase_offset_rad=0.0)  # which the labels have in them
         if self._plan is not None and self._plan.sequence == sequence:
             return
@@ -132,8 +142,9 @@ class World:
             sequence,
             {label.harmonic: label.frequency_hz for label in labels},
             conditions,
-            self._scenery.view(
-                Wanted(of_light, noise, conditions.highest_hz, lens, conditions.image_period_s)
+            partial(
+                self._scenery.view,
+                Wanted(of_light, noise, conditions.highest_hz, lens, conditions.image_period_s),
             ),
             MotionDuringSequence.name in of_light,
             next((each for each in made if isinstance(each, ModulationHarmonics)), None),
@@ -141,9 +152,13 @@ class World:
             tuple(each for each in made if isinstance(each, ShotEffect)),
             ReadOut([each for each in made if isinstance(each, ImageEffect)]),
         )
-        if not self._scenery.moves:  # all at once, rather than during the first exposures
-            for harmonic in self._plan.frequencies_hz:
-                self._quadratures(self._plan, harmonic, 0.0)
+
+    def prepare(self) -> None:
+        """Compute all at once that images need, rather than during the first exposures."""
+        plan = self._configured()
+        if plan.views and not self._scenery.moves:
+            for harmonic in plan.frequencies_hz:
+                self._quadratures(plan, harmonic, 0.0)
 
     def image(self, label: ImageLabel, *, number: int, device_time_s: float) -> NDArray[np.uint16]:
         """Expose and read one image: 1/2 (b_0 + Re(b_j G_1 exp(-i theta))), then the effects."""

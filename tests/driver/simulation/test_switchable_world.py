@@ -142,7 +142,10 @@ class _SlowWorld:
         self.preparing, self.go_on = threading.Event(), threading.Event()
 
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
-        self.prepared_for.append(sequence)
+        self.sequence = sequence
+
+    def prepare(self) -> None:
+        self.prepared_for.append(self.sequence)
         self.preparing.set()
         assert self.go_on.wait(10)
 

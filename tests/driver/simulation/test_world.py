@@ -12,6 +12,7 @@ from transientcam_driver import Sequence, SubPhases
 from transientcam_driver.sensor import Sensor
 from transientcam_driver.simulation.effects import EFFECTS, Call, Effect
 from transientcam_driver.simulation.effects.shot_noise import FEW_E, ShotNoise
+from transientcam_driver.simulation.light import Views, Wanted
 from transientcam_driver.simulation.light.transport import GivenScenery
 from transientcam_driver.simulation.responses import SparseResponses
 from transientcam_driver.simulation.world import World
@@ -190,6 +191,27 @@ def test_an_effect_that_is_off_is_not_built(
     world(effects={effect.name: "off"}).configure(sequence, sequence.labels)
     with pytest.raises(AssertionError, match="built"):
         world(effects={effect.name: "on"}).configure(sequence, sequence.labels)
+
+
+def test_light_is_traced_for_images_or_ahead_of_them_once() -> None:
+    class Traced(GivenScenery):
+        views = 0
+
+        def view(self, wanted: Wanted) -> Views:
+            self.views += 1
+            return super().view(wanted)
+
+    ones = np.ones((1, *SHAPE))
+    scenery = Traced(SparseResponses(11e-9 * ones, ones))
+    of = World(scenery, SENSOR, electrons_per_s=2e7, effects={}, seed=1)
+    sequence = Sequence(exposure_s=EXPOSURE_S)
+
+    of.configure(sequence, sequence.labels)
+    assert scenery.views == 0
+    of.prepare()
+    images(of, sequence)
+    of.truth()
+    assert scenery.views == 1
 
 
 def test_without_noise_no_random_number_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -42,7 +42,11 @@ class Renderer(Protocol):
     """What renders the images of the sensor."""
 
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
-        """Prepare for the images of a sequence."""
+        """Set the sequence of the images."""
+        ...
+
+    def prepare(self) -> None:
+        """Compute what images of the sequence need, so that none of them is late."""
         ...
 
     def image(self, label: ImageLabel, *, number: int, device_time_s: float) -> NDArray[np.uint16]:
@@ -74,7 +78,7 @@ class Firmware:
         self._labels: tuple[ImageLabel, ...] = ()
         self._epoch = 0
         self._heartbeat_s = power_on_s
-        self._committed_s: float | None = None
+        self._begun_s: float | None = None
         self._watchdog_tripped = False
         self._interlock_closed = True
         self._faulted = False
@@ -112,14 +116,14 @@ class Firmware:
             raise
 
     def resume(self, now_s: float) -> None:
-        """Begin the exposures of a sequence that was just committed now.
+        """Begin the exposures that a request has just begun, now.
 
         The emulator has prepared its light meanwhile, which would take a device no time.
         """
-        committed_s, self._committed_s = self._committed_s, None
-        if committed_s is None or not self._exposures.running:
+        begun_s, self._begun_s = self._begun_s, None
+        if begun_s is None or not self._exposures.running:
             return
-        self._heartbeat_s += now_s - committed_s
+        self._heartbeat_s += now_s - begun_s
         self._begin(now_s)
 
     def control_out(self, request: int, data: bytes, *, now_s: float) -> None:
@@ -169,8 +173,7 @@ class Firmware:
             self._renderer.configure(sequence, self._labels)
             self._epoch = max(self._epoch, epoch_above) + 1  # usb-protocol 3.1
             if streaming:
-                self._begin(now_s)
-                self._committed_s = now_s
+                self._prepare_and_begin(now_s)
         assert self._words is not None  # noqa: S101  (refused above otherwise)
         return Commitment(
             epoch=self._epoch,
@@ -190,7 +193,7 @@ class Firmware:
         self._faulted = False  # usb-protocol 2
         self._watchdog_tripped = False
         self._heartbeat_s = now_s
-        self._begin(now_s)
+        self._prepare_and_begin(now_s)
 
     def _status(self, now_s: float) -> Status:
         flags = StatusFlag(0)
@@ -239,6 +242,11 @@ class Firmware:
         packet = self._packet(image)
         self._ready = None
         return packet
+
+    def _prepare_and_begin(self, now_s: float) -> None:
+        self._renderer.prepare()
+        self._begin(now_s)
+        self._begun_s = now_s
 
     def _begin(self, now_s: float) -> None:
         self._exposures.begin(now_s, period_s=self._period_s(), count=len(self._labels))

@@ -103,18 +103,19 @@ class EmulatedDevice:
             self._requests_to_stall -= 1
             raise Stall
         try:
+            now_s, answer = self.clock.now_s(), b""
             if request_type & _DEVICE_TO_HOST:
-                answer = self._firmware.control_in(request, value, index, now_s=self.clock.now_s())
-                self._firmware.resume(self.clock.now_s())
-                return answer
-            self._firmware.control_out(request, data, now_s=self.clock.now_s())
+                answer = self._firmware.control_in(request, value, index, now_s=now_s)
+            else:
+                self._firmware.control_out(request, data, now_s=now_s)
+            self._firmware.resume(self.clock.now_s())
+            return answer
         except Refusal as refusal:
             raise Stall from refusal
         finally:
             if request in _INTERRUPTS_THE_STREAM:
                 self._clear_transfers()
             self.changed.notify_all()  # a read in progress may have another image to wait for
-        return b""
 
     def _standard(self, request_type: int, request: int, value: int) -> bytes:
         match request:

@@ -55,6 +55,7 @@ class DifferencePixels:
         # an image is 1/2 (b_0 + Re(b exp(-i theta)))
         self._weights = (4 / PHASES * np.exp(1j * phases_rad)).astype(np.complex64)
         world.configure(_SEQUENCE, self._labels)
+        world.prepare()
 
     def sub_images(self, number: int, *, device_time_s: float) -> NDArray[np.uint8]:
         """Return the sub-images (9, bytes) of a frame."""

@@ -5,7 +5,9 @@ straight from the source reflected in M1, then in M2, and so on, as far as each 
 within its rectangle and nothing stands in between.
 """
 
+import os
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -18,7 +20,7 @@ from transientcam_driver.simulation.responses import Scatter, SparseResponses
 from transientcam_driver.simulation.scene.geometry import Points, Rectangle, blocked_by_mask
 from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Viewpoint
 
-_BLOCK = 8192  # rays at a time, so that what is computed for them stays in the cache
+_BLOCK = 16384  # rays at a time, so that what is computed for them stays in the cache
 FAR_M = 1e3  # longer than any path in a scene
 _BESIDE = 1.5  # sizes of a mirror, up to which pixels at its edge may see beside it
 
@@ -132,16 +134,18 @@ def sparse_image(
 
 
 def light_rays(scene: Scene, directions: Points) -> Lit:
-    """Follow rays from the camera to their ends, and light to there."""
+    """Follow rays from the camera to their ends, and light to there, on all cores."""
     lights = tuple(image_lights(scene))
-    parts = []
-    for first in range(0, max(1, len(directions)), _BLOCK):
-        rays = directions[first : first + _BLOCK]
+
+    def follow(rays: Points) -> Lit:
         ends = first_scattering(scene, _camera(scene).position_m, rays)
-        parts.append(light_on_ends(scene, lights, ends, rays=len(rays)))
-    if len(parts) == 1:
-        return parts[0]
-    return joined(parts)
+        return light_on_ends(scene, lights, ends, rays=len(rays))
+
+    blocks = [directions[k : k + _BLOCK] for k in range(0, len(directions), _BLOCK)]
+    if len(blocks) < 2:
+        return follow(directions)
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        return joined(list(threads.map(follow, blocks)))
 
 
 def joined(parts: list[Lit]) -> Lit:

@@ -35,9 +35,13 @@ class Renderer:
 
     def __init__(self) -> None:
         self.rendered: list[int] = []
+        self.prepared = 0
 
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
         self.labels = labels
+
+    def prepare(self) -> None:
+        self.prepared += 1
 
     def image(self, label: ImageLabel, *, number: int, device_time_s: float) -> NDArray[np.uint16]:
         self.rendered.append(number)
@@ -340,6 +344,22 @@ def test_what_the_emulator_takes_to_prepare_a_sequence_costs_no_images_and_no_he
 
     device.firmware.resume(device.now_s + 1.0)
     assert [packet.header.number for packet in device.read()] == [], "nothing begins again"
+
+
+def test_light_is_prepared_when_images_begin_and_not_for_a_sequence_that_takes_none(
+    device: Device,
+) -> None:
+    assert device.renderer.prepared == 0
+
+    device.write(Request.START)
+    device.now_s += 2.0  # which it took
+    device.firmware.resume(device.now_s)
+    device.now_s += PERIOD_S + 1e-6
+
+    assert device.renderer.prepared == 1
+    assert device.numbers() == [0]
+    device.configure(Sequence(harmonics=1))
+    assert device.renderer.prepared == 2
 
 
 def test_the_light_goes_off_when_the_heartbeat_stops(device: Device) -> None:

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from transientcam_driver.sensor import Sensor
 from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.imperfections import Lens
+from transientcam_driver.simulation.light import paths
 from transientcam_driver.simulation.light.paths import (
     ImageLight,
+    Lit,
     image_lights,
     light_on,
     light_rays,
@@ -341,3 +343,27 @@ def test_chains_of_mirrors_that_are_left_out_light_nothing() -> None:
                 assert not light_on(of, chain, point, towards)[1].any()
                 left_out += 1
     assert left_out > 10
+
+
+def test_rays_are_followed_the_same_in_any_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    of = find_scene("mirrors")
+    assert isinstance(of, Scene)
+    assert of.camera is not None
+    random = np.random.default_rng(1)
+    place = random.uniform(0, [[WIDTH], [HEIGHT]], (2, 1000))
+    directions = rays_through(of.camera, *place, width=WIDTH, height=HEIGHT)
+    whole = light_rays(of, directions)
+
+    monkeypatch.setattr(paths, "_BLOCK", 70)
+    in_blocks = light_rays(of, directions)
+
+    assert (whole.weight[1:] > 0).any()
+    for name in Lit.__slots__:
+        assert np.array_equal(getattr(in_blocks, name), getattr(whole, name))
+
+
+def test_no_rays_see_no_light() -> None:
+    of = find_scene("mirrors")
+    assert isinstance(of, Scene)
+
+    assert light_rays(of, np.zeros((0, 3))).surface.size == 0
