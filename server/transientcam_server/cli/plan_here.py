@@ -60,7 +60,9 @@ def by_camera(view: View, goal: Goal | None, console: Console) -> dict[str, Any]
     if goal is not None:
         goal.require_sensible()
     virtual = view.camera.startswith("sim:") and not view.real_time
-    with open_camera(view.camera, clock=VirtualClock() if virtual else RealClock()) as camera:
+    clock = VirtualClock() if virtual else RealClock()
+    # to load kernels takes as long as they would save
+    with tm.kernels.only_note(), open_camera(view.camera, clock=clock) as camera:
         sensor = sensor_of(camera, SensorSettings())
         try:
             require_plannable(camera.capabilities)
@@ -70,11 +72,8 @@ def by_camera(view: View, goal: Goal | None, console: Console) -> dict[str, Any]
             problem.extensions["takes"] = [asdict(each) for each in predicted]
             raise
         planner = Planner(camera.capabilities, sensor, ReconstructionSettings())
-        if goal is not None and goal.computing_share is not None:
-            with console.status("compiling kernels"):
-                tm.kernels.compile()  # the daemon's speed is timed
         scene = _scene(planner, camera, view, goal or Goal(), console)
-    with console.status("predicting") as status:
+    with tm.kernels.only_note(), console.status("predicting") as status:
         progress = Progress(_shown(status))
         if goal is None:
             return planner.tradeoff_document(Goal(), scene, progress)

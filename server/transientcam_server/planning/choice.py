@@ -37,7 +37,8 @@ class Choice:
         Whether it sees more than the look that describes the scene, so that the prediction is a
         lower bound of the error.
     timed
-        Returns the computing time of one frame in s; measured on demand.
+        Returns the computing time of one frame in s, measured on demand; None where its kernels are
+        not compiled yet.
     bound_width, separation_share
         Predicted where the goal has them.
     """
@@ -46,14 +47,15 @@ class Choice:
     estimator: str
     predicted: Prediction
     beyond_scene: bool
-    timed: Callable[[], float] = field(compare=False)
+    timed: Callable[[], float | None] = field(compare=False)
     bound_width: float | None = None
     separation_share: float | None = None
 
     @property
-    def computing_share(self) -> float:
-        """Share of the time between two frames that goes into reconstruction."""
-        return self.timed() * self.applied.frame_rate_hz
+    def computing_share(self) -> float | None:
+        """Share of a core's time between two frames that goes into reconstruction, if known."""
+        reconstruct_s = self.timed()
+        return None if reconstruct_s is None else reconstruct_s * self.applied.frame_rate_hz
 
     def error(self, target: str) -> float:
         """Return the error that a target limits, as it is expected."""

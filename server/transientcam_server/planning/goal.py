@@ -79,8 +79,12 @@ class Goal:
         return (
             self.affords_time(choice.applied.capture_s)
             and (self.frame_rate_hz is None or choice.applied.frame_rate_hz >= self.frame_rate_hz)
-            and (self.computing_share is None or choice.computing_share <= self.computing_share)
+            and self.affords_computing(choice.computing_share)
         )
+
+    def affords_computing(self, share: float | None) -> bool:
+        """Return whether a share of a core's time is within the budget; not where it is unknown."""
+        return self.computing_share is None or (share is not None and share <= self.computing_share)
 
     def affords_time(self, capture_s: float) -> bool:
         """Return whether captures of this length, back to back, are within the budgets."""

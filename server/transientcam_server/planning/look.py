@@ -23,11 +23,11 @@ STILL_FRAMES: Final = 32
 """And of a scene where nothing moves: what a plan calls bias is in part the noise of the look."""
 STILL_SHARE: Final = 0.01
 """Share of the lit pixels that may seem to move there."""
-STEPS: Final = STILL_FRAMES + 3
-"""Of a look, at most, where the first exposure does not saturate."""
 COARSE_HZ: Final = 2e6
 """Base frequency of the coarse frame, unambiguous to 75 m."""
-COARSE_TAKES: Final = 4
+COARSE_FRAMES: Final = 4
+STEPS: Final = 1 + COARSE_FRAMES + STILL_FRAMES + 1
+"""Of a look, at most, where the first exposure does not saturate."""
 FIRST_EXPOSURE_S: Final = 5e-4
 LONGEST_EXPOSURE_S: Final = 0.02
 FILLED: Final = 0.6
@@ -130,7 +130,7 @@ def look_at(
 ) -> SceneStatistics:
     """Look at the scene before a camera.
 
-    A coarse frame at a low frequency gives brightness, ambient light, head room and the range to
+    Coarse frames at a low frequency give brightness, ambient light, head room and the range to
     75 m; a fine one at half the base frequency, with harmonics up to the camera's highest
     frequency, holds the moments of every sequence whose frequencies are multiples of that.
 
@@ -202,7 +202,7 @@ def look_at(
     filling_s = exposure_s * FILLED * sensor.brightest / max(brightest_dn, 1.0)
     exposure_s = max(min(filling_s, longest_s), capabilities.min_exposure_s)
     coarse = captured(
-        replace(coarse_sequence, exposure_s=exposure_s, takes=COARSE_TAKES), 1, "coarse range"
+        replace(coarse_sequence, exposure_s=exposure_s), COARSE_FRAMES, "coarse range"
     )
     fine_hz = max(base.base_frequency_hz / 2, capabilities.min_frequency_hz)
     harmonics = min(int(capabilities.max_frequency_hz / fine_hz), MOST_HARMONICS)

@@ -17,8 +17,8 @@ from transientcam_server.planning.plan import Plan, in_a_sentence, plan
 from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.scene import SceneStatistics
-from transientcam_server.planning.search import Line, Search
-from transientcam_server.planning.timing import ReconstructionTimer, timer_of
+from transientcam_server.planning.search import Line, Search, Timed
+from transientcam_server.planning.timing import timer_of
 from transientcam_server.settings import ReconstructionSettings
 
 
@@ -78,7 +78,7 @@ class Planner:
         """Recommend a sequence; see `planning.plan`. What is raised by ``progress`` ends it."""
         progress = progress or Progress()
         predictor = self._predictor(scene, progress)
-        return plan(goal, predictor, self._capabilities, timed=self._computing, progress=progress)
+        return plan(goal, predictor, self._capabilities, timed=self._timed(goal), progress=progress)
 
     def plan_document(
         self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
@@ -101,7 +101,7 @@ class Planner:
         progress = progress or Progress()
         predictor = self._predictor(scene, progress)
         found = families(goal, predictor, self._capabilities)
-        search = Search(goal, found, predictor, self._computing)
+        search = Search(goal, found, predictor, self._timed(goal))
         choices: list[Choice] = []
         for choices in search.fronts(goal.leading, progress.part(0.0, 0.8)):
             progress.show(_front_document(choices, [], scene))
@@ -113,9 +113,10 @@ class Planner:
     ) -> Predictor:
         return Predictor(scene, self._sensor, self._settings, go_on=go_on)
 
-    @property
-    def _computing(self) -> ReconstructionTimer:
-        return timer_of(self._capabilities, self._settings)
+    def _timed(self, goal: Goal) -> Timed:
+        """Return what times frames; a budget of computing time needs kernels that are compiled."""
+        timer = timer_of(self._capabilities, self._settings)
+        return timer if goal.computing_share is None else timer.once_compiled
 
 
 def _front_document(

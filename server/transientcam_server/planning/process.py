@@ -23,6 +23,8 @@ from transientcam_server.planning.progress import Progress
 NICE: Final = 10
 """A tenth of the processor time beside a service that needs all of it, all that is left else."""
 _ASK_EVERY_S: Final = 0.25
+_IDLE_S: Final = 1.0
+"""After which kernels are made ready: a plan is a look and, right after it, a search."""
 _MODULE: Final = "transientcam_server.planning.process"
 _T = TypeVar("_T")
 
@@ -181,6 +183,8 @@ def serve(connection: Connection) -> None:
 
     while True:
         try:
+            if not connection.poll(_IDLE_S):
+                tm.kernels.make_ready()  # for the next plan
             compute, arguments = connection.recv()
         except EOFError:
             return
@@ -198,7 +202,8 @@ def main() -> None:
     # Ctrl-C at a terminal is for the service, which ends this process
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     tm.kernels.use_one_thread()
-    serve(Connection(int(sys.argv[1])))
+    with tm.kernels.only_note():
+        serve(Connection(int(sys.argv[1])))
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Why a goal is out of reach: the best there is, and what limits it, in words."""
 
+import math
 from typing import Any
 
 from transientcam_server.errors import kinds
@@ -37,7 +38,7 @@ def too_small(goal: Goal, search: Search) -> Problem:
 
 def _spent(choice: Choice, budget: str) -> float:
     if budget == "computing_share":
-        return choice.computing_share
+        return math.inf if choice.computing_share is None else choice.computing_share
     return float(getattr(choice.applied, budget))
 
 

@@ -16,8 +16,8 @@ from transientcam_server.planning.pareto import front
 from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.progress import Progress
 
-Timed = Callable[[Sequence, str], float]
-"""Computing time in s of a frame of a sequence with an estimator."""
+Timed = Callable[[Sequence, str], float | None]
+"""Computing time in s of a frame of a sequence with an estimator, if it is known."""
 HOPE: Final = 1.25
 """A family is looked at closely where few draws predict up to so many times a target."""
 CONTENDERS: Final = 3
@@ -237,8 +237,9 @@ class Search:
         if goal.computing_share is None:
             return True
         sequence = family.applied(member).sequence
-        share = self.timed(sequence, family.estimator) / member.capture_s
-        return share <= goal.computing_share
+        reconstruct_s = self.timed(sequence, family.estimator)
+        share = None if reconstruct_s is None else reconstruct_s / member.capture_s
+        return goal.affords_computing(share)
 
     def _hopeful(self, targets: dict[str, float]) -> list[tuple[Family, int]]:
         """Return families and the first member that may reach the targets, by its time."""

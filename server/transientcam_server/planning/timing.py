@@ -1,7 +1,8 @@
-"""How long this machine reconstructs a frame, measured on first use."""
+"""How long a worker of the daemon reconstructs a frame on this machine, measured on first use."""
 
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any, Final
 
@@ -15,14 +16,18 @@ from transientcam_server.settings import ReconstructionSettings
 _REPEATED: Final = 3
 _ENOUGH_S: Final = 0.05
 """What takes longer is timed once."""
-_PART: Final = 8
-"""A part of the rows is timed: every pixel takes the same time."""
+_OF_FRAMES: Final = ("reconstruct", "measure", "smooth", "separate")
+"""Kernels that frames need, by the number of their harmonics."""
+_OF_ESTIMATOR: Final = {"likelihood": ("likelihood",), "maximum-entropy": ("peaks",)}
+"""And their range."""
 _DEPTH: Final = 1000.0
 """Brightness of the images that are reconstructed, in DN."""
 
 
 class ReconstructionTimer:
-    """Seconds from images to range, by estimator, number of harmonics and takes.
+    """Processor time in s from images to range, by estimator, number of harmonics and takes.
+
+    That of one thread, as of a worker of the daemon, whatever else the machine does.
 
     Parameters
     ----------
@@ -31,7 +36,7 @@ class ReconstructionTimer:
     settings
         Of the reconstruction, but for the estimator.
     clock
-        Of the machine.
+        Of the thread that computes.
     """
 
     def __init__(
@@ -39,18 +44,22 @@ class ReconstructionTimer:
         capabilities: Capabilities,
         settings: ReconstructionSettings,
         *,
-        clock: Callable[[], float] = time.perf_counter,
+        clock: Callable[[], float] = time.thread_time,
     ) -> None:
-        rows = max(1, capabilities.height // _PART)
-        self._shape = (rows, capabilities.width)
-        self._parts = capabilities.height / rows
+        self._shape = (capabilities.height, capabilities.width)
         self._full_scale = 2.0**capabilities.bits - 1.0
         self._settings = settings
         self._clock = clock
-        self._known: dict[tuple[str, int, int, str], float] = {}
+        self._known: dict[tuple[str, int, int], float] = {}
 
-    def __call__(self, sequence: Sequence, estimator: str) -> float:
-        """Return the time of one frame of a sequence; averaging grows with the number of takes."""
+    def __call__(self, sequence: Sequence, estimator: str) -> float | None:
+        """Return the time of one frame of a sequence; averaging grows with the number of takes.
+
+        None as long as kernels that it needs are not compiled: without them it takes up to fifty
+        times as long, which is no figure of the daemon, that compiles them when they are needed.
+        """
+        if not tm.kernels.settled(_kernels_of(estimator), sequence.harmonics):
+            return None
         once = self._measured(estimator, sequence.harmonics, 1)
         if sequence.takes == 1:
             return once
@@ -60,9 +69,14 @@ class ReconstructionTimer:
         averaging = max(0.0, several - self._measured("single-frequency", 1, 1)) / (4 * few)
         return once + averaging * 4 * sequence.harmonics * sequence.takes
 
+    def once_compiled(self, sequence: Sequence, estimator: str) -> float | None:
+        """Compile the kernels that it needs first: up to half a minute, once on a machine."""
+        names = _kernels_of(estimator)
+        tm.kernels.compile([sequence.harmonics], ["float32"], names=names)
+        return self(sequence, estimator)
+
     def _measured(self, estimator: str, harmonics: int, takes: int) -> float:
-        # times change once kernels are compiled
-        key = (estimator, harmonics, takes, str(sorted(map(str, tm.kernels.state().items()))))
+        key = (estimator, harmonics, takes)
         if key not in self._known:
             images = _images(harmonics, takes, self._shape)
             settings = self._settings.model_copy(update={"estimator": estimator}).for_moments(
@@ -71,12 +85,18 @@ class ReconstructionTimer:
                 takes=takes,
                 full_scale=self._full_scale,
             )
-            gains = np.ones(harmonics + 1)
-            each = [self._once(images, settings, gains)]
-            while len(each) < _REPEATED and each[0] < _ENOUGH_S:
-                each.append(self._once(images, settings, gains))
-            self._known[key] = self._parts * min(each)
+            with ThreadPoolExecutor(1, initializer=tm.kernels.use_one_thread) as worker:
+                timed = worker.submit(self._least, images, settings, np.ones(harmonics + 1))
+                self._known[key] = timed.result()
         return self._known[key]
+
+    def _least(
+        self, images: NDArray[Any], settings: tm.Settings, gains: NDArray[np.float64]
+    ) -> float:
+        each = [self._once(images, settings, gains)]
+        while len(each) < _REPEATED and each[0] < _ENOUGH_S:
+            each.append(self._once(images, settings, gains))
+        return min(each)
 
     def _once(
         self, images: NDArray[Any], settings: tm.Settings, gains: NDArray[np.float64]
@@ -85,6 +105,10 @@ class ReconstructionTimer:
         found = tm.reconstruct(images, settings, calibration=gains)
         _ = found.range_m, found.direct, found.flags
         return self._clock() - begin_s
+
+
+def _kernels_of(estimator: str) -> tuple[str, ...]:
+    return (*_OF_FRAMES, *_OF_ESTIMATOR.get(estimator, ()))
 
 
 def timer_of(capabilities: Capabilities, settings: ReconstructionSettings) -> ReconstructionTimer:

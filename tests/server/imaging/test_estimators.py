@@ -133,6 +133,8 @@ def test_computing_time_is_that_of_sequences_which_the_estimator_takes() -> None
 
         once, often = (seconds(Sequence(harmonics=6, takes=takes), "spumic") for takes in (1, 20))
 
+    assert once is not None
+    assert often is not None
     assert 0 < once <= often
 
 

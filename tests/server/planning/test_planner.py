@@ -5,6 +5,7 @@ import json
 import math
 from collections.abc import Iterator
 from functools import lru_cache
+from itertools import product
 from typing import Any, cast
 
 import numpy as np
@@ -760,9 +761,43 @@ def test_computing_time_is_measured_once_and_grows_with_takes(capabilities: Capa
     used = next(ticks)
     again = seconds(Sequence(harmonics=3), "pisarenko")
 
-    assert first == again > 0
+    assert first is not None
+    assert first == again
+    assert first > 0
     assert next(ticks) == used + 1
-    assert seconds(Sequence(harmonics=3, takes=4), "pisarenko") >= first
+    several = seconds(Sequence(harmonics=3, takes=4), "pisarenko")
+    assert several is not None
+    assert several >= first
+
+
+def test_no_computing_time_is_stated_before_the_kernels_of_a_frame_are_there(
+    capabilities: Capabilities, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiled: set[tuple[str, int]] = set()
+    monkeypatch.setattr(
+        tm.kernels, "settled", lambda names, m: all((name, m) in compiled for name in names)
+    )
+    monkeypatch.setattr(
+        tm.kernels, "compile", lambda orders, _, names: compiled.update(product(names, orders))
+    )
+    small = dataclasses.replace(capabilities, width=8, height=6)
+    seconds = ReconstructionTimer(small, SETTINGS)
+    sequence = Sequence(harmonics=3)
+
+    assert seconds(sequence, "maximum-entropy") is None
+    assert seconds.once_compiled(sequence, "maximum-entropy") is not None
+    assert ("peaks", 3) in compiled
+    assert seconds(sequence, "maximum-entropy") is not None
+    assert seconds(sequence, "likelihood") is None
+
+
+def test_a_budget_of_computing_time_affords_nothing_that_is_unknown() -> None:
+    goal = Goal(computing_share=0.5)
+
+    assert goal.affords_computing(0.5)
+    assert not goal.affords_computing(0.6)
+    assert not goal.affords_computing(None)
+    assert Goal(capture_s=1.0).affords_computing(None)
 
 
 # -- the command --------------------------------------------------------------------------------

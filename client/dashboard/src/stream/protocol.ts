@@ -133,8 +133,8 @@ export interface Choice {
   readonly estimator: string;
   readonly capture_s: number;
   readonly frame_rate_hz: number;
-  /** Computing time of one frame. */
-  readonly reconstruct_s: number;
+  /** Processor time of one frame; null as long as its kernels are not compiled. */
+  readonly reconstruct_s: number | null;
   readonly predicted: {
     /** Noise and bias together, and the interval of what is measured. */
     readonly range_error_m: { readonly median: number; readonly low: number; readonly high: number; readonly p90: number };

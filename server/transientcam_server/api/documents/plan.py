@@ -138,9 +138,11 @@ class ChoiceDocument(Document):
     """What the camera would make of it."""
     capture_s: float
     frame_rate_hz: float
-    reconstruct_s: float
-    """Computing time of one frame on this machine."""
-    computing_share: float
+    reconstruct_s: float | None
+    """Processor time of one frame on this machine; null as long as the kernels that it needs are
+    not compiled. With a budget `computing_share` they are, before the answer."""
+    computing_share: float | None
+    """That over the time between two frames: what a core is busy with."""
     predicted: PredictedDocument
 
 
