@@ -162,8 +162,8 @@ def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the buil
     Parameters
     ----------
     harmonics : sequence of int
-        Orders m, each 1 to 32, the most urgent first. Above 8 there are lanes for coefficients and
-        densities only.
+        Orders m, each 1 to 32, the most urgent first. Above 8 there are lanes for coefficients,
+        densities and their peaks only.
     precisions : sequence of {"float32", "float64"}
         Most urgent first; all of one order before the next. Single precision uses the lanes for
         double where it isn't enough.
