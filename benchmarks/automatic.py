@@ -56,6 +56,7 @@ print(json.dumps({
     "density": program("density", lambda: tm.density(coefficients, phase_rad)),
     "pisarenko": program("pisarenko", lambda: tm.pisarenko(b)),
     "levinson": program("levinson", lambda: tm.levinson(b)),
+    "peaks": program("peaks", lambda: tm.peaks(coefficients)),
 }))
 """
 _Times = dict[str, dict[str, float]]
