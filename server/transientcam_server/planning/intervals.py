@@ -31,6 +31,9 @@ MOST_BIAS: Final = 2.0
 DOUBTFUL: Final = 2.0
 """A bias is not known where ranges that the moments do not contradict make the error larger than so
 many times the predicted one."""
+DISAGREEING: Final = 0.25
+"""Nor where the estimators of the look disagree about the direct range by more than this share of
+the predicted error (docs/plans.md, decision 1165)."""
 RESAMPLED: Final = 100
 _LEAST_M: Final = 1e-9
 

@@ -15,6 +15,7 @@ from transientcam_driver import Capabilities
 from transientcam_server.planning.choice import Choice
 from transientcam_server.planning.families import families
 from transientcam_server.planning.goal import Goal
+from transientcam_server.planning.intervals import DISAGREEING
 from transientcam_server.planning.pareto import flat_from
 from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.progress import Progress
@@ -168,6 +169,12 @@ def doubt(choice: Choice, scene: SceneStatistics) -> str:
         return (
             f" Bias unknown: {scene.dim_share:.0%} of the lit pixels are so dim that other "
             "surfaces may light them alone, and by how much that light is late does not show."
+        )
+    apart_m = scene.disagreement_m
+    if apart_m > DISAGREEING * choice.predicted.range_error.median:
+        return (
+            f" Bias unknown: two ways to tell direct from later light differ by {apart_m * 1e3:.2g}"
+            " mm even at all frequencies, and both may be further off."
         )
     return (
         " Bias unknown: light that goes on coming, as out of wax or from other walls, would look "

@@ -22,6 +22,7 @@ from transientcam_server.imaging.deviation import MEDIAN_OF_NORMAL
 from transientcam_server.imaging.ranging import ranges_m
 from transientcam_server.planning.estimation import MOST_HARMONICS
 from transientcam_server.planning.intervals import (
+    DISAGREEING,
     DOUBTFUL,
     MOST_BIAS,
     RESAMPLED,
@@ -65,7 +66,8 @@ class Prediction:
         Bias of the median pixel if the light begins where the moments only just allow it.
     bias_known
         Whether the moments tell the bias: not where shapes of light that explain them alike put
-        the range elsewhere, nor where many pixels may be lit by other surfaces alone.
+        the range elsewhere, nor where estimators disagree about the direct range at all
+        frequencies, nor where many pixels may be lit by other surfaces alone.
     """
 
     range_std: Figure
@@ -198,7 +200,9 @@ class Predictor:
             ),
             errors.outlier_share,
             _median(farthest_m),
-            not self.scene.lit_in_part and doubted_m <= DOUBTFUL * error.median,
+            not self.scene.lit_in_part
+            and self.scene.disagreement_m <= DISAGREEING * error.median
+            and doubted_m <= DOUBTFUL * error.median,
         )
 
     def beyond_scene(self, sequence: Sequence) -> bool:

@@ -109,6 +109,11 @@ class SceneStatistics:
         """Whether so many pixels may be lit by other surfaces alone that no range is certain."""
         return self.dim_share >= MOSTLY_DIM
 
+    @property
+    def disagreement_m(self) -> float:
+        """What the look did not resolve of the direct range, in the median pixel."""
+        return float(np.median(self.uncertainty_m))
+
     def covers(self, harmonics: int, base_frequency_hz: float) -> bool:
         """Whether moments at these frequencies are known without a model of the returns."""
         if self.measured is None:

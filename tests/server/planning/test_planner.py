@@ -188,9 +188,10 @@ def test_bias_rules_out_what_noise_alone_would_recommend(capabilities: Capabilit
 class Doubtful(ClosedForm):
     """A look that does not tell the bias."""
 
-    def __init__(self, dim_share: float) -> None:
+    def __init__(self, dim_share: float, apart_m: float) -> None:
         super().__init__()
-        self.scene = dataclasses.replace(self.scene, dim_share=dim_share)
+        apart = np.full_like(self.scene.direct_m, apart_m)
+        self.scene = dataclasses.replace(self.scene, dim_share=dim_share, uncertainty_m=apart)
 
     def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
         found = super().predict(estimator, sequence)
@@ -198,18 +199,38 @@ class Doubtful(ClosedForm):
 
 
 @pytest.mark.parametrize(
-    ("dim_share", "reason"), [(0.0, "put the range 40 mm off"), (0.4, "40% of the lit pixels")]
+    ("dim_share", "apart_m", "reason"),
+    [
+        (0.0, 0.0, "put the range 40 mm off"),
+        (0.0, 0.08, "later light differ by 80 mm"),
+        (0.4, 0.08, "40% of the lit pixels"),
+    ],
 )
 def test_a_bias_that_is_not_known_is_marked_with_the_reason(
-    dim_share: float, reason: str, capabilities: Capabilities
+    dim_share: float, apart_m: float, reason: str, capabilities: Capabilities
 ) -> None:
-    predictor = cast(Predictor, Doubtful(dim_share))
+    predictor = cast(Predictor, Doubtful(dim_share, apart_m))
     found = plan(Goal(capture_s=0.1), predictor, capabilities, timed=lambda *_: 1e-3)
     assert "Bias unknown: " in found.summary
     assert reason in found.summary
     predicted = found.to_document()["predicted"]
     assert (predicted["bias_known"], predicted["range_bias_most_m"]) == (False, 0.04)
     assert "unknown" not in planned(Goal(capture_s=0.1), capabilities).summary
+
+
+@pytest.mark.parametrize(("apart_m", "known"), [(0.0, True), (0.0005, True), (0.02, False)])
+def test_a_bias_is_not_known_where_the_estimators_of_a_look_disagree(
+    apart_m: float, known: bool
+) -> None:
+    one = uniform_scene(4e5, [(2.0, 1.0)])
+    scene = dataclasses.replace(one, uncertainty_m=np.full_like(one.direct_m, apart_m))
+
+    found = Predictor(scene, tm.noise.Sensor(), SETTINGS).predict(
+        "likelihood", Sequence(harmonics=3)
+    )
+
+    assert found.range_error.median > apart_m
+    assert found.bias_known is known
 
 
 class Hasty(ClosedForm):

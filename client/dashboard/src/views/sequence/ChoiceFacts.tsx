@@ -8,7 +8,7 @@ export function ChoiceFacts({ choice }: { choice: Choice }) {
   const { sequence, predicted } = choice;
   const { low, high } = predicted.range_error_m;
   const bias = engineering(predicted.range_bias_m, "m");
-  const doubt = predicted.bias_known ? "" : ` – unknown, up to ${engineering(predicted.range_bias_most_m, "m", 2)}`;
+  const doubt = predicted.bias_known ? "" : ` – unknown, the look allows ${engineering(predicted.range_bias_most_m, "m", 2)}`;
   return (
     <dl class="facts" data-field="choice">
       <Fact name="Harmonics m" value={String(sequence.harmonics)} field="choice_harmonics" strong />
