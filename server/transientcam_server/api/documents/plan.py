@@ -115,8 +115,9 @@ class PredictedDocument(Document):
     just allow."""
     bias_known: bool
     """Whether the look tells the bias. It does not where shapes of light that explain its moments
-    alike put the range elsewhere, nor where many pixels may be lit by other surfaces alone: then
-    `range_bias_m` holds only for the simplest light, and `summary` says why."""
+    alike put the range elsewhere, nor where its two estimators disagree about the direct range,
+    nor where many pixels may be lit by other surfaces alone: then `range_bias_m` holds only for
+    the simplest light, and `summary` says why."""
     outlier_share: float
     """Share of the ranges that are off by more than five times `range_error_m`; pixels whose bias
     none of the frequencies looked at shows are not in it."""
