@@ -78,7 +78,13 @@ class Planner:
         """Recommend a sequence; see `planning.plan`. What is raised by ``progress`` ends it."""
         progress = progress or Progress()
         predictor = self._predictor(scene, progress)
-        return plan(goal, predictor, self._capabilities, timed=self._timed(goal), progress=progress)
+        return plan(
+            goal,
+            predictor,
+            self._capabilities,
+            timed=self._timed(goal, progress),
+            progress=progress,
+        )
 
     def plan_document(
         self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
@@ -101,7 +107,7 @@ class Planner:
         progress = progress or Progress()
         predictor = self._predictor(scene, progress)
         found = families(goal, predictor, self._capabilities)
-        search = Search(goal, found, predictor, self._timed(goal))
+        search = Search(goal, found, predictor, self._timed(goal, progress))
         choices: list[Choice] = []
         for choices in search.fronts(goal.leading, progress.part(0.0, 0.8)):
             progress.show(_front_document(choices, [], scene))
@@ -113,10 +119,20 @@ class Planner:
     ) -> Predictor:
         return Predictor(scene, self._sensor, self._settings, go_on=go_on)
 
-    def _timed(self, goal: Goal) -> Timed:
+    def _timed(self, goal: Goal, progress: Progress) -> Timed:
         """Return what times frames; a budget of computing time needs kernels that are compiled."""
         timer = timer_of(self._capabilities, self._settings)
-        return timer if goal.computing_share is None else timer.once_compiled
+        if goal.computing_share is None:
+            return timer
+
+        def compiled(sequence: Sequence, estimator: str) -> float | None:
+            known_s = timer(sequence, estimator)
+            if known_s is not None:
+                return known_s
+            progress.at(0.0, f"compiling kernels for m = {sequence.harmonics}")
+            return timer.once_compiled(sequence, estimator)
+
+        return compiled
 
 
 def _front_document(

@@ -812,6 +812,29 @@ def test_no_computing_time_is_stated_before_the_kernels_of_a_frame_are_there(
     assert seconds(sequence, "likelihood") is None
 
 
+def test_a_plan_within_a_budget_of_computing_time_says_that_it_compiles(
+    capabilities: Capabilities, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    orders: set[int] = set()
+    monkeypatch.setattr(tm.kernels, "settled", lambda names, m: m in orders)
+    monkeypatch.setattr(tm.kernels, "compile", lambda new, _, names: orders.update(new))
+    small = dataclasses.replace(capabilities, width=8, height=6)
+    planner = Planner(small, tm.noise.Sensor(), SETTINGS)
+    goal = Goal(capture_s=0.05, computing_share=0.9, estimator="likelihood")
+    steps: list[str] = []
+
+    found = planner.plan(
+        goal, uniform_scene(4e5, [(2.0, 1.0)]), Progress(lambda share, step: steps.append(step))
+    )
+
+    share = found.recommended.computing_share
+    assert share is not None
+    assert 0 < share <= 0.9
+    said = {step for step in steps if step.startswith("compiling")}
+    assert said == {f"compiling kernels for m = {m}" for m in orders}
+    assert found.recommended.applied.sequence.harmonics in orders
+
+
 def test_a_budget_of_computing_time_affords_nothing_that_is_unknown() -> None:
     goal = Goal(computing_share=0.5)
 
