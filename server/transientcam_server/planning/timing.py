@@ -70,7 +70,7 @@ class ReconstructionTimer:
         return once + averaging * 4 * sequence.harmonics * sequence.takes
 
     def once_compiled(self, sequence: Sequence, estimator: str) -> float | None:
-        """Compile the kernels that it needs first: up to half a minute for an order, once on a machine."""
+        """Compile what it needs first: up to half a minute an order, once on a machine."""
         names = _kernels_of(estimator)
         tm.kernels.compile([sequence.harmonics], ["float32"], names=names)
         return self(sequence, estimator)
