@@ -5,11 +5,12 @@ import os
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from functools import partial
 from typing import Protocol
 
+from transientcam_moments._lanes.apart import ThreadsApart
 from transientcam_moments.errors import ParameterError
 
 BLOCK = 1 << 15
@@ -89,7 +90,7 @@ class _Shared:
         with self.lock:
             if self.executor is None:
                 others = max(1, _cores() - 1)
-                self.executor = ThreadPoolExecutor(others, thread_name_prefix=SHARED_THREADS)
+                self.executor = ThreadsApart(others, SHARED_THREADS)
             return self.executor
 
     def forget(self) -> None:
