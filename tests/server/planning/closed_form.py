@@ -1,0 +1,111 @@
+"""A predictor of formulas, and brute force over all that it predicts."""
+
+import math
+from functools import lru_cache
+from typing import cast
+
+import numpy as np
+
+from transientcam_driver import (
+    Capabilities,
+    Sequence,
+    SequenceError,
+)
+from transientcam_server.planning import (
+    Goal,
+    Plan,
+    uniform_scene,
+)
+from transientcam_server.planning.families import EXPOSURES, HARMONICS, TAKES, families
+from transientcam_server.planning.intervals import Figure
+from transientcam_server.planning.plan import plan
+from transientcam_server.planning.prediction import Prediction, Predictor
+
+SPREAD = 1.1
+MARGIN = 1.05
+
+
+class ClosedForm:
+    """A predictor whose answers are formulas: noise by the light, bias by frequency and m."""
+
+    def __init__(self, *, far_m: float = 2.0) -> None:
+        self.scene = uniform_scene(1e6, [(far_m, 1.0)])
+
+    def longest_exposure_s(self) -> float:
+        return 0.004
+
+    def noise_scale(self, sequence: Sequence) -> float:
+        return float(np.sqrt(1e-3 / (sequence.exposure_s * sequence.takes)))
+
+    def least_noise_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
+        m = 1 if estimator == "single-frequency" else sequence.harmonics
+        return float(1e-2 * scale / m**1.5 / (sequence.base_frequency_hz / 23e6))
+
+    def least_bias_m(self, estimator: str, sequence: Sequence) -> float:
+        m = 1 if estimator == "single-frequency" else sequence.harmonics
+        worse = {"single-frequency": 1.0, "maximum-entropy": 0.6, "likelihood": 0.5}[estimator]
+        return 0.05 * worse / (m * sequence.base_frequency_hz / 23e6) ** 2
+
+    def quick(self, estimator: str, sequence: Sequence, scale: float) -> tuple[float, float, float]:
+        std_m = self.least_noise_m(estimator, sequence, scale)
+        bias_m = self.least_bias_m(estimator, sequence)
+        return std_m, bias_m, math.hypot(std_m, bias_m)
+
+    def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
+        each = self.quick(estimator, sequence, self.noise_scale(sequence))
+        std, bias, error = (
+            Figure(value, value / SPREAD, value * SPREAD, 2 * value, value * MARGIN)
+            for value in each
+        )
+        return Prediction(std, bias, error, 0.0, bias.median, bias_known=True)
+
+    def beyond_scene(self, sequence: Sequence) -> bool:
+        return False
+
+    def bound_width(self, sequence: Sequence) -> float:
+        return 6.0 / (sequence.harmonics + 1) + (0.5 if sequence.zeroth == "estimated" else 0.0)
+
+    def separation(self, sequence: Sequence, distance_m: float) -> float:
+        return 1.0 - float(0.5 ** (sequence.harmonics * distance_m))
+
+
+def planned(goal: Goal, capabilities: Capabilities) -> Plan:
+    return plan(goal, cast(Predictor, ClosedForm()), capabilities, timed=lambda *_: 1e-3)
+
+
+@lru_cache(maxsize=1)
+def everything(capabilities: Capabilities) -> list[tuple[float, float]]:
+    """Time and error, with margin, of all the grid, one by one: brute force."""
+    found = []
+    model = ClosedForm()
+    exposures_s = np.geomspace(2e-4, 0.9 * 0.004, EXPOSURES)
+    for factor in (0.5, 1.0, 2.0, 3.0):
+        for m in HARMONICS:
+            for estimator in ("single-frequency", "maximum-entropy", "likelihood"):
+                if (m == 1) != (estimator == "single-frequency"):
+                    continue
+                for exposure_s in exposures_s:
+                    for takes in TAKES:
+                        wanted = Sequence(
+                            factor * 23e6, m, "estimated", round(exposure_s, 9), takes
+                        )
+                        try:
+                            applied = capabilities.apply(wanted)
+                        except SequenceError:
+                            continue
+                        figure = model.predict(estimator, applied.sequence).range_error
+                        found.append((applied.capture_s, figure.with_margin))
+    return found
+
+
+def quickest_s(goal: Goal, predictor: ClosedForm, capabilities: Capabilities) -> float:
+    """Time of the quickest that reaches a target, by trying all."""
+    like = cast(Predictor, predictor)
+    assert goal.range_error_m is not None
+    return min(
+        member.capture_s
+        for family in families(goal, like, capabilities)
+        for member in family.members
+        if like.predict(family.estimator, family.applied(member).sequence).range_error.with_margin
+        <= goal.range_error_m
+    )

@@ -1,0 +1,66 @@
+"""The command that plans."""
+
+import json
+from typing import Any
+
+import pytest
+import typer
+
+from transientcam_driver import (
+    Sequence,
+)
+from transientcam_server.cli import plan as plan_verb
+
+NEARBY: dict[str, Any] = {
+    "camera": "sim:mirrors",
+    "brightness_dn_per_s": 8e5,
+    "returns": ["1.5", "3:0.5"],
+    "fixed": ["harmonics=3", "zeroth=on-off", "base_frequency_hz=23e6"],
+}
+
+
+def test_the_command_prints_a_plan_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    plan_verb.plan(**NEARBY, range_error_m=0.01, as_json=True)
+
+    said = json.loads(capsys.readouterr().out)
+    assert said["sequence"]["harmonics"] == 3
+    assert said["sequence"]["zeroth"] == "on-off"
+    assert said["predicted"]["range_error_m"]["median"] <= 0.01
+    assert said["predicted"]["range_bias_m"] <= said["predicted"]["range_error_m"]["median"]
+    assert said["estimator"] in ("maximum-entropy", "likelihood")
+
+
+def test_the_command_prints_a_plan_in_words(capsys: pytest.CaptureFixture[str]) -> None:
+    plan_verb.plan(**NEARBY, capture_s=0.1, separation_m=1.0, bound_width=9.0)
+
+    first, *words = capsys.readouterr().out.splitlines()
+    assert Sequence.from_document(json.loads(first)).harmonics == 3
+    assert any(line.startswith("captures in") for line in words)
+    assert any("bias" in line and "outliers" in line for line in words)
+    assert any("both returns" in line for line in words)
+    assert any("mean density" in line for line in words)
+    assert any(line.startswith("half the time") for line in words)
+
+
+def test_the_command_fails_with_the_best_where_a_target_is_out_of_reach(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(typer.Exit) as ended:
+        plan_verb.plan(**NEARBY, range_error_m=1e-9, as_json=True)
+
+    assert ended.value.exit_code == 1
+    assert json.loads(capsys.readouterr().out)["field"] == "range_error_m"
+
+
+@pytest.mark.parametrize(
+    "mistake",
+    [
+        {"fixed": ["harmonics"]},
+        {"returns": ["near"]},
+        {"returns": ["1:-2"]},
+        {"estimator": "guess"},
+    ],
+)
+def test_the_command_refuses_what_it_cannot_read(mistake: dict[str, Any]) -> None:
+    with pytest.raises(typer.BadParameter):
+        plan_verb.plan(**(NEARBY | mistake), capture_s=0.1)
