@@ -6,16 +6,8 @@ from typing import cast
 
 import numpy as np
 
-from transientcam_driver import (
-    Capabilities,
-    Sequence,
-    SequenceError,
-)
-from transientcam_server.planning import (
-    Goal,
-    Plan,
-    uniform_scene,
-)
+from transientcam_driver import Capabilities, Sequence, SequenceError
+from transientcam_server.planning import Goal, Plan, uniform_scene
 from transientcam_server.planning.families import EXPOSURES, HARMONICS, TAKES, families
 from transientcam_server.planning.intervals import Figure
 from transientcam_server.planning.plan import plan

@@ -4,10 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from transientcam_driver import (
-    Capabilities,
-    open_camera,
-)
+from transientcam_driver import Capabilities, open_camera
 from transientcam_driver.clock import VirtualClock
 
 

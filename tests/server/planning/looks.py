@@ -1,15 +1,9 @@
 """Looks at simulated scenes."""
 
-from transientcam_driver import (
-    Sequence,
-    open_camera,
-)
+from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.camera.source import sensor_of
-from transientcam_server.planning import (
-    Planner,
-    SceneStatistics,
-)
+from transientcam_server.planning import Planner, SceneStatistics
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
 SETTINGS = ReconstructionSettings()

@@ -6,9 +6,7 @@ from typing import Any
 import pytest
 import typer
 
-from transientcam_driver import (
-    Sequence,
-)
+from transientcam_driver import Sequence
 from transientcam_server.cli import plan as plan_verb
 
 NEARBY: dict[str, Any] = {

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 import transientcam_moments as tm
-from transientcam_server.planning import (
-    uniform_scene,
-)
+from transientcam_server.planning import uniform_scene
 from transientcam_server.planning.measures import pixel_errors
 from transientcam_server.planning.resolving import both_found
 

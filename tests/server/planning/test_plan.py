@@ -7,14 +7,9 @@ import numpy as np
 import pytest
 
 from tests.server.planning.closed_form import ClosedForm, planned
-from transientcam_driver import (
-    Capabilities,
-    Sequence,
-)
+from transientcam_driver import Capabilities, Sequence
 from transientcam_server.errors.exceptions import Problem
-from transientcam_server.planning import (
-    Goal,
-)
+from transientcam_server.planning import Goal
 from transientcam_server.planning.plan import plan
 from transientcam_server.planning.prediction import Prediction, Predictor
 

@@ -9,15 +9,8 @@ import pytest
 import transientcam_moments as tm
 from benchmarks.accuracy.promises import measured
 from tests.server.planning.looks import SETTINGS, looked
-from transientcam_driver import (
-    Sequence,
-)
-from transientcam_server.planning import (
-    Goal,
-    Planner,
-    SceneStatistics,
-    uniform_scene,
-)
+from transientcam_driver import Sequence
+from transientcam_server.planning import Goal, Planner, SceneStatistics, uniform_scene
 from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.sampling import one_of_each
 

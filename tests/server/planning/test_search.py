@@ -7,13 +7,8 @@ from typing import cast
 import pytest
 
 from tests.server.planning.closed_form import MARGIN, ClosedForm, everything, planned, quickest_s
-from transientcam_driver import (
-    Capabilities,
-    Sequence,
-)
-from transientcam_server.planning import (
-    Goal,
-)
+from transientcam_driver import Capabilities, Sequence
+from transientcam_server.planning import Goal
 from transientcam_server.planning.families import families
 from transientcam_server.planning.intervals import Figure
 from transientcam_server.planning.plan import plan

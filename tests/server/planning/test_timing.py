@@ -7,15 +7,8 @@ import pytest
 
 import transientcam_moments as tm
 from tests.server.planning.looks import SETTINGS
-from transientcam_driver import (
-    Capabilities,
-    Sequence,
-)
-from transientcam_server.planning import (
-    Goal,
-    Planner,
-    uniform_scene,
-)
+from transientcam_driver import Capabilities, Sequence
+from transientcam_server.planning import Goal, Planner, uniform_scene
 from transientcam_server.planning.progress import Progress
 from transientcam_server.planning.timing import ReconstructionTimer
 
