@@ -37,9 +37,19 @@ class Kept:
         }
 
     @property
+    def below(self) -> bool:
+        """Whether the error that was measured is less than its interval."""
+        return self.measured["error"] < self.interval[0]
+
+    @property
+    def above(self) -> bool:
+        """Whether it is more."""
+        return self.measured["error"] > self.interval[1]
+
+    @property
     def covered(self) -> bool:
         """Whether the interval of the error holds what was measured."""
-        return self.interval[0] <= self.measured["error"] <= self.interval[1]
+        return not self.below and not self.above
 
     @property
     def met(self) -> bool | None:
@@ -59,8 +69,8 @@ class Refused:
 def expectations(rows: list[Kept]) -> str:
     """State in plain words what to expect of a plan."""
     targets = [row.met for row in rows if row.met is not None]
-    above = [row for row in rows if row.measured["error"] > row.interval[1]]
-    below = [row for row in rows if row.measured["error"] < row.interval[0]]
+    above = [row for row in rows if row.above]
+    below = [row for row in rows if row.below]
     inside = len(rows) - len(above) - len(below)
     noise = np.array([row.ratios["std"] for row in rows])
     low, high = np.quantile(noise, [0.1, 0.9])

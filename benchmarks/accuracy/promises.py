@@ -174,7 +174,6 @@ def _predicted(choice: Choice) -> dict[str, float]:
     return {
         "std": predicted.range_std.median,
         "bias": predicted.range_bias.median,
-        "most_bias": predicted.most_bias_m,
         "error": predicted.range_error.median,
         "outliers": predicted.outlier_share,
     }

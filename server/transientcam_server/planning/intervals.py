@@ -1,11 +1,11 @@
 """Intervals of predicted errors: between which values a capture is expected to measure them.
 
-The interval of the noise covers the sampling of pixels and what the model is wrong by. How far the
-bias lies from its prediction is another matter, and the larger one: where nothing comes back late
-the prediction states what the noise of the look could hide, and where light comes back late it may
-begin at any range that the moments do not contradict (`plausible`). The interval of the error
-begins without bias and ends with the larger one of that and `MOST_BIAS` times the predicted bias,
-which ``python -m benchmarks.accuracy.calibrating`` measures on random scenes.
+The interval of the noise covers the sampling of pixels and what the model is wrong by. The interval
+of an error has two ends of its own: the error with the least bias that may be expected, and that
+with the most. Where the moments tell the bias, these are shares of the predicted one (`KNOWN`).
+Where they do not, the light may begin at any range that they do not contradict (`plausible`), and
+what is predicted of the bias is worth less (`UNKNOWN`). On random scenes
+``python -m benchmarks.accuracy.calibrating`` measures what both hold.
 """
 
 import math
@@ -26,8 +26,29 @@ holds plans to: those on scenes with an unknown bias fail whatever the margin (d
 MODEL_SPREAD: Final = 0.08
 """Standard deviation of the logarithm of measured over predicted errors beyond what the sampling
 of pixels explains (docs/accuracy.md)."""
-MOST_BIAS: Final = 2.0
-"""Measured over predicted bias, at most (docs/plans.md, decision 1030)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """How far the interval of an error reaches (docs/plans.md, decision 1167).
+
+    Attributes
+    ----------
+    least_bias, most_bias
+        Measured over predicted bias.
+    spread
+        As `MODEL_SPREAD`.
+    """
+
+    least_bias: float
+    most_bias: float
+    spread: float
+
+
+KNOWN: Final = Reach(least_bias=0.5, most_bias=1.5, spread=0.03)
+"""Where the moments tell the bias."""
+UNKNOWN: Final = Reach(least_bias=0.5, most_bias=3.0, spread=0.06)
+"""Where they do not."""
 DOUBTFUL: Final = 2.0
 """A bias is not known where ranges that the moments do not contradict make the error larger than so
 many times the predicted one."""
@@ -65,7 +86,12 @@ class Figure:
         return {"median": self.median, "low": self.low, "high": self.high, "p90": self.p90}
 
 
-def figure(errors_m: _Array, median: Callable[[_Array], float], picks: _Array) -> Figure:
+def figure(
+    errors_m: _Array,
+    median: Callable[[_Array], float],
+    picks: _Array,
+    spread: float = MODEL_SPREAD,
+) -> Figure:
     """Return the figure of the errors (P) of pixels.
 
     Parameters
@@ -74,39 +100,30 @@ def figure(errors_m: _Array, median: Callable[[_Array], float], picks: _Array) -
         Of such errors.
     picks
         Indices (`RESAMPLED`, P) of pixels, drawn with replacement: samples of the same scene.
+    spread
+        Standard deviation of the logarithm of measured over predicted errors.
     """
     value = max(median(errors_m), _LEAST_M)
     sampled = np.maximum([median(errors_m[pick]) for pick in picks], _LEAST_M)
     low, high, likely = (
-        _widened(value, float(np.quantile(sampled, part)), NormalDist().inv_cdf(part))
+        _widened(value, float(np.quantile(sampled, part)), NormalDist().inv_cdf(part), spread)
         for part in (0.5 - COVERAGE / 2, 0.5 + COVERAGE / 2, LIKELY)
     )
     return Figure(value, low, high, float(np.quantile(errors_m, 0.9)), likely)
 
 
-def with_unknown_bias(error: Figure, without: Figure, most: Figure) -> Figure:
-    """Return the figure of an error whose interval holds other biases than the predicted one.
-
-    Parameters
-    ----------
-    error
-        Of noise and bias together.
-    without
-        Of noise alone: what is predicted of the bias is in part what the noise of the look could
-        hide.
-    most
-        Of noise and the most that the bias may be.
-    """
-    return replace(error, low=min(error.low, without.low), high=max(error.high, most.high))
+def between(error: Figure, least: Figure, most: Figure) -> Figure:
+    """Return the figure of an error, with the interval from its least to its most."""
+    return replace(error, low=least.low, high=most.high)
 
 
-def _widened(value: float, sampled: float, deviations: float) -> float:
+def _widened(value: float, sampled: float, deviations: float, spread: float) -> float:
     """Add what the model may be wrong by to a quantile of the median of sampled pixels.
 
     Both as logarithms, as independent: ``deviations`` is the quantile of a normal variable.
     """
-    if not 0 < sampled < math.inf:
+    if not (0 < sampled < math.inf and value < math.inf):
         return sampled
-    by_sampling, by_model = math.log(sampled / value), deviations * MODEL_SPREAD
+    by_sampling, by_model = math.log(sampled / value), deviations * spread
     outwards = max(by_sampling, 0.0) if deviations > 0 else min(by_sampling, 0.0)
     return value * math.exp(math.copysign(math.hypot(outwards, by_model), deviations))

@@ -24,11 +24,12 @@ from transientcam_server.planning.estimation import MOST_HARMONICS
 from transientcam_server.planning.intervals import (
     DISAGREEING,
     DOUBTFUL,
-    MOST_BIAS,
+    KNOWN,
     RESAMPLED,
+    UNKNOWN,
     Figure,
+    between,
     figure,
-    with_unknown_bias,
 )
 from transientcam_server.planning.measures import PixelErrors, pixel_errors
 from transientcam_server.planning.resolving import Resolving
@@ -185,24 +186,20 @@ class Predictor:
         errors = self._errors(
             estimator, harmonics, sequence.base_frequency_hz, noise, FINE_DRAWS, sequence.zeroth
         )
-        picks = resampled(noise.size, RESAMPLED, self._seed)
         farthest_m = errors.farthest_m(self.scene.earliest_m, self.scene.latest_m)
-        most_m = np.hypot(errors.std_m, np.maximum(MOST_BIAS * errors.bias_m, farthest_m))
-        error = figure(errors.error_m, _median, picks)
-        doubted_m = _median(np.hypot(errors.std_m, farthest_m))
+        known = (
+            not self.scene.lit_in_part
+            and self.scene.disagreement_m <= DISAGREEING * _median(errors.error_m)
+            and _median(np.hypot(errors.std_m, farthest_m)) <= DOUBTFUL * _median(errors.error_m)
+        )
+        picks = resampled(noise.size, RESAMPLED, self._seed)
         return Prediction(
             figure(errors.std_m, _typical, picks),
             figure(errors.bias_m, _median, picks),
-            with_unknown_bias(
-                error,
-                figure(errors.std_m, _median, picks),
-                figure(most_m, _median, picks),
-            ),
+            _error(errors, None if known else farthest_m, picks),
             errors.outlier_share,
             _median(farthest_m),
-            not self.scene.lit_in_part
-            and self.scene.disagreement_m <= DISAGREEING * error.median
-            and doubted_m <= DOUBTFUL * error.median,
+            bias_known=known,
         )
 
     def beyond_scene(self, sequence: Sequence) -> bool:
@@ -288,6 +285,19 @@ class Predictor:
             self.scene.direct_m[pixels],
             self.scene.uncertainty_m[pixels],
         )
+
+
+def _error(errors: PixelErrors, farthest_m: _Array | None, picks: _Array) -> Figure:
+    """Return the figure of the error; ``farthest_m`` (P) is the most bias, where none is known."""
+    reach = KNOWN if farthest_m is None else UNKNOWN
+    least_m, most_m = reach.least_bias * errors.bias_m, reach.most_bias * errors.bias_m
+    if farthest_m is not None:
+        most_m = np.maximum(most_m, farthest_m)
+    least, most = (
+        figure(np.hypot(errors.std_m, bias_m), _median, picks, reach.spread)
+        for bias_m in (least_m, most_m)
+    )
+    return between(figure(errors.error_m, _median, picks), least, most)
 
 
 def _typical(deviations: _Array) -> float:
