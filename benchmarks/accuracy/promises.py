@@ -173,7 +173,7 @@ def _predicted(choice: Choice) -> dict[str, float]:
     predicted = choice.predicted
     return {
         "std": predicted.range_std.median,
-        "bias": predicted.range_bias.median,
+        "bias": predicted.range_bias_m,
         "error": predicted.range_error.median,
         "outliers": predicted.outlier_share,
     }

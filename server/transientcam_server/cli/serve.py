@@ -100,12 +100,12 @@ def serve(
             leave(compiling)
             app = build_app(opened, settings)
             server.freeze_startup_objects(compiling)
-            server.serve(
-                app,
-                settings,
-                listener,
-                on_listening=lambda: _announce(url, settings.camera, as_json=as_json),
-            )
+
+            def listening() -> None:
+                _announce(url, settings.camera, as_json=as_json)
+                app.state.service.planning.prepare()
+
+            server.serve(app, settings, listener, on_listening=listening)
 
 
 def _camera_names() -> list[str]:

@@ -89,7 +89,7 @@ class Choice:
             "predicted": {
                 "range_error_m": self.predicted.range_error.to_document(),
                 "range_std_m": self.predicted.range_std.to_document(),
-                "range_bias_m": self.predicted.range_bias.median,
+                "range_bias_m": self.predicted.range_bias_m,
                 "range_bias_most_m": self.predicted.most_bias_m,
                 "bias_known": self.predicted.bias_known,
                 "outlier_share": self.predicted.outlier_share,

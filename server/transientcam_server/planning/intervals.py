@@ -88,7 +88,7 @@ class Figure:
 
 def figure(
     errors_m: _Array,
-    median: Callable[[_Array], float],
+    median: Callable[[_Array], _Array],
     picks: _Array,
     spread: float = MODEL_SPREAD,
 ) -> Figure:
@@ -97,14 +97,14 @@ def figure(
     Parameters
     ----------
     median
-        Of such errors.
+        Of errors (..., P): an array (...).
     picks
         Indices (`RESAMPLED`, P) of pixels, drawn with replacement: samples of the same scene.
     spread
         Standard deviation of the logarithm of measured over predicted errors.
     """
-    value = max(median(errors_m), _LEAST_M)
-    sampled = np.maximum([median(errors_m[pick]) for pick in picks], _LEAST_M)
+    value = max(float(median(errors_m)), _LEAST_M)
+    sampled = np.maximum(median(errors_m[picks]), _LEAST_M)
     low, high, likely = (
         _widened(value, float(np.quantile(sampled, part)), NormalDist().inv_cdf(part), spread)
         for part in (0.5 - COVERAGE / 2, 0.5 + COVERAGE / 2, LIKELY)

@@ -152,7 +152,7 @@ def _as_good(quicker: Choice, best: Choice, goal: Goal) -> bool:
     """
     return (
         "range_error_m" in goal.targets
-        and best.predicted.range_bias.median > best.predicted.range_std.median
+        and best.predicted.range_bias_m > best.predicted.range_std.median
         and all(
             quicker.error(target) <= goal.limit(target)
             and quicker.error_with_margin(target) <= HARDLY_MORE * best.error_with_margin(target)
@@ -195,7 +195,7 @@ def in_a_sentence(front: list[Choice], scene: SceneStatistics) -> str:
         [
             (
                 each.predicted.range_std.median,
-                each.predicted.range_bias.median,
+                each.predicted.range_bias_m,
                 each.predicted.range_error.median,
             )
             for each in front
@@ -214,7 +214,7 @@ def _time_in_words(time_s: float) -> str:
 
 def _summary(best: Choice, twice: Choice | None) -> str:
     predicted = best.predicted
-    noise_m, bias_m = predicted.range_std.median, predicted.range_bias.median
+    noise_m, bias_m = predicted.range_std.median, predicted.range_bias_m
     first = f"{noise_m * 1e3:.3g} mm noise, {bias_m * 1e3:.3g} mm off"
     if twice is None:
         what = "more frequencies or another estimator" if bias_m > noise_m else "a longer capture"
@@ -230,5 +230,5 @@ def _in_words(choice: Choice) -> str:
         f"{choice.in_words()}: captures in {choice.applied.capture_s * 1e3:.1f} ms, "
         f"range to {predicted.range_error.median * 1e3:.2f} mm "
         f"({predicted.range_std.median * 1e3:.2f} noise, "
-        f"{predicted.range_bias.median * 1e3:.2f} bias)"
+        f"{predicted.range_bias_m * 1e3:.2f} bias)"
     )

@@ -59,8 +59,10 @@ class Prediction:
 
     Attributes
     ----------
-    range_std, range_bias, range_error
-        Noise, systematic error, and the root sum of squares of both, pixel by pixel.
+    range_std, range_error
+        Noise, and the root sum of squares of noise and bias, pixel by pixel.
+    range_bias_m
+        Systematic error of the median pixel.
     outlier_share
         Share of the ranges beyond five standard deviations.
     most_bias_m
@@ -72,8 +74,8 @@ class Prediction:
     """
 
     range_std: Figure
-    range_bias: Figure
     range_error: Figure
+    range_bias_m: float
     outlier_share: float
     most_bias_m: float
     bias_known: bool
@@ -143,7 +145,7 @@ class Predictor:
             np.exp((1 - part) * np.log(one) + part * np.log(other))
             for one, other in ((low[0], high[0]), (low[1], high[1]))
         )
-        return _typical(std), float(np.median(bias)), float(np.median(np.hypot(std, bias)))
+        return float(_typical(std)), float(np.median(bias)), float(np.median(np.hypot(std, bias)))
 
     def least_noise_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
         """Return a bound in m on the noise of the median pixel: that of Cramer and Rao.
@@ -187,7 +189,7 @@ class Predictor:
             estimator, harmonics, sequence.base_frequency_hz, noise, FINE_DRAWS, sequence.zeroth
         )
         farthest_m = errors.farthest_m(self.scene.earliest_m, self.scene.latest_m)
-        known = (
+        known = bool(
             not self.scene.lit_in_part
             and self.scene.disagreement_m <= DISAGREEING * _median(errors.error_m)
             and _median(np.hypot(errors.std_m, farthest_m)) <= DOUBTFUL * _median(errors.error_m)
@@ -195,10 +197,10 @@ class Predictor:
         picks = resampled(noise.size, RESAMPLED, self._seed)
         return Prediction(
             figure(errors.std_m, _typical, picks),
-            figure(errors.bias_m, _median, picks),
             _error(errors, None if known else farthest_m, picks),
+            float(_median(errors.bias_m)),
             errors.outlier_share,
-            _median(farthest_m),
+            float(_median(farthest_m)),
             bias_known=known,
         )
 
@@ -300,14 +302,15 @@ def _error(errors: PixelErrors, farthest_m: _Array | None, picks: _Array) -> Fig
     return between(figure(errors.error_m, _median, picks), least, most)
 
 
-def _typical(deviations: _Array) -> float:
-    """Return the typical difference of two captures over all pixels, as a deviation.
+def _typical(deviations: _Array) -> _Array:
+    """Return the typical difference of two captures over pixels (..., P), as a deviation (...).
 
     The same measure as of captured frames, whose bright and dark pixels are mixed.
     """
-    mixed = np.median(_NORMAL[:, None] * deviations)
-    return float(mixed / MEDIAN_OF_NORMAL)
+    mixed = (_NORMAL[:, None] * deviations[..., None, :]).reshape((*deviations.shape[:-1], -1))
+    return _median(mixed) / MEDIAN_OF_NORMAL
 
 
-def _median(values: _Array) -> float:
-    return float(np.median(values))
+def _median(values: _Array) -> _Array:
+    """Return the median over pixels (..., P), which are last."""
+    return np.asarray(np.median(values, axis=-1))

@@ -32,7 +32,8 @@ _T = TypeVar("_T")
 class PlanningProcess:
     """Calls functions in another process, one at a time.
 
-    It is started by the first call, stays for the next one, and is killed where a call is given up.
+    It is started by the first call, or before it (`prepare`), stays for the next one, and is killed
+    where a call is given up.
     """
 
     def __init__(self) -> None:
@@ -79,6 +80,15 @@ class PlanningProcess:
                 self._end()
                 raise
         return value
+
+    def prepare(self) -> None:
+        """Start the process, so that the first call need not wait for its imports; at once."""
+        if self._calling.acquire(blocking=False):
+            try:
+                if not self._closing.is_set():
+                    self._child = self._child or _Child()
+            finally:
+                self._calling.release()
 
     def leave(self) -> None:
         """End the process, unless it computes: its memory is given back. From any thread."""

@@ -28,6 +28,10 @@ class Planning(Protocol):
         """Return ``compute(*arguments, progress)``; what ``progress`` raises ends the work."""
         ...
 
+    def prepare(self) -> None:
+        """Get ready for a first plan; returns at once."""
+        ...
+
     def leave(self) -> None:
         """Give memory back where nothing is computed."""
         ...
@@ -91,6 +95,12 @@ class PlanningQueue:
             async with self._change:
                 self._change.notify_all()
 
+    def prepare(self) -> None:
+        """Have the process ready for a first plan, for as long as it stays for a next one."""
+        if not self._closing:
+            self._process.prepare()
+            self._leave_when_idle()
+
     async def run(self, compute: Callable[..., _T], *arguments: object, progress: Progress) -> _T:
         """Return ``compute(*arguments, progress)`` of the process, when no other plan is computed.
 
@@ -116,8 +126,7 @@ class PlanningQueue:
                 raise
             finally:
                 if not self._closing:
-                    loop = asyncio.get_running_loop()
-                    self._idle = loop.call_later(self._idle_s, self._process.leave)
+                    self._leave_when_idle()
 
     async def close(self) -> None:
         """End all that waits, without waiting until the process has ended."""
@@ -128,6 +137,11 @@ class PlanningQueue:
             self._work.cancel()
         async with self._change:
             self._change.notify_all()
+
+    def _leave_when_idle(self) -> None:
+        self._stay()
+        loop = asyncio.get_running_loop()
+        self._idle = loop.call_later(self._idle_s, self._process.leave)
 
     def _stay(self) -> None:
         if self._idle is not None:

@@ -47,7 +47,7 @@ def _limits(goal: Goal, search: Search, best: Choice, target: str) -> tuple[str,
     if not target.startswith("range"):
         return "noise", "the longest capture there is does no better"
     noise_m = best.predicted.range_std.median
-    bias_m = best.predicted.range_bias.median
+    bias_m = best.predicted.range_bias_m
     m = best.applied.sequence.harmonics
     if target == "range_error_m" and bias_m > noise_m:
         words = f"more time does not help here: bias {bias_m * 1e3:.3g} mm at m = {m}"

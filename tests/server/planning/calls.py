@@ -51,6 +51,9 @@ class Here:
     def run(self, compute: Callable[..., _T], *arguments: object, progress: Progress) -> _T:
         return compute(*arguments, progress)
 
+    def prepare(self) -> None:
+        """Be here."""
+
     def leave(self) -> None:
         """Stay."""
 

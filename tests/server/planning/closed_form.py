@@ -45,11 +45,11 @@ class ClosedForm:
 
     def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
         each = self.quick(estimator, sequence, self.noise_scale(sequence))
-        std, bias, error = (
+        std, error = (
             Figure(value, value / SPREAD, value * SPREAD, 2 * value, value * MARGIN)
-            for value in each
+            for value in (each[0], each[2])
         )
-        return Prediction(std, bias, error, 0.0, bias.median, bias_known=True)
+        return Prediction(std, error, each[1], 0.0, each[1], bias_known=True)
 
     def beyond_scene(self, sequence: Sequence) -> bool:
         return False

@@ -25,7 +25,7 @@ def test_the_ends_of_an_interval_change_no_target() -> None:
 def test_a_figure_of_equal_pixels_is_as_wide_as_the_model_is_uncertain() -> None:
     # 8 % of spread, and the 95 % quantile of a normal variable: 1.6449 deviations
     errors_m, picks = np.full(50, 2e-3), np.zeros((RESAMPLED, 50), int)
-    found = figure(errors_m, lambda each: float(np.median(each)), picks)
+    found = figure(errors_m, lambda each: np.asarray(np.median(each, axis=-1)), picks)
     assert found.median == found.p90 == pytest.approx(2e-3)
     assert found.high / found.median == pytest.approx(math.exp(1.6449 * 0.08), rel=1e-4)
     assert found.median / found.low == pytest.approx(math.exp(1.6449 * 0.08), rel=1e-4)
@@ -37,7 +37,7 @@ def test_fewer_pixels_widen_a_figure() -> None:
     def width(count: int) -> float:
         errors_m = np.exp(np.random.default_rng(1).normal(size=count))
         picks = random.integers(0, count, (RESAMPLED, count))
-        found = figure(errors_m, lambda each: float(np.median(each)), picks)
+        found = figure(errors_m, lambda each: np.asarray(np.median(each, axis=-1)), picks)
         return found.high / found.low
 
     assert width(10) > width(1000)

@@ -1,8 +1,10 @@
 """Plans are computed in a process of its own, which ends with the work that is given up."""
 
 import os
+import subprocess
 import threading
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -127,3 +129,35 @@ def test_it_leaves_when_it_has_nothing_to_do_and_comes_back(process: PlanningPro
 
     assert not calls.is_running(gone)
     assert process.run(calls.pid, progress=Progress()) != gone
+
+
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Ids of the processes that are started."""
+    ids: list[int] = []
+    start = subprocess.Popen
+
+    def noted(*arguments: Any, **options: Any) -> subprocess.Popen[bytes]:
+        process = start(*arguments, **options)
+        ids.append(process.pid)
+        return process
+
+    monkeypatch.setattr(subprocess, "Popen", noted)
+    return ids
+
+
+def test_it_is_there_before_the_first_call_once_it_was_prepared(started: list[int]) -> None:
+    process = PlanningProcess()
+    process.prepare()
+    process.prepare()
+    assert len(started) == 1
+
+    assert process.run(calls.pid, progress=Progress()) == started[0]
+    process.close()
+
+
+def test_none_is_prepared_after_the_end(started: list[int]) -> None:
+    process = PlanningProcess()
+    process.close()
+    process.prepare()
+    assert started == []

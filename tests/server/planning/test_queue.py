@@ -18,7 +18,7 @@ class Held:
     """Computes nothing: each call returns its number once a test lets it."""
 
     def __init__(self) -> None:
-        self.begun = 0
+        self.begun = self.prepared = 0
         self.left = threading.Event()
         self._free = threading.Semaphore(0)
 
@@ -27,6 +27,9 @@ class Held:
         number = self.begun
         self._free.acquire()
         return number
+
+    def prepare(self) -> None:
+        self.prepared += 1
 
     def leave(self) -> None:
         self.left.set()
@@ -90,6 +93,28 @@ def test_after_a_while_without_plans_the_process_leaves() -> None:
             await asyncio.sleep(0.001)
 
     asyncio.run(plan_and_wait())
+
+
+def test_a_process_that_is_ready_for_a_plan_that_never_comes_leaves() -> None:
+    async def prepare_and_wait() -> None:
+        held = Held()
+        PlanningQueue(held, idle_s=0.0).prepare()
+        assert held.prepared == 1
+        while not held.left.is_set():
+            await asyncio.sleep(0.001)
+
+    asyncio.run(prepare_and_wait())
+
+
+def test_no_process_is_made_ready_once_the_service_ends() -> None:
+    async def end() -> None:
+        held = Held()
+        queue = PlanningQueue(held)
+        await queue.close()
+        queue.prepare()
+        assert held.prepared == 0
+
+    asyncio.run(end())
 
 
 def test_an_address_has_few_places_and_leaves_some_to_others() -> None:

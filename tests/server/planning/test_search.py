@@ -60,8 +60,8 @@ def test_bias_rules_out_what_noise_alone_would_recommend(capabilities: Capabilit
     noise = planned(Goal(range_std_m=0.005), capabilities).recommended
     both = planned(Goal(range_error_m=0.005), capabilities).recommended
 
-    assert noise.predicted.range_bias.median > 0.005
-    assert both.predicted.range_bias.median < 0.005
+    assert noise.predicted.range_bias_m > 0.005
+    assert both.predicted.range_bias_m < 0.005
     assert noise.applied.capture_s < both.applied.capture_s
 
 
@@ -75,8 +75,8 @@ class Hasty(ClosedForm):
 
     def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
         exact = super().quick(estimator, sequence, self.noise_scale(sequence))
-        std, bias, error = (Figure(each, each, each, each, each) for each in exact)
-        return Prediction(std, bias, error, 0.0, bias.median, bias_known=True)
+        std, error = (Figure(each, each, each, each, each) for each in (exact[0], exact[2]))
+        return Prediction(std, error, exact[1], 0.0, exact[1], bias_known=True)
 
 
 class Splitting(ClosedForm):
