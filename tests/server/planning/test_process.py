@@ -137,7 +137,7 @@ def started(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     ids: list[int] = []
     start = subprocess.Popen
 
-    def noted(*arguments: Any, **options: Any) -> subprocess.Popen[bytes]:
+    def noted(*arguments: Any, **options: Any) -> Any:
         process = start(*arguments, **options)
         ids.append(process.pid)
         return process
