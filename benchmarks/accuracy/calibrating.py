@@ -83,11 +83,9 @@ def main() -> None:
     text = page(rows, arguments.scenes, len(refused), arguments.seed)
     print(text)
     if arguments.write:
-        command = "python -m benchmarks.accuracy.calibrating"
-        if arguments.seed in SEEN:
-            evidence.write("calibrating", text, f"{command} --write")
-        else:
-            evidence.write("checking", text, f"{command} --seed {arguments.seed} --write")
+        seed = "" if arguments.seed == SEEN[0] else f" --seed {arguments.seed}"
+        part = "calibrating" if arguments.seed in SEEN else "checking"
+        evidence.write(part, text, f"python -m benchmarks.accuracy.calibrating{seed} --write")
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any, Final, TypeVar
@@ -82,11 +83,15 @@ class PlanningProcess:
         return value
 
     def prepare(self) -> None:
-        """Start the process, so that the first call need not wait for its imports; at once."""
+        """Start the process, so that the first call need not wait for its imports; at once.
+
+        Where the system gives no process, the first call says so.
+        """
         if self._calling.acquire(blocking=False):
             try:
                 if not self._closing.is_set():
-                    self._child = self._child or _Child()
+                    with suppress(OSError):
+                        self._child = self._child or _Child()
             finally:
                 self._calling.release()
 
@@ -120,14 +125,14 @@ class _Child:
 
     def __init__(self) -> None:
         ours, theirs = socket.socketpair()
-        with theirs:
+        with theirs, ours:  # closed here where the system gives no process
             self._process = subprocess.Popen(  # noqa: S603 - this program
                 [sys.executable, "-P", "-m", _MODULE, str(theirs.fileno())],
                 env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
                 pass_fds=(theirs.fileno(),),
                 stdin=subprocess.DEVNULL,
             )
-        self._connection = Connection(ours.detach())
+            self._connection = Connection(ours.detach())
 
     def call(
         self,

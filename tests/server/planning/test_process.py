@@ -161,3 +161,17 @@ def test_none_is_prepared_after_the_end(started: list[int]) -> None:
     process.close()
     process.prepare()
     assert started == []
+
+
+def test_a_system_without_room_for_a_process_does_not_stop_what_prepares_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def full(*arguments: Any, **options: Any) -> Any:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    process = PlanningProcess()
+    with monkeypatch.context() as patched:
+        patched.setattr(subprocess, "Popen", full)
+        process.prepare()
+    assert process.run(calls.pid, progress=Progress()) > 0
+    process.close()
