@@ -20,7 +20,7 @@ from transientcam_moments._arrays import (
     namespace,
     squared,
 )
-from transientcam_moments._lanes import accelerated
+from transientcam_moments._dispatch import accelerated
 from transientcam_moments._loops import repeat
 from transientcam_moments._shown import summary
 from transientcam_moments.levinson import normalised

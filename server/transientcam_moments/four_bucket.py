@@ -13,7 +13,7 @@ from transientcam_moments._arrays import (
     squared,
     to_complex,
 )
-from transientcam_moments._lanes import accelerated
+from transientcam_moments._dispatch import accelerated
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.phase_steps import FOUR_PHASES_RAD, is_four_bucket, phase_weights
 from transientcam_moments.takes import average_takes

@@ -24,6 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from transientcam_compiled import Spread, at_once
 from transientcam_moments._arrays import (
     Array,
     by_blocks,
@@ -31,8 +32,7 @@ from transientcam_moments._arrays import (
     namespace,
     squared,
 )
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import Spread, at_once
+from transientcam_moments._dispatch import accelerated
 from transientcam_moments.biasing import bias, estimate_zeroth
 from transientcam_moments.calibration import inverse_gains
 from transientcam_moments.errors import ParameterError, ShapeError

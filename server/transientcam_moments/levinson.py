@@ -25,8 +25,7 @@ from transientcam_moments._arrays import (
     some,
     squared,
 )
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import on_threads
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 

@@ -13,8 +13,7 @@ from transientcam_moments._arrays import (
     phases,
     real_type,
 )
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import on_threads
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments.levinson import Coefficients
 
 _BLOCK_VALUES = 1 << 18

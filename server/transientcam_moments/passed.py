@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from functools import cached_property
 
+from transientcam_compiled import Spread, at_once
 from transientcam_moments._arrays import (
     Array,
 )
 from transientcam_moments._kernels.one_pass import Planes
-from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments.flags import Flags
 from transientcam_moments.levinson import Coefficients, levinson
 from transientcam_moments.pisarenko import (

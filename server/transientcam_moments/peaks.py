@@ -13,8 +13,7 @@ from transientcam_moments._arrays import (
     in_turn,
     namespace,
 )
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import on_threads
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments._loops import repeat
 from transientcam_moments._shown import summary
 from transientcam_moments.levinson import Coefficients

@@ -13,8 +13,7 @@ from transientcam_moments._arrays import (
     namespace,
     squared,
 )
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import on_threads
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments._shown import summary
 from transientcam_moments.biasing import search
 from transientcam_moments.levinson import Recursion, normalised, onto_circle, recursion

@@ -6,12 +6,12 @@ from html import escape
 
 import numpy as np
 
+from transientcam_compiled import Spread, at_once
 from transientcam_moments._arrays import (
     Array,
     in_turn,
     namespace,
 )
-from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments._shown import map_html
 from transientcam_moments.biasing import bias, estimate_zeroth, smallest_eigenvalue
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order

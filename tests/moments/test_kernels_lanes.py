@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from tests.moments.kernel_lanes import FEW, lanes, without_lanes
-from transientcam_moments import _lanes
+from tests.moments.kernel_lanes import FEW, find, lanes, without_lanes
+from transientcam_compiled import BLOCK, Part, blocks
+from transientcam_compiled._spread import LARGE
 from transientcam_moments._kernels import density as density_module
 from transientcam_moments._kernels import phase_groups
-from transientcam_moments._lanes.parallel import BLOCK, LARGE, Part, blocks
 from transientcam_moments.levinson import _levinson
 from transientcam_moments.polishing import residual, size
 
@@ -41,7 +41,7 @@ def compiled() -> Iterator[None]:
 
 
 def lane(name: str, planes: Array) -> Any:
-    found = _lanes.find(name, planes)
+    found = find(name, planes)
     assert found is not None
     return found
 

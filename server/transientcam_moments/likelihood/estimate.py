@@ -5,6 +5,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from transientcam_compiled import Spread
 from transientcam_moments._arrays import (
     MAX_HARMONICS,
     Array,
@@ -15,8 +16,7 @@ from transientcam_moments._arrays import (
     moment_planes,
     namespace,
 )
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import Spread, on_threads
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.likelihood import choice

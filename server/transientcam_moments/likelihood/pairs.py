@@ -12,9 +12,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_compiled import Spread
 from transientcam_moments._arrays import Array, by_blocks, in_range, moment_planes, namespace
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import Spread, on_threads
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments.likelihood import pair_fit
 from transientcam_moments.likelihood.choice import COUNT, PLANES, SCORE, nothing
 from transientcam_moments.likelihood.estimate import Likelihood, dense, prepared, results

@@ -3,7 +3,7 @@
 import numpy as np
 
 from transientcam_moments._arrays import Array, by_blocks
-from transientcam_moments._lanes import accelerated
+from transientcam_moments._dispatch import accelerated
 
 _BLOCK_PIXELS = 1024
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from transientcam_moments._arrays import Array, in_range, namespace
-from transientcam_moments._lanes import lookup
+from transientcam_moments._dispatch import lookup
 from transientcam_moments._shown import summary
 from transientcam_moments.noise.cramer_rao import COINCIDE_RAD, CramerRao, cramer_rao
 from transientcam_moments.noise.moments import MomentNoise

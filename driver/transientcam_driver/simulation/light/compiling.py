@@ -1,7 +1,6 @@
-"""From functions to lanes: compiled for one signature by numba, or loaded from its cache."""
+"""From functions to lanes: compiled for one signature by numba, or loaded from the cache."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Any
 
 from numba import float32 as numba_float32
@@ -12,8 +11,7 @@ from numba import njit
 from numba import types as numba_types
 from numba import uint16 as numba_uint16
 
-LANES: dict[str, Callable[..., Any]] = {}
-"""All lanes that are compiled, by their names."""
+from transientcam_driver.simulation.light.lanes import CACHE, FUNCTIONS
 
 # numba is only partly annotated
 float32: Any = numba_float32
@@ -43,10 +41,10 @@ REGION = _types.UniTuple(int64, 4)
 
 
 def inner(function: Callable[..., Any]) -> Any:
-    """Have a function compiled into those that call it, which are in the same file.
+    """Have a function compiled into those that call it.
 
-    The cache notices changes of that file only. Calls that remain would count references of every
-    array they pass, one by one between all cores: a fourth of the time of loops over short rows.
+    Calls that remain would count references of every array they pass, one by one between all cores:
+    a fourth of the time of loops over short rows.
     """
     return njit(nogil=True, error_model="numpy", forceinline=True)(function)
 
@@ -56,11 +54,9 @@ def lane(*signature: Any) -> Callable[[Callable[..., Any]], Any]:
 
     def decorate(function: Callable[..., Any]) -> Any:
         dispatcher = njit(nogil=True, error_model="numpy")(function)
-        with suppress(RuntimeError):  # where there is no place to keep it between processes
-            dispatcher.enable_caching()
-        dispatcher.compile(signature)
+        CACHE.compile(dispatcher, signature)
         dispatcher.disable_compile()
-        LANES[function.__name__] = dispatcher
+        FUNCTIONS.setdefault(function.__module__, {})[function.__name__] = dispatcher
         return dispatcher
 
     return decorate
