@@ -28,10 +28,9 @@ class _ProgramEnds(Exception):  # noqa: N818 - no error
 class Kernels(Generic[Key]):
     """The kernels of one library in this process, and how far making them ready has come.
 
-    A kernel is compiled code that does the same as a function in NumPy, which serves until it is
-    ready. Making it ready means to load it from the cache; what is not kept there is compiled into
-    it first: by another process of low priority, or where there can be none, by the thread that
-    loads.
+    A kernel does the same as a function in NumPy, which serves until the kernel is ready: loaded
+    from the cache. What is not kept there is compiled into it first, by another process of low
+    priority, or by the thread that loads where there can be none.
 
     ``TRANSIENTCAM_KERNELS``: "off" (or 0, no, false) leaves everything to NumPy; with "manual"
     there is nothing but what the process itself compiles.
@@ -144,14 +143,15 @@ class Kernels(Generic[Key]):
             arrays = results if isinstance(results, tuple) else (results,)
             self._results_bytes[key] = [each.nbytes for each in arrays]
 
-    def make_ready_in_background(self, keys: Iterable[Key] = ()) -> threading.Thread:
-        """Make ready what calls wanted so far, and then these, in the background; returns at once.
+    def make_wanted_ready(self) -> None:
+        """Make ready in the background what calls wanted so far; returns at once."""
+        with self._queueing:
+            if self._waiting:
+                self._may_load.set()
+                self._work()
 
-        Returns
-        -------
-        thread
-            Ends when all is done.
-        """
+    def make_ready_in_background(self, keys: Iterable[Key]) -> threading.Thread:
+        """Make these ready in the background, in this order; return the thread, which ends then."""
         with self._queueing:
             self._may_load.set()
             self._waiting.extend(keys)
@@ -208,6 +208,7 @@ class Kernels(Generic[Key]):
                 # whatever stops a compiler (a missing one, a full disk, an unknown processor) must
                 # stop nothing else: NumPy goes on serving
                 self.failed[key] = f"{type(error).__name__}: {error}".splitlines()[0]
+                _log.info("NumPy goes on without the kernel %s: %s", key, self.failed[key])
             finally:
                 self.compiling = None
 
@@ -217,7 +218,9 @@ class Kernels(Generic[Key]):
                 return self.load(key)
             try:
                 self._child.call(_fill_cache, self.load, key, ask=_go_on)
-            except OSError as error:
+            except _ProgramEnds:
+                raise
+            except Exception as error:
                 _log.warning(
                     "the process that compiles kernels has failed (%s); they are compiled on a "
                     "thread",

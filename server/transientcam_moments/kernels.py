@@ -238,7 +238,7 @@ def only_note() -> Iterator[None]:
 
 def make_ready() -> None:
     """Load or compile in the background what calls since `only_note` would have used."""
-    KERNELS.make_ready_in_background()
+    KERNELS.make_wanted_ready()
 
 
 def settled(names: Sequence[str], harmonics: int) -> bool:

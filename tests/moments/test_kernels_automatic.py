@@ -59,7 +59,7 @@ class Compiler:
 @pytest.fixture
 def anew(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have nothing compiled, and nothing wanted before."""
-    fresh = Kernels({}, _dispatch.CACHE, takes_long=lambda key: key.takes_long)
+    fresh: Kernels[Key] = Kernels({}, _dispatch.CACHE, takes_long=lambda key: key.takes_long)
     for name, value in vars(fresh).items():
         monkeypatch.setattr(KERNELS, name, value)
 

@@ -32,7 +32,8 @@ CHUNK: Final = 64
 FUNCTIONS: Final[dict[str, dict[str, Callable[..., Any]]]] = {}
 """Those that each module has compiled, by their names."""
 _PACKAGE: Final = "transientcam_driver.simulation"
-CACHE: Final = Cache(*(f"{_PACKAGE}.{name}" for name in (*COMPILED, "light.lanes")))
+CACHE: Final = Cache(f"{_PACKAGE}.light.lanes", f"{_PACKAGE}.light.compiling")
+"""numba itself notices changes of each file of lanes, which use no functions of another."""
 
 
 def _load(name: str) -> dict[str, Callable[..., Any]]:

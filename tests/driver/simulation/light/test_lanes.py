@@ -1,10 +1,13 @@
 """Compiled lanes against the statements in NumPy that they stand beside: the same bytes."""
 
+import os
+import subprocess
 import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -254,3 +257,21 @@ def test_without_a_compiler_numpy_goes_on(monkeypatch: pytest.MonkeyPatch) -> No
 
     assert lanes.find("seen") is None
     assert lanes.kernels.failed.keys() == set(COMPILED)
+
+
+def test_lanes_are_compiled_by_another_process_and_loaded_by_this_one(tmp_path: Path) -> None:
+    code = (
+        "import threading\n"
+        "from transientcam_compiled import THREAD\n"
+        "from transientcam_driver.simulation.light.lanes import LANES, OF_IMAGES\n"
+        "LANES.want(OF_IMAGES)\n"
+        "[each.join() for each in threading.enumerate() if each.name == THREAD]\n"
+        "stats = LANES.find('at_phase').stats\n"
+        "print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))\n"
+    )
+    environ = {"NUMBA_CACHE_DIR": str(tmp_path), "TRANSIENTCAM_KERNELS": "on"}
+    command = [sys.executable, "-W", "error", "-c", code]
+
+    printed = subprocess.check_output(command, env=os.environ | environ, text=True)
+
+    assert printed == "1 0\n"
