@@ -13,7 +13,7 @@ import transientcam_moments as tm
 from transientcam_moments._kernels.one_pass import Constants, OnePass
 from transientcam_moments._lanes import find, lookup
 from transientcam_moments._lanes.registry import REGISTRY
-from transientcam_moments.smoothing import gaussian_taps
+from transientcam_moments.images import gaussian_taps
 
 Array = NDArray[Any]
 CORES = len(os.sched_getaffinity(0))

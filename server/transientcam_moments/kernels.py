@@ -23,7 +23,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TypedDict
 
-from transientcam_moments._arrays import MAX_HARMONICS, chosen
 from transientcam_moments._lanes import lookup
 from transientcam_moments._lanes.automatic import (
     MOST_ROOTS,
@@ -49,6 +48,7 @@ from transientcam_moments._lanes.registry import (
     Key,
     Lane,
 )
+from transientcam_moments.arrays import MAX_HARMONICS, chosen
 from transientcam_moments.errors import ParameterError
 
 __all__ = [

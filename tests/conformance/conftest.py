@@ -11,7 +11,7 @@ import pytest
 from tests.conformance.breaking import NOTHING, Breaker
 from tests.serving import Served, serving
 from transientcam.conformance import Device
-from transientcam.conformance.device import API
+from transientcam.conformance._device import API
 from transientcam.wire import LEASE_HEADER
 
 CAMERA = "sim:wall?noise=off"  # the scene that is rendered quickest

@@ -16,18 +16,19 @@ from transientcam.cli import run as command
 from transientcam.conformance import (
     CHECKS,
     GROUPS,
+    SLOW,
     Check,
     Device,
     Report,
+    _recording as recording,
     chosen,
-    recording,
     run,
 )
-from transientcam.conformance.rate import Rate, measured_rate
-from transientcam.conformance.running import SLOW
+from transientcam.conformance._rate import Rate, measured_rate
 from transientcam.errors import ParameterError, PromiseBroken, ServerUnreachable
 from transientcam.wire import LEASE_HEADER
-from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
+from transientcam_server.api import Role, utc_now
+from transientcam_server.api._auth.tokens import TokenFile
 
 LONG_S = 20.0
 SHORT_S = 2.5

@@ -2,11 +2,10 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from transientcam_driver import Capabilities, Sequence, SequenceError, SubPhases
-from transientcam_driver.simulation.device.prototype import prototype
+from transientcam_simulation.emulated._open_usb.prototype import prototype
 
 CAPABILITIES = prototype(serial="T", width=163, height=120, bits=12)
 

@@ -5,19 +5,12 @@ import numpy as np
 import pytest
 
 from tests.driver.conftest import OpenCamera
-from transientcam_driver import (
-    CameraName,
-    CameraNotFound,
-    PluginError,
-    SceneError,
-    SpecError,
-    opening,
-)
-from transientcam_driver.entries.sim import SimulatedScene, scene_of
-from transientcam_driver.opening import check_camera, open_camera
-from transientcam_driver.plugin import GROUP
-from transientcam_driver.simulation.device.bus import SimulatedBus
-from transientcam_driver.usb import open_transport
+from transientcam_driver import CameraName, CameraNotFound, PluginError, SceneError, SpecError
+from transientcam_driver.camera import _opening as opening, check_camera, open_camera
+from transientcam_driver.camera._plugin import GROUP
+from transientcam_driver.cameras.open_usb import open_transport
+from transientcam_simulation.emulated._open_usb.bus import SimulatedBus
+from transientcam_simulation.entries.sim import SimulatedScene, scene_of
 
 
 @pytest.mark.parametrize(
@@ -101,7 +94,7 @@ def test_an_absent_file_is_named(tmp_path: Path) -> None:
 
 def test_without_a_camera_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "transientcam_driver.entries.usb.open_transport",
+        "transientcam_driver.cameras.open_usb._plugin.open_transport",
         lambda serial: open_transport(serial, backend=SimulatedBus([])),
     )
 

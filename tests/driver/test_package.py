@@ -6,7 +6,7 @@ import pytest
 
 import transientcam_driver
 
-ENTRY_POINTS = {"transientcam_driver.cli", "transientcam_driver.entries"}
+ENTRY_POINTS = {"transientcam_driver.cli", "transientcam_simulation.entries"}
 PACKAGES = [
     each.name
     for each in pkgutil.walk_packages(transientcam_driver.__path__, "transientcam_driver.")

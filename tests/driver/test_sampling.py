@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from transientcam_driver import Sampling, Sequence, SequenceError
-from transientcam_driver.simulation.device.prototype import prototype
+from transientcam_simulation.emulated._open_usb.prototype import prototype
 
 THIRDS = (0.0, 2 * math.pi / 3, 4 * math.pi / 3)
 FIXED = Sampling((2, 10, 15), THIRDS)

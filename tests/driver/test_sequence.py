@@ -3,8 +3,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from transientcam_driver import ImageLabel, Sequence, SequenceError, SubPhases
 from transientcam_driver.sequence import READ_ONLY_FIELDS

@@ -15,16 +15,16 @@ from transientcam_driver import (
     LibusbMissing,
     PermissionDenied,
 )
+from transientcam_driver.camera import FoundCamera
+from transientcam_driver.cameras.kinect2 import UDEV_RULES
+from transientcam_driver.cameras.open_usb import UDEV_RULE, list_cameras, open_transport
+from transientcam_driver.cameras.open_usb.protocol import Request
+from transientcam_driver.cameras.opt8241 import _usb_link as usb_link
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.errors import UDEV_RULES_FILE, TransferOverflow, TransferStalled
-from transientcam_driver.kinect2.usb_port import UDEV_RULES
-from transientcam_driver.opt8241 import usb_link
-from transientcam_driver.plugin import FoundCamera
-from transientcam_driver.protocol import Request
-from transientcam_driver.simulation.build import build, find_scene
-from transientcam_driver.simulation.device.bus import SimulatedBus
-from transientcam_driver.simulation.device.usb_device import EmulatedDevice
-from transientcam_driver.usb import UDEV_RULE, list_cameras, open_transport
+from transientcam_simulation.emulated import build, find_scene
+from transientcam_simulation.emulated._open_usb.bus import SimulatedBus
+from transientcam_simulation.emulated._open_usb.usb_device import EmulatedDevice
 
 
 def plug(scene: str = "mirrors") -> EmulatedDevice:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tests.moments import oracles
-from transientcam_moments._arrays import below_one, by_blocks, in_turn
-from transientcam_moments._loops import repeat
+from transientcam_moments.arrays import below_one, by_blocks, in_turn, repeat
 
 
 @pytest.mark.parametrize("pixels", [0, 1, 7, 8, 9, 100])

@@ -6,7 +6,7 @@ import pytest
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import lanes, without_lanes
 from transientcam_moments import noise
-from transientcam_moments.noise.returns import direct_phase_noise
+from transientcam_moments.noise import direct_phase_noise
 
 PIXELS = 600
 

@@ -6,14 +6,13 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import lanes, without_lanes
 from tests.moments.oracles import Content, phasor
-from transientcam_moments.harmonics import ROUNDS
+from transientcam_moments.images._harmonics import ROUNDS
 
 Array = NDArray[np.complex128]
 

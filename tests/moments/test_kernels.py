@@ -12,8 +12,7 @@ import pytest
 import transientcam_moments as tm
 from tests.moments import kernel_lanes
 from tests.moments.kernel_lanes import lanes, without_lanes
-from transientcam_moments import _lanes
-from transientcam_moments._kernels.cache import cache_directory
+from transientcam_moments import _lanes, cache_directory
 from transientcam_moments._lanes import registry
 from transientcam_moments._lanes.registry import REGISTRY, Key, Registry
 

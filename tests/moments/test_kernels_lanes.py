@@ -16,11 +16,10 @@ import transientcam_moments as tm
 from tests.moments import oracles
 from tests.moments.kernel_lanes import FEW, lanes, without_lanes
 from transientcam_moments import _lanes
-from transientcam_moments._kernels import density as density_module
-from transientcam_moments._kernels import phase_groups
+from transientcam_moments._kernels import density as density_module, phase_groups
 from transientcam_moments._lanes.parallel import BLOCK, LARGE, Part, blocks
-from transientcam_moments.levinson import _levinson
-from transientcam_moments.polishing import residual, size
+from transientcam_moments.moment_problem._levinson import _levinson
+from transientcam_moments.moment_problem._polishing import residual, size
 
 ORDERS = [3, 4, 8]
 LANES = tuple(name for name in FEW if name != "reconstruct")

@@ -13,7 +13,7 @@ from tests.moments import oracles
 from tests.moments.kernel_lanes import lanes, without_lanes
 from transientcam_moments import _lanes
 from transientcam_moments._lanes.parallel import over
-from transientcam_moments.peaks import PEAK_THRESHOLD
+from transientcam_moments.moment_problem._peaks import PEAK_THRESHOLD
 
 ORDERS = [1, 3, 4, 12]
 TYPES = [np.complex64, np.complex128]

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import lanes, without_lanes
 from transientcam_moments._lanes.registry import REGISTRY
-from transientcam_moments.four_bucket import harmonics_of
-from transientcam_moments.passed import PassedReconstruction
+from transientcam_moments.images import harmonics_of
+from transientcam_moments.reconstruction._one_pass import PassedReconstruction
 
 ORDERS = (3, 4, 8)
 M = 3

@@ -5,14 +5,19 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.optimize import least_squares
 from scipy.stats import chi2, gamma
 
 import transientcam_moments as tm
 from tests.moments.oracles import moments_of_returns
-from transientcam_moments.likelihood import chi_square, choice, estimate, sharp, tail
+from transientcam_moments.likelihood import (
+    _chi_square as chi_square,
+    _estimate as estimate,
+    choice,
+    sharp,
+    tail,
+)
 
 NOISE_SHARE = 1 / 100
 

@@ -12,8 +12,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
@@ -21,7 +20,7 @@ from tests.moments.kernel_lanes import lanes
 from transientcam_driver import RawFrame, Sequence, SubPhases, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_moments import noise
-from transientcam_moments.noise.returns import direct_phase_noise
+from transientcam_moments.noise import direct_phase_noise
 
 Array = NDArray[Any]
 DRAWS = 2000

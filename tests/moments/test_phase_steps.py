@@ -5,8 +5,8 @@ import pytest
 
 import transientcam_moments as tm
 from transientcam_moments.errors import ParameterError, ShapeError
-from transientcam_moments.four_bucket import demodulate
-from transientcam_moments.phase_steps import FOUR_PHASES_RAD, phase_noise, phase_weights
+from transientcam_moments.images import FOUR_PHASES_RAD, phase_noise, phase_weights
+from transientcam_moments.images._four_bucket import demodulate
 
 RNG = np.random.default_rng(20)
 SETS = [

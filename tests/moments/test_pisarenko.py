@@ -5,8 +5,8 @@ import pytest
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from transientcam_moments.levinson import into_disc, recursion
-from transientcam_moments.pisarenko import _christoffel
+from transientcam_moments.moment_problem._levinson import into_disc, recursion
+from transientcam_moments.moment_problem._pisarenko import _christoffel
 
 ORDERS = [1, 2, 3, 4, 8, 16, 32]
 

@@ -10,7 +10,7 @@ from tests.moments import oracles
 from transientcam_driver import SubPhases
 from transientcam_moments.comparisons import sra_table
 from transientcam_moments.likelihood import MODEL_ERROR
-from transientcam_moments.settings import ESTIMATORS
+from transientcam_moments.reconstruction import ESTIMATORS
 
 SHAPE = (6, 7)
 FREQUENCY_HZ = 23e6

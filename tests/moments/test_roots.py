@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.moments import oracles
-from transientcam_moments.roots import circle_roots, disc_roots
+from transientcam_moments.moment_problem._roots import circle_roots, disc_roots
 
 
 def coefficients(roots: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from PIL import Image
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from transientcam_moments._shown import map_html
+from transientcam_moments.arrays import map_html
 
 MOMENTS = oracles.random_moments(np.random.default_rng(0), 2, 12).reshape((3, 3, 4))
 

@@ -9,8 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from transientcam.cli.options import TokenOption, UrlArgument
-from transientcam.conformance import CHECKS, Check, Device, Report, Result, chosen, run
-from transientcam.conformance.running import SLOW
+from transientcam.conformance import CHECKS, SLOW, Check, Device, Report, Result, chosen, run
 
 _MARKS = {
     "passed": "[green]passed [/]",

@@ -4,14 +4,15 @@
 leave the camera as they found it.
 """
 
-from transientcam.conformance.check import Check
-from transientcam.conformance.device import Device
-from transientcam.conformance.report import Report, Result
-from transientcam.conformance.running import CHECKS, GROUPS, chosen, run
+from transientcam.conformance._check import Check
+from transientcam.conformance._device import Device
+from transientcam.conformance._report import Report, Result
+from transientcam.conformance._running import CHECKS, GROUPS, SLOW, chosen, run
 
 __all__ = [
     "CHECKS",
     "GROUPS",
+    "SLOW",
     "Check",
     "Device",
     "Report",

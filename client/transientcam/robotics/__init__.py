@@ -4,7 +4,9 @@
 Foxglove's, and `foxglove_bridge` serves them live.
 """
 
-from transientcam.robotics.messages import (
+from transientcam.robotics._foxglove_bridge import SHOWN, FoxgloveBridge
+from transientcam.robotics._foxglove_messages import Encoded
+from transientcam.robotics._messages import (
     CAMERA_FRAME,
     OPTICAL_FRAME,
     Calibration,
@@ -16,16 +18,27 @@ from transientcam.robotics.messages import (
     messages_of,
     viewable,
 )
+from transientcam.robotics._reports import Report
+from transientcam.robotics._rerun_bridge import BINS, LOGGED, RerunBridge
+from transientcam.robotics._rerun_messages import blueprint
 
 __all__ = [
+    "BINS",
     "CAMERA_FRAME",
+    "LOGGED",
     "OPTICAL_FRAME",
+    "SHOWN",
     "Calibration",
+    "Encoded",
+    "FoxgloveBridge",
     "Image",
     "Message",
     "Pinhole",
     "Points",
+    "Report",
+    "RerunBridge",
     "Transform",
+    "blueprint",
     "messages_of",
     "viewable",
 ]

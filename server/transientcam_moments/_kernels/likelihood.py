@@ -35,8 +35,7 @@ from transientcam_moments._kernels.stages import (
 )
 from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments._lanes.pool import empty
-from transientcam_moments.likelihood import choice
-from transientcam_moments.likelihood.choice import MOST_RETURNS, TAIL_SHAPE
+from transientcam_moments.likelihood import MOST_RETURNS, TAIL_SHAPE, choice
 
 
 @njit(nogil=True, error_model="numpy")

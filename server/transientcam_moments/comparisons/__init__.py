@@ -14,24 +14,24 @@ was not at hand; no label claims to be the authors' implementation.
 """
 
 from transientcam_moments.comparisons import (
-    coded,
-    dorrington,
-    frequency_domain,
-    godbaz,
-    high_frequency,
-    inverse_fourier,
-    logarithmic,
-    matching_pursuit,
-    matrix_pencil,
-    own,
-    regularised,
-    single_frequency,
-    spumic,
-    sra,
-    sra_table,
+    _coded as coded,
+    _dorrington as dorrington,
+    _frequency_domain as frequency_domain,
+    _godbaz as godbaz,
+    _high_frequency as high_frequency,
+    _inverse_fourier as inverse_fourier,
+    _logarithmic as logarithmic,
+    _matching_pursuit as matching_pursuit,
+    _matrix_pencil as matrix_pencil,
+    _own as own,
+    _regularised as regularised,
+    _single_frequency as single_frequency,
+    _spumic as spumic,
+    _sra as sra,
+    _sra_table as sra_table,
 )
-from transientcam_moments.comparisons._pixels import check_order
-from transientcam_moments.comparisons.estimate import (
+from transientcam_moments.comparisons._coded import Code, equal_shifts_rad, maximum_length_code
+from transientcam_moments.comparisons._estimate import (
     Estimate,
     GridEstimate,
     LikelihoodEstimate,
@@ -39,7 +39,8 @@ from transientcam_moments.comparisons.estimate import (
     SparseEstimate,
     grid_rad,
 )
-from transientcam_moments.comparisons.technique import Technique
+from transientcam_moments.comparisons._pixels import check_order
+from transientcam_moments.comparisons._technique import Technique
 
 TECHNIQUES: dict[str, Technique] = {
     technique.name: technique
@@ -68,6 +69,7 @@ TECHNIQUES: dict[str, Technique] = {
 
 __all__ = [
     "TECHNIQUES",
+    "Code",
     "Estimate",
     "GridEstimate",
     "LikelihoodEstimate",
@@ -75,5 +77,8 @@ __all__ = [
     "SparseEstimate",
     "Technique",
     "check_order",
+    "coded",
+    "equal_shifts_rad",
     "grid_rad",
+    "maximum_length_code",
 ]

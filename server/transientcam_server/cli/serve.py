@@ -59,7 +59,7 @@ def serve(
     as_json: JsonOption = False,
 ) -> None:
     """Run the daemon: a camera on the network, with its dashboard."""
-    from transientcam_server.daemon.configuration import load_settings
+    from transientcam_server.daemon import load_settings
 
     command_line = {
         "camera": camera,
@@ -79,8 +79,8 @@ def serve(
 
     import transientcam_moments as tm
     from transientcam_driver import open_camera
-    from transientcam_server.api.app import build_app
-    from transientcam_server.camera.source import start_with
+    from transientcam_server.api import build_app
+    from transientcam_server.camera import start_with
     from transientcam_server.daemon import server
 
     server.configure_logging(settings)
@@ -110,15 +110,14 @@ def serve(
 
 def _camera_names() -> list[str]:
     from transientcam_driver import list_scenes
-    from transientcam_driver.opening import kinds
+    from transientcam_driver.camera import kinds
 
     return [*kinds(), *(f"sim:{scene.name}" for scene in list_scenes())]
 
 
 def _check(command_line: dict[str, Any], config: Path | None, *, as_json: bool) -> None:
-    from transientcam_server.daemon import check as settings_check
-    from transientcam_server.daemon.configuration import load
-    from transientcam_server.errors.exceptions import SettingsError
+    from transientcam_server.daemon import check as settings_check, load
+    from transientcam_server.errors import SettingsError
 
     try:
         configuration = load(command_line, file=config, environment=os.environ)

@@ -5,11 +5,11 @@ import subprocess
 import sys
 
 from transientcam_driver import TriggeredCamera
-from transientcam_driver.tofcam660 import DeviceOptions, Region, Tofcam660
+from transientcam_driver.cameras.tofcam660 import DeviceOptions, Region, Tofcam660
 
 PROGRAM = """
 import typer
-from transientcam_driver.cli.emulate import emulate
+from transientcam_simulation.cli.emulate import emulate
 app = typer.Typer()
 app.command()(emulate)
 app()

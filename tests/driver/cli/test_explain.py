@@ -5,7 +5,7 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
-from transientcam_driver.cli.explain import explain
+from transientcam_simulation.cli.explain import explain
 
 
 def run(*arguments: str) -> Result:

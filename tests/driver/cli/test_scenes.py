@@ -5,7 +5,7 @@ import typer
 from typer.testing import CliRunner
 
 from transientcam_driver import list_scenes
-from transientcam_driver.cli import scenes
+from transientcam_simulation.cli import scenes
 
 
 def run(*arguments: str, verb: Callable[..., None] = scenes.scenes) -> str:

@@ -5,13 +5,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.cameras.kinect2 import (
+    HEIGHT,
+    MEASURED,
+    SUB_IMAGE_BYTES,
+    WIDTH,
+    DepthParameters,
+    Kinect2,
+    Kinect2Camera,
+    P0Tables,
+)
 from transientcam_driver.clock import Clock, RealClock
-from transientcam_driver.kinect2.camera import Kinect2Camera
-from transientcam_driver.kinect2.device import Kinect2
-from transientcam_driver.kinect2.layout import HEIGHT, MEASURED, SUB_IMAGE_BYTES, WIDTH
-from transientcam_driver.kinect2.parameters import DepthParameters
-from transientcam_driver.kinect2.tables import P0Tables
-from transientcam_driver.simulation.kinect2 import EmulatedFirmware, EmulatedKinect2
+from transientcam_simulation.emulated._kinect2 import EmulatedFirmware, EmulatedKinect2
 
 READ_S = 600.0  # against a test that hangs, not against a machine that is slow
 SERIAL = "001234567890"

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tests.driver.kinect2.conftest import Load
-from transientcam_driver.kinect2 import codes
-from transientcam_driver.kinect2.layout import HEIGHT, SUB_IMAGE_BYTES, WIDTH
+from transientcam_driver.cameras.kinect2 import HEIGHT, SUB_IMAGE_BYTES, WIDTH, codes
 
 
 def sample_by_hand(sub_image: bytes, row: int, column: int) -> int | None:

@@ -3,8 +3,7 @@
 import pytest
 
 from transientcam_driver import ProtocolError
-from transientcam_driver.kinect2 import commands
-from transientcam_driver.kinect2.commands import Request
+from transientcam_driver.cameras.kinect2 import Request, _commands as commands
 
 # by hand from OpenKinect/libfreenect2 @ fd64c5d, include/internal/libfreenect2/protocol/command.h:
 # magic, sequence, longest answer, command, 0, parameters

@@ -7,10 +7,11 @@ import pytest
 
 from tests.driver.kinect2.standing import P0, PARAMETERS, SERIAL, emulated, firmware, ignore
 from transientcam_driver import CameraBusy, CameraError, CameraLost, CameraNotFound, ProtocolError
+from transientcam_driver.cameras.kinect2 import Kinect2
+from transientcam_driver.cameras.kinect2._device import READY_TRIES
 from transientcam_driver.errors import TransferStalled
-from transientcam_driver.kinect2.device import READY_TRIES, Kinect2
-from transientcam_driver.simulation.kinect2 import EmulatedKinect2
-from transientcam_driver.simulation.kinect2.link import EmulatedLink
+from transientcam_simulation.emulated._kinect2 import EmulatedKinect2
+from transientcam_simulation.emulated._kinect2.link import EmulatedLink
 
 # libfreenect2 @ fd64c5d, src/libfreenect2.cpp; numbers are commands with their parameters
 IDENTIFY = ["awake", "2", "14", "22 1", "22 3", "22 2", "22 4"]

@@ -3,9 +3,9 @@
 import pytest
 
 from transientcam_driver import CameraError, SpecError, open_camera
+from transientcam_driver.camera import CameraName
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.entries import kinect2
-from transientcam_driver.plugin import CameraName
+from transientcam_simulation.entries import kinect2
 
 
 @pytest.mark.parametrize(

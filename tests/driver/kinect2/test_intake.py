@@ -5,16 +5,14 @@ import pytest
 
 from tests.driver.kinect2.standing import STILL, emulated
 from transientcam_driver import CameraError, CameraLost, Counters
-from transientcam_driver.capabilities import AppliedSequence
+from transientcam_driver.camera import AppliedSequence
+from transientcam_driver.cameras.kinect2 import Identity, capabilities_of, encoder, measurement
+from transientcam_driver.cameras.kinect2._frames import FrameMaker
+from transientcam_driver.cameras.kinect2._intake import ROOM_FRAMES, Arrival, Intake
+from transientcam_driver.cameras.kinect2._packets import SubImages
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.kinect2 import encoder, measurement
-from transientcam_driver.kinect2.abilities import capabilities_of
-from transientcam_driver.kinect2.device import Identity
-from transientcam_driver.kinect2.frames import FrameMaker
-from transientcam_driver.kinect2.intake import ROOM_FRAMES, Arrival, Intake
-from transientcam_driver.kinect2.packets import SubImages
 from transientcam_driver.sequence import Sequence
-from transientcam_driver.simulation.device import Fault
+from transientcam_simulation.emulated._open_usb import Fault
 
 PERIOD_TICKS = 266
 CAPABILITIES = capabilities_of(Identity("1", "2", b"", b""))

@@ -17,9 +17,8 @@ from tests.driver.kinect2.standing import (
     firmware,
 )
 from transientcam_driver import CameraError, CameraLost, CameraNotFound, Sequence
-from transientcam_driver.kinect2 import measurement
-from transientcam_driver.kinect2.camera import Kinect2Camera
-from transientcam_driver.simulation.kinect2 import EmulatedKinect2
+from transientcam_driver.cameras.kinect2 import Kinect2Camera, measurement
+from transientcam_simulation.emulated._kinect2 import EmulatedKinect2
 
 IMAGES = measurement.images(STILL.data)
 

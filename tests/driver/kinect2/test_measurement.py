@@ -5,10 +5,15 @@ import pytest
 
 import transientcam_moments as tm
 from tests.driver.kinect2.conftest import Load
-from transientcam_driver.kinect2 import codes, encoder, measurement
-from transientcam_driver.kinect2.layout import SAMPLING, SUB_IMAGE_BYTES
-from transientcam_driver.kinect2.packets import Assembler
-from transientcam_driver.kinect2.tables import P0Tables
+from transientcam_driver.cameras.kinect2 import (
+    SAMPLING,
+    SUB_IMAGE_BYTES,
+    Assembler,
+    P0Tables,
+    codes,
+    encoder,
+    measurement,
+)
 
 FREQUENCIES_HZ = np.array([16e6, 80e6, 120e6])
 

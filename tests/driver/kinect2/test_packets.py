@@ -8,9 +8,9 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.driver.kinect2.conftest import Load
-from transientcam_driver.kinect2.encoder import MAGIC, packets
-from transientcam_driver.kinect2.layout import MEASURED, SUB_IMAGE_BYTES
-from transientcam_driver.kinect2.packets import Assembler, Footer, SubImages
+from transientcam_driver.cameras.kinect2 import MEASURED, SUB_IMAGE_BYTES, Assembler
+from transientcam_driver.cameras.kinect2._encoder import MAGIC, packets
+from transientcam_driver.cameras.kinect2._packets import Footer, SubImages
 
 PER_SUB_IMAGE = 10  # nine with data, one of length zero
 PER_FRAME = 10 * PER_SUB_IMAGE

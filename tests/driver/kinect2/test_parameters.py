@@ -7,7 +7,7 @@ import pytest
 
 from tests.driver.kinect2.conftest import Load
 from transientcam_driver import ProtocolError
-from transientcam_driver.kinect2.parameters import DepthParameters, Rows
+from transientcam_driver.cameras.kinect2 import DepthParameters, Rows
 
 
 @pytest.mark.data

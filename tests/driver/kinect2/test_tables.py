@@ -5,7 +5,7 @@ import pytest
 
 from tests.driver.kinect2.conftest import Load
 from transientcam_driver import ProtocolError
-from transientcam_driver.kinect2.tables import P0Tables
+from transientcam_driver.cameras.kinect2 import P0Tables
 
 
 @pytest.mark.data

@@ -18,8 +18,8 @@ from tests.driver.kinect2.standing import SERIAL, STILL, emulated
 from tests.driver.kinect2.usb3 import Usb3Mount
 from tests.driver.usbfs.processes import PRELOAD, missing_libraries, skip_or_fail
 from transientcam_driver import CameraError
-from transientcam_driver.kinect2 import measurement
-from transientcam_driver.kinect2.usb_port import require_bandwidth
+from transientcam_driver.cameras.kinect2 import measurement
+from transientcam_driver.cameras.kinect2._usb_port import require_bandwidth
 
 PROGRAM = Path(__file__).parent / "usb_program.py"
 

@@ -19,9 +19,9 @@ from tests.driver.usbfs.usbfs import (
     UsbfsMount,
 )
 from transientcam_driver.errors import CameraError, CameraLost
-from transientcam_driver.simulation.device.descriptors import string_descriptors
-from transientcam_driver.simulation.kinect2.device import EmulatedKinect2
-from transientcam_driver.simulation.kinect2.link import EmulatedLink
+from transientcam_simulation.emulated._kinect2.device import EmulatedKinect2
+from transientcam_simulation.emulated._kinect2.link import EmulatedLink
+from transientcam_simulation.emulated._open_usb.descriptors import string_descriptors
 
 SUPER_SPEED_MBIT, SUPER_SPEED = 5000, 5
 PACKET_BYTES = 33_792

@@ -8,9 +8,8 @@ import json
 import sys
 from typing import Any
 
+from transientcam_driver.cameras.kinect2 import Kinect2Camera, list_kinects, open_kinect2
 from transientcam_driver.errors import DriverError
-from transientcam_driver.kinect2.camera import Kinect2Camera
-from transientcam_driver.kinect2.finding import list_kinects, open_kinect2
 
 
 def main() -> None:

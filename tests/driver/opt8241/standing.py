@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import TriggeredCamera
+from transientcam_driver.cameras.opt8241 import Opt8241
 from transientcam_driver.clock import Clock, RealClock
-from transientcam_driver.opt8241 import Opt8241
-from transientcam_driver.simulation.opt8241 import EmulatedOpt8241
+from transientcam_simulation.emulated._opt8241 import EmulatedOpt8241
 
 SERIAL = "0042"
 

@@ -7,14 +7,12 @@ import pytest
 
 from tests.driver.opt8241.standing import SERIAL, Marked, camera_of, emulated
 from transientcam_driver import CameraLost, DeviceRefused, SequenceError, SpecError
+from transientcam_driver.camera import CameraName
+from transientcam_driver.cameras.opt8241 import Opt8241, Request, registers as reg
+from transientcam_driver.cameras.opt8241._device import quad_images
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.entries import opt8241
-from transientcam_driver.opt8241 import Opt8241
-from transientcam_driver.opt8241 import registers as reg
-from transientcam_driver.opt8241.device import quad_images
-from transientcam_driver.opt8241.link import Request
-from transientcam_driver.plugin import CameraName
-from transientcam_driver.simulation.device import Fault
+from transientcam_simulation.emulated._open_usb import Fault
+from transientcam_simulation.entries import opt8241
 
 
 @pytest.mark.parametrize("quads", [4, 6])

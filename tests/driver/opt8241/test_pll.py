@@ -2,7 +2,7 @@
 
 import pytest
 
-from transientcam_driver.opt8241.pll import PllSetting
+from transientcam_driver.cameras.opt8241 import PllSetting
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,8 @@ import pytest
 
 from tests.driver.opt8241.standing import emulated
 from transientcam_driver import CameraLost, ProtocolError
-from transientcam_driver.opt8241 import registers as reg
-from transientcam_driver.opt8241.control import Control
-from transientcam_driver.opt8241.link import Request
-from transientcam_driver.opt8241.registers import Field
+from transientcam_driver.cameras.opt8241 import Field, Request, registers as reg
+from transientcam_driver.cameras.opt8241._control import Control
 
 
 def test_no_two_fields_share_a_bit() -> None:

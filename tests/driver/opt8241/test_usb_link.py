@@ -11,11 +11,10 @@ import usb.core
 
 from tests.driver.opt8241.standing import camera_of, emulated
 from transientcam_driver import CameraNotFound, PermissionDenied, TriggeredCamera
+from transientcam_driver.cameras.opt8241 import Opt8241, Request, _usb_link as usb_link
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.entries import opt8241
-from transientcam_driver.opt8241 import Opt8241, usb_link
-from transientcam_driver.opt8241.link import Request
-from transientcam_driver.simulation.opt8241 import EmulatedOpt8241
+from transientcam_simulation.emulated._opt8241 import EmulatedOpt8241
+from transientcam_simulation.entries import opt8241
 
 
 class Device:

@@ -5,30 +5,30 @@ import struct
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from transientcam_driver import FirmwareTooOld, ProtocolError, Sequence, SubPhases
-from transientcam_driver.protocol import (
+from transientcam_driver.camera import DeviceState, Status, StatusFlag
+from transientcam_driver.cameras.open_usb.protocol import (
     Commitment,
-    DeviceState,
     ErrorCode,
     ImageFlag,
     ImageHeader,
     Request,
     SequenceWords,
-    Status,
-)
-from transientcam_driver.protocol.capabilities import (
-    CAPS_BYTES,
     pack_capabilities,
+    pack_last_error,
+    pack_status,
+    pack_time,
+    payload_checksum,
+    phase_word,
     unpack_capabilities,
+    unpack_last_error,
+    unpack_status,
+    unpack_time,
 )
-from transientcam_driver.protocol.images import payload_checksum
-from transientcam_driver.protocol.requests import pack_last_error, unpack_last_error
-from transientcam_driver.protocol.status import StatusFlag, pack_time, unpack_time
-from transientcam_driver.protocol.units import phase_word
-from transientcam_driver.simulation.device.prototype import prototype
+from transientcam_driver.cameras.open_usb.protocol._capabilities import CAPS_BYTES
+from transientcam_simulation.emulated._open_usb.prototype import prototype
 
 CAPABILITIES = prototype(serial="T-1", width=163, height=120, bits=12)
 
@@ -323,12 +323,12 @@ def test_a_status_has_the_fields_at_the_offsets_of_the_specification() -> None:
         temperature_c=41.37,
     )
 
-    packed = status.pack()
+    packed = pack_status(status)
 
     assert packed == bytes.fromhex(
         "01 01 0300 09000000 0000000002000000 002f685900000000 07000000 64000000 c8000000 2910 0000"
     )
-    assert Status.unpack(packed) == status
+    assert unpack_status(packed) == status
     assert status.light_on
     assert status.interlock_closed
     assert not status.watchdog_tripped
@@ -337,7 +337,7 @@ def test_a_status_has_the_fields_at_the_offsets_of_the_specification() -> None:
 @given(data=st.binary(max_size=64))
 def test_answers_of_the_wrong_length_are_protocol_errors(data: bytes) -> None:
     for unpack, sizes in (
-        (Status.unpack, (40,)),
+        (unpack_status, (40,)),
         (Commitment.unpack, (40, 44)),
         (SequenceWords.unpack, (20, 24)),
         (unpack_time, (8,)),
@@ -349,7 +349,7 @@ def test_answers_of_the_wrong_length_are_protocol_errors(data: bytes) -> None:
 
 def test_an_unknown_state_is_a_protocol_error() -> None:
     with pytest.raises(ProtocolError, match="state 9"):
-        Status.unpack(b"\x01\x09" + bytes(38))
+        unpack_status(b"\x01\x09" + bytes(38))
 
 
 def test_time_is_in_nanoseconds() -> None:

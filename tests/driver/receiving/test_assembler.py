@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 from transientcam_driver import Counters, RawFrame, Sequence
-from transientcam_driver.protocol import ImageFlag, ImageHeader
-from transientcam_driver.protocol.units import phase_word
-from transientcam_driver.receiving.assembler import FrameAssembler
-from transientcam_driver.receiving.decoder import ImagePacket
-from transientcam_driver.simulation.device.prototype import prototype
+from transientcam_driver.cameras.open_usb._receiving.assembler import FrameAssembler
+from transientcam_driver.cameras.open_usb._receiving.decoder import ImagePacket
+from transientcam_driver.cameras.open_usb.protocol import ImageFlag, ImageHeader, phase_word
+from transientcam_simulation.emulated._open_usb.prototype import prototype
 
 CAPABILITIES = prototype(serial="T", width=4, height=3, bits=12)
 APPLIED = CAPABILITIES.apply(Sequence(harmonics=1, zeroth="on-off"), epoch=5)

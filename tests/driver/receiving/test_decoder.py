@@ -1,12 +1,10 @@
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from transientcam_driver.protocol import ImageFlag, ImageHeader
-from transientcam_driver.protocol.images import payload_checksum
-from transientcam_driver.receiving.decoder import ImagePacket, PacketDecoder
+from transientcam_driver.cameras.open_usb._receiving.decoder import ImagePacket, PacketDecoder
+from transientcam_driver.cameras.open_usb.protocol import ImageFlag, ImageHeader, payload_checksum
 
 PAYLOAD_BYTES = 96
 

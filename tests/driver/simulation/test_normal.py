@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from transientcam_driver.simulation.normal import standard_normal
+from transientcam_simulation.base import standard_normal
 
 
 def generator(seed: int) -> np.random.Generator:

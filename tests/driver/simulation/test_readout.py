@@ -5,12 +5,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from transientcam_driver.sensor import Sensor
+from transientcam_driver.camera import Sensor
 from transientcam_driver.sequence import Sequence
-from transientcam_driver.simulation.light import GivenScenery
-from transientcam_driver.simulation.light.lanes import LANES, Lanes
-from transientcam_driver.simulation.responses import SparseResponses
-from transientcam_driver.simulation.world import World
+from transientcam_simulation.base import SparseResponses
+from transientcam_simulation.compiled import LANES
+from transientcam_simulation.compiled._lanes import Lanes
+from transientcam_simulation.imaging import World
+from transientcam_simulation.light import GivenScenery
 
 SEQUENCE = Sequence(harmonics=1, zeroth="estimated", exposure_s=1e-3)
 NO_NOISE = {"shot-noise": "off", "read-noise": "off"}

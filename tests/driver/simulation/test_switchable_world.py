@@ -9,8 +9,7 @@ import pytest
 from tests.driver.conftest import OpenCamera
 from transientcam_driver import Camera, CameraLost, EffectError, SceneError, Sequence, Simulation
 from transientcam_driver.sequence import ImageLabel
-from transientcam_driver.simulation.switchable_world import SwitchableWorld
-from transientcam_driver.simulation.world import World
+from transientcam_simulation.imaging import SwitchableWorld, World
 
 
 def _simulation(camera: Camera) -> Simulation:

@@ -9,13 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 from transientcam_driver import Sequence, SubPhases
-from transientcam_driver.sensor import Sensor
-from transientcam_driver.simulation.effects import EFFECTS, Call, Effect
-from transientcam_driver.simulation.effects.shot_noise import FEW_E, ShotNoise
-from transientcam_driver.simulation.light import Views, Wanted
-from transientcam_driver.simulation.light.transport import GivenScenery
-from transientcam_driver.simulation.responses import SparseResponses
-from transientcam_driver.simulation.world import World
+from transientcam_driver.camera import Sensor
+from transientcam_simulation.base import SparseResponses
+from transientcam_simulation.effects import EFFECTS, FEW_E, Call, Effect, ShotNoise
+from transientcam_simulation.imaging import World
+from transientcam_simulation.light import GivenScenery, Views, Wanted
 
 SENSOR = Sensor(full_well_e=40_000, gain_e_per_dn=9.0, read_noise_e=30.0, dark_dn=64.0, bits=12)
 QUIET = {"shot-noise": "off", "read-noise": "off"}

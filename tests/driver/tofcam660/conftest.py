@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import pytest
 
 from transientcam_driver import Simulation
+from transientcam_driver.cameras.tofcam660 import CONTROL_PORT, DATA_PORT
 from transientcam_driver.clock import RealClock
-from transientcam_driver.simulation.build import find_scene, without_noise
-from transientcam_driver.simulation.tofcam660 import EmulatedTofcam660, build_tofcam660
-from transientcam_driver.tofcam660.wire import CONTROL_PORT, DATA_PORT
+from transientcam_simulation.emulated import build_tofcam660, find_scene, without_noise
+from transientcam_simulation.emulated._tofcam660 import EmulatedTofcam660
 
 VENDOR_HOST = "127.0.66.60"
 """An address of its own: the vendor's client knows no other ports than the device's."""

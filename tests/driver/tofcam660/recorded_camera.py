@@ -6,13 +6,13 @@ from collections import defaultdict, deque
 from pathlib import Path
 
 from tests.driver.tofcam660.session import frames, steps
-from transientcam_driver.tofcam660.wire import (
+from transientcam_driver.cameras.tofcam660 import (
     AnswerType,
     Command,
     pack_answer,
-    pack_request,
     payload_bytes,
 )
+from transientcam_driver.cameras.tofcam660._wire import pack_request
 
 NEVER_RECORDED = {Command.STOP_STREAM}
 """The vendor's client has no use for it: it takes single images."""

@@ -9,11 +9,16 @@ from contextlib import contextmanager, suppress
 import pytest
 
 from transientcam_driver import CameraError, CameraLost, CameraNotFound, ImagesLost
-from transientcam_driver.tofcam660 import DeviceOptions, Tofcam660
-from transientcam_driver.tofcam660.control import ControlConnection
-from transientcam_driver.tofcam660.image import PacketHeader
-from transientcam_driver.tofcam660.images import TcpImages, UdpImages
-from transientcam_driver.tofcam660.wire import AnswerType, Command, pack_answer
+from transientcam_driver.cameras.tofcam660 import (
+    AnswerType,
+    Command,
+    ControlConnection,
+    DeviceOptions,
+    PacketHeader,
+    Tofcam660,
+    pack_answer,
+)
+from transientcam_driver.cameras.tofcam660._images import TcpImages, UdpImages
 
 ANSWER_S = 0.2
 HEAD = struct.pack("!II", 0xFFFFAA55, 2)

@@ -5,11 +5,11 @@ import pytest
 
 from tests.driver.tofcam660.conftest import Emulation
 from transientcam_driver import Sequence, SpecError, SubPhases, TriggeredCamera
-from transientcam_driver.entries.tofcam660 import device_options
-from transientcam_driver.plugin import CameraName
-from transientcam_driver.tofcam660 import DeviceOptions, Region, Tofcam660
-from transientcam_server.imaging.recipe import Recipe
+from transientcam_driver.camera import CameraName
+from transientcam_driver.cameras.tofcam660 import DeviceOptions, Region, Tofcam660
+from transientcam_server.imaging import Recipe
 from transientcam_server.settings import ReconstructionSettings
+from transientcam_simulation.entries.tofcam660 import device_options
 
 REGION = Region(152, 112, 168, 128)
 

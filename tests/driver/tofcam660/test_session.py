@@ -7,10 +7,9 @@ import numpy as np
 from tests.driver.tofcam660.recorded_camera import RecordedCamera
 from tests.driver.tofcam660.session import frames, steps
 from transientcam_driver import Sequence, SubPhases, TriggeredCamera
-from transientcam_driver.simulation.tofcam660.firmware import EmulatedFirmware
-from transientcam_driver.tofcam660 import DeviceOptions, Region, Tofcam660
-from transientcam_driver.tofcam660.image import HEADER_BYTES
-from transientcam_driver.tofcam660.wire import Command
+from transientcam_driver.cameras.tofcam660 import Command, DeviceOptions, Region, Tofcam660
+from transientcam_driver.cameras.tofcam660._image import HEADER_BYTES
+from transientcam_simulation.emulated._tofcam660.firmware import EmulatedFirmware
 
 ROI = Region(100, 90, 180, 150)
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from tests.driver.tofcam660.conftest import VENDOR_HOST, Emulation, emulation
 from tests.driver.tofcam660.vendor_client import FREE_MHZ, INTEGRATION_US, PRESETS_MHZ
 from transientcam_driver import Sequence, SubPhases, TriggeredCamera
+from transientcam_driver.cameras.tofcam660 import DeviceOptions, Tofcam660
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
-from transientcam_driver.tofcam660 import DeviceOptions, Tofcam660
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("epc") is None, reason="needs epc-tofcam-toolkit (make test has it)"

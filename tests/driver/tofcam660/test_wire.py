@@ -6,30 +6,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tests.driver.tofcam660.session import frames, steps
 from transientcam_driver import DeviceRefused, ImagesLost, ProtocolError
-from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
-from transientcam_driver.tofcam660 import Region
-from transientcam_driver.tofcam660.device import offset_m
-from transientcam_driver.tofcam660.image import (
-    HEADER_BYTES,
-    ImageHeader,
-    PacketHeader,
-    dcs_images,
-)
-from transientcam_driver.tofcam660.wire import (
-    Answer,
+from transientcam_driver.cameras.tofcam660 import (
     AnswerType,
     CalibrationEntry,
     Command,
-    pack_request,
+    ImageHeader,
+    PacketHeader,
+    Region,
+    offset_m,
     payload_bytes,
     require_end,
-    unpack_calibration,
 )
+from transientcam_driver.cameras.tofcam660._image import HEADER_BYTES, dcs_images
+from transientcam_driver.cameras.tofcam660._wire import Answer, pack_request, unpack_calibration
+from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 
 ROI = Region(100, 90, 180, 150)
 ENTRIES = (CalibrationEntry(1, 39.0, 8123),)

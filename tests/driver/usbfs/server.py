@@ -10,10 +10,11 @@ from typing import Any
 
 from usbfs import UsbfsMount  # type: ignore[import-not-found]  # beside this script, no package
 
+from transientcam_driver.camera import Status
+from transientcam_driver.cameras.open_usb.protocol import Request, unpack_status
 from transientcam_driver.clock import RealClock
-from transientcam_driver.protocol import Request, Status
-from transientcam_driver.simulation.build import build, find_scene, without_noise
-from transientcam_driver.simulation.device.faults import Fault
+from transientcam_simulation.emulated import build, find_scene, without_noise
+from transientcam_simulation.emulated._open_usb.faults import Fault
 
 
 def main() -> None:
@@ -25,7 +26,7 @@ def main() -> None:
         with device.changed:  # past the bus, which may stall
             now_s = device.clock.now_s()
             answer = device._firmware.control_in(Request.GET_STATUS, 0, 0, now_s=now_s)
-        return Status.unpack(answer)
+        return unpack_status(answer)
 
     def obey(command: str, *arguments: Any) -> object:
         match command:

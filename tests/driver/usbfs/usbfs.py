@@ -19,13 +19,9 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
-from transientcam_driver.protocol.requests import PRODUCT_ID, VENDOR_ID
-from transientcam_driver.simulation.device import descriptors
-from transientcam_driver.simulation.device.usb_device import (
-    Overflow,
-    Stall,
-    Unplugged,
-)
+from transientcam_driver.cameras.open_usb.protocol import PRODUCT_ID, VENDOR_ID
+from transientcam_simulation.emulated._open_usb import descriptors
+from transientcam_simulation.emulated._open_usb.usb_device import Overflow, Stall, Unplugged
 
 DEVICE_PATH = "/devices/pci0000:00/0000:00:14.0/usb1/1-1"
 HIGH_SPEED_MBIT, HIGH_SPEED = 480, 3

@@ -9,7 +9,7 @@ from zarr.core.sync import cleanup_resources
 
 from tests.server.recording.made import APPLIED, record
 from transientcam.cli import run
-from transientcam_server.offline import job
+from transientcam_server.offline import _job as job
 
 
 @pytest.fixture(autouse=True)

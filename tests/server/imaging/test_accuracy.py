@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import RawFrame, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.camera.source import sensor_of
-from transientcam_server.imaging.accuracy import (
+from transientcam_server.camera import sensor_of
+from transientcam_server.imaging import Recipe
+from transientcam_server.imaging._errors_of_range.accuracy import (
     RangeAccuracy,
     median_around,
     range_accuracy,
     spacing_px,
 )
-from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.planning.measures import pixel_errors
+from transientcam_server.planning._prediction.measures import pixel_errors
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
 CAPTURES = 8

@@ -26,18 +26,18 @@ from transientcam_driver import (
     capture_calibration,
     open_camera,
 )
-from transientcam_driver.simulation.device.prototype import prototype
-from transientcam_server.imaging.calibration import (
+from transientcam_server.imaging import (
     NOMINAL_ID,
     Calibration,
+    Pipeline,
+    Recipe,
+    Workers,
     evaluate,
     load_calibration,
     nominal_gains,
 )
-from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.imaging.workers import Workers
 from transientcam_server.settings import ReconstructionSettings
+from transientcam_simulation.emulated._open_usb.prototype import prototype
 
 _Array = NDArray[Any]
 SHAPE = (10, 12)

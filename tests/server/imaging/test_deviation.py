@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from transientcam_server.imaging.deviation import typical_deviation
+from transientcam_server.imaging import typical_deviation
 
 STD = 3e-3
 PIXELS = 40_000

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from transientcam_driver import CalibrationCapture, Sequence, capture_calibration, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.imaging.calibration import evaluate
-from transientcam_server.imaging.diffusor import judge, smooth_field
-from transientcam_server.imaging.verdict import Verdict
+from transientcam_server.imaging import Verdict, evaluate, judge
+from transientcam_server.imaging._calibrations.diffuser import smooth_field
 
 _Array = NDArray[Any]
 HEIGHT, WIDTH = 90, 120

@@ -15,13 +15,16 @@ import transientcam_moments as tm
 from tests.server.recording.made import APPLIED, CAPABILITIES, HEIGHT, WIDTH, frame, header
 from transientcam_driver import CalibrationMismatch, FactoryCalibration
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.imaging.calibration import FACTORY_ID, Calibration, factory_gains
-from transientcam_server.imaging.noise import moment_noise
-from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.imaging.workers import Workers
-from transientcam_server.recording import RecordingWriter
-from transientcam_server.recording.replay import ReplayCamera
+from transientcam_server.imaging import (
+    FACTORY_ID,
+    Calibration,
+    Pipeline,
+    Recipe,
+    Workers,
+    factory_gains,
+)
+from transientcam_server.imaging._errors_of_range.noise import moment_noise
+from transientcam_server.recording import RecordingWriter, ReplayCamera
 from transientcam_server.settings import ReconstructionSettings
 
 _RNG = np.random.default_rng(8)

@@ -4,12 +4,10 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.frame import Frame
-from transientcam_server.imaging.history import History
+from transientcam_server.errors import Problem
+from transientcam_server.imaging import Frame, History
 from transientcam_server.settings import HistorySettings
 
 

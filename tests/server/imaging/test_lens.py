@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from transientcam_driver import Lens, open_camera
-from transientcam_driver.simulation.build import find_scene
-from transientcam_driver.simulation.light.rays import camera_rays
-from transientcam_server.imaging.lens import Intrinsics, known_intrinsics
+from transientcam_server.imaging import Intrinsics, known_intrinsics
 from transientcam_server.settings import LensSettings
+from transientcam_simulation.emulated import find_scene
+from transientcam_simulation.light._rays import camera_rays
 
 SIZE: dict[str, Any] = {"width": 163, "height": 120}
 SCENE = Intrinsics.of_field(40.0, **SIZE, source="scene")

@@ -9,16 +9,15 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import Sequence, open_camera
-from transientcam_server.camera.source import sensor_of
-from transientcam_server.imaging import noise as module
-from transientcam_server.imaging.noise import (
+from transientcam_server.camera import sensor_of
+from transientcam_server.imaging import Recipe, contradictory_share
+from transientcam_server.imaging._errors_of_range import noise as module
+from transientcam_server.imaging._errors_of_range.noise import (
     beyond_noise,
     contradictions,
-    contradictory_share,
     moment_noise,
     range_noise,
 )
-from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
 SHAPE = (40, 50)

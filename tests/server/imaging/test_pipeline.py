@@ -16,16 +16,21 @@ from tests.moments.kernel_lanes import without_lanes
 from transientcam import wire
 from transientcam_driver import AppliedSequence, Camera, RawFrame, Sampling, Sequence, open_camera
 from transientcam_moments._lanes.registry import REGISTRY, Key
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging import frame as module
-from transientcam_server.imaging import stages
-from transientcam_server.imaging.encodings.encoding import MSGPACK, NPY, Encoding
-from transientcam_server.imaging.frame import Frame
-from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.recipe import Recipe, SettingsVersion, suited
-from transientcam_server.imaging.view import Crop, View
-from transientcam_server.imaging.workers import Workers
+from transientcam_server.errors import Problem, kinds
+from transientcam_server.imaging import (
+    MSGPACK,
+    Crop,
+    Encoding,
+    Frame,
+    Pipeline,
+    Recipe,
+    SettingsVersion,
+    View,
+    Workers,
+    suited,
+)
+from transientcam_server.imaging._encodings.encoding import NPY
+from transientcam_server.imaging._frames import frame as module, stages
 from transientcam_server.settings import ReconstructionSettings
 
 

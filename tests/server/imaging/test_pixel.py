@@ -10,8 +10,8 @@ import pytest
 
 from tests.driver.triggered.scripted import CAPABILITIES
 from transientcam_driver import AppliedSequence, RawFrame, Sampling
-from transientcam_server.imaging.pixel import describe_pixel, pixel_csv
-from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging import Recipe, pixel_csv
+from transientcam_server.imaging._products.pixel import describe_pixel
 from transientcam_server.settings import ReconstructionSettings
 
 THREE = tuple(2 * math.pi * k / 3 for k in range(3))

@@ -14,11 +14,9 @@ from transientcam import wire
 from transientcam_driver import Sequence, Truth, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_moments.likelihood import MODEL_ERROR
-from transientcam_server.camera.source import sensor_of
-from transientcam_server.imaging.noise import moment_noise
-from transientcam_server.imaging.products import PRODUCTS
-from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.imaging.view import Crop, View
+from transientcam_server.camera import sensor_of
+from transientcam_server.imaging import PRODUCTS, Crop, Recipe, View
+from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
 LATEST = "/api/v1/frames/latest"

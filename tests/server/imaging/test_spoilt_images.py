@@ -10,8 +10,7 @@ import pytest
 
 from transientcam_driver import AppliedSequence, Camera, RawFrame, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.workers import Workers
+from transientcam_server.imaging import Pipeline, Workers
 from transientcam_server.settings import ReconstructionSettings
 
 PAIR = (7, 9)

@@ -7,7 +7,7 @@ import pytest
 
 import transientcam_moments as tm
 from transientcam_driver import RawFrame
-from transientcam_server.imaging.stages import spread_of
+from transientcam_server.imaging._frames.stages import spread_of
 
 
 def raw(height: int, width: int) -> RawFrame:

@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from transientcam_server.imaging.verdict import Finding, Verdict, word_of
+from transientcam_server.imaging import Verdict
+from transientcam_server.imaging._calibrations.verdict import Finding, word_of
 
 FINDINGS = (
     Finding("unlike_share", 0.1, 0.05, "share"),

@@ -3,11 +3,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.view import WHOLE, Crop
+from transientcam_server.errors import Problem
+from transientcam_server.imaging import WHOLE, Crop
 
 HEIGHT, WIDTH = 12, 17
 

@@ -15,16 +15,21 @@ from tests.server.imaging.test_calibration import SHAPE, Sensor, capture_of
 from tests.server.recording.made import HEIGHT, WIDTH, frame, header, record
 from transientcam import opening
 from transientcam_driver import ImageLabel, RawFrame, Sequence, open_camera
-from transientcam_driver.calibration.sweep import PhaseSweep
+from transientcam_driver.calibration._sweep import PhaseSweep
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.simulation.device.prototype import prototype
-from transientcam_server.errors.exceptions import NotARecording
-from transientcam_server.imaging.calibration import evaluate
-from transientcam_server.imaging.recipe import Recipe, SettingsVersion
-from transientcam_server.imaging.waveform import COUNT, SweepEvaluation, to_document, usable
-from transientcam_server.recording.reader import Recording
-from transientcam_server.recording.recipe import recorded_recipe
+from transientcam_server.errors import NotARecording
+from transientcam_server.imaging import (
+    Recipe,
+    SettingsVersion,
+    SweepEvaluation,
+    evaluate,
+    to_document,
+    usable,
+)
+from transientcam_server.imaging._recipe.waveform import COUNT
+from transientcam_server.recording import Recording, recorded_recipe
 from transientcam_server.settings import ReconstructionSettings
+from transientcam_simulation.emulated._open_usb.prototype import prototype
 
 _Array = NDArray[Any]
 SEQUENCE = Sequence(harmonics=3, zeroth="on-off", takes=1)
@@ -163,7 +168,7 @@ def test_frames_have_them_taken_out_unless_settings_keep_them(
 def test_a_recording_gives_the_numbers_of_the_daemon(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    point = EntryPoint("hdf5", "transientcam_server.offline.opening:open_recording", opening.GROUP)
+    point = EntryPoint("hdf5", "transientcam_server.offline._opening:open_recording", opening.GROUP)
     monkeypatch.setattr(opening, "entry_points", lambda group: [point])
     random = np.random.default_rng(2)
     turns = random.normal(0, 0.2, (3, HEIGHT, WIDTH))

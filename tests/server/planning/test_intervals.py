@@ -5,7 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from transientcam_server.planning.intervals import RESAMPLED, Figure, between, figure
+from transientcam_server.planning._prediction.intervals import (
+    RESAMPLED,
+    Figure,
+    between,
+    figure,
+)
 
 ERROR = Figure(median=5e-3, low=4e-3, high=6e-3, p90=9e-3, with_margin=5.3e-3)
 NOISE = Figure(median=3e-3, low=2.5e-3, high=3.5e-3, p90=5e-3, with_margin=3.2e-3)

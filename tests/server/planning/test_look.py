@@ -9,11 +9,10 @@ import pytest
 from tests.server.planning.looks import SCENE, SETTINGS, looked
 from transientcam_driver import Camera, RawFrame, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.camera.source import sensor_of
-from transientcam_server.errors.exceptions import Problem
-from transientcam_server.planning import Goal, Planner
-from transientcam_server.planning.look import FRAMES, STILL_FRAMES, STILL_SHARE
-from transientcam_server.planning.progress import Progress
+from transientcam_server.camera import sensor_of
+from transientcam_server.errors import Problem
+from transientcam_server.planning import Goal, Planner, Progress
+from transientcam_server.planning._scene.look import FRAMES, STILL_FRAMES, STILL_SHARE
 from transientcam_server.settings import SensorSettings
 
 

@@ -7,8 +7,8 @@ import pytest
 
 import transientcam_moments as tm
 from transientcam_server.planning import uniform_scene
-from transientcam_server.planning.measures import pixel_errors
-from transientcam_server.planning.resolving import both_found
+from transientcam_server.planning._prediction.measures import pixel_errors
+from transientcam_server.planning._prediction.resolving import both_found
 
 FREQUENCY_HZ = 23e6
 

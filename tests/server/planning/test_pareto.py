@@ -1,9 +1,8 @@
 """The Pareto front of points with a cost and an error."""
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from transientcam_server.planning.pareto import flat_from, front
+from transientcam_server.planning import flat_from, front
 
 
 @given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), max_size=30))

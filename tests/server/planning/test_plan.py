@@ -8,10 +8,10 @@ import pytest
 
 from tests.server.planning.closed_form import ClosedForm, planned
 from transientcam_driver import Capabilities, Sequence
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.errors import Problem
 from transientcam_server.planning import Goal
-from transientcam_server.planning.plan import plan
-from transientcam_server.planning.prediction import Prediction, Predictor
+from transientcam_server.planning._prediction.prediction import Prediction, Predictor
+from transientcam_server.planning._search.plan import plan
 
 
 class Doubtful(ClosedForm):

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_server.planning.description import dim_share
-from transientcam_server.planning.plausible import plausible_ranges
+from transientcam_server.planning._scene.description import dim_share
+from transientcam_server.planning._scene.plausible import plausible_ranges
 
 BASE_HZ = 11.5e6
 HARMONICS = 12

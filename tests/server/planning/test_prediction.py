@@ -11,8 +11,8 @@ from benchmarks.accuracy.promises import measured
 from tests.server.planning.looks import SETTINGS, looked
 from transientcam_driver import Sequence
 from transientcam_server.planning import Goal, Planner, SceneStatistics, uniform_scene
-from transientcam_server.planning.prediction import Predictor
-from transientcam_server.planning.sampling import one_of_each
+from transientcam_server.planning._prediction.prediction import Predictor
+from transientcam_server.planning._scene.sampling import one_of_each
 
 FREQUENCY_HZ = 23e6
 

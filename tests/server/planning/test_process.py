@@ -10,8 +10,8 @@ import pytest
 
 from tests.server.planning import calls
 from transientcam_server.errors import Problem, kinds
-from transientcam_server.planning import Progress
-from transientcam_server.planning.process import NICE, PlanningProcess
+from transientcam_server.planning import PlanningProcess, Progress
+from transientcam_server.planning._process.process import NICE
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from transientcam_server.planning.progress import Progress
+from transientcam_server.planning import Progress
 
 
 def test_the_whole_is_where_its_part_is() -> None:

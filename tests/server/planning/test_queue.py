@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from transientcam_server.api.problems import problem_response
+from transientcam_server.api import problem_response
 from transientcam_server.errors import Problem, kinds
-from transientcam_server.planning import Progress
-from transientcam_server.planning.queue import MOST, MOST_OF_ONE, RETRY_AFTER_S, PlanningQueue
+from transientcam_server.planning import PlanningQueue, Progress
+from transientcam_server.planning._process.queue import MOST, MOST_OF_ONE, RETRY_AFTER_S
 
 
 class Held:

@@ -8,13 +8,12 @@ import pytest
 
 from tests.server.planning.closed_form import MARGIN, ClosedForm, everything, planned, quickest_s
 from transientcam_driver import Capabilities, Sequence
-from transientcam_server.planning import Goal
-from transientcam_server.planning.families import families
-from transientcam_server.planning.intervals import Figure
-from transientcam_server.planning.plan import plan
-from transientcam_server.planning.prediction import Prediction, Predictor
-from transientcam_server.planning.progress import Progress
-from transientcam_server.planning.search import Search
+from transientcam_server.planning import Goal, Progress
+from transientcam_server.planning._prediction.intervals import Figure
+from transientcam_server.planning._prediction.prediction import Prediction, Predictor
+from transientcam_server.planning._search.families import families
+from transientcam_server.planning._search.plan import plan
+from transientcam_server.planning._search.search import Search
 
 
 @pytest.mark.parametrize("target_m", [0.03, 0.008, 0.002])

@@ -9,9 +9,8 @@ import transientcam_moments as tm
 from tests.server.imaging.test_pixel import GAPPED, frame_of
 from transientcam_driver import AppliedSequence, ImageLabel, TriggeredCamera
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.imaging.calibration import factory_gains
-from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.planning.takes import predict_takes
+from transientcam_server.imaging import Recipe, factory_gains
+from transientcam_server.planning import predict_takes
 from transientcam_server.settings import ReconstructionSettings
 
 

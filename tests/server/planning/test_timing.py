@@ -8,9 +8,8 @@ import pytest
 import transientcam_moments as tm
 from tests.server.planning.looks import SETTINGS
 from transientcam_driver import Capabilities, Sequence
-from transientcam_server.planning import Goal, Planner, uniform_scene
-from transientcam_server.planning.progress import Progress
-from transientcam_server.planning.timing import ReconstructionTimer
+from transientcam_server.planning import Goal, Planner, Progress, uniform_scene
+from transientcam_server.planning._prediction.timing import ReconstructionTimer
 
 
 def test_computing_time_is_measured_once_and_grows_with_takes(capabilities: Capabilities) -> None:

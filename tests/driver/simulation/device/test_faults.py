@@ -2,7 +2,7 @@
 
 import pytest
 
-from transientcam_driver.simulation.device.faults import Fault, FaultyCable
+from transientcam_simulation.emulated._open_usb.faults import Fault, FaultyCable
 
 PACKETS = [bytes([number]) * 200 for number in range(4)]
 

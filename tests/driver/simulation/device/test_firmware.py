@@ -7,21 +7,21 @@ import pytest
 from numpy.typing import NDArray
 
 from transientcam_driver import ImageLabel, Sequence
-from transientcam_driver.protocol import (
+from transientcam_driver.camera import DeviceState, Status
+from transientcam_driver.cameras.open_usb._receiving.decoder import ImagePacket, PacketDecoder
+from transientcam_driver.cameras.open_usb.protocol import (
     Commitment,
-    DeviceState,
     ErrorCode,
     ImageFlag,
     Request,
     SequenceWords,
-    Status,
+    unpack_capabilities,
+    unpack_last_error,
+    unpack_status,
+    unpack_time,
 )
-from transientcam_driver.protocol.capabilities import unpack_capabilities
-from transientcam_driver.protocol.requests import unpack_last_error
-from transientcam_driver.protocol.status import unpack_time
-from transientcam_driver.receiving.decoder import ImagePacket, PacketDecoder
-from transientcam_driver.simulation.device.firmware import Firmware, Refusal
-from transientcam_driver.simulation.device.prototype import prototype
+from transientcam_simulation.emulated._open_usb.firmware import Firmware, Refusal
+from transientcam_simulation.emulated._open_usb.prototype import prototype
 
 CAPABILITIES = replace(prototype(serial="T", width=4, height=3, bits=12), fifo_bytes=8 * 88)
 SEQUENCE = Sequence(harmonics=1, zeroth="on-off", exposure_s=1.02e-3)
@@ -73,7 +73,7 @@ class Device:
         return Commitment.unpack(self.read_answer(Request.COMMIT, epoch_above))
 
     def status(self) -> Status:
-        return Status.unpack(self.read_answer(Request.GET_STATUS))
+        return unpack_status(self.read_answer(Request.GET_STATUS))
 
     def read(self) -> list[ImagePacket]:
         """Read all that is there."""

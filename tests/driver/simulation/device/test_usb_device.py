@@ -11,12 +11,11 @@ import pytest
 import usb.core
 import usb.util
 
+from transientcam_driver.cameras.open_usb.protocol import PRODUCT_ID, VENDOR_ID, Request
 from transientcam_driver.clock import Clock, RealClock, VirtualClock
-from transientcam_driver.protocol import Request
-from transientcam_driver.protocol.requests import PRODUCT_ID, VENDOR_ID
-from transientcam_driver.simulation.build import build, find_scene
-from transientcam_driver.simulation.device.bus import SimulatedBus
-from transientcam_driver.simulation.device.usb_device import EmulatedDevice
+from transientcam_simulation.emulated import build, find_scene
+from transientcam_simulation.emulated._open_usb.bus import SimulatedBus
+from transientcam_simulation.emulated._open_usb.usb_device import EmulatedDevice
 
 
 def emulated(clock: Clock) -> EmulatedDevice:

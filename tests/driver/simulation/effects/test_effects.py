@@ -12,15 +12,10 @@ import pytest
 from numpy.typing import NDArray
 
 from transientcam_driver import SceneError, Sequence, SubPhases
-from transientcam_driver.sensor import Sensor
-from transientcam_driver.simulation import effects as package
-from transientcam_driver.simulation.build import find_scene, world_of
-from transientcam_driver.simulation.effects import CALLED_ABOVE, EFFECTS, Effect
-from transientcam_driver.simulation.effects.modulation_harmonics import measured_harmonics
-from transientcam_driver.simulation.effects.pixel_pattern import read_offsets_rad
-from transientcam_driver.simulation.imperfections import (
+from transientcam_driver.camera import Sensor
+from transientcam_simulation import effects as package
+from transientcam_simulation.base import (
     IDEAL,
-    PROTOTYPE,
     TYPICAL,
     DarkCurrent,
     DeviceProfile,
@@ -30,14 +25,21 @@ from transientcam_driver.simulation.imperfections import (
     Outliers,
     Pattern,
     RollOff,
+    SparseResponses,
     Waveform,
 )
-from transientcam_driver.simulation.light.transport import GivenScenery
-from transientcam_driver.simulation.responses import SparseResponses
-from transientcam_driver.simulation.scene.geometry import Rectangle
-from transientcam_driver.simulation.scene.motion import Motion
-from transientcam_driver.simulation.scene.scene import Surface
-from transientcam_driver.simulation.world import World
+from transientcam_simulation.base._imperfections import PROTOTYPE
+from transientcam_simulation.effects import (
+    CALLED_ABOVE,
+    EFFECTS,
+    Effect,
+    measured_harmonics,
+    read_offsets_rad,
+)
+from transientcam_simulation.emulated import find_scene, world_of
+from transientcam_simulation.imaging import World
+from transientcam_simulation.light import GivenScenery
+from transientcam_simulation.scene import Motion, Rectangle, Surface
 
 SHAPE = (12, 16)
 EXPOSURE_S = 1e-3
@@ -107,7 +109,7 @@ def test_the_bytes_are_those_of_a_build_without_what_is_not_called_for(
     ]
 
     left = tuple(effect for effect in EFFECTS if effect.name in built)
-    monkeypatch.setattr("transientcam_driver.simulation.world.EFFECTS", left)
+    monkeypatch.setattr("transientcam_simulation.imaging._world.EFFECTS", left)
     without = world_of(find_scene(scene), width=41, height=30, readout_s=4e-3)
     without.configure(sequence, sequence.labels)
 

@@ -7,15 +7,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from transientcam_driver.camera import Sensor
+from transientcam_driver.cameras.kinect2 import (
+    P0Tables,
+    Request,
+    _commands as commands,
+    measurement,
+)
+from transientcam_driver.cameras.kinect2._codes import SATURATED_DN
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.errors import TransferStalled
-from transientcam_driver.kinect2 import commands, measurement
-from transientcam_driver.kinect2.codes import SATURATED_DN
-from transientcam_driver.kinect2.commands import Request
-from transientcam_driver.kinect2.tables import P0Tables
-from transientcam_driver.sensor import Sensor
-from transientcam_driver.simulation.build import find_scene
-from transientcam_driver.simulation.kinect2 import EmulatedFirmware, build_kinect2
+from transientcam_simulation.emulated import build_kinect2, find_scene
+from transientcam_simulation.emulated._kinect2 import EmulatedFirmware
 
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 TwoFrames = tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any], Sensor]

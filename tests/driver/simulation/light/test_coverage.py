@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.light.coverage import covered, covered_among, overlapped
+from transientcam_simulation.light._coverage import covered, covered_among, overlapped
 
 FINE = 64  # places a side of a pixel
 

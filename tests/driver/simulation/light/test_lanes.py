@@ -11,22 +11,20 @@ import pytest
 from numpy.typing import NDArray
 
 from transientcam_driver import Sequence
-from transientcam_driver.simulation.build import find_scene, world_of
-from transientcam_driver.simulation.light.coverage import covered, overlapped
-from transientcam_driver.simulation.light.ends import Ends
-from transientcam_driver.simulation.light.lanes import (
+from transientcam_simulation.compiled import LANES
+from transientcam_simulation.compiled._lanes import (
     COMPILED,
-    LANES,
     OF_IMAGES,
     THREAD,
     WORTH_PIXELS,
     Lanes,
 )
-from transientcam_driver.simulation.light.paths import image_lights
-from transientcam_driver.simulation.light.shares import Around, hide
-from transientcam_driver.simulation.scene.geometry import Ellipsoid, Rectangle
-from transientcam_driver.simulation.scene.motion import Motion
-from transientcam_driver.simulation.scene.scene import Scene, Surface
+from transientcam_simulation.emulated import find_scene, world_of
+from transientcam_simulation.light._coverage import covered, overlapped
+from transientcam_simulation.light._hit_points import Ends
+from transientcam_simulation.light._paths import image_lights
+from transientcam_simulation.light._shares import Around, hide
+from transientcam_simulation.scene import Ellipsoid, Motion, Rectangle, Scene, Surface
 
 SIZE = 82, 60
 CHOSEN = {
@@ -245,7 +243,7 @@ def test_a_setting_leaves_everything_to_numpy(setting: str) -> None:
 
 def test_without_a_compiler_numpy_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in (*COMPILED, "light.compiling"):
-        monkeypatch.delitem(sys.modules, f"transientcam_driver.simulation.{name}")
+        monkeypatch.delitem(sys.modules, f"transientcam_simulation.{name}")
     monkeypatch.setitem(sys.modules, "numba", None)
     lanes = Lanes({})
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from transientcam_driver import SceneError, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.simulation.light.measured import area_weights, load_responses
-from transientcam_driver.simulation.scene.file import BUILT_IN, load_scene
-from transientcam_driver.simulation.scene.scene import Light, ResponseFile, Scene
+from transientcam_simulation.light import load_responses
+from transientcam_simulation.light._measured import area_weights
+from transientcam_simulation.scene import BUILT_IN, Light, ResponseFile, Scene, load_scene
 
 C = 299_792_458.0
 WIDTH, HEIGHT = 8, 6

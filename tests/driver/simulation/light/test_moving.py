@@ -6,16 +6,23 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.build import find_scene
-from transientcam_driver.simulation.light.layers import MovingResponses
-from transientcam_driver.simulation.light.moving import MovingLight, still_scene
-from transientcam_driver.simulation.light.paths import light_rays
-from transientcam_driver.simulation.light.rays import camera_rays, rays_through
-from transientcam_driver.simulation.light.steps import Steps
-from transientcam_driver.simulation.light.still import StillLight
-from transientcam_driver.simulation.scene.geometry import Ellipsoid, Rectangle
-from transientcam_driver.simulation.scene.motion import Motion
-from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Transport, Viewpoint
+from transientcam_simulation.emulated import find_scene
+from transientcam_simulation.light._layers import MovingResponses
+from transientcam_simulation.light._moving import MovingLight, still_scene
+from transientcam_simulation.light._paths import light_rays
+from transientcam_simulation.light._rays import camera_rays, rays_through
+from transientcam_simulation.light._still import StillLight
+from transientcam_simulation.light._time_interpolation import Steps
+from transientcam_simulation.scene import (
+    Ellipsoid,
+    Light,
+    Motion,
+    Rectangle,
+    Scene,
+    Surface,
+    Viewpoint,
+)
+from transientcam_simulation.scene._scene import Transport
 
 WIDTH, HEIGHT = 82, 60
 C = 299_792_458.0

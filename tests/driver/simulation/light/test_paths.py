@@ -8,22 +8,21 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from transientcam_driver.sensor import Sensor
-from transientcam_driver.simulation.build import find_scene
-from transientcam_driver.simulation.imperfections import Lens
-from transientcam_driver.simulation.light import paths
-from transientcam_driver.simulation.light.paths import (
+from transientcam_driver.camera import Sensor
+from transientcam_simulation.base import Lens, SparseResponses
+from transientcam_simulation.emulated import find_scene
+from transientcam_simulation.light import _paths as paths
+from transientcam_simulation.light._paths import (
     ImageLight,
     Lit,
     image_lights,
     light_on,
     light_rays,
 )
-from transientcam_driver.simulation.light.rays import rays_through
-from transientcam_driver.simulation.light.still import StillLight
-from transientcam_driver.simulation.responses import SparseResponses
-from transientcam_driver.simulation.scene.geometry import Rectangle
-from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Transport, Viewpoint
+from transientcam_simulation.light._rays import rays_through
+from transientcam_simulation.light._still import StillLight
+from transientcam_simulation.scene import Light, Rectangle, Scene, Surface, Viewpoint
+from transientcam_simulation.scene._scene import Transport
 
 C = 299_792_458.0
 WIDTH, HEIGHT = 33, 25

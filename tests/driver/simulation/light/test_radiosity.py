@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.build import find_scene
-from transientcam_driver.simulation.light.exchange import Exchange
-from transientcam_driver.simulation.light.patches import Patches, form_factors
-from transientcam_driver.simulation.light.paths import light_rays
-from transientcam_driver.simulation.light.radiosity import Interreflection
-from transientcam_driver.simulation.light.rays import camera_rays
-from transientcam_driver.simulation.responses import BIN_S
-from transientcam_driver.simulation.scene.geometry import Ellipsoid, Rectangle
-from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Transport, Viewpoint
+from transientcam_simulation.base import BIN_S
+from transientcam_simulation.emulated import find_scene
+from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._patches import Patches, form_factors
+from transientcam_simulation.light._paths import light_rays
+from transientcam_simulation.light._radiosity import Interreflection
+from transientcam_simulation.light._rays import camera_rays
+from transientcam_simulation.scene import Ellipsoid, Light, Rectangle, Scene, Surface, Viewpoint
+from transientcam_simulation.scene._scene import Transport
 
 C = 299_792_458.0
 WIDTH, HEIGHT = 41, 31

@@ -1,6 +1,6 @@
 """The last few results are kept, the others made again."""
 
-from transientcam_driver.simulation.light.recent import Recent
+from transientcam_simulation.light._recent import Recent
 
 
 def test_the_last_ones_that_were_used_are_kept() -> None:

@@ -9,9 +9,8 @@ import pytest
 
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.simulation.build import find_scene
-from transientcam_driver.simulation.light import Wanted
-from transientcam_driver.simulation.light.shared import shared_scenery
+from transientcam_simulation.emulated import find_scene
+from transientcam_simulation.light import Wanted, shared_scenery
 
 SIZE = {"width": 40, "height": 30}
 

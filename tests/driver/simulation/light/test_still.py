@@ -7,16 +7,23 @@ import pytest
 from numpy.typing import NDArray
 
 from transientcam_driver import Sequence
-from transientcam_driver.simulation.build import find_scene, world_of
-from transientcam_driver.simulation.effects.glimpses import Noise
-from transientcam_driver.simulation.light import still as module
-from transientcam_driver.simulation.light.followed import FollowedRays
-from transientcam_driver.simulation.light.paths import Lit, light_rays
-from transientcam_driver.simulation.light.rays import RAYS, RAYS_AT_EDGES
-from transientcam_driver.simulation.light.still import StillLight
-from transientcam_driver.simulation.scene.geometry import Ellipsoid, Rectangle
-from transientcam_driver.simulation.scene.motion import Motion
-from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Transport, Viewpoint
+from transientcam_simulation.effects import Noise
+from transientcam_simulation.emulated import find_scene, world_of
+from transientcam_simulation.light import _still as module
+from transientcam_simulation.light._followed import FollowedRays
+from transientcam_simulation.light._paths import Lit, light_rays
+from transientcam_simulation.light._rays import RAYS, RAYS_AT_EDGES
+from transientcam_simulation.light._still import StillLight
+from transientcam_simulation.scene import (
+    Ellipsoid,
+    Light,
+    Motion,
+    Rectangle,
+    Scene,
+    Surface,
+    Viewpoint,
+)
+from transientcam_simulation.scene._scene import Transport
 
 WIDTH, HEIGHT = 60, 44
 NOISE = Noise(1e5, 0.0, 900.0, 1)

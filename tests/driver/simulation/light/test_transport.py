@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from transientcam_driver import SceneError, Sequence, list_scenes, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.simulation.build import find_scene, scenery_of, world_of
-from transientcam_driver.simulation.light.transport import Wanted
-from transientcam_driver.simulation.responses import Scatter, SparseResponses
-from transientcam_driver.simulation.scene.file import load_scene
-from transientcam_driver.simulation.world import World
+from transientcam_simulation.base import Scatter, SparseResponses
+from transientcam_simulation.emulated import find_scene, world_of
+from transientcam_simulation.emulated._build import scenery_of
+from transientcam_simulation.imaging import World
+from transientcam_simulation.light import Wanted
+from transientcam_simulation.scene import load_scene
 
 C = 299_792_458.0
 BUILT_IN = [info.name for info in list_scenes() if info.name != "measured"]

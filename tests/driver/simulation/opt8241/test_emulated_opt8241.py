@@ -5,13 +5,12 @@ import pytest
 
 from tests.driver.opt8241.standing import emulated
 from transientcam_driver import TriggeredCamera
+from transientcam_driver.cameras.opt8241 import Opt8241, registers as reg
+from transientcam_driver.cameras.opt8241._control import Control
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.errors import CameraError, TransferStalled
-from transientcam_driver.opt8241 import Opt8241
-from transientcam_driver.opt8241 import registers as reg
-from transientcam_driver.opt8241.control import Control
-from transientcam_driver.simulation.build import find_scene, without_noise
-from transientcam_driver.simulation.opt8241 import EmulatedRegisters, build_opt8241
+from transientcam_simulation.emulated import build_opt8241, find_scene, without_noise
+from transientcam_simulation.emulated._opt8241 import EmulatedRegisters
 
 SPEED_OF_LIGHT_M_S = 299_792_458.0
 

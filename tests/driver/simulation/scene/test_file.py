@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from transientcam_driver import SceneError, list_scenes
-from transientcam_driver.simulation.build import find_scene
-from transientcam_driver.simulation.scene.file import load_scene, parse_scene
+from transientcam_simulation.emulated import find_scene
+from transientcam_simulation.scene import load_scene, parse_scene
 
 SCENE = """
 [light]

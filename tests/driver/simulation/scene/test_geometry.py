@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.scene.geometry import Ellipsoid, Rectangle
+from transientcam_simulation.scene import Ellipsoid, Rectangle
 
 
 def v(*values: float) -> NDArray[np.float64]:

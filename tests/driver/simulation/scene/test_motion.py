@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from transientcam_driver.simulation.scene.motion import Motion, Repeat
+from transientcam_simulation.scene import Motion
+from transientcam_simulation.scene._motion import Repeat
 
 PATH = np.array([[0.0, 0, 0], [1.0, 0, 0], [1.0, 2.0, 0]])
 

@@ -4,9 +4,8 @@ import httpx
 import pytest
 
 from tests.serving import Served
-from transientcam_server.api import problems
-from transientcam_server.api.middleware.requests import REQUEST_ID_HEADER
-from transientcam_server.api.middleware.security import SECURITY_HEADERS
+from transientcam_server.api import SECURITY_HEADERS, _problems as problems
+from transientcam_server.api._middleware.requests import REQUEST_ID_HEADER
 
 JSON = {"Content-Type": "application/json"}
 
@@ -146,7 +145,7 @@ def test_changes_are_logged_without_their_query(
     ours = [
         each
         for each in caplog.records
-        if each.name == "transientcam_server.api.middleware.requests"
+        if each.name == "transientcam_server.api._middleware.requests"
     ]
     (record,) = ours
     assert record.getMessage() == "PUT /api/v1/acquisition: 200, for anybody"
