@@ -34,7 +34,7 @@ def player(
     source
         A camera, whose newest frame is shown again and again; an open recording, with a slider for
         its frames; a frame of the product ``coefficients``, an array of the same planes
-        (2m + 1, H, W), or the coefficients that ``transientcam_moments.moment_problem._levinson`` returns.
+        (2m + 1, H, W), or the coefficients that ``transientcam_moments.levinson`` returns.
     base_frequency_hz
         Of coefficients that are no frame.
     rate_hz

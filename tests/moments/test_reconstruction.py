@@ -8,7 +8,7 @@ import pytest
 import transientcam_moments as tm
 from tests.moments import oracles
 from transientcam_driver import SubPhases
-from transientcam_moments.comparisons import sra_table
+from transientcam_moments.comparisons import _sra_table as sra_table
 from transientcam_moments.likelihood import MODEL_ERROR
 from transientcam_moments.reconstruction import ESTIMATORS
 

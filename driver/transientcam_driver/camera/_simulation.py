@@ -178,7 +178,7 @@ class Simulation(Protocol):
             the present one by default.
         definition
             In its place the text of a scene file, which may name no other file and cost no more
-            than `transientcam_simulation.scene._limits` states.
+            than the limits of `transientcam_simulation.scene` state.
         effects
             "auto", "on" or "off" by an effect's name, in place of all earlier choices; by default
             these stay.

@@ -38,7 +38,7 @@ class FaultyDevice(Protocol):
 
 
 class SimulationHandle:
-    """A `transientcam_driver.camera._simulation.Simulation`: see there for what each member guarantees.
+    """A `transientcam_driver.Simulation`: see there for what each member guarantees.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Two returns by all pairs: `transientcam_moments.likelihood._pairs` in lanes."""
+"""Two returns by all pairs: `transientcam_moments.two_returns` in lanes."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,6 +1,6 @@
 """Local maxima of the maximum entropy density, a register of pixels at a time (Sec. 5.3).
 
-The search of ``transientcam_moments.moment_problem._peaks``: poles of the density by simultaneous iteration, a
+The search of ``transientcam_moments.peaks``: poles of the density by simultaneous iteration, a
 climb from the angle of each, and what was found twice or is too low left out.
 """
 

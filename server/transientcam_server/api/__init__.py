@@ -5,18 +5,6 @@
 frames of the camera and of recordings alike, `problems` every answer.
 """
 
-from transientcam_server.api._app import build_app
-from transientcam_server.api._auth import TokenFile
-from transientcam_server.api._auth.tokens import Role, utc_now
-from transientcam_server.api._middleware.security import SECURITY_HEADERS, own_names
-from transientcam_server.api._problems import problem_response
+import lazy_loader
 
-__all__ = [
-    "SECURITY_HEADERS",
-    "Role",
-    "TokenFile",
-    "build_app",
-    "own_names",
-    "problem_response",
-    "utc_now",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

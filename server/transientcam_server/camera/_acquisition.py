@@ -36,7 +36,7 @@ from transientcam_server.camera._light import LightGuard
 from transientcam_server.camera._status import AcquisitionStatus, State
 from transientcam_server.errors import JobCancelled, Problem, SequenceConflict, kinds
 
-_log = logging.getLogger("transientcam_server.camera._acquisition")
+_log = logging.getLogger("transientcam_server.camera.acquisition")
 _T = TypeVar("_T")
 
 READ_TIMEOUT_S: Final = 0.1

@@ -30,7 +30,7 @@ from transientcam_server.imaging import (
 )
 from transientcam_server.settings import CalibrationSettings
 
-_log = logging.getLogger("transientcam_server.camera._calibration_store")
+_log = logging.getLogger("transientcam_server.camera.calibration_store")
 SUFFIX: Final = ".npz"
 _ACTIVE: Final = "active.json"
 _ABANDONED_S: Final = 24 * 3600.0

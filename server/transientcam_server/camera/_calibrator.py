@@ -48,7 +48,7 @@ from transientcam_server.imaging import (
     to_document,
 )
 
-_log = logging.getLogger("transientcam_server.camera._calibrator")
+_log = logging.getLogger("transientcam_server.camera.calibrator")
 _Array = NDArray[Any]
 MAX_CAPTURE_BYTES: Final = 2 * 1024**3
 """Of the raw images of one measurement, which are kept in memory until they are averaged."""

@@ -17,7 +17,7 @@ from typing import Any, Final, Literal
 
 from transientcam_server.errors import JobCancelled, Problem, kinds, problem_document, problem_of
 
-_log = logging.getLogger("transientcam_server.camera._jobs")
+_log = logging.getLogger("transientcam_server.camera.jobs")
 MAX_UNFINISHED: Final = 8
 """Jobs that run or wait; one more is refused."""
 REMEMBERED: Final = 64

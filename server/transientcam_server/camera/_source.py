@@ -11,7 +11,7 @@ from transientcam_server.recording import ReplayCamera
 from transientcam_server.relay import RelayCamera
 from transientcam_server.settings import SensorSettings, SequenceSettings
 
-_log = logging.getLogger("transientcam_server.camera._source")
+_log = logging.getLogger("transientcam_server.camera.source")
 
 
 def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:

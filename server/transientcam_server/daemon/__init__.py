@@ -4,13 +4,6 @@
 wrong.
 """
 
-from transientcam_server.daemon import _check as check, _server as server
-from transientcam_server.daemon._configuration import load, load_settings, tokens_file_of
+import lazy_loader
 
-__all__ = [
-    "check",
-    "load",
-    "load_settings",
-    "server",
-    "tokens_file_of",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -18,7 +18,7 @@ from transientcam_server.daemon._refusals import refusal
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.settings import LimitSettings
 
-_log = logging.getLogger("transientcam_server.daemon._acceptor")
+_log = logging.getLogger("transientcam_server.daemon.acceptor")
 AT_ONCE: Final = 16
 """Connections accepted before other tasks run."""
 PAUSE_S: Final = 0.5

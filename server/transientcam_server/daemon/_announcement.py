@@ -22,7 +22,7 @@ from transientcam_driver import Capabilities
 from transientcam_server.api import own_names
 from transientcam_server.settings import Settings
 
-_log = logging.getLogger("transientcam_server.daemon._announcement")
+_log = logging.getLogger("transientcam_server.daemon.announcement")
 _LABEL_BYTES: Final = 63  # RFC 1035, 2.3.4
 _TEXT_BYTES: Final = 200
 """Of a value in the TXT record, whose strings have at most 255 bytes (RFC 6763, 6.1)."""

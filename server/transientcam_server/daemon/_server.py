@@ -204,7 +204,7 @@ class Server(uvicorn.Server):
         return tuple(self._captured_signals)
 
 
-def serve(
+def serve_app(
     app: FastAPI,
     settings: Settings,
     listener: socket.socket,

@@ -16,7 +16,7 @@ from typing import Final, Self
 
 from transientcam_server.camera import Acquisition, AcquisitionStatus
 
-_log = logging.getLogger("transientcam_server.daemon._systemd")
+_log = logging.getLogger("transientcam_server.daemon.systemd")
 
 UNWATCHED_EVERY_S: Final = 10.0
 """How often the status line is renewed without a watchdog."""

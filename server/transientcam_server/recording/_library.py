@@ -32,7 +32,7 @@ from transientcam_server.recording._recorder import Limits, Recorder, Totals
 from transientcam_server.recording._writer import RecordingWriter, annotate
 from transientcam_server.settings import RecordingSettings
 
-_log = logging.getLogger("transientcam_server.recording._library")
+_log = logging.getLogger("transientcam_server.recording.library")
 _STOP_WITHIN_S: Final = 60.0
 _REMOVED: Final = 16
 """How many recordings whose files were removed are remembered."""

@@ -16,7 +16,7 @@ from typing import Self
 
 from transientcam_server.errors import RecordingInUse
 
-_log = logging.getLogger("transientcam_server.recording._lock")
+_log = logging.getLogger("transientcam_server.recording.lock")
 
 
 class Lock:

@@ -9,7 +9,7 @@ from transientcam_server.errors import Problem, kinds
 from transientcam_server.recording import _layout as layout
 from transientcam_server.recording._swmr import in_words
 
-_log = logging.getLogger("transientcam_server.recording._problems")
+_log = logging.getLogger("transientcam_server.recording.problems")
 
 
 def unknown(recording_id: str) -> Problem:

@@ -16,7 +16,7 @@ from transientcam_server.recording._layout import Header
 from transientcam_server.recording._swmr import in_words
 from transientcam_server.recording._writer import RecordingWriter
 
-_log = logging.getLogger("transientcam_server.recording._recorder")
+_log = logging.getLogger("transientcam_server.recording.recorder")
 CHECK_S: Final = 0.2
 """Interval at which limits are checked while no frame comes."""
 _REMOVED: Final = "its file was removed while it was written"

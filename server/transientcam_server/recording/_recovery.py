@@ -12,7 +12,7 @@ from transientcam_server.recording._reader import Recording
 from transientcam_server.recording._salvage import rebuild, salvage
 from transientcam_server.recording._seal import sealed_frames
 
-_log = logging.getLogger("transientcam_server.recording._recovery")
+_log = logging.getLogger("transientcam_server.recording.recovery")
 
 
 def recover(part: Path) -> Path:

@@ -25,7 +25,7 @@ from transientcam_driver.errors import (
 
 READY_TRIES: Final = 50
 READY_EVERY_S: Final = 0.1
-_log = logging.getLogger("transientcam_driver.cameras.kinect2._device")
+_log = logging.getLogger("transientcam_driver.kinect2.device")
 
 Action = Request | Callable[[Link], None]
 

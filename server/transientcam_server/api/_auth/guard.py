@@ -14,7 +14,7 @@ from transientcam_server.api._problems import problem_response
 from transientcam_server.errors import Problem, TokenFileError, kinds
 from transientcam_server.settings import Settings
 
-_log = logging.getLogger("transientcam_server.api._auth.guard")
+_log = logging.getLogger("transientcam_server.api.auth.guard")
 _GUARDED: Final = ("/api/v1/", "/metrics")
 _FORWARDED: Final = ("forwarded", "x-forwarded-for")
 

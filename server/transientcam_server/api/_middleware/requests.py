@@ -16,7 +16,7 @@ from transientcam_server.api._problems import problem_response
 from transientcam_server.errors import problem_of
 from transientcam_server.logs import request_id
 
-_log = logging.getLogger("transientcam_server.api._middleware.requests")
+_log = logging.getLogger("transientcam_server.api.middleware.requests")
 REQUEST_ID_HEADER: Final = "X-Request-ID"
 _ACCEPTED: Final = re.compile(r"[A-Za-z0-9._:+/=-]{1,128}")
 _HEAD: Final = "transientcam.head"

@@ -18,7 +18,7 @@ from transientcam_server.errors import Problem, kinds, problem_document, problem
 from transientcam_server.imaging import Crop, stream_encoding
 from transientcam_server.service import Service
 
-_log = logging.getLogger("transientcam_server.api._stream.websocket")
+_log = logging.getLogger("transientcam_server.api.stream.websocket")
 router = APIRouter()
 _TOKENS_EVERY_S = 1.0
 _REVOKED = "the token is not valid any more"

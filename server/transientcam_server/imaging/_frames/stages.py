@@ -14,7 +14,7 @@ from transientcam_driver import RawFrame
 from transientcam_server.imaging._errors_of_range.noise import contradictions, range_noise
 from transientcam_server.imaging._recipe.recipe import Recipe
 
-_log = logging.getLogger("transientcam_server.imaging._frames.stages")
+_log = logging.getLogger("transientcam_server.imaging.stages")
 
 STAGES: Final[dict[str, tuple[str, ...]]] = {
     "light": ("flags", "validity", "brightness"),

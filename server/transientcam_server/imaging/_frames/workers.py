@@ -11,7 +11,7 @@ from concurrent.futures import Executor, Future, wait
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-_log = logging.getLogger("transientcam_server.imaging._frames.workers")
+_log = logging.getLogger("transientcam_server.imaging.workers")
 _T = TypeVar("_T")
 
 

@@ -1,7 +1,7 @@
 """The registry of products: what clients can ask of a frame, and how each follows from it.
 
 A product names the one input it is computed from: ``raw`` images, the simulated ``truth``, the
-``accuracy`` of the range, or a stage of the reconstruction (`transientcam_server.imaging._frames.stages`).
+``accuracy`` of the range, or a stage of the reconstruction (`imaging/_frames/stages.py`).
 The functions here are pure, so any worker may run them.
 """
 

@@ -18,7 +18,7 @@ from transientcam_server.imaging._recipe.lens import ASSUMED_FIELD_OF_VIEW_DEG, 
 from transientcam_server.imaging._recipe.moment_frame import MomentFrame
 from transientcam_server.settings import ReconstructionSettings
 
-_log = logging.getLogger("transientcam_server.imaging._recipe.recipe")
+_log = logging.getLogger("transientcam_server.imaging.recipe")
 _UNTIL_COMPILED: Final = "pisarenko"
 """In NumPy as in compiled lanes fast enough for a camera of 163 x 120 pixels."""
 _ONE_RETURN: Final = "unwrapped-phase"

@@ -145,7 +145,7 @@ def test_changes_are_logged_without_their_query(
     ours = [
         each
         for each in caplog.records
-        if each.name == "transientcam_server.api._middleware.requests"
+        if each.name == "transientcam_server.api.middleware.requests"
     ]
     (record,) = ours
     assert record.getMessage() == "PUT /api/v1/acquisition: 200, for anybody"
