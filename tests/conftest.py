@@ -71,16 +71,16 @@ _LONGEST_FIRST = (
     "tests/experiments/paper/test_figures.py",
     "tests/server/api/routes/test_recordings.py",
     # before all others that need what it compiles: two workers would compile it at the same time
-    "tests/moments/test_kernels_lanes.py",
+    "tests/moments/kernels/test_kernels_lanes.py",
     "tests/conformance/test_conformance.py",
     "tests/stability/test_sweep.py",
-    "tests/moments/test_noise.py",
+    "tests/moments/noise/test_noise.py",
     "tests/server/recording/test_recovery.py",
     "tests/server/daemon/test_server.py",
     "tests/browser/test_views.py",
     "tests/browser/test_accessibility.py",
     "tests/server/fuzzing/test_recordings.py",
-    "tests/moments/test_kernels_reconstruct.py",
+    "tests/moments/kernels/test_kernels_reconstruct.py",
 )
 
 

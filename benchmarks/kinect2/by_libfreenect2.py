@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.kinect2.seen import EVERY, SCENES, STORED, spec
-from tests.driver.kinect2.usb3 import Usb3Mount
-from tests.driver.usbfs.processes import PRELOAD, missing_libraries
+from tests.driver.cameras.kinect2.usb3 import Usb3Mount
+from tests.driver.cameras.open_usb.usbfs.processes import PRELOAD, missing_libraries
 from transientcam_driver.camera import CameraName
 from transientcam_driver.cameras.kinect2 import HEIGHT, WIDTH
 from transientcam_driver.clock import RealClock

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import usb.core
 
-from tests.driver.usbfs.processes import Program, emulated_camera
+from tests.driver.cameras.open_usb.usbfs.processes import Program, emulated_camera
 from transientcam_driver import Camera, CameraLost, CameraNotFound, Sequence, open_camera
 from transientcam_driver.cameras.open_usb import UsbCamera, open_transport
 from transientcam_driver.cameras.open_usb.protocol import STATUS_BYTES, Request, unpack_status

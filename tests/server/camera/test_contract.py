@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import transientcam
-from tests.driver.kinect2.standing import READ_S, camera_of, emulated
+from tests.driver.cameras.kinect2.standing import READ_S, camera_of, emulated
+from tests.driver.cameras.opt8241 import standing as opt8241
 from tests.driver.mounts import PyusbMount
-from tests.driver.opt8241 import standing as opt8241
 from tests.server.recording.made import record
 from tests.serving import serving
 from transientcam_driver import Camera, TriggeredCamera, open_camera
