@@ -1,7 +1,7 @@
 """An emulated Kinect v2 on an emulated SuperSpeed bus, below the libusb of another process.
 
-Bulk, control and isochronous transfers arrive as calls of usbfs, and go to the camera by the link that
-the emulation has anyway.
+Bulk, control and isochronous transfers arrive as calls of usbfs, and go to the camera by the
+link that the emulation has anyway.
 """
 
 import errno
