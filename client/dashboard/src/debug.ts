@@ -6,8 +6,8 @@ import { decodeMessage, type FrameMessage } from "./stream/protocol";
 import { frameOf } from "./store/frames";
 import { coefficientsOf, summarised } from "./stream/summary";
 import type { Store } from "./store/store";
-import { LAYOUTS } from "./views/layout";
-import { VIEW_NAMES } from "./views/names";
+import { LAYOUTS } from "./store/layout";
+import { VIEW_NAMES } from "./store/viewNames";
 
 /** A density read back from the renderer that the page's own pictures are made with. */
 interface Reading {

@@ -4,8 +4,8 @@ import { effect } from "@preact/signals";
 import { App } from "./App";
 import { keepAddress } from "./store/permalink";
 import { Store, StoreContext } from "./store/store";
-import { StreamClient } from "./stream/client";
-import { AnimationLoop } from "./ui/animation";
+import { StreamClient } from "./store/client";
+import { AnimationLoop } from "./store/animation";
 import "@fontsource-variable/inter/wght.css";
 import "./style.css";
 

@@ -1,9 +1,9 @@
 /** The colours of light in flight, as the shader has them, for whatever draws without it. */
 import { densityImage } from "../physics/densityImage";
 import type { Coefficients } from "../physics/maximumEntropy";
-import { colourTable, LEVELS, type ColourMapName } from "../ui/colourMaps";
+import { colourTable, LEVELS, type ColourMapName } from "../scales/colourMaps";
 import type { Backdrop, Exposure } from "./renderer";
-import { backdropGrey, strength, toned, type ToneKind } from "./tone";
+import { backdropGrey, strength, toned, type ToneKind } from "../scales/tone";
 
 const OPAQUE = 0xff000000;
 /** Steps of the place on the colour map, many to each colour: what light adds to the scene is within 0.07 of 255 there. */

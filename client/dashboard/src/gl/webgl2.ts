@@ -1,9 +1,9 @@
 import type { Coefficients } from "../physics/maximumEntropy";
-import { colourTable, LEVELS, type ColourMapName } from "../ui/colourMaps";
+import { colourTable, LEVELS, type ColourMapName } from "../scales/colourMaps";
 import type { Backdrop, DensityRenderer, Exposure } from "./renderer";
 import { FRAGMENT_SHADER, VERTEX_SHADER } from "./shader";
 import { layersOf, packTexels } from "./texels";
-import { toneIndex } from "./tone";
+import { toneIndex } from "../scales/tone";
 
 const UNIFORMS = [
   "coefficients", "backdrop", "colours", "layers", "z", "baseFrequencyHz", "white", "backdropWhite", "tone", "asNumbers",

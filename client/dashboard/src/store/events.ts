@@ -2,7 +2,7 @@
 import { signal } from "@preact/signals";
 
 import type { AppliedSequence, Notice } from "../stream/protocol";
-import { engineering, grouped } from "../ui/format";
+import { engineering, grouped } from "../scales/format";
 
 export type EventTone = "plain" | "good" | "bad";
 

@@ -1,7 +1,8 @@
 import { computed, signal, type Signal } from "@preact/signals";
 
 import type { Coefficients } from "../physics/maximumEntropy";
-import type { FrameMeta, Numbers } from "../stream/protocol";
+import type { Numbers } from "../stream/compact";
+import type { FrameMeta } from "../stream/protocol";
 import { coefficientsOf, type FrameReport, type LightSummary, type MapSummary } from "../stream/summary";
 import { LIVE } from "./api";
 

@@ -1,8 +1,8 @@
 /** Layouts that the user named, and the way back from changes. */
 import { computed, effect, signal, untracked, type Signal } from "@preact/signals";
 
-import { isLayout, type Layout } from "../views/layout";
-import { VIEW_NAMES } from "../views/names";
+import { isLayout, type Layout } from "./layout";
+import { VIEW_NAMES } from "./viewNames";
 import { remembered, type Shelf } from "./settings";
 
 /** Changes that can be undone, the last first. */

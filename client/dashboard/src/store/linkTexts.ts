@@ -1,10 +1,10 @@
 /** Parts of an address as text, and back: where the views stand, how maps and light are shown, what is pinned. */
-import { TONES, type ToneKind } from "../gl/tone";
-import { COLOUR_MAPS, type ColourMapName } from "../ui/colourMaps";
-import { isLayout, isStack, type Layout, type Slot, type Stack } from "../views/layout";
-import { MAP_PRODUCTS } from "../views/map/catalogue";
-import { VIEW_NAMES } from "../views/names";
-import { PLAYS, type LightChoice, type Play } from "../views/transient/look";
+import { TONES, type ToneKind } from "../scales/tone";
+import { COLOUR_MAPS, type ColourMapName } from "../scales/colourMaps";
+import { isLayout, isStack, type Layout, type Slot, type Stack } from "./layout";
+import { MAP_PRODUCTS } from "./mapCatalogue";
+import { VIEW_NAMES } from "./viewNames";
+import { PLAYS, type LightChoice, type Play } from "./lightLook";
 import { isLimits, type LookChoice } from "./looks";
 import { PIN_NAMES, polygonOf, regionOf, type Pin, type Region } from "./measures";
 import type { Pixel } from "./pixel";

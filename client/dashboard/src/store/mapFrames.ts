@@ -2,7 +2,7 @@
 import { computed, type ReadonlySignal } from "@preact/signals";
 
 import { summariseMap } from "../stream/summary";
-import { type MapProduct } from "../views/map/catalogue";
+import { type MapProduct } from "./mapCatalogue";
 import type { Frame, Frames } from "./frames";
 import type { Noises } from "./noise";
 

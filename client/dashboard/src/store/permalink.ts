@@ -1,11 +1,11 @@
 /** What is looked at, as the part of the address behind #: it can be kept, sent and typed. */
 import { effect } from "@preact/signals";
 
-import { MAP_PRODUCTS } from "../views/map/catalogue";
-import { VIEW_NAMES } from "../views/names";
-import { viewsOf, type Layout } from "../views/layout";
-import { SIDES, type Side } from "../views/response/sides";
-import type { LightChoice } from "../views/transient/look";
+import { MAP_PRODUCTS } from "./mapCatalogue";
+import { VIEW_NAMES } from "./viewNames";
+import { viewsOf, type Layout } from "./layout";
+import { SIDES, type Side } from "./pixelSides";
+import type { LightChoice } from "./lightLook";
 import { RequestError } from "./api";
 import { layoutOf, layoutText, lightOf, lightText, looksOf, lookText, partOf, partText, pinsOf, pinsText, pixelOf, pixelText, viewOf, viewText } from "./linkTexts";
 import type { LookChoice } from "./looks";

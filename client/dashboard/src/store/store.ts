@@ -20,11 +20,11 @@ import { Player } from "./player";
 import { RangeErrors } from "./rangeErrors";
 import { Sequencing } from "./sequencing";
 import { aBoolean, aNumber, browserShelf, oneOf, remembered, sessionShelf, type Shelf } from "./settings";
-import { isLayout, OVERVIEW, SPACE, type Layout } from "../views/layout";
-import { MAP_PRODUCTS } from "../views/map/catalogue";
-import { VIEW_NAMES } from "../views/names";
-import { SIDES, type Side } from "../views/response/sides";
-import { TransientLook } from "../views/transient/look";
+import { isLayout, OVERVIEW, SPACE, type Layout } from "./layout";
+import { MAP_PRODUCTS } from "./mapCatalogue";
+import { VIEW_NAMES } from "./viewNames";
+import { SIDES, type Side } from "./pixelSides";
+import { TransientLook } from "./lightLook";
 import { Reconstruction } from "./reconstruction";
 import { Recordings } from "./recordings";
 import { Replay } from "./replay";
@@ -33,7 +33,7 @@ import { Status } from "./status";
 import { Details } from "./details";
 import { Trends } from "./trends";
 import { pixelsOf, Viewport, type View, WHOLE } from "./viewport";
-import { Theme } from "../ui/theme";
+import { Theme } from "./theme";
 
 /** All that the page knows. Views read and set it; what fills it is no concern of theirs. */
 export class Store {

@@ -5,13 +5,11 @@
  */
 import { decode, encode } from "@msgpack/msgpack";
 
-import { decodeReflection16, decodeU16, whole } from "./compact";
+import { decodeReflection16, decodeU16, type Numbers, whole } from "./compact";
 
 export const SUBPROTOCOL = "transientcam.v1.msgpack";
 
 export type Dtype = "<f4" | "<f8" | "<c8" | "<u2" | "|u1";
-
-export type Numbers = Float32Array | Float64Array | Uint16Array | Uint8Array;
 
 /** An array in C order. Complex numbers ("<c8") lie as pairs of float32: real, imaginary. */
 export interface NdArray {

@@ -1,10 +1,10 @@
 import { computed, useSignal, type ReadonlySignal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 
-import { beyond, colourTable, LEVELS, levelOf, type ColourMapName } from "./colourMaps";
-import { fixed, significant, withUnit } from "./format";
+import { beyond, colourTable, LEVELS, levelOf, type ColourMapName } from "../scales/colourMaps";
+import { fixed, significant, withUnit } from "../scales/format";
 import { useDrawing } from "./hooks";
-import { decimalsFor, fraction, histogram, niceStep, ticks, valueAt, type Scale, type Span } from "./scale";
+import { decimalsFor, fraction, histogram, niceStep, ticks, valueAt, type Scale, type Span } from "../scales/scale";
 
 /** Share of the scale's length that the bar goes on beyond either end: for what lies there, and for handles to be drawn to. */
 export const MARGIN = 0.1;

@@ -1,8 +1,8 @@
 /** A picture as a figure: with axes, colour bar, unit and words, as SVG that stands by itself. */
 import type { FrameMeta } from "../stream/protocol";
-import { colourTable, LEVELS, levelOf, type ColourMapName } from "./colourMaps";
-import { engineering, fixed, significant, withUnit } from "./format";
-import { decimalsFor, fraction, niceStep, ticks, type Scale } from "./scale";
+import { colourTable, LEVELS, levelOf, type ColourMapName } from "../scales/colourMaps";
+import { engineering, fixed, significant, withUnit } from "../scales/format";
+import { decimalsFor, fraction, niceStep, ticks, type Scale } from "../scales/scale";
 
 export interface Figure {
   /** The picture as an address that stands in the file; null leaves its place empty. */

@@ -1,7 +1,7 @@
 import type { Store } from "../store/store";
 import { SPEEDS_NS } from "../store/player";
-import { MAP_PRODUCTS } from "../views/map/catalogue";
-import { LAYOUTS } from "../views/layout";
+import { MAP_PRODUCTS } from "../store/mapCatalogue";
+import { LAYOUTS } from "../store/layout";
 
 /** Flight passed by one press of an arrow key, in s. */
 const STEP_S = 0.1e-9;

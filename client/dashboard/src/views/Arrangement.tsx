@@ -4,7 +4,7 @@ import { useRef } from "preact/hooks";
 
 import { useStore, type Store } from "../store/store";
 import { DRAGGED, Panel, SlotContext } from "../ui/Panel";
-import { below, beside, closed, isStack, replaced, split, viewsOf, type Layout, type Row, type Slot, type Stack } from "./layout";
+import { below, beside, closed, isStack, replaced, split, viewsOf, type Layout, type Row, type Slot, type Stack } from "../store/layout";
 import { VIEWS } from "./registry";
 
 /** The views in their places, with splitters between them. */

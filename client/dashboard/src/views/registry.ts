@@ -13,7 +13,7 @@ import { SimulationView } from "./simulation/SimulationView";
 import { StreakView } from "./streak/StreakView";
 import { TransientView } from "./transient/TransientView";
 import { ValidityView } from "./validity/ValidityView";
-import type { ViewName } from "./names";
+import type { ViewName } from "../store/viewNames";
 
 interface View {
   readonly name: ViewName;

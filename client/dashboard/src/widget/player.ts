@@ -11,7 +11,7 @@ import { rangeOfTime_m } from "../physics/constants";
 import type { Coefficients } from "../physics/maximumEntropy";
 import { Player } from "../store/player";
 import { summariseLight } from "../stream/summary";
-import { AnimationLoop } from "../ui/animation";
+import { AnimationLoop } from "../store/animation";
 import { timeWords } from "../ui/figure";
 import { litOf } from "../views/transient/arrivals";
 import STYLE from "./player.css?inline";

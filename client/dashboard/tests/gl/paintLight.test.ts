@@ -2,9 +2,9 @@ import { describe, expect, test } from "vitest";
 
 import { LightPainter } from "../../src/gl/paintLight";
 import type { Backdrop } from "../../src/gl/renderer";
-import { backdropGrey, strength, TONES, toned } from "../../src/gl/tone";
+import { backdropGrey, strength, TONES, toned } from "../../src/scales/tone";
 import { densityAt } from "../../src/physics/maximumEntropy";
-import { colourTable, levelOf } from "../../src/ui/colourMaps";
+import { colourTable, levelOf } from "../../src/scales/colourMaps";
 import { momentsOf, picture } from "../oracle";
 
 const PIXELS = 60;

@@ -3,7 +3,7 @@ import { describe, expect, test } from "vitest";
 
 import { Layouts } from "../../src/store/layouts";
 import { Store } from "../../src/store/store";
-import { closed, LAYOUTS, type Layout, OVERVIEW, split } from "../../src/views/layout";
+import { closed, LAYOUTS, type Layout, OVERVIEW, split } from "../../src/store/layout";
 
 describe("changes of the layout", () => {
   test("are undone one by one, and undoing is none", () => {

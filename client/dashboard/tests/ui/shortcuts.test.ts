@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 
 import { Store } from "../../src/store/store";
 import { SHORTCUTS } from "../../src/ui/shortcuts";
-import { LAYOUTS } from "../../src/views/layout";
+import { LAYOUTS } from "../../src/store/layout";
 
 function press(store: Store, key: string, shiftKey = false): void {
   SHORTCUTS.find(({ keys }) => keys.includes(key))?.run(store, { key, shiftKey } as KeyboardEvent);

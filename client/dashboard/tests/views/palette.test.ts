@@ -2,7 +2,7 @@ import { describe, expect, test } from "vitest";
 
 import { Store } from "../../src/store/store";
 import { commandsOf, matching } from "../../src/views/palette/commands";
-import { LAYOUTS } from "../../src/views/layout";
+import { LAYOUTS } from "../../src/store/layout";
 
 describe("a search of commands", () => {
   const commands = ["Map: Range", "Map: Direct", "Layout: Six views", "Scene: mirrors", "Map: Indirect"].map((words) => ({ words }));

@@ -5,7 +5,7 @@ import type { CalibrationDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
 import { ActionMenu } from "../../ui/ActionMenu";
 import { download } from "../../ui/files";
-import { engineering, fixed } from "../../ui/format";
+import { engineering, fixed } from "../../scales/format";
 import { Steer } from "../../ui/Steer";
 import type { Task } from "../../ui/useTask";
 import { clock } from "../replay/words";

@@ -4,7 +4,7 @@ import { useEffect, useRef } from "preact/hooks";
 import type { CalibrationDocument, JobDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
 import { Confirm } from "../../ui/Confirm";
-import { fixed } from "../../ui/format";
+import { fixed } from "../../scales/format";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { useTask, type Task } from "../../ui/useTask";

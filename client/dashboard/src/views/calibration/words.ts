@@ -1,5 +1,5 @@
 import type { CalibrationDocument, VerdictDocument } from "../../store/documents";
-import { fixed } from "../../ui/format";
+import { fixed } from "../../scales/format";
 
 /** How old something is, as people say it. */
 export function ageOf(age_s: number): string {

@@ -17,8 +17,8 @@ import { PopoverButton } from "../../ui/PopoverButton";
 import { paint } from "../../ui/paint";
 import { Panel } from "../../ui/Panel";
 import { Stage } from "../../ui/Stage";
-import type { ViewName } from "../names";
-import { MAP_PRODUCTS, type MapProduct } from "./catalogue";
+import type { ViewName } from "../../store/viewNames";
+import { MAP_PRODUCTS, type MapProduct } from "../../store/mapCatalogue";
 import { Measured } from "./Measured";
 import { Readout, valueAtPixel } from "./Readout";
 

@@ -4,10 +4,10 @@ import { copyLink } from "../../store/permalink";
 import { PAST_S } from "../../store/recordings";
 import type { Store } from "../../store/store";
 import { SHORTCUTS } from "../../ui/shortcuts";
-import { THEMES } from "../../ui/theme";
+import { THEMES } from "../../store/theme";
 import { chooseFile } from "../files/openFile";
-import { LAYOUTS } from "../layout";
-import { MAP_PRODUCTS } from "../map/catalogue";
+import { LAYOUTS } from "../../store/layout";
+import { MAP_PRODUCTS } from "../../store/mapCatalogue";
 import { VIEWS } from "../registry";
 import { PRESETS } from "../sequence/presets";
 

@@ -6,7 +6,7 @@ import type { Frame } from "../../store/frames";
 import type { Look } from "../../store/looks";
 import { figuresOf, PIN_COLOURS } from "../../store/measures";
 import { type Store, useStore } from "../../store/store";
-import { deviation, fixed } from "../../ui/format";
+import { deviation, fixed } from "../../scales/format";
 import { useDrawing } from "../../ui/hooks";
 import { valueAtPixel } from "../map/Readout";
 import { History, KEPT_S } from "./history";

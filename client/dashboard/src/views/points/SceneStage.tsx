@@ -6,7 +6,7 @@ import type { Frame } from "../../store/frames";
 import { PIN_COLOURS } from "../../store/measures";
 import { type Pixel, stepped } from "../../store/pixel";
 import { useStore } from "../../store/store";
-import { fixed } from "../../ui/format";
+import { fixed } from "../../scales/format";
 import { useDrawing } from "../../ui/hooks";
 import { lensOf, pointAt } from "./lens";
 import type { PointScene } from "./Scene";

@@ -1,8 +1,8 @@
 /** A range map as points in space: written into the arrays of a geometry, nothing allocated a frame. */
-import type { ColourMapName } from "../../ui/colourMaps";
+import type { ColourMapName } from "../../scales/colourMaps";
 import { gravest } from "../../ui/flags";
 import { picker } from "../../ui/paint";
-import type { Scale } from "../../ui/scale";
+import type { Scale } from "../../scales/scale";
 
 export interface Cloud {
   /** x to the right, y up, z towards the viewer, in m: the camera stands at 0 and looks along -z. */

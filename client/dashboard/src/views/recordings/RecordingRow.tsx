@@ -4,7 +4,7 @@ import type { RecordingDocument, RecordingState } from "../../store/documents";
 import { useStore } from "../../store/store";
 import { ActionMenu } from "../../ui/ActionMenu";
 import { download } from "../../ui/files";
-import { grouped } from "../../ui/format";
+import { grouped } from "../../scales/format";
 import { PlayIcon } from "../../ui/icons";
 import type { Task } from "../../ui/useTask";
 import { bytes, clock, duration } from "../replay/words";

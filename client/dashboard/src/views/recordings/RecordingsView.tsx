@@ -4,7 +4,7 @@ import { useEffect } from "preact/hooks";
 import type { RecordingDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
 import { Confirm } from "../../ui/Confirm";
-import { grouped } from "../../ui/format";
+import { grouped } from "../../scales/format";
 import { Panel } from "../../ui/Panel";
 import { TaskLine } from "../../ui/Steer";
 import { useTask, type Task } from "../../ui/useTask";

@@ -3,7 +3,7 @@ import { useEffect } from "preact/hooks";
 import { REPLAY_SPEEDS, type Replay, type ReplaySettings, type Timeline } from "../../store/replay";
 import { useStore } from "../../store/store";
 import { Choice } from "../../ui/controls";
-import { fixed, grouped } from "../../ui/format";
+import { fixed, grouped } from "../../scales/format";
 import { PauseIcon, PlayIcon, StepIcon } from "../../ui/icons";
 import { clock } from "./words";
 

@@ -3,7 +3,7 @@ import { useComputed } from "@preact/signals";
 import { rangeOfTime_m } from "../../physics/constants";
 import type { Pixel } from "../../store/pixel";
 import { useStore } from "../../store/store";
-import { deviation, fixed } from "../../ui/format";
+import { deviation, fixed } from "../../scales/format";
 
 /** Range, time and light of the first return of a pixel, each with its standard deviation over the last frames. */
 export function PixelFigures({ pixel }: { pixel: Pixel }) {

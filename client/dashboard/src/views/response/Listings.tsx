@@ -2,7 +2,7 @@ import { rangeOfTime_m } from "../../physics/constants";
 import type { PixelDocument, Return } from "../../stream/protocol";
 import { useStore } from "../../store/store";
 import { FLAGS } from "../../ui/flags";
-import { deviation, engineering, fixed } from "../../ui/format";
+import { deviation, engineering, fixed } from "../../scales/format";
 import type { FlagHistory } from "./flagShares";
 import { linesOf, sifted, type ReturnHistory, type ReturnLine } from "./returns";
 

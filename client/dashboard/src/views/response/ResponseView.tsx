@@ -10,13 +10,13 @@ import { PIN_COLOURS } from "../../store/measures";
 import type { Pixel } from "../../store/pixel";
 import { type Store, useStore } from "../../store/store";
 import { Tabs, Toggle } from "../../ui/controls";
-import { fixed, significant } from "../../ui/format";
+import { fixed, significant } from "../../scales/format";
 import { save } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
-import { autoLimits, type Span } from "../../ui/scale";
-import { csvOf, drawnOf, type Aspect, type Subject } from "./curves";
+import { autoLimits, type Span } from "../../scales/scale";
+import { csvOf, drawnOf, type Subject } from "./curves";
 import { PixelFigures } from "./Figures";
 import { FlagHistory } from "./flagShares";
 import { richestPixel } from "./interesting";
@@ -24,7 +24,7 @@ import { FlagWords, Found } from "./Listings";
 import { MomentsPlane } from "./MomentsPlane";
 import { responsePlot, type ResponsePlot } from "./plot";
 import { ReturnHistory } from "./returns";
-import { ASPECTS, SIDES } from "./sides";
+import { type Aspect, ASPECTS, SIDES } from "../../store/pixelSides";
 import { NO_STEMS, stemsOf } from "./stems";
 
 /** Share of the height that the axis was made for which is left after a frame without such a peak. */

@@ -4,9 +4,9 @@ import type { Coefficients } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
 import { boundsAt, pixelOf, poissonKernel } from "../../physics/reflection";
 import type { Pin, PinName } from "../../store/measures";
+import type { Aspect } from "../../store/pixelSides";
 import type { PixelDocument } from "../../stream/protocol";
 
-export type Aspect = "density" | "bounds" | "cumulative";
 export type Truth = NonNullable<PixelDocument["truth"]>;
 
 /** Curves over the same times; their aspect says what they are. */

@@ -2,8 +2,9 @@ import uPlot from "uplot";
 
 import { rangeOfTime_m } from "../../physics/constants";
 import { PIN_COLOURS, PIN_NAMES } from "../../store/measures";
-import { grouped, significant, withUnit } from "../../ui/format";
-import { ESTIMATES, type Aspect, type Curves, type PinLines } from "./curves";
+import { grouped, significant, withUnit } from "../../scales/format";
+import type { Aspect } from "../../store/pixelSides";
+import { ESTIMATES, type Curves, type PinLines } from "./curves";
 import { drawStems, NO_STEMS, type Stems } from "./stems";
 
 /** The plot, and the line that marks the player's time in it. */

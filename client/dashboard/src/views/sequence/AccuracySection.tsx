@@ -1,6 +1,6 @@
 import { useStore } from "../../store/store";
 import type { AppliedSequence, Choice } from "../../stream/protocol";
-import { engineering, fixed } from "../../ui/format";
+import { engineering, fixed } from "../../scales/format";
 import { useProducts } from "../../ui/hooks";
 import { Obstacle, Steer } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";

@@ -2,7 +2,7 @@ import { signal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 
 import type { Choice, Tradeoff } from "../../stream/protocol";
-import { engineering, significant } from "../../ui/format";
+import { engineering, significant } from "../../scales/format";
 import { useSize } from "../../ui/hooks";
 import { endsOf, marksOf, nearest, placeOf, sameSequence, type Standing } from "./place";
 

@@ -1,7 +1,7 @@
 import { useRef } from "preact/hooks";
 
 import type { Choice } from "../../stream/protocol";
-import { engineering, fixed } from "../../ui/format";
+import { engineering, fixed } from "../../scales/format";
 import { sameSequence, stepOf } from "./place";
 
 interface FrontSliderProps {

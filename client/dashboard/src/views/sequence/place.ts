@@ -1,6 +1,6 @@
 /** Where choices of sequences stand in the plot of accuracy against time, both logarithmic. */
 import type { AppliedSequence, Choice, FrameMeta, Tradeoff } from "../../stream/protocol";
-import { fraction, ticks, type Scale } from "../../ui/scale";
+import { fraction, ticks, type Scale } from "../../scales/scale";
 
 export interface Ends {
   readonly time: Scale;

@@ -1,7 +1,7 @@
 import { plainWords } from "../../store/api";
 import type { Problem, Zeroth } from "../../stream/protocol";
 import type { RangeError } from "../../store/rangeErrors";
-import { engineering } from "../../ui/format";
+import { engineering } from "../../scales/format";
 
 /** Names of the fields as the form has them. */
 const FIELD_NAMES: Readonly<Record<string, string>> = {

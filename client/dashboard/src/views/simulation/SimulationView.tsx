@@ -2,7 +2,7 @@ import { useEffect } from "preact/hooks";
 
 import type { EffectChoice, EffectDocument, Fault } from "../../store/documents";
 import { useStore } from "../../store/store";
-import { engineering } from "../../ui/format";
+import { engineering } from "../../scales/format";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { useTask, type Task } from "../../ui/useTask";

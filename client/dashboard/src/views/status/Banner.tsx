@@ -3,7 +3,7 @@ import { useComputed, useSignal } from "@preact/signals";
 
 import { lossReason } from "../../store/events";
 import { useStore } from "../../store/store";
-import { timeOfDay } from "../../ui/format";
+import { timeOfDay } from "../../scales/format";
 
 /** Says at once what is wrong, and what is being done about it; goes away with it. */
 export function Banner({ onRetry }: { onRetry: () => void }) {

@@ -3,7 +3,7 @@ import { useSignal } from "@preact/signals";
 import { LONGEST_NAME } from "../../store/layouts";
 import { useStore } from "../../store/store";
 import { SwitchedDialog } from "../../ui/Dialog";
-import { LAYOUTS } from "../layout";
+import { LAYOUTS } from "../../store/layout";
 
 /** Saves the present layout under a name, and removes saved ones. */
 export function LayoutDialog() {

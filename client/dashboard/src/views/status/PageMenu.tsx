@@ -1,9 +1,9 @@
 import { copyLink } from "../../store/permalink";
 import { useStore } from "../../store/store";
 import { ActionMenu } from "../../ui/ActionMenu";
-import { THEMES, type ThemeChoice } from "../../ui/theme";
+import { THEMES, type ThemeChoice } from "../../store/theme";
 import { chooseFile } from "../files/openFile";
-import { LAYOUTS } from "../layout";
+import { LAYOUTS } from "../../store/layout";
 
 /** What concerns the page and not the camera. */
 export function PageMenu() {

@@ -2,7 +2,7 @@ import { useComputed } from "@preact/signals";
 
 import { flowTrouble } from "../../store/status";
 import { useStore } from "../../store/store";
-import { deviation, fixed } from "../../ui/format";
+import { deviation, fixed } from "../../scales/format";
 import { errorWords } from "../sequence/words";
 import { useNow } from "../../ui/hooks";
 import { Figures } from "./Figures";

@@ -1,7 +1,7 @@
 import { captureOne } from "../../store/capture";
 import { useStore } from "../../store/store";
 import { Toggle } from "../../ui/controls";
-import { fixed } from "../../ui/format";
+import { fixed } from "../../scales/format";
 import { useNow } from "../../ui/hooks";
 import { ControlIcon, HoldIcon, PauseIcon, PlayIcon, SingleIcon } from "../../ui/icons";
 import { Steer } from "../../ui/Steer";

@@ -1,19 +1,19 @@
 import { computed, useComputed, useSignal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 
-import { scaleOf, TONES, type ToneKind } from "../../gl/tone";
+import { scaleOf, TONES, type ToneKind } from "../../scales/tone";
 import { rangeOfTime_m } from "../../physics/constants";
 import { oneOf, remembered } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
 import { ColourChoice } from "../../ui/ColourChoice";
-import { COLOUR_MAPS, type ColourMapName } from "../../ui/colourMaps";
+import { COLOUR_MAPS, type ColourMapName } from "../../scales/colourMaps";
 import { npy, save, savePicture } from "../../ui/download";
-import { fixed, significant } from "../../ui/format";
+import { fixed, significant } from "../../scales/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
-import { ticks } from "../../ui/scale";
+import { ticks } from "../../scales/scale";
 import { ToneChoice } from "../../ui/ToneChoice";
 import { BINS, paintStreak, Streak, whiteOf } from "./streak";
 

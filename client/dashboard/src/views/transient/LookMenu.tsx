@@ -2,7 +2,7 @@ import { ColourChoice } from "../../ui/ColourChoice";
 import { Check, Choice } from "../../ui/controls";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { ToneChoice } from "../../ui/ToneChoice";
-import type { TransientLook } from "./look";
+import type { TransientLook } from "../../store/lightLook";
 
 const STOPS = [-4, -3, -2, -1, 0, 1, 2, 3, 4, 6, 8];
 

@@ -7,8 +7,8 @@ import { useStore } from "../../store/store";
 import { useDrawing } from "../../ui/hooks";
 import { FirstFrame } from "../../ui/FirstFrame";
 import { Stage } from "../../ui/Stage";
-import { AMPLITUDE } from "../map/catalogue";
-import type { TransientLook } from "./look";
+import { AMPLITUDE } from "../../store/mapCatalogue";
+import type { TransientLook } from "../../store/lightLook";
 
 /** Tries of WebGL2 before the page is content with typed arrays. */
 const GRAPHICS_TRIES = 2;

@@ -2,9 +2,9 @@ import { useEffect, useRef } from "preact/hooks";
 
 import { useStore } from "../../store/store";
 import { useDrawing } from "../../ui/hooks";
-import { fixed } from "../../ui/format";
+import { fixed } from "../../scales/format";
 import { rangeOfTime_m } from "../../physics/constants";
-import { ticks } from "../../ui/scale";
+import { ticks } from "../../scales/scale";
 
 /** Finest step of the slider, in shares of the period. */
 const STEP = 1 / 2048;

@@ -8,17 +8,17 @@ import { SPEEDS_NS, type Lit } from "../../store/player";
 import { type Store, useStore } from "../../store/store";
 import { Choice, Tabs } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
-import { fixed, significant, superscript } from "../../ui/format";
+import { fixed, significant, superscript } from "../../scales/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { captionOf, timeWords } from "../../ui/figure";
 import { saveFigure, type FigureParts } from "../../ui/figureFiles";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
-import { AMPLITUDE } from "../map/catalogue";
+import { AMPLITUDE } from "../../store/mapCatalogue";
 import { litOf, peaksOf, turnsOf } from "./arrivals";
-import { FilmProgress } from "./Filming";
+import { Filming, FilmProgress } from "./Filming";
 import { LightBar, lightScale } from "./LightBar";
-import { gateStart_rad, NAMES, type Play, type TransientLook } from "./look";
+import { gateStart_rad, NAMES, type Play, type TransientLook } from "../../store/lightLook";
 import { LightSoFar } from "./LightSoFar";
 import { LookMenu } from "./LookMenu";
 import { Picture } from "./Picture";
@@ -37,13 +37,14 @@ export function TransientView() {
   useProducts(["coefficients", AMPLITUDE]);
   const frame = store.frames.of("coefficients");
   const { player, light: look } = store;
+  const filming = useMemo(() => new Filming(), []);
   // A film ends with the picture that it is taken of.
   useEffect(
     () => () => {
-      look.filming.cancel();
+      filming.cancel();
       look.snapshot = () => null;
     },
-    [look],
+    [look, filming],
   );
   useDrawing(() => {
     const arrivals = frame.value?.light?.arrivals;
@@ -86,7 +87,7 @@ export function TransientView() {
             savePicture(`${look.play.peek()}-strip-${frame.peek()?.meta.frame ?? 0}`, strip);
           },
         },
-        ...look.filming.actions(subject, store),
+        ...filming.actions(subject, store),
       ]}
       tools={
         <>
@@ -100,7 +101,7 @@ export function TransientView() {
         <LightBar look={look} play={play} />
       </div>
       <footer class="panel-foot">
-        <FilmProgress filming={look.filming} />
+        <FilmProgress filming={filming} />
         <Timeline />
         <div class="panel-row">
           <button

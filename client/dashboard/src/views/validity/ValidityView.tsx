@@ -6,7 +6,7 @@ import { useStore } from "../../store/store";
 import { saveNumbers, savePicture } from "../../ui/download";
 import { FLAGS } from "../../ui/flags";
 import { FirstFrame } from "../../ui/FirstFrame";
-import { fixed, grouped } from "../../ui/format";
+import { fixed, grouped } from "../../scales/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { Stage } from "../../ui/Stage";

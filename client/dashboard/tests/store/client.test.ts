@@ -3,11 +3,11 @@ import { beforeEach, describe, expect, test, vi } from "vitest";
 import { Api } from "../../src/store/api";
 import type { RecordingDocument } from "../../src/store/documents";
 import { Store } from "../../src/store/store";
-import { StreamClient, type WorkerPort } from "../../src/stream/client";
+import { StreamClient, type WorkerPort } from "../../src/store/client";
 import type { AppliedSequence, FrameMeta, FrameMessage, Hello } from "../../src/stream/protocol";
 import { type FrameReport, summarised } from "../../src/stream/summary";
 import type { Command, Report } from "../../src/stream/worker";
-import { AnimationLoop } from "../../src/ui/animation";
+import { AnimationLoop } from "../../src/store/animation";
 
 const CAMERA = { state: "streaming", reason: null, simulated: true, capabilities: { model: "A" } } as const;
 

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 
-import { engineering, fixed, grouped, significant, superscript } from "../../src/ui/format";
+import { engineering, fixed, grouped, significant, superscript } from "../../src/scales/format";
 
 const plain = (text: string): string => text.replaceAll("\u202f", " ");
 

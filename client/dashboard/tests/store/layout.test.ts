@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 
-import { below, beside, closed, isLayout, type Layout, LAYOUTS, OVERVIEW, replaced, split, viewsOf } from "../../src/views/layout";
-import { VIEW_NAMES } from "../../src/views/names";
+import { below, beside, closed, isLayout, type Layout, LAYOUTS, OVERVIEW, replaced, split, viewsOf } from "../../src/store/layout";
+import { VIEW_NAMES } from "../../src/store/viewNames";
 
 describe("a layout", () => {
   test("is accepted back from the shelf, and nothing else is", () => {

@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import { autoLimits, fraction, histogram, type Scale, symmetric, ticks, valueAt } from "../../src/ui/scale";
+import { autoLimits, fraction, histogram, type Scale, symmetric, ticks, valueAt } from "../../src/scales/scale";
 
 const linear: Scale = { low: 2, high: 6, kind: "linear" };
 const logarithmic: Scale = { low: 1, high: 1000, kind: "logarithmic" };

@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import { backdropGrey, strength, TONES, toned, toneIndex } from "../../src/gl/tone";
+import { backdropGrey, strength, TONES, toned, toneIndex } from "../../src/scales/tone";
 
 describe.each(TONES)("the %s tone", (kind) => {
   test("goes from dark to white and no further", () => {

@@ -1,5 +1,5 @@
-import type { ColourMapName } from "../../ui/colourMaps";
-import type { ScaleKind } from "../../ui/scale";
+import type { ColourMapName } from "../scales/colourMaps";
+import type { ScaleKind } from "../scales/scale";
 
 /** A map of one number a pixel, and how it is shown unless the user chose otherwise. */
 export interface MapProduct {

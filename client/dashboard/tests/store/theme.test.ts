@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 
-import { Theme } from "../../src/ui/theme";
+import { Theme } from "../../src/store/theme";
 
 function system(matches: boolean) {
   let listener: ((event: { matches: boolean }) => void) | null = null;

@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import { COLOUR_MAPS, colourTable, levelOf, LEVELS } from "../../src/ui/colourMaps";
+import { COLOUR_MAPS, colourTable, levelOf, LEVELS } from "../../src/scales/colourMaps";
 
 /** CIE lightness of an sRGB colour (IEC 61966-2-1 and CIE 15). */
 function lightness(rgb: ArrayLike<number>): number {

@@ -1,7 +1,7 @@
 import { effect, signal } from "@preact/signals";
 import { expect, test } from "vitest";
 
-import { AnimationLoop } from "../../src/ui/animation";
+import { AnimationLoop } from "../../src/store/animation";
 
 /** A display that refreshes on command. */
 function display(): { loop: AnimationLoop; refresh: (now_ms: number) => void; waiting: () => number } {

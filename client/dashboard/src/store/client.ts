@@ -1,15 +1,15 @@
 /** Between the worker and the store: takes what arrives into the store once an animation frame. */
 import { effect } from "@preact/signals";
 
-import { kindOf, LIVE, RequestError } from "../store/api";
-import { inWords, lossWords, sequenceKey } from "../store/events";
-import { frameOf } from "../store/frames";
-import type { Store } from "../store/store";
-import type { AnimationLoop } from "../ui/animation";
-import { Fluency } from "./fluency";
-import type { AppliedSequence, CameraDocument, ErrorMessage, Hello, Notice, Problem } from "./protocol";
-import type { FrameReport } from "./summary";
-import type { Command, Report } from "./worker";
+import { kindOf, LIVE, RequestError } from "./api";
+import { inWords, lossWords, sequenceKey } from "./events";
+import { frameOf } from "./frames";
+import type { Store } from "./store";
+import type { AnimationLoop } from "./animation";
+import { Fluency } from "../stream/fluency";
+import type { AppliedSequence, CameraDocument, ErrorMessage, Hello, Notice, Problem } from "../stream/protocol";
+import type { FrameReport } from "../stream/summary";
+import type { Command, Report } from "../stream/worker";
 
 /** What of a Worker is used. */
 export interface WorkerPort {

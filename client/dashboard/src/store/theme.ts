@@ -1,6 +1,6 @@
 import { computed, effect, signal, type ReadonlySignal, type Signal } from "@preact/signals";
 
-import { oneOf, remembered, type Shelf } from "../store/settings";
+import { oneOf, remembered, type Shelf } from "./settings";
 
 export const THEMES = ["auto", "light", "dark"] as const;
 export type ThemeChoice = (typeof THEMES)[number];
