@@ -1,8 +1,7 @@
 /** What happened, for people: notices of the service and what this page noticed, the newest last. */
 import { signal } from "@preact/signals";
-
-import type { AppliedSequence, Notice } from "../stream/protocol";
 import { engineering, grouped } from "../scales/format";
+import type { AppliedSequence, Notice } from "../stream/protocol";
 
 export type EventTone = "plain" | "good" | "bad";
 

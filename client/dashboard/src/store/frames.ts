@@ -1,4 +1,4 @@
-import { computed, signal, type Signal } from "@preact/signals";
+import { computed, type Signal, signal } from "@preact/signals";
 
 import type { Coefficients } from "../physics/maximumEntropy";
 import type { Numbers } from "../stream/compact";
@@ -33,7 +33,7 @@ export class Frames {
   /** Products that a view shows and that can be had, sorted. */
   readonly wanted = computed(() => this.#claimed.value.filter((product) => this.absent.value[product] === undefined));
   /** The product that says how much light a pixel has. */
-  readonly amplitude = computed(() => (this.absent.value["brightness"] === undefined ? "brightness" : "direct"));
+  readonly amplitude = computed(() => (this.absent.value.brightness === undefined ? "brightness" : "direct"));
   readonly #claimed = signal<readonly string[]>([]);
   readonly #claims = new Map<string, number>();
   readonly #newest = new Map<string, Signal<Frame | null>>();

@@ -1,10 +1,9 @@
 import { computed, type ReadonlySignal, type Signal } from "@preact/signals";
-
+import { COLOUR_MAPS, type ColourMapName } from "../scales/colourMaps";
 import type { Tone, ToneKind } from "../scales/tone";
 import { TONES } from "../scales/tone";
 import type { Frame } from "./frames";
 import { aBoolean, aNumber, oneOf, remembered, type Shelf } from "./settings";
-import { COLOUR_MAPS, type ColourMapName } from "../scales/colourMaps";
 
 /** Light as it comes, what came within the last nanosecond, or all that has come so far. */
 export const PLAYS = ["density", "gate", "cumulative"] as const;

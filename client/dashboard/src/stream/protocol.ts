@@ -267,10 +267,10 @@ export function decodeMessage(buffer: ArrayBuffer): ServerMessage | null {
   } catch (error) {
     throw new ProtocolError(`The message is not msgpack: ${String(error)}`);
   }
-  if (!isMap(message) || typeof message["type"] !== "string") {
+  if (!isMap(message) || typeof message.type !== "string") {
     throw new ProtocolError("The message is not a map with a type.");
   }
-  switch (message["type"]) {
+  switch (message.type) {
     case "frame":
       return frameOf(message);
     case "hello":
@@ -286,8 +286,8 @@ export function decodeMessage(buffer: ArrayBuffer): ServerMessage | null {
 function frameOf(message: Record<string, unknown>): FrameMessage | AnnouncementMessage {
   const announced = announcementOf(message);
   if (announced !== null) return announced;
-  const axes = Array.isArray(message["axes"]) ? message["axes"] : [];
-  const frame = { ...message, axes, array: decoded(message, ndArray(message["array"])) } as unknown as FrameMessage;
+  const axes = Array.isArray(message.axes) ? message.axes : [];
+  const frame = { ...message, axes, array: decoded(message, ndArray(message.array)) } as unknown as FrameMessage;
   const { meta, array } = frame;
   const { region, decimation, width, height }: Partial<FrameMeta> = isMap(meta) ? meta : {};
   if (region === undefined || decimation === undefined || width === undefined || height === undefined) return frame;

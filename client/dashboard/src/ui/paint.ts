@@ -1,4 +1,4 @@
-import { beyond, colourTable, levelOf, type ColourMapName } from "../scales/colourMaps";
+import { beyond, type ColourMapName, colourTable, levelOf } from "../scales/colourMaps";
 import { fraction, type Scale } from "../scales/scale";
 
 /** Writes the colours of `values` into RGBA bytes; what lies beyond the scale has a colour of its own, a pixel without a value stays clear. */

@@ -45,8 +45,14 @@ test("what several steps change is drawn once", () => {
   effect(() => {
     drawn += 1 + 0 * (a.value + b.value);
   });
-  loop.add(() => ((a.value += 1), false));
-  loop.add(() => ((b.value += 1), false));
+  loop.add(() => {
+    a.value += 1;
+    return false;
+  });
+  loop.add(() => {
+    b.value += 1;
+    return false;
+  });
   loop.wake();
   refresh(0);
   expect(drawn).toBe(2); // once at first, once for both

@@ -80,6 +80,11 @@ export function axesLines({ far }: Floor): Float32Array {
 /** The camera's field of view: from its centre along the corners of the picture, and the picture's frame. */
 export function frustumLines({ far }: Floor, width: number, height: number, { fx, fy, cx, cy }: Pinhole): Float32Array {
   const depth = -FIELD * far;
-  const corners = [[-0.5, -0.5], [width - 0.5, -0.5], [width - 0.5, height - 0.5], [-0.5, height - 0.5]].map(([x, y]) => [((x - cx) / fx) * depth, ((cy - y) / fy) * depth, -depth]); // prettier-ignore
+  const corners = [
+    [-0.5, -0.5],
+    [width - 0.5, -0.5],
+    [width - 0.5, height - 0.5],
+    [-0.5, height - 0.5],
+  ].map(([x, y]) => [((x - cx) / fx) * depth, ((cy - y) / fy) * depth, -depth]);
   return Float32Array.from(corners.flatMap((corner, n) => [0, 0, 0, ...corner, ...corner, ...corners[(n + 1) % 4]]));
 }

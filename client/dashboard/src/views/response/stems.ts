@@ -2,7 +2,7 @@ import type uPlot from "uplot";
 
 import type { PixelDocument } from "../../stream/protocol";
 import type { Truth } from "./curves";
-import { sifted, type ReturnHistory } from "./returns";
+import { type ReturnHistory, sifted } from "./returns";
 
 /** A return in the plot. */
 export interface Stem {

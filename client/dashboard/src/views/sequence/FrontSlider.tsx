@@ -1,7 +1,6 @@
 import { useRef } from "preact/hooks";
-
-import type { Choice } from "../../stream/protocol";
 import { engineering, fixed } from "../../scales/format";
+import type { Choice } from "../../stream/protocol";
 import { sameSequence, stepOf } from "./place";
 
 interface FrontSliderProps {

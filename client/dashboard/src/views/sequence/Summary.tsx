@@ -1,5 +1,5 @@
-import type { AppliedSequence } from "../../stream/protocol";
 import { engineering, fixed } from "../../scales/format";
+import type { AppliedSequence } from "../../stream/protocol";
 import { Fact, Figures } from "./Figures";
 import { TAKE_ORDER_NAMES, ZEROTH_NAMES } from "./words";
 
