@@ -9,10 +9,10 @@ export interface Scale {
 }
 
 /** A logarithmic scale never reaches further down than this share of its high end. */
-export const SMALLEST_SHARE = 1e-4;
+const SMALLEST_SHARE = 1e-4;
 
 /** The low end in use: a logarithm needs one above zero. */
-export function lowEnd(scale: Scale): number {
+function lowEnd(scale: Scale): number {
   return scale.kind !== "logarithmic" ? scale.low : Math.max(scale.low, scale.high * SMALLEST_SHARE);
 }
 

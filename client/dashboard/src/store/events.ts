@@ -6,7 +6,7 @@ import type { AppliedSequence, Notice } from "../stream/protocol";
 export type EventTone = "plain" | "good" | "bad";
 
 /** What can be done about what happened. */
-export interface Remedy {
+interface Remedy {
   readonly word: string;
   readonly run: () => void;
 }

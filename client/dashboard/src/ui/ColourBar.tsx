@@ -7,7 +7,7 @@ import { decimalsFor, fraction, histogram, niceStep, type Scale, type Span, tick
 import { useDrawing } from "./hooks";
 
 /** Share of the scale's length that the bar goes on beyond either end: for what lies there, and for handles to be drawn to. */
-export const MARGIN = 0.1;
+const MARGIN = 0.1;
 const LENGTH = 1 + 2 * MARGIN;
 /** Rows of the canvas; bins of the histogram. */
 const ROWS = 240;

@@ -18,7 +18,7 @@ export interface Curves {
 }
 
 /** The lines of each aspect, in their order, as the columns of a table call them. */
-export const LINES: Readonly<Record<Aspect, readonly string[]>> = {
+const LINES: Readonly<Record<Aspect, readonly string[]>> = {
   density: ["density"],
   bounds: ["lower", "upper", "smoothed", "truth_smoothed"],
   cumulative: ["cumulative", "truth_cumulative"],
