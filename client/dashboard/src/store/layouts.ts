@@ -1,9 +1,9 @@
 /** Layouts that the user named, and the way back from changes. */
-import { computed, effect, signal, untracked, type Signal } from "@preact/signals";
+import { computed, effect, type Signal, signal, untracked } from "@preact/signals";
 
-import { isLayout, type Layout } from "../views/layout";
-import { VIEW_NAMES } from "../views/names";
+import { isLayout, type Layout } from "./layout";
 import { remembered, type Shelf } from "./settings";
+import { VIEW_NAMES } from "./viewNames";
 
 /** Changes that can be undone, the last first. */
 const MOST_STEPS = 50;
@@ -27,9 +27,7 @@ export class Layouts {
     effect(() => {
       const [before, now] = [this.#last, current.value];
       this.#last = now;
-      untracked(() => {
-        this.#keep(before, now);
-      });
+      untracked(() => this.#keep(before, now));
     });
   }
 

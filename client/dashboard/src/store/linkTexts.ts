@@ -1,14 +1,15 @@
 /** Parts of an address as text, and back: where the views stand, how maps and light are shown, what is pinned. */
-import { TONES, type ToneKind } from "../gl/tone";
-import { COLOUR_MAPS, type ColourMapName } from "../ui/colourMaps";
-import { isLayout, isStack, type Layout, type Slot, type Stack } from "../views/layout";
-import { MAP_PRODUCTS } from "../views/map/catalogue";
-import { VIEW_NAMES } from "../views/names";
-import { PLAYS, type LightChoice, type Play } from "../views/transient/look";
+
+import { COLOUR_MAPS, type ColourMapName } from "../scales/colourMaps";
+import { TONES, type ToneKind } from "../scales/tone";
+import { isLayout, isStack, type Layout, type Slot, type Stack } from "./layout";
+import { type LightChoice, PLAYS, type Play } from "./lightLook";
 import { isLimits, type LookChoice } from "./looks";
-import { PIN_NAMES, polygonOf, regionOf, type Pin, type Region } from "./measures";
+import { MAP_PRODUCTS } from "./mapCatalogue";
+import { PIN_NAMES, type Pin, polygonOf, type Region, regionOf } from "./measures";
 import type { Pixel } from "./pixel";
-import { WHOLE, windowAt, type View } from "./viewport";
+import { VIEW_NAMES } from "./viewNames";
+import { type View, WHOLE, windowAt } from "./viewport";
 
 /** A pixel as "81,20". */
 export function pixelOf(text: string): Pixel | null {
@@ -84,7 +85,10 @@ export function pinsText(pins: readonly Pin[]): string {
 
 /** A region as its two corners, "50,40/69,54", or as three or more of a polygon. */
 export function partOf(text: string): Region | null {
-  const corners = text.split("/").map(pixelOf).filter((corner) => corner !== null);
+  const corners = text
+    .split("/")
+    .map(pixelOf)
+    .filter((corner) => corner !== null);
   if (corners.length < 2 || corners.length > MOST_CORNERS) return null;
   return corners.length === 2 ? regionOf(corners[0], corners[1]) : polygonOf(corners);
 }
@@ -92,7 +96,14 @@ export function partOf(text: string): Region | null {
 const MOST_CORNERS = 32;
 
 export function partText({ x0, y0, x1, y1, corners }: Region): string {
-  return (corners ?? [{ x: x0, y: y0 }, { x: x1, y: y1 }]).map(pixelText).join("/");
+  return (
+    corners ?? [
+      { x: x0, y: y0 },
+      { x: x1, y: y1 },
+    ]
+  )
+    .map(pixelText)
+    .join("/");
 }
 
 /** The part of the picture that is in sight as "4,0.25,0.1": how many times larger, its left and top end in shares. */

@@ -1,10 +1,10 @@
 /** How each map is shown, wherever it is: as a picture, as points, on its colour bar. */
-import { computed, signal, type ReadonlySignal, type Signal } from "@preact/signals";
+import { computed, type ReadonlySignal, type Signal, signal } from "@preact/signals";
 
-import { COLOUR_MAPS, type ColourMapName } from "../ui/colourMaps";
-import { autoLimits, type Scale, type ScaleKind, type Span, symmetric } from "../ui/scale";
-import { MAP_PRODUCTS, type MapProduct } from "../views/map/catalogue";
+import { COLOUR_MAPS, type ColourMapName } from "../scales/colourMaps";
+import { autoLimits, type Scale, type ScaleKind, type Span, symmetric } from "../scales/scale";
 import type { Frame, Frames } from "./frames";
+import { MAP_PRODUCTS, type MapProduct } from "./mapCatalogue";
 import { mapFrame } from "./mapFrames";
 import type { Noises } from "./noise";
 import { oneOf, remembered, type Shelf } from "./settings";

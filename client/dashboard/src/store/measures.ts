@@ -77,7 +77,7 @@ export function holds({ corners }: Region, x: number, y: number): boolean {
     // Of whole numbers, and exact.
     const side = (b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x);
     if (side === 0 && between(x, a.x, b.x) && between(y, a.y, b.y)) return true;
-    if ((a.y > y) !== (b.y > y) && (side > 0) === (b.y > a.y)) odd = !odd;
+    if (a.y > y !== b.y > y && side > 0 === b.y > a.y) odd = !odd;
   }
   return odd;
 }

@@ -1,17 +1,16 @@
 /** What is looked at, as the part of the address behind #: it can be kept, sent and typed. */
 import { effect } from "@preact/signals";
-
-import { MAP_PRODUCTS } from "../views/map/catalogue";
-import { VIEW_NAMES } from "../views/names";
-import { viewsOf, type Layout } from "../views/layout";
-import { SIDES, type Side } from "../views/response/sides";
-import type { LightChoice } from "../views/transient/look";
 import { RequestError } from "./api";
+import { type Layout, viewsOf } from "./layout";
+import type { LightChoice } from "./lightLook";
 import { layoutOf, layoutText, lightOf, lightText, looksOf, lookText, partOf, partText, pinsOf, pinsText, pixelOf, pixelText, viewOf, viewText } from "./linkTexts";
 import type { LookChoice } from "./looks";
+import { MAP_PRODUCTS } from "./mapCatalogue";
 import type { Pin, Region } from "./measures";
 import type { Pixel } from "./pixel";
+import { SIDES, type Side } from "./pixelSides";
 import type { Store } from "./store";
+import { VIEW_NAMES } from "./viewNames";
 import type { View } from "./viewport";
 
 export interface Place {
@@ -188,9 +187,7 @@ function go(store: Store, { map, map2, pixel, time_ns, view, recording, frame, l
     // A time is a share of the period, which comes from the service.
     if (store.sequence.value === null) return;
     store.player.seek((time_ns * 1e-9) / store.period_s.peek());
-    queueMicrotask(() => {
-      end();
-    });
+    queueMicrotask(() => end());
   });
 }
 
@@ -217,9 +214,7 @@ function tokenOf({ api: { credentials } }: Store): Promise<void> {
   return new Promise((resolve) => {
     const end = credentials.token.subscribe((token) => {
       if (token === before || token === null) return;
-      queueMicrotask(() => {
-        end();
-      });
+      queueMicrotask(() => end());
       resolve();
     });
   });

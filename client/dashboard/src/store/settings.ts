@@ -1,4 +1,4 @@
-import { effect, signal, type Signal } from "@preact/signals";
+import { effect, type Signal, signal } from "@preact/signals";
 
 /** Where settings outlive the page; a browser may refuse it (private windows, policies). */
 export interface Shelf {

@@ -1,4 +1,4 @@
-import { computed, effect, signal, type Signal } from "@preact/signals";
+import { computed, effect, type Signal, signal } from "@preact/signals";
 import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 
@@ -8,32 +8,32 @@ import { Api, kindOf } from "./api";
 import { Calibrations } from "./calibrations";
 import { Caller } from "./caller";
 import { Credentials } from "./credentials";
+import { Details } from "./details";
 import { Events } from "./events";
 import { Frames } from "./frames";
+import { isLayout, type Layout, OVERVIEW, SPACE } from "./layout";
 import { Layouts } from "./layouts";
 import { Lease } from "./lease";
+import { TransientLook } from "./lightLook";
 import { Looks } from "./looks";
+import { MAP_PRODUCTS } from "./mapCatalogue";
 import { Measures } from "./measures";
 import { Noises } from "./noise";
 import type { Pixel } from "./pixel";
+import { SIDES, type Side } from "./pixelSides";
 import { Player } from "./player";
 import { RangeErrors } from "./rangeErrors";
-import { Sequencing } from "./sequencing";
-import { aBoolean, aNumber, browserShelf, oneOf, remembered, sessionShelf, type Shelf } from "./settings";
-import { isLayout, OVERVIEW, SPACE, type Layout } from "../views/layout";
-import { MAP_PRODUCTS } from "../views/map/catalogue";
-import { VIEW_NAMES } from "../views/names";
-import { SIDES, type Side } from "../views/response/sides";
-import { TransientLook } from "../views/transient/look";
 import { Reconstruction } from "./reconstruction";
 import { Recordings } from "./recordings";
 import { Replay } from "./replay";
+import { Sequencing } from "./sequencing";
+import { aBoolean, aNumber, browserShelf, oneOf, remembered, type Shelf, sessionShelf } from "./settings";
 import { Simulation } from "./simulation";
 import { Status } from "./status";
-import { Details } from "./details";
+import { Theme } from "./theme";
 import { Trends } from "./trends";
-import { pixelsOf, Viewport, type View, WHOLE } from "./viewport";
-import { Theme } from "../ui/theme";
+import { VIEW_NAMES } from "./viewNames";
+import { pixelsOf, type View, Viewport, WHOLE } from "./viewport";
 
 /** All that the page knows. Views read and set it; what fills it is no concern of theirs. */
 export class Store {
@@ -151,7 +151,7 @@ export class Store {
     this.looks = new Looks(this.frames, this.noises, shelf);
     this.layout = remembered<Layout>(shelf, "layout", OVERVIEW, (value): value is Layout => isLayout(value, VIEW_NAMES));
     effect(() => {
-      const seesLight = this.frames.absent.value["coefficients"] === undefined;
+      const seesLight = this.frames.absent.value.coefficients === undefined;
       if (!seesLight && JSON.stringify(this.layout.peek()) === JSON.stringify(OVERVIEW)) this.layout.value = SPACE;
     });
     this.layouts = new Layouts(shelf, this.layout);

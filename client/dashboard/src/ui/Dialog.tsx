@@ -1,6 +1,6 @@
+import type { Signal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
-import type { Signal } from "@preact/signals";
 
 interface DialogProps {
   readonly open: boolean;

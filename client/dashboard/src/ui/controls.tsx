@@ -91,13 +91,7 @@ interface CheckProps {
 export function Check({ checked, title, onChange, children }: CheckProps) {
   return (
     <label class="check" title={title}>
-      <input
-        type="checkbox"
-        checked={checked}
-        onChange={(event) => {
-          onChange(event.currentTarget.checked);
-        }}
-      />
+      <input type="checkbox" checked={checked} onChange={(event) => onChange(event.currentTarget.checked)} />
       <span>{children}</span>
     </label>
   );

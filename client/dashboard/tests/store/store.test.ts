@@ -200,8 +200,7 @@ describe("settings", () => {
 });
 
 describe("requests", () => {
-  const answering = (body: string, status: number, type: string): Api =>
-    new Api(() => Promise.resolve(new Response(body, { status, headers: { "Content-Type": type } })));
+  const answering = (body: string, status: number, type: string): Api => new Api(() => Promise.resolve(new Response(body, { status, headers: { "Content-Type": type } })));
 
   test("a problem becomes its own words, and keeps the field it names", async () => {
     const problem = { title: "Invalid sequence", detail: "harmonics is 99, but must be from 1 to 32.", field: "harmonics" };
@@ -212,9 +211,7 @@ describe("requests", () => {
     expect((refusal as RequestError).problem).toMatchObject({ status: 422, field: "harmonics" });
   });
 
-  test("a proxy's page says at least its status", async () => {
-    await expect(answering("<html>", 502, "text/html").camera()).rejects.toThrow(/502/);
-  });
+  test("a proxy's page says at least its status", async () => await expect(answering("<html>", 502, "text/html").camera()).rejects.toThrow(/502/));
 
   test("a service that cannot be reached says that", async () => {
     const api = new Api(() => Promise.reject(new TypeError("Failed to fetch")));

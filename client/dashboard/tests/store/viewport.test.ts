@@ -5,7 +5,11 @@ import { placeIn, seenAt, Viewport, WHOLE } from "../../src/store/viewport";
 describe("the part of the picture that is shown", () => {
   test("grows around the pointer: what lies there stays there", () => {
     const viewport = new Viewport();
-    for (const [at, factor] of [[{ x: 0.8, y: 0.3 }, 3], [{ x: 0.1, y: 0.9 }, 1.7], [{ x: 0.5, y: 0.5 }, 0.6]] as const) {
+    for (const [at, factor] of [
+      [{ x: 0.8, y: 0.3 }, 3],
+      [{ x: 0.1, y: 0.9 }, 1.7],
+      [{ x: 0.5, y: 0.5 }, 0.6],
+    ] as const) {
       const before = placeIn(viewport.view.value, at);
       viewport.zoomAt(at, factor);
       const seen = seenAt(viewport.view.value, before);

@@ -1,13 +1,13 @@
 import { signal } from "@preact/signals";
 import { describe, expect, test } from "vitest";
 
-import { beyond, colourTable } from "../../src/ui/colourMaps";
+import { beyond, colourTable } from "../../src/scales/colourMaps";
 import { type Frame, Frames } from "../../src/store/frames";
+import { Look, Looks } from "../../src/store/looks";
+import { MAP_PRODUCTS } from "../../src/store/mapCatalogue";
 import { Noises } from "../../src/store/noise";
 import { drawn, onBar } from "../../src/ui/ColourBar";
 import { typed } from "../../src/ui/LimitFields";
-import { MAP_PRODUCTS } from "../../src/views/map/catalogue";
-import { Look, Looks } from "../../src/store/looks";
 import { paint } from "../../src/ui/paint";
 
 describe("a painted map", () => {

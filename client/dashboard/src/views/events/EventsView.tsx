@@ -1,5 +1,5 @@
+import { timeOfDay } from "../../scales/format";
 import { useStore } from "../../store/store";
-import { timeOfDay } from "../../ui/format";
 import { Panel } from "../../ui/Panel";
 
 /** What happened since the page was opened, the newest first. */

@@ -37,9 +37,7 @@ export function FileDrop() {
   if (!over.value) return null;
   return (
     <div class="file-drop" aria-hidden="true">
-      <p>
-        A scene (.toml) to put the camera before, a recording (.h5) of this service to show, a calibration (.npz) to take in
-      </p>
+      <p>A scene (.toml) to put the camera before, a recording (.h5) of this service to show, a calibration (.npz) to take in</p>
     </div>
   );
 }

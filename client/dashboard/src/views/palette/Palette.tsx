@@ -22,9 +22,7 @@ function Search({ onDone }: { onDone: () => void }) {
   const list = useRef<HTMLUListElement>(null);
   const found = matching(commandsOf(store), query.value);
   const at = Math.min(chosen.value, found.length - 1);
-  useEffect(() => {
-    list.current?.children[at]?.scrollIntoView({ block: "nearest" });
-  }, [at, query.value]);
+  useEffect(() => list.current?.children[at]?.scrollIntoView({ block: "nearest" }), [at, query.value]);
   const run = (place: number): void => {
     const command = found[place];
     if (command === undefined) return;
@@ -66,7 +64,11 @@ function Search({ onDone }: { onDone: () => void }) {
           </li>
         ))}
       </ul>
-      {found.length === 0 && <p class="quiet" role="status">Nothing is called that.</p>}
+      {found.length === 0 && (
+        <p class="quiet" role="status">
+          Nothing is called that.
+        </p>
+      )}
     </div>
   );
 }

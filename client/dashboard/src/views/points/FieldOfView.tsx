@@ -1,6 +1,6 @@
 import { DEGREE } from "../../physics/constants";
+import { fixed } from "../../scales/format";
 import { isField, useStore } from "../../store/store";
-import { fixed } from "../../ui/format";
 import { fieldOfView } from "./cloud";
 import { knownLens } from "./lens";
 

@@ -3,23 +3,23 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 
 import { LightPainter } from "../../gl/paintLight";
 import type { Backdrop } from "../../gl/renderer";
+import { grouped } from "../../scales/format";
 import { LIVE, RequestError } from "../../store/api";
 import type { Frame } from "../../store/frames";
+import type { TransientLook } from "../../store/lightLook";
 import { aBoolean, aNumber, oneOf, remembered } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { frameUrl } from "../../stream/frameUrl";
 import { ColourBar } from "../../ui/ColourBar";
 import { Choice, Toggle } from "../../ui/controls";
 import { save, savePicture } from "../../ui/download";
-import { download } from "../../ui/files";
-import { grouped } from "../../ui/format";
 import { FirstFrame } from "../../ui/FirstFrame";
+import { download } from "../../ui/files";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { PinsRow } from "../map/PinsRow";
 import { LightBar } from "../transient/LightBar";
-import type { TransientLook } from "../transient/look";
 import { byFlags, byPicture, byValue, colourCloud, fillCloud, type Painter } from "./cloud";
 import { FieldOfView } from "./FieldOfView";
 import { knownLens, lensOf } from "./lens";
@@ -59,14 +59,17 @@ export function PointsView() {
 
   useEffect(() => {
     let wanted = true;
-    void import("./Scene").then(({ PointScene: Made }) => {
-      if (!wanted || canvas.current === null) return;
-      try {
-        scene.value = new Made(canvas.current);
-      } catch {
-        trouble.value = "This browser grants no WebGL, which points in space need.";
-      }
-    }, () => (trouble.value = "The part of the page that draws points could not be loaded.")); // prettier-ignore
+    void import("./Scene").then(
+      ({ PointScene: Made }) => {
+        if (!wanted || canvas.current === null) return;
+        try {
+          scene.value = new Made(canvas.current);
+        } catch {
+          trouble.value = "This browser grants no WebGL, which points in space need.";
+        }
+      },
+      () => (trouble.value = "The part of the page that draws points could not be loaded."),
+    );
     return () => {
       wanted = false;
       scene.peek()?.dispose();
@@ -108,7 +111,11 @@ export function PointsView() {
     if (flags !== null) return byFlags(flags.values);
     if (coefficients !== null && coefficients.width * coefficients.height === frame.values.length) {
       if (lit.pixels.length !== frame.values.length) lit.pixels = new Uint32Array(frame.values.length);
-      lit.painter.paint(coefficients, { phase_rad: store.player.phase_rad.value, tone: light.toneNow, colours: light.colours.value, backdrop: backdropOf(amplitude, light) }, lit.pixels);
+      lit.painter.paint(
+        coefficients,
+        { phase_rad: store.player.phase_rad.value, tone: light.toneNow, colours: light.colours.value, backdrop: backdropOf(amplitude, light) },
+        lit.pixels,
+      );
       return byPicture(lit.pixels);
     }
     if (chosen === "light" && amplitude !== null) return byValue(amplitude.values, lightLook.scale.value, lightLook.colours.value);
@@ -151,8 +158,18 @@ export function PointsView() {
       title={<h2>Points in space</h2>}
       tools={
         <PopoverButton face="Look" label="Look of the points" title="What the points are coloured by, and their size" kind="look">
-          <Choice label="Colour by" value={colouring.value} options={COLOURINGS.map((each) => ({ value: each, text: each === "light" ? ofLight : NAMES[each] }))} onChange={(each) => (colouring.value = each)} />
-          <Choice label="Size of a point" value={pointSize.value} options={[1, 2, 3, 4, 6].map((each) => ({ value: each, text: `${each} px` }))} onChange={(each) => (pointSize.value = each)} />
+          <Choice
+            label="Colour by"
+            value={colouring.value}
+            options={COLOURINGS.map((each) => ({ value: each, text: each === "light" ? ofLight : NAMES[each] }))}
+            onChange={(each) => (colouring.value = each)}
+          />
+          <Choice
+            label="Size of a point"
+            value={pointSize.value}
+            options={[1, 2, 3, 4, 6].map((each) => ({ value: each, text: `${each} px` }))}
+            onChange={(each) => (pointSize.value = each)}
+          />
         </PopoverButton>
       }
       downloads={[
@@ -195,10 +212,18 @@ export function PointsView() {
           </span>
           <FieldOfView />
           <span class="panel-tools">
-            <Toggle pressed={surrounded.value} title="Floor with a grid in metres, the camera's axes (x red, y green, z blue) and its field of view" onToggle={() => (surrounded.value = !surrounded.peek())}>
+            <Toggle
+              pressed={surrounded.value}
+              title="Floor with a grid in metres, the camera's axes (x red, y green, z blue) and its field of view"
+              onToggle={() => (surrounded.value = !surrounded.peek())}
+            >
               Grid
             </Toggle>
-            <Toggle pressed={shaded.value} title="Eye-dome lighting: what stands behind its neighbours is darker. Without it colours are exactly those of the colour bar" onToggle={() => (shaded.value = !shaded.peek())}>
+            <Toggle
+              pressed={shaded.value}
+              title="Eye-dome lighting: what stands behind its neighbours is darker. Without it colours are exactly those of the colour bar"
+              onToggle={() => (shaded.value = !shaded.peek())}
+            >
               Shading
             </Toggle>
             <button type="button" onClick={() => scene.peek()?.fromCamera()}>

@@ -3,7 +3,7 @@ import { DEGREE } from "../../physics/constants";
 import type { Pixel } from "../../store/pixel";
 import type { Store } from "../../store/store";
 import type { Intrinsics } from "../../stream/protocol";
-import { fillCloud, makeCloud, pinholeOf, type Pinhole } from "./cloud";
+import { fillCloud, makeCloud, type Pinhole, pinholeOf } from "./cloud";
 
 /** What the service knows of the lens; null where it only assumes. */
 export function knownLens({ camera }: Store): Intrinsics | null {

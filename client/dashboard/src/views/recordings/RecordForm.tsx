@@ -26,7 +26,15 @@ export function RecordForm({ task }: { task: Task }) {
     <label class="field">
       <span>{label}</span>
       <span class="field-input">
-        <input type="text" inputMode="decimal" name={field} autocomplete="off" placeholder="none" value={text.value} onInput={(event) => (text.value = event.currentTarget.value)} />
+        <input
+          type="text"
+          inputMode="decimal"
+          name={field}
+          autocomplete="off"
+          placeholder="none"
+          value={text.value}
+          onInput={(event) => (text.value = event.currentTarget.value)}
+        />
         <span class="quiet">{unit}</span>
       </span>
     </label>
@@ -42,7 +50,15 @@ export function RecordForm({ task }: { task: Task }) {
     >
       <label class="field record-name">
         <span>Name</span>
-        <input type="text" name="name" maxLength={200} autocomplete="off" placeholder="named after the time" value={name.value} onInput={(event) => (name.value = event.currentTarget.value)} />
+        <input
+          type="text"
+          name="name"
+          maxLength={200}
+          autocomplete="off"
+          placeholder="named after the time"
+          value={name.value}
+          onInput={(event) => (name.value = event.currentTarget.value)}
+        />
       </label>
       <fieldset class="record-limits">
         <legend>Ends after</legend>

@@ -2,10 +2,10 @@ import type uPlot from "uplot";
 
 import type { PixelDocument } from "../../stream/protocol";
 import type { Truth } from "./curves";
-import { sifted, type ReturnHistory } from "./returns";
+import { type ReturnHistory, sifted } from "./returns";
 
 /** A return in the plot. */
-export interface Stem {
+interface Stem {
   readonly time_s: number;
   /** Standard deviation of that time over the last looks (1 σ); NaN where it is not known. */
   readonly std_s: number;

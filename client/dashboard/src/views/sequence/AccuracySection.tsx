@@ -1,6 +1,6 @@
+import { engineering, fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
 import type { AppliedSequence, Choice } from "../../stream/protocol";
-import { engineering, fixed } from "../../ui/format";
 import { useProducts } from "../../ui/hooks";
 import { Obstacle, Steer } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
@@ -10,8 +10,8 @@ import { FrontPlot } from "./FrontPlot";
 import { FrontSlider } from "./FrontSlider";
 import { GoalForm } from "./GoalForm";
 import { sameSequence, standingOf } from "./place";
-import { errorWords } from "./words";
 import { Summary } from "./Summary";
+import { errorWords } from "./words";
 
 /** What accuracy costs in time on the scene before the camera: the front, and a slider along it that sets the sequence. */
 export function AccuracySection({ applied }: { applied: AppliedSequence }) {
@@ -70,7 +70,8 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
 function LookedFigures({ choice }: { choice: Choice }) {
   return (
     <>
-      <strong data-field="choice_range_error_m">± {engineering(choice.predicted.range_error_m.median, "m")}</strong> <span data-field="choice_capture_s">{engineering(choice.capture_s, "s")}</span>
+      <strong data-field="choice_range_error_m">± {engineering(choice.predicted.range_error_m.median, "m")}</strong>{" "}
+      <span data-field="choice_capture_s">{engineering(choice.capture_s, "s")}</span>
       <span data-field="choice_frame_rate_hz">{fixed(choice.frame_rate_hz, 1, "Hz")}</span> <span class="quiet">predicted</span>
     </>
   );

@@ -58,16 +58,7 @@ function Control({ onDone }: { onDone: () => void }) {
       {control.kind !== "us" && (
         <label class="field">
           <span>What others should call you</span>
-          <input
-            type="text"
-            name="holder"
-            autocomplete="nickname"
-            maxLength={LONGEST_NAME}
-            value={name.value}
-            onInput={(event) => {
-              name.value = event.currentTarget.value;
-            }}
-          />
+          <input type="text" name="holder" autocomplete="nickname" maxLength={LONGEST_NAME} value={name.value} onInput={(event) => (name.value = event.currentTarget.value)} />
         </label>
       )}
       <TaskLine task={task} field="control-status" />
@@ -85,7 +76,12 @@ function Control({ onDone }: { onDone: () => void }) {
             Give back
           </button>
         ) : (
-          <button type="submit" class="primary" title={barred ?? undefined} disabled={barred !== null || task.busy.value !== null || control.kind === "unknown" || name.value.trim() === ""}>
+          <button
+            type="submit"
+            class="primary"
+            title={barred ?? undefined}
+            disabled={barred !== null || task.busy.value !== null || control.kind === "unknown" || name.value.trim() === ""}
+          >
             {control.kind === "other" ? "Take over" : "Take control"}
           </button>
         )}

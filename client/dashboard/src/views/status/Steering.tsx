@@ -1,7 +1,7 @@
+import { fixed } from "../../scales/format";
 import { captureOne } from "../../store/capture";
 import { useStore } from "../../store/store";
 import { Toggle } from "../../ui/controls";
-import { fixed } from "../../ui/format";
 import { useNow } from "../../ui/hooks";
 import { ControlIcon, HoldIcon, PauseIcon, PlayIcon, SingleIcon } from "../../ui/icons";
 import { Steer } from "../../ui/Steer";
@@ -68,7 +68,14 @@ function ControlButton() {
   const barred = caller.obstacle.value;
   if (barred !== null && control.kind !== "other") {
     return (
-      <button type="button" class="control-button" title={`${barred}: it can look, but not take control`} data-field="control" data-obstacle="" onClick={() => (asksForControl.value = true)}>
+      <button
+        type="button"
+        class="control-button"
+        title={`${barred}: it can look, but not take control`}
+        data-field="control"
+        data-obstacle=""
+        onClick={() => (asksForControl.value = true)}
+      >
         <ControlIcon /> <span class="wide">View only</span>
       </button>
     );

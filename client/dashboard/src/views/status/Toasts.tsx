@@ -22,9 +22,7 @@ export function Toasts() {
   useEffect(() => {
     if (soonest_s === null) return undefined;
     const timer = setTimeout(() => (now_s.value = Date.now() / 1000), 1000 * Math.max(0.1, soonest_s - Date.now() / 1000));
-    return () => {
-      clearTimeout(timer);
-    };
+    return () => clearTimeout(timer);
   }, [soonest_s, now_s]);
   return (
     <div class="toasts" role="log" aria-label="What just happened">

@@ -1,19 +1,18 @@
 import { computed, useComputed, useSignal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
-
-import { scaleOf, TONES, type ToneKind } from "../../gl/tone";
 import { rangeOfTime_m } from "../../physics/constants";
+import { COLOUR_MAPS, type ColourMapName } from "../../scales/colourMaps";
+import { fixed, significant } from "../../scales/format";
+import { ticks } from "../../scales/scale";
+import { scaleOf, TONES, type ToneKind } from "../../scales/tone";
 import { oneOf, remembered } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
 import { ColourChoice } from "../../ui/ColourChoice";
-import { COLOUR_MAPS, type ColourMapName } from "../../ui/colourMaps";
 import { npy, save, savePicture } from "../../ui/download";
-import { fixed, significant } from "../../ui/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
-import { ticks } from "../../ui/scale";
 import { ToneChoice } from "../../ui/ToneChoice";
 import { BINS, paintStreak, Streak, whiteOf } from "./streak";
 
@@ -75,9 +74,9 @@ export function StreakView() {
         </PopoverButton>
       }
       downloads={[
-        { text: "Picture (PNG)", run: () => { savePicture(name(), canvas.current); } },
-        { text: "Density in DN/s (NPY)", run: () => { save(`${name()}.npy`, new Blob([npy(streak.values, [BINS, streak.width])])); } },
-      ]} // prettier-ignore
+        { text: "Picture (PNG)", run: () => savePicture(name(), canvas.current) },
+        { text: "Density in DN/s (NPY)", run: () => save(`${name()}.npy`, new Blob([npy(streak.values, [BINS, streak.width])])) },
+      ]}
     >
       <div class="streak">
         <div class="streak-axis" aria-hidden="true">

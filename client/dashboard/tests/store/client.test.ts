@@ -1,13 +1,12 @@
 import { beforeEach, describe, expect, test, vi } from "vitest";
-
+import { AnimationLoop } from "../../src/store/animation";
 import { Api } from "../../src/store/api";
+import { StreamClient, type WorkerPort } from "../../src/store/client";
 import type { RecordingDocument } from "../../src/store/documents";
 import { Store } from "../../src/store/store";
-import { StreamClient, type WorkerPort } from "../../src/stream/client";
-import type { AppliedSequence, FrameMeta, FrameMessage, Hello } from "../../src/stream/protocol";
+import type { AppliedSequence, FrameMessage, FrameMeta, Hello } from "../../src/stream/protocol";
 import { type FrameReport, summarised } from "../../src/stream/summary";
 import type { Command, Report } from "../../src/stream/worker";
-import { AnimationLoop } from "../../src/ui/animation";
 
 const CAMERA = { state: "streaming", reason: null, simulated: true, capabilities: { model: "A" } } as const;
 
@@ -32,12 +31,7 @@ class Page {
     shelf: null,
     api: new Api(() => Promise.resolve(new Response(JSON.stringify({ ...CAMERA, absent_products: this.absent })))),
   });
-  readonly client = new StreamClient(
-    this.store,
-    this.worker,
-    new AnimationLoop((callback) => this.#requested.push(callback)),
-    () => this.now_s,
-  );
+  readonly client = new StreamClient(this.store, this.worker, new AnimationLoop((callback) => this.#requested.push(callback)), () => this.now_s);
   now_s = 1000;
 
   receives(...reports: Report[]): void {
@@ -126,13 +120,13 @@ describe("between worker and store", () => {
       return page.sent.slice(before).filter(({ type }) => type === "moved");
     };
 
-    beforeEach(() => {
-      page.store.frames.claim(["coefficients"]);
-    });
+    beforeEach(() => page.store.frames.claim(["coefficients"]));
 
     test("is counted while it plays, and while it is scrubbed", () => {
       page.store.player.playing.value = true;
-      expect(watches()).toEqual([{ type: "moved", pictures_hz: expect.closeTo(10, 6) as number, frames_hz: expect.closeTo(5, 6) as number, camera_hz: expect.closeTo(10, 6) as number }]);
+      expect(watches()).toEqual([
+        { type: "moved", pictures_hz: expect.closeTo(10, 6) as number, frames_hz: expect.closeTo(5, 6) as number, camera_hz: expect.closeTo(10, 6) as number },
+      ]);
       page.store.player.playing.value = false;
       page.store.player.scrubbed.value = true;
       expect(watches()).toHaveLength(1);
@@ -245,15 +239,13 @@ describe("between worker and store", () => {
   test("notices become what happened", () => {
     page.receives({ type: "message", message: { type: "notice", kind: "lease-changed", change: "granted", holder: "bench 2" } });
     page.receives({ type: "message", message: { type: "notice", kind: "lost-images", count: 2 } });
-    expect(page.store.events.all.value.map(({ words }) => words)).toEqual([
-      "bench 2 has taken control.",
-      expect.stringMatching(/^2 images did not arrive intact/),
-    ]);
+    expect(page.store.events.all.value.map(({ words }) => words)).toEqual(["bench 2 has taken control.", expect.stringMatching(/^2 images did not arrive intact/)]);
   });
 
   test("a sequence that was set anew and is what it was is no news", () => {
     const sequence = { sequence_id: 1, harmonics: 4, base_frequency_hz: 23e6, exposure_s: 1e-3, images: 20 };
-    const changed = (change: object): void => page.receives({ type: "message", message: { type: "notice", kind: "sequence-changed", sequence: { ...sequence, ...change } as unknown as AppliedSequence } });
+    const changed = (change: object): void =>
+      page.receives({ type: "message", message: { type: "notice", kind: "sequence-changed", sequence: { ...sequence, ...change } as unknown as AppliedSequence } });
     changed({});
     changed({ sequence_id: 2 });
     expect(page.store.events.all.value).toHaveLength(1);

@@ -5,7 +5,7 @@
  * that is shown as the brightest colour.
  */
 
-import type { Scale } from "../ui/scale";
+import type { Scale } from "./scale";
 
 export type ToneKind = "linear" | "root" | "logarithmic";
 

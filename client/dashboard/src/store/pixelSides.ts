@@ -1,6 +1,6 @@
 /** What of a pixel can be shown. */
-import type { Aspect } from "./curves";
 
+export type Aspect = "density" | "bounds" | "cumulative";
 export type Side = Aspect | "moments";
 
 interface Words<T> {

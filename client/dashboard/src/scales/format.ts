@@ -56,7 +56,9 @@ export function deviation(std: number | null | undefined, unit: string): string 
 
 /** A whole number with its thousands apart. */
 export function grouped(value: number): string {
-  return Math.round(value).toString().replace(/\B(?=(\d{3})+$)/g, THIN_SPACE);
+  return Math.round(value)
+    .toString()
+    .replace(/\B(?=(\d{3})+$)/g, THIN_SPACE);
 }
 
 export function superscript(exponent: number): string {

@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 
-import { below, beside, closed, isLayout, type Layout, LAYOUTS, OVERVIEW, replaced, split, viewsOf } from "../../src/views/layout";
-import { VIEW_NAMES } from "../../src/views/names";
+import { below, beside, closed, isLayout, LAYOUTS, type Layout, OVERVIEW, replaced, split, viewsOf } from "../../src/store/layout";
+import { VIEW_NAMES } from "../../src/store/viewNames";
 
 describe("a layout", () => {
   test("is accepted back from the shelf, and nothing else is", () => {
@@ -24,19 +24,46 @@ describe("a layout", () => {
     }
   });
 
-  test("changes two views' places where one takes the other's", () => {
-    expect(viewsOf(replaced(OVERVIEW, "map", "sequence"))).toEqual(["transient", "sequence", "response", "map"]);
-  });
+  test("changes two views' places where one takes the other's", () => expect(viewsOf(replaced(OVERVIEW, "map", "sequence"))).toEqual(["transient", "sequence", "response", "map"]));
 
   test("shows another view where one stood", () => {
     const two = closed(closed(OVERVIEW, "sequence"), "response");
-    expect(two).toEqual([{ share: 1, slots: [{ view: "transient", share: 13 }, { view: "map", share: 7 }] }]);
+    expect(two).toEqual([
+      {
+        share: 1,
+        slots: [
+          { view: "transient", share: 13 },
+          { view: "map", share: 7 },
+        ],
+      },
+    ]);
     expect(viewsOf(replaced(two, "map", "response"))).toEqual(["transient", "response"]);
   });
 
   test("gives a view that comes to the place of a flat one no less than the mean of its stack", () => {
-    const flat: Layout = [{ share: 1, slots: [{ share: 1, slots: [{ view: "map", share: 5 }, { view: "sequence", share: 1 }] }] }];
-    expect(replaced(flat, "sequence", "points")[0].slots).toEqual([{ share: 1, slots: [{ view: "map", share: 5 }, { view: "points", share: 3 }] }]);
+    const flat: Layout = [
+      {
+        share: 1,
+        slots: [
+          {
+            share: 1,
+            slots: [
+              { view: "map", share: 5 },
+              { view: "sequence", share: 1 },
+            ],
+          },
+        ],
+      },
+    ];
+    expect(replaced(flat, "sequence", "points")[0].slots).toEqual([
+      {
+        share: 1,
+        slots: [
+          { view: "map", share: 5 },
+          { view: "points", share: 3 },
+        ],
+      },
+    ]);
   });
 
   test("keeps its last view", () => {
@@ -54,7 +81,13 @@ describe("a layout", () => {
   test("takes a view below another in half of its height, or in a row of its own where the row is the other's", () => {
     const two = closed(closed(OVERVIEW, "sequence"), "response");
     const stacked = below(two, "map", "response") ?? [];
-    expect(stacked[0].slots[1]).toEqual({ share: 7, slots: [{ view: "map", share: 3.5 }, { view: "response", share: 3.5 }] });
+    expect(stacked[0].slots[1]).toEqual({
+      share: 7,
+      slots: [
+        { view: "map", share: 3.5 },
+        { view: "response", share: 3.5 },
+      ],
+    });
     expect(viewsOf(below(OVERVIEW, "response", "points") ?? [])).toEqual(["transient", "map", "response", "points", "sequence"]);
     expect(below(below(OVERVIEW, "response", "points") ?? [], "map", "streak")).toBeNull(); // four are enough
     const one = closed(two, "map");

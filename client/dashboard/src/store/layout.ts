@@ -31,7 +31,13 @@ const row = (share: number, ...views: readonly (readonly [string, number])[]): R
 
 /** One picture as large as the window allows, and what belongs to it stacked beside it. */
 const hero = (view: string, ...beside: readonly (readonly [string, number])[]): Layout => [
-  { share: 1, slots: [{ view, share: 13 }, { share: 7, slots: slots(beside) }] },
+  {
+    share: 1,
+    slots: [
+      { view, share: 13 },
+      { share: 7, slots: slots(beside) },
+    ],
+  },
 ];
 
 /** Layouts to begin with. */
@@ -47,9 +53,9 @@ export const LAYOUTS: Readonly<Record<string, Layout>> = {
   Space: hero("points", ["map", 9], ["response", 10], ["sequence", 5]),
 };
 
-export const OVERVIEW = LAYOUTS["Overview"];
+export const OVERVIEW = LAYOUTS.Overview;
 /** The same for cameras that see no light in flight. */
-export const SPACE = LAYOUTS["Space"];
+export const SPACE = LAYOUTS.Space;
 
 /** Whether a remembered value is a layout of known views, each at most once. */
 export function isLayout(value: unknown, known: readonly string[]): value is Layout {
@@ -112,7 +118,14 @@ export function closed(layout: Layout, view: string): Layout {
 export function beside(layout: Layout, view: string, wanted: string): Layout | null {
   const home = layout.find(({ slots }) => slots.some((place) => holds(place, view)));
   if (home === undefined || home.slots.length >= MOST_SLOTS) return null;
-  return mapped(layout, (place) => (holds(place, view) ? [{ ...place, share: place.share / 2 }, { view: wanted, share: place.share / 2 }] : [place]));
+  return mapped(layout, (place) =>
+    holds(place, view)
+      ? [
+          { ...place, share: place.share / 2 },
+          { view: wanted, share: place.share / 2 },
+        ]
+      : [place],
+  );
 }
 
 /** `wanted` below `view`: in a row of its own where `view` has one, else in half of its height; null where there is no room. */
@@ -122,12 +135,21 @@ export function below(layout: Layout, view: string, wanted: string): Layout | nu
   if (home === undefined || place === undefined) return null;
   if (home.slots.length === 1 && !isStack(place)) return layout.length >= MOST_ROWS ? null : layout.flatMap((each) => (each === home ? withRowBelow(each, wanted) : [each]));
   if (slotsOf(place).length >= MOST_SLOTS) return null;
-  const halved = (slot: Slot): Slot[] => (slot.view === view ? [{ ...slot, share: slot.share / 2 }, { view: wanted, share: slot.share / 2 }] : [slot]);
+  const halved = (slot: Slot): Slot[] =>
+    slot.view === view
+      ? [
+          { ...slot, share: slot.share / 2 },
+          { view: wanted, share: slot.share / 2 },
+        ]
+      : [slot];
   return mapped(layout, (each) => (each === place ? [{ share: place.share, slots: slotsOf(place).flatMap(halved) }] : [each]));
 }
 
 function withRowBelow(above: Row, wanted: string): Row[] {
-  return [{ ...above, share: above.share * 0.6 }, { share: above.share * 0.4, slots: [{ view: wanted, share: 1 }] }];
+  return [
+    { ...above, share: above.share * 0.6 },
+    { share: above.share * 0.4, slots: [{ view: wanted, share: 1 }] },
+  ];
 }
 
 /** Two neighbours' shares after the splitter between them stands at `place`, 0 to 1 of both. */

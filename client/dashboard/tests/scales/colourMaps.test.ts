@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import { COLOUR_MAPS, colourTable, levelOf, LEVELS } from "../../src/ui/colourMaps";
+import { COLOUR_MAPS, colourTable, LEVELS, levelOf } from "../../src/scales/colourMaps";
 
 /** CIE lightness of an sRGB colour (IEC 61966-2-1 and CIE 15). */
 function lightness(rgb: ArrayLike<number>): number {
@@ -27,7 +27,6 @@ describe.each(COLOUR_MAPS.filter((name) => name !== "coolwarm"))("%s", (name) =>
     });
     expect(values[LEVELS - 1] - values[0]).toBeGreaterThan(70);
   });
-
 });
 
 describe.each(COLOUR_MAPS)("%s", (name) => {
@@ -55,6 +54,4 @@ test("viridis has the colours it is known by", () => {
   expect([...table.slice(4 * 255, 4 * 255 + 3)]).toEqual([253, 231, 37]);
 });
 
-test("a place on the scale finds its colour, and one beyond the ends the last", () => {
-  expect([-1, 0, 0.5, 0.999, 1, 7].map(levelOf)).toEqual([0, 0, 128, 255, 255, 255]);
-});
+test("a place on the scale finds its colour, and one beyond the ends the last", () => expect([-1, 0, 0.5, 0.999, 1, 7].map(levelOf)).toEqual([0, 0, 128, 255, 255, 255]));

@@ -1,11 +1,9 @@
 import { computed, type ReadonlySignal, type Signal } from "@preact/signals";
-
-import type { Tone, ToneKind } from "../../gl/tone";
-import { TONES } from "../../gl/tone";
-import type { Frame } from "../../store/frames";
-import { aBoolean, aNumber, oneOf, remembered, type Shelf } from "../../store/settings";
-import { COLOUR_MAPS, type ColourMapName } from "../../ui/colourMaps";
-import { Filming } from "./Filming";
+import { COLOUR_MAPS, type ColourMapName } from "../scales/colourMaps";
+import type { Tone, ToneKind } from "../scales/tone";
+import { TONES } from "../scales/tone";
+import type { Frame } from "./frames";
+import { aBoolean, aNumber, oneOf, remembered, type Shelf } from "./settings";
 
 /** Light as it comes, what came within the last nanosecond, or all that has come so far. */
 export const PLAYS = ["density", "gate", "cumulative"] as const;
@@ -40,8 +38,6 @@ export class TransientLook {
   readonly play: Signal<Play>;
   /** Draws the picture anew and answers its canvas, which can be read in this task. */
   snapshot: () => HTMLCanvasElement | null = () => null;
-  /** The film that is made of it. */
-  readonly filming = new Filming();
   readonly white: ReadonlySignal<number>;
   #metered: number | null = null;
 

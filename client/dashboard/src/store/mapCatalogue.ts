@@ -1,5 +1,5 @@
-import type { ColourMapName } from "../../ui/colourMaps";
-import type { ScaleKind } from "../../ui/scale";
+import type { ColourMapName } from "../scales/colourMaps";
+import type { ScaleKind } from "../scales/scale";
 
 /** A map of one number a pixel, and how it is shown unless the user chose otherwise. */
 export interface MapProduct {
@@ -22,10 +22,36 @@ export const MAP_PRODUCTS: readonly MapProduct[] = [
   { product: "direct", name: "Direct", hint: "Light of the first return", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
   { product: "indirect", name: "Indirect", hint: "Light that took a longer way", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
   { product: "brightness", name: "Brightness", hint: "All light: the zeroth moment", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
-  { product: "validity", name: "Validity", hint: "Smallest eigenvalue of the moments over b₀; below zero no light could have made them", unit: "1", colours: "coolwarm", scale: "linear", decimals: 4, signed: true },
-  { product: "range_std", name: "Deviation", hint: "Standard deviation of the range that the noise of the sensor predicts, by the likelihood estimate", unit: "m", colours: "cividis", scale: "logarithmic", decimals: 4 },
-  { product: "range_scatter", name: "Scatter", hint: "Standard deviation of the range over the last 30 frames, as measured here", unit: "m", colours: "cividis", scale: "logarithmic", decimals: 4, scatterOf: "range" },
-]; // prettier-ignore
+  {
+    product: "validity",
+    name: "Validity",
+    hint: "Smallest eigenvalue of the moments over b₀; below zero no light could have made them",
+    unit: "1",
+    colours: "coolwarm",
+    scale: "linear",
+    decimals: 4,
+    signed: true,
+  },
+  {
+    product: "range_std",
+    name: "Deviation",
+    hint: "Standard deviation of the range that the noise of the sensor predicts, by the likelihood estimate",
+    unit: "m",
+    colours: "cividis",
+    scale: "logarithmic",
+    decimals: 4,
+  },
+  {
+    product: "range_scatter",
+    name: "Scatter",
+    hint: "Standard deviation of the range over the last 30 frames, as measured here",
+    unit: "m",
+    colours: "cividis",
+    scale: "logarithmic",
+    decimals: 4,
+    scatterOf: "range",
+  },
+];
 
 /** What the hover line says beside the map's own value. */
 export const AMPLITUDE = "brightness";

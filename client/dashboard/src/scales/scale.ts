@@ -9,10 +9,10 @@ export interface Scale {
 }
 
 /** A logarithmic scale never reaches further down than this share of its high end. */
-export const SMALLEST_SHARE = 1e-4;
+const SMALLEST_SHARE = 1e-4;
 
 /** The low end in use: a logarithm needs one above zero. */
-export function lowEnd(scale: Scale): number {
+function lowEnd(scale: Scale): number {
   return scale.kind !== "logarithmic" ? scale.low : Math.max(scale.low, scale.high * SMALLEST_SHARE);
 }
 
@@ -108,12 +108,7 @@ export function histogram(values: ArrayLike<number>, scale: Scale, bins: number,
  */
 export function autoLimits(previous: Span | null, span: Span): Span {
   if (!(span.high >= span.low)) return previous ?? { low: 0, high: 1 };
-  if (
-    previous !== null &&
-    span.low >= previous.low &&
-    span.high <= previous.high &&
-    span.high - span.low > 0.5 * (previous.high - previous.low)
-  ) {
+  if (previous !== null && span.low >= previous.low && span.high <= previous.high && span.high - span.low > 0.5 * (previous.high - previous.low)) {
     return previous;
   }
   const width = span.high - span.low || Math.abs(span.high) || 1;

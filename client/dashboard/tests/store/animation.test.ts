@@ -1,7 +1,7 @@
 import { effect, signal } from "@preact/signals";
 import { expect, test } from "vitest";
 
-import { AnimationLoop } from "../../src/ui/animation";
+import { AnimationLoop } from "../../src/store/animation";
 
 /** A display that refreshes on command. */
 function display(): { loop: AnimationLoop; refresh: (now_ms: number) => void; waiting: () => number } {
@@ -45,8 +45,14 @@ test("what several steps change is drawn once", () => {
   effect(() => {
     drawn += 1 + 0 * (a.value + b.value);
   });
-  loop.add(() => ((a.value += 1), false));
-  loop.add(() => ((b.value += 1), false));
+  loop.add(() => {
+    a.value += 1;
+    return false;
+  });
+  loop.add(() => {
+    b.value += 1;
+    return false;
+  });
   loop.wake();
   refresh(0);
   expect(drawn).toBe(2); // once at first, once for both

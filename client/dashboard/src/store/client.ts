@@ -1,15 +1,14 @@
 /** Between the worker and the store: takes what arrives into the store once an animation frame. */
 import { effect } from "@preact/signals";
-
-import { kindOf, LIVE, RequestError } from "../store/api";
-import { inWords, lossWords, sequenceKey } from "../store/events";
-import { frameOf } from "../store/frames";
-import type { Store } from "../store/store";
-import type { AnimationLoop } from "../ui/animation";
-import { Fluency } from "./fluency";
-import type { AppliedSequence, CameraDocument, ErrorMessage, Hello, Notice, Problem } from "./protocol";
-import type { FrameReport } from "./summary";
-import type { Command, Report } from "./worker";
+import { Fluency } from "../stream/fluency";
+import type { AppliedSequence, CameraDocument, ErrorMessage, Hello, Notice, Problem } from "../stream/protocol";
+import type { FrameReport } from "../stream/summary";
+import type { Command, Report } from "../stream/worker";
+import type { AnimationLoop } from "./animation";
+import { kindOf, LIVE, RequestError } from "./api";
+import { inWords, lossWords, sequenceKey } from "./events";
+import { frameOf } from "./frames";
+import type { Store } from "./store";
 
 /** What of a Worker is used. */
 export interface WorkerPort {
@@ -42,9 +41,7 @@ export class StreamClient {
     this.#worker = worker;
     this.#loop = loop;
     this.#now_s = now_s;
-    worker.onmessage = ({ data }) => {
-      this.#receive(data);
-    };
+    worker.onmessage = ({ data }) => this.#receive(data);
     loop.add(() => {
       this.#draw();
       for (const take of this.#brought.splice(0)) take();
@@ -70,15 +67,11 @@ export class StreamClient {
       known = wanted;
       this.#send({ type: "want", products: wanted });
     });
-    effect(() => {
-      this.#send({ type: "adapt", adapts: this.#store.adapts.value });
-    });
+    effect(() => this.#send({ type: "adapt", adapts: this.#store.adapts.value }));
     effect(() => {
       const sight = this.#store.sight.value;
       clearTimeout(this.#looking);
-      this.#looking = setTimeout(() => {
-        this.#send({ type: "look", sight });
-      }, 1000 * SETTLED_S);
+      this.#looking = setTimeout(() => this.#send({ type: "look", sight }), 1000 * SETTLED_S);
     });
     effect(() => {
       if (!this.#store.held.value) this.#loop.wake();
@@ -328,9 +321,7 @@ export class StreamClient {
       errand.reject(new RequestError(problem));
       return;
     }
-    this.#brought.push(() => {
-      errand.resolve(reports);
-    });
+    this.#brought.push(() => errand.resolve(reports));
     this.#loop.wake();
   }
 }

@@ -1,6 +1,6 @@
-import { computed, effect, signal, type ReadonlySignal, type Signal } from "@preact/signals";
+import { computed, effect, type ReadonlySignal, type Signal, signal } from "@preact/signals";
 
-import { oneOf, remembered, type Shelf } from "../store/settings";
+import { oneOf, remembered, type Shelf } from "./settings";
 
 export const THEMES = ["auto", "light", "dark"] as const;
 export type ThemeChoice = (typeof THEMES)[number];
@@ -20,7 +20,7 @@ export class Theme {
   /** Shows itself on the page's root, where the style sheet looks for it. */
   show(root: HTMLElement): () => void {
     return effect(() => {
-      root.dataset["theme"] = this.dark.value ? "dark" : "light";
+      root.dataset.theme = this.dark.value ? "dark" : "light";
     });
   }
 

@@ -1,13 +1,11 @@
 import { expect, test } from "vitest";
 
-import { engineering, fixed, grouped, significant, superscript } from "../../src/ui/format";
+import { engineering, fixed, grouped, significant, superscript } from "../../src/scales/format";
 
 const plain = (text: string): string => text.replaceAll("\u202f", " ");
 
 test("what is missing is a dash, never a number", () => {
-  expect([fixed(NaN, 2, "m"), fixed(null, 2), engineering(undefined, "s"), significant(Infinity, 3)]).toEqual(
-    Array(4).fill("–"),
-  );
+  expect([fixed(NaN, 2, "m"), fixed(null, 2), engineering(undefined, "s"), significant(Infinity, 3)]).toEqual(Array(4).fill("–"));
 });
 
 test("units get the prefix that keeps a number short", () => {

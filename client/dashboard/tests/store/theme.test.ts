@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 
-import { Theme } from "../../src/ui/theme";
+import { Theme } from "../../src/store/theme";
 
 function system(matches: boolean) {
   let listener: ((event: { matches: boolean }) => void) | null = null;
@@ -16,13 +16,13 @@ test("the page is as dark as the system until the user chooses", () => {
   const theme = new Theme(null, list);
   const root = { dataset: {} as Record<string, string> } as unknown as HTMLElement;
   const end = theme.show(root);
-  expect(root.dataset["theme"]).toBe("dark");
+  expect(root.dataset.theme).toBe("dark");
   change(false);
-  expect(root.dataset["theme"]).toBe("light");
+  expect(root.dataset.theme).toBe("light");
   theme.choice.value = "dark";
-  expect(root.dataset["theme"]).toBe("dark");
+  expect(root.dataset.theme).toBe("dark");
   change(true);
   change(false);
-  expect(root.dataset["theme"]).toBe("dark");
+  expect(root.dataset.theme).toBe("dark");
   end();
 });
