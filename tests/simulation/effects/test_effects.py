@@ -417,9 +417,9 @@ def test_effects_of_the_prototype_spoil_nominal_moments_and_the_ideal_device_non
 
 def test_every_file_of_an_effect_has_its_entry_and_a_name_of_its_own() -> None:
     files = {each.name for each in pkgutil.iter_modules(package.__path__)} - {
-        "conditions",
-        "effect",
-        "glimpses",
+        "_conditions",
+        "_effect",
+        "_glimpses",
     }
 
     assert {effect.__module__.rpartition(".")[2] for effect in EFFECTS} == files
