@@ -196,17 +196,24 @@ def test_closing_a_camera_that_is_gone_is_no_error(
     transport.close()
 
 
-def test_usb_is_imported_in_two_places_only() -> None:
+def test_pyusb_is_imported_in_two_places_only() -> None:
     import transientcam_driver
+    import transientcam_simulation
 
-    package = Path(transientcam_driver.__file__).parent
+    packages = [
+        Path(each.__file__).parent for each in (transientcam_driver, transientcam_simulation)
+    ]
     importing = {
-        str(path.relative_to(package))
+        str(path.relative_to(package.parent))
+        for package in packages
         for path in package.rglob("*.py")
         for line in path.read_text().splitlines()
         if line.startswith(("import usb", "from usb"))
     }
-    assert importing == {"usb.py", "simulation/device/bus.py"}
+    assert importing == {
+        "transientcam_driver/cameras/open_usb/_transport.py",
+        "transientcam_simulation/emulated/_open_usb/bus.py",
+    }
 
 
 def test_cameras_are_listed_without_being_claimed(bus: SimulatedBus) -> None:
