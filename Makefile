@@ -7,6 +7,8 @@ PORT ?= 8000
 CAMERA ?= sim:mirrors
 
 BIN := .venv/bin
+# Distributions of their own, which extras name.
+PACKAGES := $(foreach each,$(wildcard packages/*),--editable ./$(each))
 PAGE := server/transientcam_server/static/index.html
 DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 2>/dev/null)
 DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace
@@ -72,7 +74,8 @@ docs-site: .venv/test.stamp  ## Write the documentation as a site: open build/si
 EPOCH_S = $(shell git ls-files --error-unmatch Makefile >/dev/null 2>&1 && git log -1 --format=%ct || date -r pyproject.toml +%s)
 dist: .venv/test.stamp dashboard  ## Build the sdist and, from it, the wheel (dist/)
 	SOURCE_DATE_EPOCH=$${SOURCE_DATE_EPOCH:-$(EPOCH_S)} \
-		$(BIN)/python -m build --no-isolation --outdir dist
+		$(BIN)/python -m build --no-isolation --outdir dist && \
+	for each in packages/*; do $(BIN)/python -m build --no-isolation --wheel --outdir dist $$each; done
 
 clean:  ## Remove everything that was built or installed here
 	rm -rf .venv build dist client/dashboard/node_modules $(dir $(PAGE))
@@ -85,14 +88,14 @@ clean:  ## Remove everything that was built or installed here
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade pip
 
-.venv/serve.stamp: pyproject.toml | .venv/bin/python
-	$(BIN)/python -m pip install --quiet --editable '.[server,plot]'
+.venv/serve.stamp: pyproject.toml $(wildcard packages/*/pyproject.toml) | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --editable '.[server,plot,conformance,opt8241]' $(PACKAGES)
 	@touch $@
 
 # The client of the TOFcam660's vendor, which drives our emulation of it. What the tests use of it needs NumPy
 # alone; its own requirements (OpenCV, Bluetooth, serial ports) are for its other cameras.
-.venv/test.stamp: pyproject.toml | .venv/bin/python
-	$(BIN)/python -m pip install --quiet --editable '.[test]'
+.venv/test.stamp: pyproject.toml $(wildcard packages/*/pyproject.toml) | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --editable '.[test]' $(PACKAGES)
 	$(BIN)/python -m pip install --quiet --no-deps 'epc-tofcam-toolkit==0.13.0'
 	@touch $@ .venv/serve.stamp
 

@@ -13,7 +13,9 @@ from tests.conformance.broken_promises import API, BROKEN, BROKEN_WITH_TOKENS
 from tests.conformance.conftest import Breakable, breakable_daemon
 from tests.serving import serving
 from transientcam.cli import run as command
-from transientcam.conformance import (
+from transientcam.errors import ParameterError, PromiseBroken, ServerUnreachable
+from transientcam.wire import LEASE_HEADER
+from transientcam_conformance import (
     CHECKS,
     GROUPS,
     SLOW,
@@ -24,9 +26,7 @@ from transientcam.conformance import (
     chosen,
     run,
 )
-from transientcam.conformance._rate import Rate, measured_rate
-from transientcam.errors import ParameterError, PromiseBroken, ServerUnreachable
-from transientcam.wire import LEASE_HEADER
+from transientcam_conformance._rate import Rate, measured_rate
 from transientcam_server.api import Role, utc_now
 from transientcam_server.api._auth.tokens import TokenFile
 

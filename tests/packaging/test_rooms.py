@@ -8,8 +8,15 @@ import pytest
 
 ENTRY_POINTS = {"cli", "entries"}
 """Rooms of entry points, whose files pyproject.toml names."""
-PACKAGES = ("transientcam", "transientcam_driver", "transientcam_simulation")
-PACKAGES += ("transientcam_moments", "transientcam_server")
+PACKAGES = (
+    "transientcam",
+    "transientcam_conformance",
+    "transientcam_driver",
+    "transientcam_moments",
+    "transientcam_opt8241",
+    "transientcam_server",
+    "transientcam_simulation",
+)
 
 
 def _folder(package: str) -> Path:

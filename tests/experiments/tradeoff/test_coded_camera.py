@@ -8,8 +8,7 @@ import transientcam_moments as tm
 from transientcam_driver import Sequence, SubPhases, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.capture import capture
-from transientcam_moments.comparisons import Code, maximum_length_code
-from transientcam_moments.comparisons._coded import coded
+from transientcam_moments.comparisons import Code, coded, maximum_length_code
 from transientcam_simulation import scenes
 
 BASE_HZ = 11.5e6

@@ -9,8 +9,8 @@ import pytest
 
 import transientcam
 from tests.driver.cameras.kinect2.standing import READ_S, camera_of, emulated
-from tests.driver.cameras.opt8241 import standing as opt8241
 from tests.driver.mounts import PyusbMount
+from tests.opt8241 import standing as opt8241
 from tests.server.recording.made import record
 from tests.serving import serving
 from transientcam_driver import Camera, TriggeredCamera, open_camera
@@ -19,8 +19,7 @@ from transientcam_driver.cameras.tofcam660 import DeviceOptions, Region, Tofcam6
 from transientcam_driver.clock import RealClock, VirtualClock
 from transientcam_driver.contract import CLAUSES, Bench, Clause, ContractSkipped
 from transientcam_server.relay import Origin, RelayCamera
-from transientcam_simulation.emulated import build_tofcam660, find_scene, without_noise
-from transientcam_simulation.emulated._open_usb import Fault
+from transientcam_simulation.emulated import Fault, build_tofcam660, find_scene, without_noise
 
 SKIPPED = {
     "recording": {

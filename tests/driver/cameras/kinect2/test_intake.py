@@ -12,7 +12,7 @@ from transientcam_driver.cameras.kinect2._intake import ROOM_FRAMES, Arrival, In
 from transientcam_driver.cameras.kinect2._packets import SubImages
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.sequence import Sequence
-from transientcam_simulation.emulated._open_usb import Fault
+from transientcam_simulation.emulated import Fault
 
 PERIOD_TICKS = 266
 CAPABILITIES = capabilities_of(Identity("1", "2", b"", b""))

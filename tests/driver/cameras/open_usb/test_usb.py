@@ -19,9 +19,9 @@ from transientcam_driver.camera import FoundCamera
 from transientcam_driver.cameras.kinect2 import UDEV_RULES
 from transientcam_driver.cameras.open_usb import UDEV_RULE, list_cameras, open_transport
 from transientcam_driver.cameras.open_usb.protocol import Request
-from transientcam_driver.cameras.opt8241 import _usb_link as usb_link
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.errors import UDEV_RULES_FILE, TransferOverflow, TransferStalled
+from transientcam_opt8241 import _usb_link as usb_link
 from transientcam_simulation.emulated import build, find_scene
 from transientcam_simulation.emulated._open_usb.bus import SimulatedBus
 from transientcam_simulation.emulated._open_usb.usb_device import EmulatedDevice
@@ -201,7 +201,9 @@ def test_pyusb_is_imported_in_two_places_only() -> None:
     import transientcam_simulation
 
     packages = [
-        Path(each.__file__).parent for each in (transientcam_driver, transientcam_simulation)
+        Path(path)
+        for each in (transientcam_driver, transientcam_simulation)
+        for path in each.__path__
     ]
     importing = {
         str(path.relative_to(package.parent))
