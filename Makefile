@@ -14,17 +14,22 @@ DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 
 DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test check bench paper docs docs-site dist clean dashboard debian-packages \
+.PHONY: help serve test test-fast check bench paper docs docs-site dist clean dashboard debian-packages \
 	check-pyright check-mypy check-style check-dashboard
 
 help:  ## Say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 16
 
-serve: .venv/serve.stamp dashboard  ## Run the daemon and its dashboard (PORT=8000 CAMERA=sim:mirrors)
+serve: .venv/serve.stamp .venv/version.stamp dashboard  ## Run the daemon and its dashboard (PORT=8000 CAMERA=sim:mirrors)
 	$(BIN)/transientcam serve --host $(HOST) --port $(PORT) --camera '$(CAMERA)'
 
-test: check debian-packages dashboard  ## Run every check and every test
+test: check .venv/version.stamp debian-packages dashboard  ## Run every check and every test
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
+
+# The packages that are arithmetic, without a daemon, a browser, a compiler or a fuzzer.
+test-fast: .venv/test.stamp  ## Run the tests of mathematics, wire format and planning's arithmetic, in a minute
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m 'not daemon and not browser and not fuzz and not compiled' \
+		tests/moments tests/stability tests/client/wire tests/server/planning
 
 check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lint, types, import laws
 	@$(MAKE) --no-print-directory --jobs 2 check-pyright check-mypy check-style check-dashboard
@@ -98,6 +103,11 @@ clean:  ## Remove everything that was built or installed here
 	$(BIN)/python -m pip install --quiet --editable '.[test]' $(PACKAGES)
 	$(BIN)/python -m pip install --quiet --no-deps 'epc-tofcam-toolkit==0.13.0'
 	@touch $@ .venv/serve.stamp
+
+# What is installed here states the commit that it is of.
+.venv/version.stamp: $(wildcard .git/logs/HEAD) | .venv/serve.stamp
+	$(BIN)/python -m pip install --quiet --no-deps --editable .
+	@touch $@
 
 client/dashboard/node_modules/.package-lock.json: client/dashboard/package-lock.json
 	npm --prefix client/dashboard ci --no-audit --no-fund

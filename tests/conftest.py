@@ -84,8 +84,24 @@ _LONGEST_FIRST = (
 )
 
 
+_MARKED = {
+    "tests/browser": "browser",
+    "tests/server/fuzzing": "fuzz",
+    "tests/moments/kernels": "compiled",
+}
+_DAEMONS = {"breakable", "http", "served", "steady", "streaming", "serving", "url"}
+"""Fixtures that begin a daemon, and functions that a module of tests imports for it."""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files that take longest."""
+    """Mark tests by what they need; begin with the files that take longest."""
+    for item in items:
+        for folder, mark in _MARKED.items():
+            if item.path.is_relative_to(ROOT / folder):
+                item.add_marker(mark)
+        known = {*getattr(item, "fixturenames", ()), *vars(getattr(item, "module", object))}
+        if _DAEMONS & known:
+            item.add_marker("daemon")
     place = {ROOT / name: at for at, name in enumerate(_LONGEST_FIRST)}
     items.sort(key=lambda item: place.get(item.path, len(place)))
 

@@ -4,41 +4,6 @@
 Foxglove's, and `foxglove_bridge` serves them live.
 """
 
-from transientcam.robotics._foxglove_bridge import SHOWN, FoxgloveBridge
-from transientcam.robotics._foxglove_messages import Encoded
-from transientcam.robotics._messages import (
-    CAMERA_FRAME,
-    OPTICAL_FRAME,
-    Calibration,
-    Image,
-    Message,
-    Pinhole,
-    Points,
-    Transform,
-    messages_of,
-    viewable,
-)
-from transientcam.robotics._reports import Report
-from transientcam.robotics._rerun_bridge import BINS, LOGGED, RerunBridge
-from transientcam.robotics._rerun_messages import blueprint
+import lazy_loader
 
-__all__ = [
-    "BINS",
-    "CAMERA_FRAME",
-    "LOGGED",
-    "OPTICAL_FRAME",
-    "SHOWN",
-    "Calibration",
-    "Encoded",
-    "FoxgloveBridge",
-    "Image",
-    "Message",
-    "Pinhole",
-    "Points",
-    "Report",
-    "RerunBridge",
-    "Transform",
-    "blueprint",
-    "messages_of",
-    "viewable",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
