@@ -258,7 +258,7 @@ takes, {SEQUENCE.base_frequency_hz / 1e6:.0f} MHz, m = {SEQUENCE.harmonics}, zer
 
 Only what is judged `diffusor` is used without being forced. *residual*, *harmonics* and
 *magnitudes* are what all but 5 % of the blocks keep, besides what noise explains; see
-[calibration](calibration.md#was-it-a-diffusor) for the tests and their limits.
+[calibration](calibration.md#was-it-a-diffuser) for the tests and their limits.
 
 """
 
