@@ -35,7 +35,7 @@ def test_a_room_shows_three_to_eight_names_that_exist_and_says_what_it_is(room: 
 
 @pytest.mark.parametrize("room", [api, cli, daemon], ids=lambda room: room.__name__)
 def test_a_room_of_entry_points_imports_nothing_before_one_is_entered(room: ModuleType) -> None:
-    """Decision 0810: a verb loads what it runs, not what its neighbours do."""
+    """Decision 23: a verb loads what it runs, not what its neighbours do."""
     (statement,) = ast.parse(inspect.getsource(room)).body
     assert isinstance(statement, ast.Expr)
     assert len(room.__doc__ or "") > 80
