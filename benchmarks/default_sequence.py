@@ -78,7 +78,7 @@ def row(scene: str, sequence: Sequence) -> tuple[str, ...]:
 def deviation_m(range_m: _Array) -> float:
     """Return the typical difference of two captures, as that of a normal distribution.
 
-    See docs/decisions/0521: a few pixels that jump between returns do not decide it.
+    See decision 8: a few pixels that jump between returns do not decide it.
     """
     apart = np.abs(np.diff(range_m, axis=0))
     return float(np.nanmedian(apart) / (np.sqrt(2) * MEDIAN_OF_NORMAL))

@@ -7,7 +7,7 @@ plans whose bias is said to be known, and of the others (`KNOWN` and `UNKNOWN` o
     python -m benchmarks.accuracy.calibrating --write             # 32 scenes, to docs/plans.md
     python -m benchmarks.accuracy.calibrating --seed 2 --write    # others, as an independent check
 
-Both were chosen with the errors of docs/plans.md and of the seeds `SEEN` in sight (decision 1167).
+Both were chosen with the errors of docs/plans.md and of the seeds `SEEN` in sight (decision 14).
 Other seeds make scenes that took no part in that; they have a part of docs/plans.md of their own.
 """
 

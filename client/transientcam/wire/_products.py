@@ -57,7 +57,7 @@ PRODUCTS: Final[dict[str, Product]] = {
             "m",
             _IMAGE,
             "<f4",
-            "how far the range is off for good, as far as the frame shows it; NaN if m = 1",
+            "bias of the range, as far as the frame shows it; NaN if m = 1",
         ),
         Product(
             "range_error",

@@ -1,7 +1,7 @@
 """A process that compiles lanes into the cache, for a process that goes on working meanwhile.
 
 Compiling is Python in large part: on a thread it would hold the interpreter's lock for most of a
-minute, which all other threads need (decision 1055).
+minute, which all other threads need (decision 10).
 """
 
 import logging

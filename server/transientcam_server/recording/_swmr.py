@@ -1,7 +1,7 @@
 """Append-only HDF5 files that survive the death of their writer, and can be read meanwhile.
 
 HDF5 in its single-writer multiple-reader mode (SWMR) orders what it writes so that the file is
-consistent at any moment. What it requires, measured (docs/decisions/0601): every dataset and
+consistent at any moment. What it requires, measured (decision 31): every dataset and
 attribute exists before the mode is switched on, appended is along the first axis only, and the
 series whose length counts the rows is written last. The format is that of HDF5 1.10, never the
 newest one, which older readers refuse.

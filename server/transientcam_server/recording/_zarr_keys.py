@@ -2,7 +2,7 @@
 
 Chunks of the images are the bytes that HDF5 has stored, shuffled and deflated, which version 2
 names by the codecs ``shuffle`` and ``zlib``. Version 3 has no names for the two that all its
-readers share (decision 1015). Everything else is small, and made from what the reader has checked.
+readers share (decision 33). Everything else is small, and made from what the reader has checked.
 """
 
 import itertools

@@ -1,7 +1,7 @@
 """Noise and bias of a frame's range, pixel by pixel, as far as the frame itself shows them.
 
 Noise is that of the sensor, drawn and put through the estimator. Bias is known by disagreement
-(decision 0900): the frame's own estimator without its highest harmonic, the likelihood and
+(decision 8): the frame's own estimator without its highest harmonic, the likelihood and
 Pisarenko's resolve returns differently, and where nothing is left to resolve they agree. Noise
 makes them disagree, too, but in neighbouring pixels independently, so that the median over these
 is taken. It is a figure of the frame alone; a plan rests on a look at more frequencies.

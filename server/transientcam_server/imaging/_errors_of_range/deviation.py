@@ -1,4 +1,4 @@
-"""The deviation between few captures, which strays do not blow up (decisions 0521 and 1156)."""
+"""The deviation between few captures, which strays do not blow up (decision 8)."""
 
 import warnings
 from functools import lru_cache

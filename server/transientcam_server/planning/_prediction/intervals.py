@@ -22,7 +22,7 @@ COVERAGE: Final = 0.9
 """Of the intervals."""
 LIKELY: Final = 0.9
 """Share of the captures that are to meet a target. It is more than the 80 % that docs/plans.md
-holds plans to: those on scenes with an unknown bias fail whatever the margin (decision 1151)."""
+holds plans to: those on scenes with an unknown bias fail whatever the margin (decision 12)."""
 MODEL_SPREAD: Final = 0.08
 """Standard deviation of the logarithm of measured over predicted errors beyond what the sampling
 of pixels explains (docs/accuracy.md)."""
@@ -30,7 +30,7 @@ of pixels explains (docs/accuracy.md)."""
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """How far the interval of an error reaches (docs/plans.md, decision 1167).
+    """How far the interval of an error reaches (docs/plans.md, decision 14).
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ DOUBTFUL: Final = 2.0
 many times the predicted one."""
 DISAGREEING: Final = 0.25
 """Nor where the estimators of the look disagree about the direct range by more than this share of
-the predicted error (docs/plans.md, decision 1165)."""
+the predicted error (docs/plans.md, decision 14)."""
 RESAMPLED: Final = 100
 _LEAST_M: Final = 1e-9
 

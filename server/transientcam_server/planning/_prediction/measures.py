@@ -20,7 +20,7 @@ class PixelErrors:
     ----------
     std_m
         (P) standard deviation between captures: the typical difference of two captures, as the
-        deviation of the normal variable that has the same (decision 0521).
+        deviation of the normal variable that has the same (decision 8).
     bias_m
         (P) how far the median of the captures is off, without sign. The noise of that median is
         part of it: with 30 captures and no bias it is 0.15 of the deviation.

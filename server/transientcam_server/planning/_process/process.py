@@ -1,7 +1,7 @@
 """A process of its own for plans, which frames go before.
 
 What plans is Python in large part: on a thread of the service it would hold the interpreter's lock,
-which every frame needs many times, and memory that the service would keep (decision 1045).
+which every frame needs many times, and memory that the service would keep (decision 15).
 """
 
 import os

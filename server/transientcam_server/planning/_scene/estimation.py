@@ -28,7 +28,7 @@ def direct_range(
     as smooth as the moments allow, the other as few returns as they do. Light that neither resolves
     comes later than the direct return, so that both are too long and the shorter one is nearer;
     where they agree, nothing is left to resolve. Of eight such rules this one was closest to the
-    truth of simulated scenes (decision 0851).
+    truth of simulated scenes (decision 13).
     """
     each = [
         ranges_m(b, variance, name, base_frequency_hz, settings)

@@ -24,7 +24,7 @@ from transientcam_server.planning._search.refusal import too_small, unreachable
 from transientcam_server.planning._search.search import Search, Timed
 
 HARDLY_MORE: Final = 1.05
-"""Growth of an error that half the time is taken for, where bias rules (decision 1150)."""
+"""Growth of an error that half the time is taken for, where bias rules (decision 12)."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
