@@ -11,6 +11,7 @@ import { Panel } from "../../ui/Panel";
 import { AlongLine } from "./AlongLine";
 import { KEPT_S } from "./history";
 import { OverTime } from "./OverTime";
+import "./PlotsView.css";
 
 type Side = "time" | "line";
 const SIDES: readonly { readonly value: Side; readonly text: string; readonly hint: string }[] = [

@@ -26,6 +26,7 @@ import { knownLens, lensOf } from "./lens";
 import { plyOf } from "./ply";
 import type { PointScene } from "./Scene";
 import { SceneStage } from "./SceneStage";
+import "./PointsView.css";
 
 const COLOURINGS = ["range", "light", "validity", "flight"] as const;
 type Colouring = (typeof COLOURINGS)[number];

@@ -26,6 +26,7 @@ import { MomentsPlane } from "./MomentsPlane";
 import { type ResponsePlot, responsePlot } from "./plot";
 import { ReturnHistory } from "./returns";
 import { NO_STEMS, stemsOf } from "./stems";
+import "./ResponseView.css";
 
 /** Share of the height that the axis was made for which is left after a frame without such a peak. */
 const SHRINK = 0.96;
@@ -95,7 +96,7 @@ export function ResponseView() {
           <Plot key={side.value} aspect={side.value} logarithmic={logarithmic} shown={shown} returns={returns} pointed={pointed} />
         )}
         {place.value !== null && (
-          <aside class="response-side" aria-label="What was found at the pixel" tabIndex={0}>
+          <aside class="response-side fades" aria-label="What was found at the pixel" tabIndex={0}>
             <Found flags={flags} returns={returns} details={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
             {pixel.value !== null && <PixelFigures key={place.value} pixel={pixel.value} />}
             <FlagWords flags={flags} looked={store.details.document.value !== null} />

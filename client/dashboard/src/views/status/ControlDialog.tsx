@@ -6,6 +6,7 @@ import { SwitchedDialog } from "../../ui/Dialog";
 import { useNow } from "../../ui/hooks";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
+import "./ControlDialog.css";
 
 /** Longest name the service takes. */
 const LONGEST_NAME = 80;

@@ -15,6 +15,7 @@ import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { ToneChoice } from "../../ui/ToneChoice";
 import { BINS, paintStreak, Streak, whiteOf } from "./streak";
+import "./StreakView.css";
 
 /** One row of the picture over time of flight: columns across, time downwards. */
 export function StreakView() {

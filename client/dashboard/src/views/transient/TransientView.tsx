@@ -24,6 +24,7 @@ import { LookMenu } from "./LookMenu";
 import { Picture } from "./Picture";
 import { PICTURES, stripOf } from "./strip";
 import { Timeline, TimeReadout } from "./Timeline";
+import "./TransientView.css";
 
 const PLAY_TABS: readonly { readonly value: Play; readonly text: string; readonly hint: string }[] = [
   { value: "density", text: "In flight", hint: "The light that arrives at one time" },
