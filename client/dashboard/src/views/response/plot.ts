@@ -3,8 +3,8 @@ import uPlot from "uplot";
 import { rangeOfTime_m } from "../../physics/constants";
 import { grouped, significant, withUnit } from "../../scales/format";
 import { PIN_COLOURS, PIN_NAMES } from "../../store/measures";
-import type { Aspect } from "../../store/pixelSides";
 import { type Curves, ESTIMATES, type PinLines } from "./curves";
+import type { Aspect } from "./sides";
 import { drawStems, NO_STEMS, type Stems } from "./stems";
 
 /** The plot, and the line that marks the player's time in it. */
