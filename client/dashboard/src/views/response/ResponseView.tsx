@@ -154,7 +154,7 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
       aspect,
       logarithmic,
       top: () => top.current?.high ?? 1,
-      period_ns: () => store.period_s.peek() * 1e9,
+      ends_ns: () => [0, store.period_s.peek() * 1e9],
       seek: (time_ns) => {
         store.player.playing.value = false;
         store.player.seek((time_ns * 1e-9) / store.period_s.peek());
