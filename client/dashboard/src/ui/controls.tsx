@@ -1,4 +1,5 @@
 import type { ComponentChildren } from "preact";
+import "./controls.css";
 
 interface ChoiceProps<T extends string | number> {
   readonly label: string;

@@ -10,6 +10,7 @@ import type { Task } from "../../ui/useTask";
 import { clock } from "../replay/words";
 import { Blocks } from "./Blocks";
 import { ageOf, doubtOf, driftOf } from "./words";
+import "../recordings/RecordingRow.css";
 
 /** What is used where no calibration is. */
 export function NominalRow({ active, task }: { active: boolean; task: Task }) {

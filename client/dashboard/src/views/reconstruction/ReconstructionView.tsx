@@ -7,6 +7,7 @@ import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
 import { type Draft, draftOf, isNumber, labelOf, readingOf, spanOf, unitOf } from "./fields";
+import "./ReconstructionView.css";
 
 /** How images become moments and moments become returns; changed while frames come. */
 export function ReconstructionView() {
@@ -42,7 +43,7 @@ export function ReconstructionView() {
       }
     >
       <form
-        class="panel-body"
+        class="panel-body fades"
         onSubmit={(event) => {
           event.preventDefault();
           if ("settings" in reading) void apply(reading.settings, typed.peek()?.tag ?? current?.tag ?? null);

@@ -6,6 +6,7 @@ import { Dialog } from "../../ui/Dialog";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
 import { annotationsOf, type Line, linesOf } from "./lines";
+import "./Annotations.css";
 
 /** What is written about a recording: names and what they say, one a line. */
 export function Annotations({ recording, onClose }: { recording: RecordingDocument; onClose: () => void }) {

@@ -4,6 +4,7 @@ import { PAST_S } from "../../store/recordings";
 import { useStore } from "../../store/store";
 import type { Task } from "../../ui/useTask";
 import { limitsOf } from "./limits";
+import "./RecordForm.css";
 
 /** What to call a recording and when to end it; and a button that saves what just happened. */
 export function RecordForm({ task }: { task: Task }) {

@@ -8,6 +8,7 @@ import { download } from "../../ui/files";
 import { PlayIcon } from "../../ui/icons";
 import type { Task } from "../../ui/useTask";
 import { bytes, clock, duration } from "../replay/words";
+import "./RecordingRow.css";
 
 const STATES: Readonly<Record<RecordingState, string | null>> = {
   recording: "running",

@@ -5,6 +5,7 @@ import type { PixelDocument, Return } from "../../stream/protocol";
 import { FLAGS } from "../../ui/flags";
 import type { FlagHistory } from "./flagShares";
 import { linesOf, type ReturnHistory, type ReturnLine, sifted } from "./returns";
+import "./Listings.css";
 
 /** What the service found at the pixel: returns, the truth where it is known, and flags. `held` is the number of the frame that is held. */
 export function Found({ details, held, flags, returns }: { details: PixelDocument | null; held: number | null; flags: FlagHistory; returns: ReturnHistory }) {

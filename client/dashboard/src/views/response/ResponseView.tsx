@@ -9,8 +9,7 @@ import { autoLimits, type Span } from "../../scales/scale";
 import type { Frame } from "../../store/frames";
 import { PIN_COLOURS } from "../../store/measures";
 import type { Pixel } from "../../store/pixel";
-import { ASPECTS, type Aspect, SIDES } from "../../store/pixelSides";
-import { aBoolean, remembered } from "../../store/settings";
+import { aBoolean, type Setting } from "../../store/settings";
 import { type Store, useStore } from "../../store/store";
 import { Tabs, Toggle } from "../../ui/controls";
 import { save } from "../../ui/download";
@@ -25,7 +24,11 @@ import { FlagWords, Found } from "./Listings";
 import { MomentsPlane } from "./MomentsPlane";
 import { type ResponsePlot, responsePlot } from "./plot";
 import { ReturnHistory } from "./returns";
+import { ASPECTS, type Aspect, SIDE, SIDES } from "./sides";
 import { NO_STEMS, stemsOf } from "./stems";
+import "./ResponseView.css";
+
+const LOGARITHMIC: Setting<boolean> = { key: "response.logarithmic", initial: false, ...aBoolean() };
 
 /** Share of the height that the axis was made for which is left after a frame without such a peak. */
 const SHRINK = 0.96;
@@ -41,7 +44,7 @@ export function ResponseView() {
   const frame = store.frames.of(obstacle === undefined ? "coefficients" : "range");
   useEffect(() => store.details.follow(store.selected, frame), [store, frame]);
   useEffect(() => selectFirst(store, frame), [store, frame]);
-  const { side } = store;
+  const side = store.settings.of(SIDE);
   const shown = useMemo(
     () =>
       computed(() => {
@@ -55,7 +58,7 @@ export function ResponseView() {
     [frame, store],
   );
   const levinson = useComputed(() => (shown.value === null ? null : pixelOf(shown.value.coefficients, shown.value.index)));
-  const logarithmic = useMemo(() => remembered(store.shelf, "response.logarithmic", false, aBoolean), [store]);
+  const logarithmic = store.settings.of(LOGARITHMIC);
   const pointed = useSignal("");
   const pixel = useComputed(() => (absent.value.coefficients === undefined ? (shown.value?.pixel ?? null) : store.selected.value));
   const frameless = useComputed(() => frame.value === null);
@@ -95,7 +98,7 @@ export function ResponseView() {
           <Plot key={side.value} aspect={side.value} logarithmic={logarithmic} shown={shown} returns={returns} pointed={pointed} />
         )}
         {place.value !== null && (
-          <aside class="response-side" aria-label="What was found at the pixel" tabIndex={0}>
+          <aside class="response-side fades" aria-label="What was found at the pixel" tabIndex={0}>
             <Found flags={flags} returns={returns} details={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
             {pixel.value !== null && <PixelFigures key={place.value} pixel={pixel.value} />}
             <FlagWords flags={flags} looked={store.details.document.value !== null} />
@@ -151,7 +154,7 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
       aspect,
       logarithmic,
       top: () => top.current?.high ?? 1,
-      period_ns: () => store.period_s.peek() * 1e9,
+      ends_ns: () => [0, store.period_s.peek() * 1e9],
       seek: (time_ns) => {
         store.player.playing.value = false;
         store.player.seek((time_ns * 1e-9) / store.period_s.peek());

@@ -12,6 +12,7 @@ import { GoalForm } from "./GoalForm";
 import { sameSequence, standingOf } from "./place";
 import { Summary } from "./Summary";
 import { errorWords } from "./words";
+import "./AccuracySection.css";
 
 /** What accuracy costs in time on the scene before the camera: the front, and a slider along it that sets the sequence. */
 export function AccuracySection({ applied }: { applied: AppliedSequence }) {
@@ -38,7 +39,7 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
     }
   };
   return (
-    <div class="accuracy" data-predicted={tradeoff !== null}>
+    <div class="accuracy fades" data-predicted={tradeoff !== null}>
       {tradeoff !== null && <FrontPlot tradeoff={tradeoff} now={now} chosen={looked} onChoose={look} />}
       <div class="accuracy-control">
         <p class="accuracy-figures">{looked === null ? <NowFigures applied={applied} truth_m={truth_m} /> : <LookedFigures choice={looked} />}</p>
@@ -56,7 +57,7 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
           </div>
         )}
       </div>
-      <div class="accuracy-facts">
+      <div class="accuracy-facts fades">
         {looked === null ? <Summary applied={applied} /> : <ChoiceFacts choice={looked} />}
         <details class="accuracy-goal">
           <summary>Plan for a target</summary>

@@ -4,6 +4,7 @@ import { engineering, significant } from "../../scales/format";
 import type { Choice, Tradeoff } from "../../stream/protocol";
 import { useSize } from "../../ui/hooks";
 import { endsOf, marksOf, nearest, placeOf, type Standing, sameSequence } from "./place";
+import "./FrontPlot.css";
 
 const MARGIN = { left: 52, right: 14, top: 14, bottom: 50 };
 

@@ -2,6 +2,7 @@ import { useRef } from "preact/hooks";
 import { engineering, fixed } from "../../scales/format";
 import type { Choice } from "../../stream/protocol";
 import { sameSequence, stepOf } from "./place";
+import "./FrontSlider.css";
 
 interface FrontSliderProps {
   /** By rising time and falling error. */

@@ -9,6 +9,7 @@ import { DRAFT_FIELD, type Draft, documentOf, draftOf } from "./draft";
 import { Figures } from "./Figures";
 import { PRESETS } from "./presets";
 import { fieldOf, sequenceProblem, TAKE_ORDER_NAMES, ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
+import "./SequenceEditor.css";
 
 /** Pause after the last keystroke before the service is asked what the sequence would cost. */
 const TYPING_PAUSE_MS = 250;
@@ -86,7 +87,7 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
 
   return (
     <form
-      class="editor"
+      class="editor fades"
       onSubmit={(event) => {
         event.preventDefault();
         void apply();

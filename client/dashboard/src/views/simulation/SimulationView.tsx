@@ -7,6 +7,7 @@ import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
 import { OpenButton } from "../files/OpenButton";
 import { effectWords, FAULTS, ordered, possible, sizeShare, sizeWords } from "./words";
+import "./SimulationView.css";
 
 /** The scene of a simulated camera, which effects it calls for, and what can be made to go wrong. */
 export function SimulationView() {
@@ -29,7 +30,7 @@ export function SimulationView() {
         )
       }
     >
-      <div class="panel-body">
+      <div class="panel-body fades">
         {simulation.trouble.value !== null && <p class="quiet">{simulation.trouble.value}</p>}
         <Obstacle />
         {world !== null && (
