@@ -12,7 +12,7 @@ from transientcam_driver import Capabilities, Sequence, Truth
 from transientcam_server.planning.choice import Choice
 from transientcam_server.planning.families import Family, families, require_plannable
 from transientcam_server.planning.goal import Goal
-from transientcam_server.planning.look import STEPS, LookedThrough, look_at
+from transientcam_server.planning.look import STEPS, FrameSource, look_at
 from transientcam_server.planning.plan import Plan, in_a_sentence, plan
 from transientcam_server.planning.prediction import Predictor
 from transientcam_server.planning.progress import Progress
@@ -51,7 +51,7 @@ class Planner:
 
     def look(
         self,
-        camera: LookedThrough,
+        camera: FrameSource,
         base: Sequence,
         *,
         ambient_dn_per_s: float | None = None,
