@@ -7,22 +7,29 @@ PORT ?= 8000
 CAMERA ?= sim:mirrors
 
 BIN := .venv/bin
+# Distributions of their own, which extras name.
+PACKAGES := $(foreach each,$(wildcard packages/*),--editable ./$(each))
 PAGE := server/transientcam_server/static/index.html
 DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 2>/dev/null)
 DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test check bench paper docs docs-site dist clean dashboard debian-packages \
+.PHONY: help serve test test-fast check bench paper docs docs-site dist clean dashboard debian-packages \
 	check-pyright check-mypy check-style check-dashboard check-newest
 
 help:  ## Say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 16
 
-serve: .venv/serve.stamp dashboard  ## Run the daemon and its dashboard (PORT=8000 CAMERA=sim:mirrors)
+serve: .venv/serve.stamp .venv/version.stamp dashboard  ## Run the daemon and its dashboard (PORT=8000 CAMERA=sim:mirrors)
 	$(BIN)/transientcam serve --host $(HOST) --port $(PORT) --camera '$(CAMERA)'
 
-test: check debian-packages dashboard  ## Run every check and every test
+test: check .venv/version.stamp debian-packages dashboard  ## Run every check and every test
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
+
+# The packages that are arithmetic, without a daemon, a browser, a compiler or a fuzzer.
+test-fast: .venv/test.stamp  ## Run the tests of mathematics, wire format and planning's arithmetic, in a minute
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m 'not daemon and not browser and not fuzz and not compiled' \
+		tests/moments tests/stability tests/client/wire tests/server/planning
 
 check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lint, types, import laws
 	@$(MAKE) --no-print-directory --jobs 2 check-pyright check-mypy check-style check-dashboard
@@ -72,7 +79,8 @@ docs-site: .venv/test.stamp  ## Write the documentation as a site: open build/si
 EPOCH_S = $(shell git ls-files --error-unmatch Makefile >/dev/null 2>&1 && git log -1 --format=%ct || date -r pyproject.toml +%s)
 dist: .venv/test.stamp dashboard  ## Build the sdist and, from it, the wheel (dist/)
 	SOURCE_DATE_EPOCH=$${SOURCE_DATE_EPOCH:-$(EPOCH_S)} \
-		$(BIN)/python -m build --no-isolation --outdir dist
+		$(BIN)/python -m build --no-isolation --outdir dist && \
+	for each in packages/*; do $(BIN)/python -m build --no-isolation --wheel --outdir dist $$each; done
 
 clean:  ## Remove everything that was built or installed here
 	rm -rf .venv build dist client/dashboard/node_modules $(dir $(PAGE))
@@ -85,16 +93,21 @@ clean:  ## Remove everything that was built or installed here
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade pip
 
-.venv/serve.stamp: pyproject.toml | .venv/bin/python
-	$(BIN)/python -m pip install --quiet --editable '.[server,plot]'
+.venv/serve.stamp: pyproject.toml $(wildcard packages/*/pyproject.toml) | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --editable '.[server,plot,conformance,opt8241]' $(PACKAGES)
 	@touch $@
 
 # The client of the TOFcam660's vendor, which drives our emulation of it. What the tests use of it needs NumPy
 # alone; its own requirements (OpenCV, Bluetooth, serial ports) are for its other cameras.
-.venv/test.stamp: pyproject.toml | .venv/bin/python
-	$(BIN)/python -m pip install --quiet --editable '.[test]'
+.venv/test.stamp: pyproject.toml $(wildcard packages/*/pyproject.toml) | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --editable '.[test]' $(PACKAGES)
 	$(BIN)/python -m pip install --quiet --no-deps 'epc-tofcam-toolkit==0.13.0'
 	@touch $@ .venv/serve.stamp
+
+# What is installed here states the commit that it is of.
+.venv/version.stamp: $(wildcard .git/logs/HEAD) | .venv/serve.stamp
+	$(BIN)/python -m pip install --quiet --no-deps --editable .
+	@touch $@
 
 client/dashboard/node_modules/.package-lock.json: client/dashboard/package-lock.json
 	npm --prefix client/dashboard ci --no-audit --no-fund
@@ -105,15 +118,15 @@ client/dashboard/node_modules/.package-lock.json: client/dashboard/package-lock.
 #   (transientcam_compiled/_cache.py); extending, cgutils, castgraph and typing.templates
 #   (transientcam_moments/_kernels/simd.py, portable.py)
 # - uvicorn: HttpToolsProtocol, WebSocketsSansIOProtocol (conn, queue, close_sent, read_paused), FlowControl
-#   (transientcam_server/daemon/connections.py, streams.py); Server's signals and the clock of its loop (server.py)
+#   (transientcam_server/daemon); Server's signals and the clock of its loop
 # Where this passes with a newer one, the bound may be raised to it.
 check-newest:  ## Test what uses internals of numba and uvicorn with the newest of both
 	$(PYTHON) -m venv build/newest
 	build/newest/bin/python -m pip install --quiet --upgrade --editable '.[test]'
 	build/newest/bin/python -m pip install --quiet --upgrade numba 'uvicorn[standard]'
 	build/newest/bin/python -m pip list | grep -E '^(numba|uvicorn) '
-	build/newest/bin/python -m pytest --numprocesses auto --dist loadfile tests/compiled tests/moments/test_kernels*.py \
-		tests/driver/simulation/light/test_lanes.py tests/server/daemon tests/server/api/stream
+	build/newest/bin/python -m pytest --numprocesses auto --dist loadfile tests/compiled tests/moments/kernels \
+		tests/simulation/light/test_lanes.py tests/server/daemon tests/server/api/stream
 
 # Side by side, the slowest first.
 check-pyright:

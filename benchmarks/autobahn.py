@@ -27,9 +27,9 @@ from typing import Any
 import uvicorn
 
 from benchmarks.machine import machine
-from transientcam_server.daemon.acceptor import Acceptor
-from transientcam_server.daemon.connections import BoundedConnection
-from transientcam_server.daemon.streams import BoundedStream
+from transientcam_server.daemon._acceptor import Acceptor
+from transientcam_server.daemon._connections import BoundedConnection
+from transientcam_server.daemon._streams import BoundedStream
 from transientcam_server.settings import LimitSettings, StreamSettings
 
 PAGE = Path(__file__).parents[1] / "docs" / "autobahn.md"

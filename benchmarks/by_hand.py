@@ -23,7 +23,7 @@ from benchmarks.daemon import daemon
 from benchmarks.machine import machine
 from benchmarks.tables import Table, write_section
 from transientcam import Camera
-from transientcam_server.offline.opening import open_recording
+from transientcam_server.offline._opening import open_recording
 from transientcam_server.settings import ReconstructionSettings
 
 PAGE: Final = Path(__file__).parents[1] / "docs" / "recordings.md"

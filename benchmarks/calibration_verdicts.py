@@ -18,13 +18,12 @@ from rich.console import Console
 import transientcam_moments as tm
 from benchmarks.tables import Table
 from transientcam_driver import CalibrationCapture, Sequence
-from transientcam_driver.simulation import find_scene, list_scenes, measured_scene
-from transientcam_driver.simulation.build import world_of
-from transientcam_driver.simulation.imperfections import IDEAL, PROTOTYPE, Pattern
-from transientcam_driver.simulation.scene import Scene
-from transientcam_server.imaging.calibration import Calibration, evaluate
-from transientcam_server.imaging.diffusor import judge
-from transientcam_server.imaging.verdict import Verdict
+from transientcam_server.imaging import Calibration, Verdict, evaluate, judge
+from transientcam_simulation import find_scene, list_scenes, measured_scene
+from transientcam_simulation.base import IDEAL, Pattern
+from transientcam_simulation.base._imperfections import PROTOTYPE
+from transientcam_simulation.emulated import world_of
+from transientcam_simulation.scene import Scene
 
 PAGE = Path(__file__).parents[1] / "docs" / "calibration-verdicts.md"
 COMMAND: Final = "python -m benchmarks.calibration_verdicts --write"
@@ -259,7 +258,7 @@ takes, {SEQUENCE.base_frequency_hz / 1e6:.0f} MHz, m = {SEQUENCE.harmonics}, zer
 
 Only what is judged `diffusor` is used without being forced. *residual*, *harmonics* and
 *magnitudes* are what all but 5 % of the blocks keep, besides what noise explains; see
-[calibration](calibration.md#was-it-a-diffusor) for the tests and their limits.
+[calibration](calibration.md#was-it-a-diffuser) for the tests and their limits.
 
 """
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from benchmarks.tables import Table
-from transientcam_moments.four_bucket import demodulate
-from transientcam_moments.phase_steps import FOUR_PHASES_RAD
+from transientcam_moments.images import FOUR_PHASES_RAD
+from transientcam_moments.images._four_bucket import demodulate
 
 SEPARATIONS_M: Final = (1.2, 2.4, 5.0)
 FIRST_M: Final = 2.0

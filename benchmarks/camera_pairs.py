@@ -12,8 +12,8 @@ from benchmarks.data import numpy_alone
 from benchmarks.machine import machine
 from benchmarks.tables import Table
 from benchmarks.timing import duration, measure
-from transientcam_moments.likelihood.estimate import dense, prepared
-from transientcam_moments.likelihood.planar import SharpFit
+from transientcam_moments.likelihood._estimate import dense, prepared
+from transientcam_moments.likelihood._planar import SharpFit
 
 MULTIPLES: Final = (2, 10, 15)
 BASE_HZ: Final = 8e6

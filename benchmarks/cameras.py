@@ -19,8 +19,8 @@ from benchmarks import camera_estimates, camera_pairs
 from benchmarks.camera_estimates import FIRST_M, NOISE, RATIO
 from benchmarks.tables import Table
 from transientcam_driver import Sequence, SubPhases, open_camera
-from transientcam_driver.tofcam660.image import FULL_SCALE_DN
-from transientcam_server.imaging.recipe import Recipe
+from transientcam_driver.cameras.tofcam660._image import FULL_SCALE_DN
+from transientcam_server.imaging import Recipe
 from transientcam_server.settings import ReconstructionSettings
 
 PAGE: Final = Path(__file__).parents[1] / "docs" / "cameras.md"

@@ -23,9 +23,8 @@ from benchmarks.machine import machine
 from benchmarks.tables import Table, verdict, write_section
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.offline import BatchOptions
-from transientcam_server.offline.cluster import reconstruct_on
-from transientcam_server.offline.job import BLOCK_FRAMES
+from transientcam_server.offline import BatchOptions, reconstruct_on
+from transientcam_server.offline._job import BLOCK_FRAMES
 from transientcam_server.recording import Header, RecordingWriter
 from transientcam_server.settings import ReconstructionSettings
 

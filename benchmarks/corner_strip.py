@@ -14,7 +14,7 @@ from benchmarks.likelihood.errors import ESTIMATORS, errors_of, ranges, turn_m
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench
-from transientcam_server.imaging.lens import Intrinsics
+from transientcam_server.imaging import Intrinsics
 
 FIGURE: Final = Path(__file__).parents[1] / "docs" / "figures" / "corner-points.png"
 SEQUENCE: Final = Sequence(base_frequency_hz=23e6, harmonics=4, takes=1)

@@ -255,7 +255,7 @@ def _head(command: str) -> list[str]:
         "Light in flight plays in Chromium without a graphics processor, first with the camera",
         "stopped, then while frames of 12, 16 or 32 images stream; daemon, simulation and page",
         "share the machine. Where pictures become fewer than 30 a second, the page asks for fewer",
-        f"frames (decision 1069): streaming is measured {_SETTLING_MS / 1000:.0f} s after it",
+        f"frames (decision 38): streaming is measured {_SETTLING_MS / 1000:.0f} s after it",
         "began, with what was asked for then, in the words of the page's header. Frames drawn are",
         "of those that the camera took. Then, as long after, the timeline is held and moved by",
         "hand before each refresh of the screen, while all this goes on. Cores are those of all",

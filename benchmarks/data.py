@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_moments._dispatch import KERNELS, PRECISIONS, lookup
+from transientcam_moments._dispatch import KERNELS, find, lookup
 from transientcam_moments._kernels.one_pass import Constants, OnePass
-from transientcam_moments.smoothing import gaussian_taps
+from transientcam_moments.images import gaussian_taps
 
 Array = NDArray[Any]
 CORES = len(os.sched_getaffinity(0))
@@ -84,8 +84,7 @@ def numpy_alone() -> Iterator[None]:
 
 def lane(name: str, planes: Array) -> Any:
     """Return a compiled lane, which has to be there."""
-    precision = PRECISIONS[planes.dtype.char]
-    found = lookup(name, len(planes) - 1, planes[0].size, precision)
+    found = find(name, planes)
     if found is None:
         raise RuntimeError(f"{name} isn't compiled: {tm.kernels.state()}")
     return found

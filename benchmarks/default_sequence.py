@@ -16,10 +16,9 @@ import transientcam_moments as tm
 from benchmarks.tables import Table
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.camera.source import sensor_of
-from transientcam_server.imaging.deviation import MEDIAN_OF_NORMAL
-from transientcam_server.imaging.noise import contradictions
-from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.camera import sensor_of
+from transientcam_server.imaging import MEDIAN_OF_NORMAL, Recipe
+from transientcam_server.imaging._errors_of_range.noise import contradictions
 from transientcam_server.settings import ReconstructionSettings, SensorSettings, SequenceSettings
 
 PAGE = Path(__file__).parents[1] / "docs" / "default-sequence.md"
@@ -79,7 +78,7 @@ def row(scene: str, sequence: Sequence) -> tuple[str, ...]:
 def deviation_m(range_m: _Array) -> float:
     """Return the typical difference of two captures, as that of a normal distribution.
 
-    See docs/decisions/0521: a few pixels that jump between returns do not decide it.
+    See decision 8: a few pixels that jump between returns do not decide it.
     """
     apart = np.abs(np.diff(range_m, axis=0))
     return float(np.nanmedian(apart) / (np.sqrt(2) * MEDIAN_OF_NORMAL))

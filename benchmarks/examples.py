@@ -17,8 +17,8 @@ import httpx
 
 from benchmarks.daemon import daemon
 from transientcam.cli import run
-from transientcam_server.api.documents.document import EXAMPLES_FILE
-from transientcam_server.api.documents.sequence import SequenceDocument
+from transientcam_server.api._documents.document import EXAMPLES_FILE
+from transientcam_server.api._documents.sequence import SequenceDocument
 
 CAMERA: Final = "sim:mirrors?noise=off"
 _KEPT: Final = 2

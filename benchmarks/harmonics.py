@@ -24,17 +24,14 @@ import transientcam_moments as tm
 from benchmarks.data import PAPER, SETTINGS, VGA, images
 from benchmarks.machine import machine
 from benchmarks.tables import Table
-from transientcam_driver import Camera, SubPhases, Truth, capture_calibration
-from transientcam_driver import Sequence as Capture
+from transientcam_driver import Camera, Sequence as Capture, SubPhases, Truth, capture_calibration
 from transientcam_driver.calibration import DEFAULT_TAKES
+from transientcam_driver.cameras.open_usb import UsbCamera, open_transport
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.simulation.build import DEFAULT_HEIGHT, DEFAULT_WIDTH, build, find_scene
-from transientcam_driver.simulation.device.bus import SimulatedBus
-from transientcam_driver.simulation.imperfections import DeviceProfile, Pattern, Waveform
-from transientcam_driver.usb import open_transport
-from transientcam_driver.usb_camera import UsbCamera
-from transientcam_server.imaging.calibration import Calibration, evaluate
-from transientcam_server.imaging.waveform import SweepEvaluation
+from transientcam_server.imaging import Calibration, SweepEvaluation, evaluate
+from transientcam_simulation.base import DeviceProfile, Pattern, Waveform
+from transientcam_simulation.emulated import DEFAULT_HEIGHT, DEFAULT_WIDTH, build, find_scene
+from transientcam_simulation.emulated._open_usb.bus import SimulatedBus
 
 PAGE: Final = Path(__file__).parents[1] / "docs" / "harmonics.md"
 _BEGIN: Final = "<!-- measured -->"

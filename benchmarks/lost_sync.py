@@ -19,8 +19,7 @@ from rich.console import Console
 import transientcam_moments as tm
 from benchmarks.machine import machine
 from benchmarks.tables import Table
-from transientcam_driver import Sequence as Capture
-from transientcam_driver import open_camera
+from transientcam_driver import Sequence as Capture, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.paper.bench import DEVICE, WARM_UP_S, Bench
 

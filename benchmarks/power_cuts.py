@@ -17,7 +17,7 @@ from benchmarks.machine import machine
 from tests.server.fuzzing.recordings import in_memory
 from tests.server.recording.made import frame
 from tests.server.recording.power import DISKS, Event, cut, moments, traced
-from transientcam_server.errors.exceptions import NotARecording
+from transientcam_server.errors import NotARecording
 from transientcam_server.recording import Recording, recover
 
 PAGE = Path(__file__).parents[1] / "docs" / "power-cuts.md"

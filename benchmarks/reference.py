@@ -14,7 +14,7 @@ from typing import Any
 import typer
 
 from transientcam.cli import app_for
-from transientcam_server.daemon.configuration import ENVIRONMENT_PREFIX
+from transientcam_server.daemon._configuration import ENVIRONMENT_PREFIX
 from transientcam_server.settings import Settings
 
 DOCS = Path(__file__).parents[1] / "docs"

@@ -20,7 +20,7 @@ import transientcam
 from benchmarks.daemon import Process, daemon
 from benchmarks.machine import machine
 from transientcam import wire
-from transientcam_server.relay.frames import MOMENTS, RAW, SUBSCRIBED
+from transientcam_server.relay._frames import MOMENTS, RAW, SUBSCRIBED
 
 PAGE: Final = Path(__file__).parents[1] / "docs" / "relay.md"
 BEGIN: Final = "<!-- measured: python -m benchmarks.relay_moments --write -->"

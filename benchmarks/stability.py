@@ -19,9 +19,9 @@ from benchmarks.tables import Table
 from tests.moments import oracles
 from tests.stability import exact
 from tests.stability.cases import ORDERS, PRECISIONS, Signal, dense_signals, sparse_signals
-from transientcam_moments._arrays import by_blocks
-from transientcam_moments.pisarenko import _pisarenko
-from transientcam_moments.polishing import residual, size
+from transientcam_moments.arrays import by_blocks
+from transientcam_moments.moment_problem import first_returns
+from transientcam_moments.moment_problem._polishing import residual, size
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
@@ -234,10 +234,10 @@ def helped() -> Table:
         )
         for name, moments in (("noisy", tm.bias(noisy).moments), ("exactly m returns", sparse)):
             b: Complex = moments.astype(np.complex64)
-            plain = by_blocks(_pisarenko, b)
+            plain = by_blocks(first_returns, b)
             tolerance = 16 * (m + 1) * np.finfo(np.float32).eps
             redone = size(residual(b, *plain[:3]), b) > tolerance
-            alone = median_ms(partial(by_blocks, _pisarenko, b))
+            alone = median_ms(partial(by_blocks, first_returns, b))
             whole = median_ms(partial(tm.pisarenko, b))
             table.rows.append(
                 (name, f"{m}", f"{100 * redone.mean():.2f} %", f"{alone:.1f} ms", f"{whole:.1f} ms")

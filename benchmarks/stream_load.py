@@ -28,10 +28,9 @@ from benchmarks.machine import machine
 from benchmarks.viewers import Viewer, cut, stuck, watch
 from transientcam import wire
 from transientcam_driver import open_camera
-from transientcam_server.api.app import build_app
-from transientcam_server.daemon.server import Server, address, listen
-from transientcam_server.imaging.frame import Frame
-from transientcam_server.imaging.history import History
+from transientcam_server.api import build_app
+from transientcam_server.daemon._server import Server, address, listen
+from transientcam_server.imaging import Frame, History
 from transientcam_server.settings import Settings
 
 PAGE = Path(__file__).parents[1] / "docs" / "stream-load.md"

@@ -13,8 +13,7 @@ from typing import Any
 
 import msgpack  # type: ignore[import-untyped]  # it ships no types
 from websockets.client import ClientProtocol
-from websockets.frames import Frame as WebSocketFrame
-from websockets.frames import Opcode
+from websockets.frames import Frame as WebSocketFrame, Opcode
 from websockets.typing import Subprotocol
 from websockets.uri import parse_uri
 

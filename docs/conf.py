@@ -4,6 +4,7 @@ Nothing on a page is fetched from another host: the theme uses the reader's own 
 MathML, and search runs in the browser over an index that lies beside the pages.
 """
 
+import importlib.metadata
 import re
 import tomllib
 from pathlib import Path
@@ -19,7 +20,7 @@ _PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_tex
 ]
 
 project = _PROJECT["name"]
-release = version = _PROJECT["version"]
+release = version = importlib.metadata.version("transientcam")
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 
 html_theme = "furo"

@@ -71,21 +71,37 @@ _LONGEST_FIRST = (
     "tests/experiments/paper/test_figures.py",
     "tests/server/api/routes/test_recordings.py",
     # before all others that need what it compiles: two workers would compile it at the same time
-    "tests/moments/test_kernels_lanes.py",
+    "tests/moments/kernels/test_kernels_lanes.py",
     "tests/conformance/test_conformance.py",
     "tests/stability/test_sweep.py",
-    "tests/moments/test_noise.py",
+    "tests/moments/noise/test_noise.py",
     "tests/server/recording/test_recovery.py",
     "tests/server/daemon/test_server.py",
     "tests/browser/test_views.py",
     "tests/browser/test_accessibility.py",
     "tests/server/fuzzing/test_recordings.py",
-    "tests/moments/test_kernels_reconstruct.py",
+    "tests/moments/kernels/test_kernels_reconstruct.py",
 )
 
 
+_MARKED = {
+    "tests/browser": "browser",
+    "tests/server/fuzzing": "fuzz",
+    "tests/moments/kernels": "compiled",
+}
+_DAEMONS = {"breakable", "http", "served", "steady", "streaming", "serving", "url"}
+"""Fixtures that begin a daemon, and functions that a module of tests imports for it."""
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files that take longest."""
+    """Mark tests by what they need; begin with the files that take longest."""
+    for item in items:
+        for folder, mark in _MARKED.items():
+            if item.path.is_relative_to(ROOT / folder):
+                item.add_marker(mark)
+        known = {*getattr(item, "fixturenames", ()), *vars(getattr(item, "module", object))}
+        if _DAEMONS & known:
+            item.add_marker("daemon")
     place = {ROOT / name: at for at, name in enumerate(_LONGEST_FIRST)}
     items.sort(key=lambda item: place.get(item.path, len(place)))
 

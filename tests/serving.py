@@ -14,9 +14,9 @@ from fastapi import FastAPI
 
 from transientcam_driver import Camera, open_camera
 from transientcam_driver.clock import Clock
-from transientcam_server.api.app import build_app
-from transientcam_server.camera import acquisition
-from transientcam_server.daemon.server import Server, address, listen
+from transientcam_server.api import build_app
+from transientcam_server.camera import _acquisition as acquisition
+from transientcam_server.daemon._server import Server, address, listen
 from transientcam_server.service import Service
 from transientcam_server.settings import Settings
 

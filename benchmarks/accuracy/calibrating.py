@@ -2,12 +2,12 @@
 
 Plans on random scenes (`worlds`) are captured, and their errors are held against the intervals: of
 plans whose bias is said to be known, and of the others (`KNOWN` and `UNKNOWN` of
-``transientcam_server.planning.intervals``). ::
+``transientcam_server.planning._prediction.intervals``). ::
 
     python -m benchmarks.accuracy.calibrating --write             # 32 scenes, to docs/plans.md
     python -m benchmarks.accuracy.calibrating --seed 2 --write    # others, as an independent check
 
-Both were chosen with the errors of docs/plans.md and of the seeds `SEEN` in sight (decision 1167).
+Both were chosen with the errors of docs/plans.md and of the seeds `SEEN` in sight (decision 14).
 Other seeds make scenes that took no part in that; they have a part of docs/plans.md of their own.
 """
 
@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.accuracy import evidence, worlds
 from benchmarks.accuracy.kept import Kept
 from benchmarks.accuracy.promises import GOALS, all_kept
-from transientcam_server.planning.intervals import KNOWN, UNKNOWN
+from transientcam_server.planning._prediction.intervals import KNOWN, UNKNOWN
 
 SEEN = 1, 7
 """Seeds of the scenes that intervals were made by."""

@@ -2,8 +2,8 @@
 
 import transientcam_moments as tm
 from transientcam_driver import Camera, Sequence, list_scenes
-from transientcam_server.camera.source import sensor_of
-from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.camera import sensor_of
+from transientcam_server.imaging import Recipe
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
 SEED = 1

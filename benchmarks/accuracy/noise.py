@@ -14,7 +14,7 @@ from benchmarks.accuracy.capturing import SEED, captured, short
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.measuring import spec_of
-from transientcam_server.imaging.noise import moment_noise
+from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.settings import ReconstructionSettings
 
 

@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from transientcam_experiments.tradeoff.picture import errors_m, saved
-from transientcam_server.planning.pareto import flat_from
+from transientcam_server.planning import flat_from
 
 TARGET_M: Final = 5e-3
 PICTURE: Final = "accuracy-price.png"

@@ -5,8 +5,7 @@ import numpy as np
 from benchmarks.accuracy.capturing import short
 from benchmarks.accuracy.noise import FRAMES, Compared
 from benchmarks.accuracy.opening import Documents, opening
-from benchmarks.accuracy.stated import FRAMES as OF_FRAMES
-from benchmarks.accuracy.stated import Stated
+from benchmarks.accuracy.stated import FRAMES as OF_FRAMES, Stated
 from benchmarks.machine import machine
 from transientcam_driver import Sequence
 from transientcam_experiments import tradeoff

@@ -29,14 +29,13 @@ import transientcam_moments as tm
 from benchmarks.accuracy.kept import Kept, Refused, expectations, page, table
 from transientcam_driver import Camera, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.camera.source import sensor_of
-from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.noise import moment_noise
-from transientcam_server.imaging.ranging import ranges_m
-from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.camera import sensor_of
+from transientcam_server.errors import Problem
+from transientcam_server.imaging import Recipe, ranges_m
+from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.planning import Goal, Planner, SceneStatistics
-from transientcam_server.planning.choice import Choice
-from transientcam_server.planning.measures import pixel_errors
+from transientcam_server.planning._prediction.measures import pixel_errors
+from transientcam_server.planning._search.choice import Choice
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
 ROOT = Path(__file__).parents[2]

@@ -35,12 +35,10 @@ from benchmarks.accuracy.promises import (
     scenes,
 )
 from transientcam_driver import Sequence
-from transientcam_server.errors.exceptions import Problem
-from transientcam_server.planning import Goal, Planner, SceneStatistics
-from transientcam_server.planning.choice import in_words
-from transientcam_server.planning.estimation import ESTIMATORS
-from transientcam_server.planning.families import Family
-from transientcam_server.planning.scene import AMBIGUOUS_SHARE
+from transientcam_server.errors import Problem
+from transientcam_server.planning import ESTIMATORS, Goal, Planner, SceneStatistics, in_words
+from transientcam_server.planning._scene.scene import AMBIGUOUS_SHARE
+from transientcam_server.planning._search.families import Family
 
 SCENES = ("wall", "mirrors", "translucent", "corner")
 TARGETS = ("20 mm", "5 mm", "2 mm")

@@ -9,9 +9,9 @@ from benchmarks.accuracy.noise import NOISE
 from transientcam_driver import open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.measuring import spec_of
-from transientcam_server.imaging.accuracy import range_accuracy
-from transientcam_server.imaging.deviation import typical_deviation
-from transientcam_server.imaging.noise import range_noise
+from transientcam_server.imaging import typical_deviation
+from transientcam_server.imaging._errors_of_range.accuracy import range_accuracy
+from transientcam_server.imaging._errors_of_range.noise import range_noise
 
 SCENES = ("wall", "corner", "mirrors")
 FRAMES = 40

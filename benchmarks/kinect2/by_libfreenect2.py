@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.kinect2.seen import EVERY, SCENES, STORED, spec
-from tests.driver.kinect2.usb3 import Usb3Mount
-from tests.driver.usbfs.processes import PRELOAD, missing_libraries
+from tests.driver.cameras.kinect2.usb3 import Usb3Mount
+from tests.driver.cameras.open_usb.usbfs.processes import PRELOAD, missing_libraries
+from transientcam_driver.camera import CameraName
+from transientcam_driver.cameras.kinect2 import HEIGHT, WIDTH
 from transientcam_driver.clock import RealClock
-from transientcam_driver.entries.emulated import simulated_scene
-from transientcam_driver.kinect2.layout import HEIGHT, WIDTH
-from transientcam_driver.plugin import CameraName
-from transientcam_driver.simulation.kinect2 import build_kinect2
+from transientcam_simulation.emulated import build_kinect2
+from transientcam_simulation.entries.emulated import simulated_scene
 
 _PROGRAM: Final = Path(__file__).with_name("read_frames.cpp")
 _FRAMES: Final = 2

@@ -11,13 +11,13 @@ from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import TOO_LONG
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array
 from benchmarks.tables import Table
+from transientcam_driver.camera import CameraName
+from transientcam_driver.cameras.kinect2 import SAMPLING
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.entries.kinect2 import PLUGIN
-from transientcam_driver.kinect2.layout import SAMPLING
-from transientcam_driver.plugin import CameraName
-from transientcam_server.camera.source import sensor_of
-from transientcam_server.imaging.lens import Intrinsics
+from transientcam_server.camera import sensor_of
+from transientcam_server.imaging import Intrinsics
 from transientcam_server.settings import SensorSettings
+from transientcam_simulation.entries.kinect2 import PLUGIN
 
 SPEC: Final = "kinect2:emulated?scene=corner&seed=1"
 STEP: Final = 4

@@ -9,10 +9,7 @@ from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Scene, folder, load, noise
 from benchmarks.tables import Table, verdict
 from benchmarks.timing import duration, measure
-from transientcam_driver.kinect2 import encoder, measurement
-from transientcam_driver.kinect2.layout import SUB_IMAGES
-from transientcam_driver.kinect2.packets import Assembler
-from transientcam_driver.kinect2.parameters import Rows
+from transientcam_driver.cameras.kinect2 import SUB_IMAGES, Assembler, Rows, encoder, measurement
 
 SCENES: Final = ("ramp", "noisy", "two_returns")
 NOISY_STD: Final = 4.0

@@ -9,10 +9,17 @@ from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import NOISY_STD, ROUNDING, TOO_LONG
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array, Scene, load, noise
 from benchmarks.tables import Table, verdict
-from transientcam_driver.kinect2 import codes, encoder, measurement
-from transientcam_driver.kinect2.layout import BASE_FREQUENCY_HZ, HEIGHT, SAMPLING, WIDTH
-from transientcam_driver.kinect2.tables import P0Tables
-from transientcam_moments.comparisons.sra import sra
+from transientcam_driver.cameras.kinect2 import (
+    BASE_FREQUENCY_HZ,
+    HEIGHT,
+    SAMPLING,
+    WIDTH,
+    P0Tables,
+    codes,
+    encoder,
+    measurement,
+)
+from transientcam_moments.comparisons._sra import sra
 
 GROSS_M: Final = 0.05
 RATIOS: Final = (0.1, 0.25, 0.5, 0.8)

@@ -14,13 +14,12 @@ from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import ROUNDING, TOO_LONG
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array, noise
 from benchmarks.tables import Table
+from transientcam_driver.camera import CameraName
+from transientcam_driver.cameras.kinect2 import HEIGHT, SAMPLING, WIDTH, Kinect2Camera
+from transientcam_driver.cameras.kinect2._codes import SATURATED_DN
+from transientcam_driver.cameras.kinect2._parameters import LIGHT_X_M
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.entries.kinect2 import PLUGIN
-from transientcam_driver.kinect2.camera import Kinect2Camera
-from transientcam_driver.kinect2.codes import SATURATED_DN
-from transientcam_driver.kinect2.layout import HEIGHT, SAMPLING, WIDTH
-from transientcam_driver.kinect2.parameters import LIGHT_X_M
-from transientcam_driver.plugin import CameraName
+from transientcam_simulation.entries.kinect2 import PLUGIN
 
 SCENES: Final = ("corner", "hall")
 STEP: Final = 12

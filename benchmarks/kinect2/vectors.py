@@ -9,18 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_driver.kinect2 import measurement
-from transientcam_driver.kinect2.codes import SATURATED_DN
-from transientcam_driver.kinect2.layout import (
+from transientcam_driver.cameras.kinect2 import (
     BASE_FREQUENCY_HZ,
     HEIGHT,
     SAMPLING,
     SUB_IMAGES,
     WIDTH,
+    DepthParameters,
+    P0Tables,
+    Rows,
+    measurement,
 )
-from transientcam_driver.kinect2.parameters import DepthParameters, Rows
-from transientcam_driver.kinect2.tables import P0Tables
-from transientcam_server.imaging.lens import Intrinsics
+from transientcam_driver.cameras.kinect2._codes import SATURATED_DN
+from transientcam_server.imaging import Intrinsics
 
 Array = NDArray[Any]
 MULTIPLES: Final = SAMPLING.multiples

@@ -21,8 +21,7 @@ from benchmarks.likelihood.errors import (
 )
 from benchmarks.measured_scenes import composite_scene, cornell_scene
 from benchmarks.tables import Table
-from transientcam_driver import Sequence as Capture
-from transientcam_driver import Truth
+from transientcam_driver import Sequence as Capture, Truth
 from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
 
 SCENES: Final = ("wall", "mirrors", "corner", "corner-left", "translucent")

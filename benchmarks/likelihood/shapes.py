@@ -10,8 +10,7 @@ import numpy as np
 import transientcam_moments as tm
 from benchmarks.likelihood.errors import Array, errors_of, ranges, turn_m
 from benchmarks.tables import Table
-from transientcam_moments.likelihood import MODEL_ERROR
-from transientcam_moments.likelihood.choice import TAIL_SHAPE
+from transientcam_moments.likelihood import MODEL_ERROR, TAIL_SHAPE
 
 BASE_HZ: Final = 23e6
 NOISE_SHARE: Final = 1 / 200

@@ -20,7 +20,7 @@ from benchmarks.simulation.costs import (
 from benchmarks.simulation.noise import noise_lines
 from benchmarks.simulation.page import range_lines, rule_lines
 from benchmarks.simulation.scenes import BUILT_IN, unseen
-from transientcam_driver.simulation.light.lanes import LANES
+from transientcam_simulation.compiled import LANES
 
 PAGE = Path(__file__).parents[2] / "docs" / "simulation.md"
 CORNERS = (("corner", "anywhere"), ("corner", "crease"), ("corner-left", "anywhere"))

@@ -16,9 +16,9 @@ from benchmarks.simulation.reference import COARSE, FINE_MOVING, FINE_STILL, ref
 from benchmarks.simulation.scenes import scene_named
 from transientcam_driver import Sequence
 from transientcam_driver.sequence import ImageLabel
-from transientcam_driver.simulation.build import world_of
-from transientcam_driver.simulation.scene.scene import Scene
-from transientcam_driver.simulation.world import World
+from transientcam_simulation.emulated import world_of
+from transientcam_simulation.imaging import World
+from transientcam_simulation.scene import Scene
 
 READOUT_S = 3.98e-3
 START_S = 9.0  # a visitor is there

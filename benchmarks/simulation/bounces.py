@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 from benchmarks.simulation.scenes import scene_named
 from transientcam_driver import Sequence
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
-from transientcam_driver.simulation.build import world_of
-from transientcam_driver.simulation.light.exchange import Exchange
-from transientcam_driver.simulation.light.paths import (
+from transientcam_simulation.emulated import world_of
+from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._paths import (
     first_scattering,
     image_lights,
     light_on,
     light_rays,
     normals_at,
 )
-from transientcam_driver.simulation.light.radiosity import Interreflection
-from transientcam_driver.simulation.light.rays import camera_rays
-from transientcam_driver.simulation.scene.scene import Scene
+from transientcam_simulation.light._radiosity import Interreflection
+from transientcam_simulation.light._rays import camera_rays
+from transientcam_simulation.scene import Scene
 
 WIDTH, HEIGHT = 163, 120
 PATHS = 20_000

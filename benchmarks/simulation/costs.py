@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 from benchmarks.simulation.scenes import scene_named
 from transientcam_driver import Sequence
-from transientcam_driver.simulation.build import world_of
-from transientcam_driver.simulation.effects import EFFECTS
-from transientcam_driver.simulation.scene.scene import Scene
-from transientcam_driver.simulation.world import World
+from transientcam_simulation.effects import EFFECTS
+from transientcam_simulation.emulated import world_of
+from transientcam_simulation.imaging import World
+from transientcam_simulation.scene import Scene
 
 VIDEO = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005)
 VIDEO_HZ = 18.6

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import Sequence
-from transientcam_driver.sensor import Sensor
-from transientcam_driver.simulation.light import GivenScenery
-from transientcam_driver.simulation.responses import SparseResponses
-from transientcam_driver.simulation.world import World
+from transientcam_driver.camera import Sensor
+from transientcam_simulation.base import SparseResponses
+from transientcam_simulation.imaging import World
+from transientcam_simulation.light import GivenScenery
 
 SHAPE = (120, 163)
 IMAGES = 60

@@ -3,9 +3,9 @@
 from benchmarks.corner import RangeError
 from benchmarks.simulation.scenes import BUILT_IN, scene_named, unseen
 from transientcam_driver import Sequence
-from transientcam_driver.cli.explain import scenes_table
-from transientcam_driver.simulation.build import world_of
-from transientcam_driver.simulation.effects import CALLED_ABOVE, EFFECTS, WORST_ABOVE
+from transientcam_simulation.cli.explain import scenes_table
+from transientcam_simulation.effects import CALLED_ABOVE, EFFECTS, WORST_ABOVE
+from transientcam_simulation.emulated import world_of
 
 READOUT_S = 3.98e-3
 

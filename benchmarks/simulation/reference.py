@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.simulation.light.exchange import Exchange
-from transientcam_driver.simulation.light.paths import Lit, light_rays
-from transientcam_driver.simulation.light.radiosity import Interreflection
-from transientcam_driver.simulation.light.rays import rays_through
-from transientcam_driver.simulation.scene.scene import Scene
+from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._paths import Lit, light_rays
+from transientcam_simulation.light._radiosity import Interreflection
+from transientcam_simulation.light._rays import rays_through
+from transientcam_simulation.scene import Scene
 
 COARSE = 16  # rays
 FINE_MOVING, FINE_STILL = 256, 4096

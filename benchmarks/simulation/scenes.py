@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from transientcam_driver.simulation import list_scenes
-from transientcam_driver.simulation.build import find_scene
-from transientcam_driver.simulation.scene.scene import Scene
+from transientcam_simulation import list_scenes
+from transientcam_simulation.emulated import find_scene
+from transientcam_simulation.scene import Scene
 
 HERE = Path(__file__).parent / "scenes"
 BUILT_IN = tuple(info.name for info in list_scenes() if info.name != "measured")

@@ -2,7 +2,7 @@
 import { defineConfig } from "vite";
 
 // The daemon a developer's page talks to while Vite serves the sources.
-const DAEMON = process.env["TRANSIENTCAM_URL"] ?? "http://127.0.0.1:8000";
+const DAEMON = process.env.TRANSIENTCAM_URL ?? "http://127.0.0.1:8000";
 
 export default defineConfig({
   build: {

@@ -15,10 +15,18 @@ from transientcam.base_camera import BaseCamera
 from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
 from transientcam.frame import Frame
 from transientcam.lease import AsyncLease, OnLapse
-from transientcam.requests import Request, document, problem
-from transientcam.requests.changes import set_reconstruction, set_sequence
-from transientcam.requests.jobs import PROGRESS_EVERY_S, WAIT_S, OnProgress, ended
-from transientcam.requests.recordings import recording_file
+from transientcam.requests import (
+    PROGRESS_EVERY_S,
+    WAIT_S,
+    OnProgress,
+    Request,
+    document,
+    ended,
+    problem,
+    recording_file,
+    set_reconstruction,
+    set_sequence,
+)
 from transientcam.stream import BaseStream
 from transientcam.stream_state import (
     DEFAULT_CREDITS,
@@ -29,16 +37,16 @@ from transientcam.stream_state import (
     subscribe_message,
 )
 from transientcam.transport import (
+    Deadline,
     DownloadProgress,
     Progress,
     answer_of,
     http_options,
     request_options,
+    set_lease,
     stream_options,
     translated,
 )
-from transientcam.transport.deadline import Deadline
-from transientcam.transport.options import set_lease
 from transientcam.wire import CloseCode, Subscription
 
 _T = TypeVar("_T")

@@ -5,8 +5,17 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Generic, TypeVar, overload
 
 from transientcam.frame import Frame
-from transientcam.requests import Calibrations, Jobs, Request, changes, frames, planning, recordings
-from transientcam.requests.frames import Part, Which
+from transientcam.requests import (
+    Calibrations,
+    Jobs,
+    Part,
+    Request,
+    Which,
+    changes,
+    frames,
+    planning,
+    recordings,
+)
 from transientcam.transport import parse_address
 
 _Document = TypeVar("_Document")

@@ -12,10 +12,18 @@ from transientcam.errors import TransientcamError
 from transientcam.frame import Frame
 from transientcam.lease import Lease, OnLapse
 from transientcam.notebook import table_html
-from transientcam.requests import Request, document, problem
-from transientcam.requests.changes import set_reconstruction, set_sequence
-from transientcam.requests.jobs import PROGRESS_EVERY_S, WAIT_S, OnProgress, ended
-from transientcam.requests.recordings import recording_file
+from transientcam.requests import (
+    PROGRESS_EVERY_S,
+    WAIT_S,
+    OnProgress,
+    Request,
+    document,
+    ended,
+    problem,
+    recording_file,
+    set_reconstruction,
+    set_sequence,
+)
 from transientcam.stream import Stream
 from transientcam.stream_state import (
     DEFAULT_CREDITS,
@@ -31,9 +39,9 @@ from transientcam.transport import (
     answer_of,
     http_options,
     request_options,
+    set_lease,
     translated,
 )
-from transientcam.transport.options import set_lease
 from transientcam.wire import Subscription
 
 _T = TypeVar("_T")

@@ -6,8 +6,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any, Final, Literal
 
 from transientcam.errors import ProblemError, TransientcamError
-from transientcam.requests import Request
-from transientcam.requests.lease import give_lease_back, lease_id, renew_lease, take_lease
+from transientcam.requests import Request, give_lease_back, lease_id, renew_lease, take_lease
 
 OnLapse = Literal["stop", "keep"]
 _RENEWALS: Final = 3.0

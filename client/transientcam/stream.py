@@ -11,8 +11,7 @@ from websockets.typing import Data
 from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
 from transientcam.frame import Frame
 from transientcam.stream_state import DEFAULT_CREDITS, StreamState, subscribe_message
-from transientcam.transport import stream_options, translated
-from transientcam.transport.deadline import Deadline
+from transientcam.transport import Deadline, stream_options, translated
 from transientcam.wire import Channel, CloseCode, Hello, Notice, Subscription
 
 

@@ -9,13 +9,31 @@
 (12, 120, 163)
 """
 
+from typing import TYPE_CHECKING, Any
+
 from transientcam_driver.calibration import (
     CalibrationCapture,
     CalibrationSubject,
     capture_calibration,
 )
-from transientcam_driver.camera import Camera, CameraState
-from transientcam_driver.capabilities import AppliedSequence, Capabilities
+from transientcam_driver.camera import (
+    AppliedSequence,
+    Camera,
+    CameraName,
+    CameraPlugin,
+    CameraState,
+    Capabilities,
+    Counters,
+    FactoryCalibration,
+    FoundCamera,
+    Lens,
+    RawFrame,
+    Simulation,
+    Status,
+    Truth,
+    open_camera,
+)
+from transientcam_driver.cameras.triggered import TriggeredCamera, TriggeredDevice
 from transientcam_driver.errors import (
     CalibrationError,
     CalibrationFileError,
@@ -42,16 +60,10 @@ from transientcam_driver.errors import (
     SequenceError,
     SpecError,
 )
-from transientcam_driver.factory import FactoryCalibration, Lens
-from transientcam_driver.handle import Simulation, Truth
-from transientcam_driver.opening import open_camera
-from transientcam_driver.plugin import CameraName, CameraPlugin, FoundCamera
-from transientcam_driver.protocol import Status
-from transientcam_driver.receiving import Counters, RawFrame
-from transientcam_driver.sampling import Sampling
-from transientcam_driver.sequence import ImageLabel, Sequence, SubPhases
-from transientcam_driver.simulation import SceneInfo, list_scenes
-from transientcam_driver.triggered import TriggeredCamera, TriggeredDevice
+from transientcam_driver.sequence import ImageLabel, Sampling, Sequence, SubPhases
+
+if TYPE_CHECKING:
+    from transientcam_simulation import SceneInfo, list_scenes
 
 __all__ = [
     "AppliedSequence",
@@ -105,3 +117,12 @@ __all__ = [
     "list_scenes",
     "open_camera",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the names of the simulation when asked for: it stands above the driver."""
+    if name in {"SceneInfo", "list_scenes"}:
+        import transientcam_simulation
+
+        return getattr(transientcam_simulation, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -91,8 +91,7 @@ def _made_on(
 ) -> Generator[tuple[int, tuple[dict[str, Any], bytes]], None, None]:
     """Yield the number, the document and the picture of each figure as a cluster has made it."""
     from transientcam_experiments.paper.making import made_by_worker
-    from transientcam_server.offline.cluster import completed
-    from transientcam_server.offline.job import installed
+    from transientcam_server.offline import completed, installed
 
     # workers may run in another directory
     place = None if waveform is None else waveform.resolve()
@@ -113,7 +112,7 @@ def _print_statements(console: Console, document: dict[str, Any]) -> None:
 
 
 def _require_matplotlib() -> None:
-    from transientcam_server.errors.exceptions import MissingExtra
+    from transientcam_server.errors import MissingExtra
 
     try:
         import matplotlib  # noqa: F401 - only whether it is there

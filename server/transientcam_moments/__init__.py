@@ -13,54 +13,76 @@ of pixels after them, single or double precision, NumPy, JAX or CuPy. ::
 """
 
 from transientcam_moments import comparisons, kernels, noise
-from transientcam_moments.bad_pixels import fill_bad_pixels, find_bad_pixels
-from transientcam_moments.biasing import (
-    Biased,
-    bias,
-    estimate_zeroth,
-    smallest_eigenvalue,
-)
-from transientcam_moments.bounds import bounds, smoothed_density
-from transientcam_moments.calibration import calibrate, calibration_of, nominal_calibration
-from transientcam_moments.cumulative import cumulative
 from transientcam_moments.errors import (
     MomentsError,
     ParameterError,
     ShapeError,
     UnlabelledImages,
 )
-from transientcam_moments.flags import INVALID, Flags, flags
-from transientcam_moments.four_bucket import four_bucket, measure, saturated
-from transientcam_moments.harmonics import Corrected, HarmonicCorrection, checked_waveform
-from transientcam_moments.labels import Labels
-from transientcam_moments.levinson import (
-    Coefficients,
-    extend,
-    from_reflection,
-    levinson,
-    moments_of,
-)
-from transientcam_moments.likelihood import Likelihood, likelihood
-from transientcam_moments.likelihood.pairs import two_returns
-from transientcam_moments.maximum_entropy import density
-from transientcam_moments.merging import merge_returns
-from transientcam_moments.modulation import modulation_gain
-from transientcam_moments.peaks import Peaks, peaks
-from transientcam_moments.pisarenko import Returns, Separation, pisarenko, separate
-from transientcam_moments.ranging import SPEED_OF_LIGHT_M_S, range_m
-from transientcam_moments.reconstruction import Reconstruction
-from transientcam_moments.reconstructor import Reconstructor, reconstruct
-from transientcam_moments.repair import Repair, repair
-from transientcam_moments.settings import Settings
-from transientcam_moments.smoothing import smooth
-from transientcam_moments.sweep import (
+from transientcam_moments.images import (
+    Average,
+    Corrected,
+    HarmonicCorrection,
+    Repair,
     SweepPhasors,
+    average_takes,
+    calibrate,
+    calibration_of,
+    checked_waveform,
+    fill_bad_pixels,
+    find_bad_pixels,
+    four_bucket,
+    measure,
+    modulation_gain,
+    nominal_calibration,
+    repair,
+    saturated,
+    smooth,
     sweep_offsets_rad,
     sweep_phasors,
     waveform_of,
 )
-from transientcam_moments.takes import Average, average_takes
-from transientcam_moments.unwrapping import Unwrapped, unwrap
+from transientcam_moments.likelihood import (
+    Likelihood,
+    Unwrapped,
+    likelihood,
+    merge_returns,
+    two_returns,
+    unwrap,
+)
+from transientcam_moments.moment_problem import (
+    Biased,
+    Coefficients,
+    Peaks,
+    Returns,
+    Separation,
+    bias,
+    bounds,
+    cumulative,
+    density,
+    estimate_zeroth,
+    extend,
+    from_reflection,
+    levinson,
+    moments_of,
+    peaks,
+    pisarenko,
+    separate,
+    smallest_eigenvalue,
+    smoothed_density,
+)
+from transientcam_moments.reconstruction import (
+    INVALID,
+    SPEED_OF_LIGHT_M_S,
+    Flags,
+    Labels,
+    Reconstruction,
+    Reconstructor,
+    Settings,
+    flags,
+    range_m,
+    reconstruct,
+)
 
 __all__ = [
     "INVALID",

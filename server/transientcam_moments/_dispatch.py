@@ -57,8 +57,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from transientcam_compiled import Cache, Kernels, Spread
-from transientcam_compiled import on_threads as on_any_threads
+from transientcam_compiled import Cache, Kernels, Spread, on_threads as on_any_threads
 from transientcam_moments.errors import ParameterError
 
 PRECISIONS = {"f": "f", "F": "f", "d": "d", "D": "d"}  # of an array's type, by its character

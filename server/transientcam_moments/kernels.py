@@ -34,7 +34,6 @@ from transientcam_compiled import (
     use_all_cores,
     use_one_thread,
 )
-from transientcam_moments._arrays import MAX_HARMONICS, chosen
 from transientcam_moments._dispatch import (
     CACHE,
     KERNELS,
@@ -45,6 +44,7 @@ from transientcam_moments._dispatch import (
     Key,
     lookup,
 )
+from transientcam_moments.arrays import MAX_HARMONICS, chosen
 from transientcam_moments.errors import ParameterError
 
 __all__ = [

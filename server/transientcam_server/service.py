@@ -14,56 +14,61 @@ from typing import Any, Final, Protocol
 import transientcam_moments as tm
 from transientcam import wire
 from transientcam_driver import AppliedSequence, CalibrationError, Camera
-from transientcam_driver.calibration.file import DEVICE_FIELDS
-from transientcam_server.broadcast.channel import Channel
-from transientcam_server.broadcast.hub import Hub
+from transientcam_driver.calibration import DEVICE_FIELDS
+from transientcam_server.broadcast import Channel, Hub
 from transientcam_server.camera import (
     Acquisition,
+    Back,
     CalibrationStore,
     Calibrator,
-    Jobs,
-    LeaseManager,
-)
-from transientcam_server.camera.calibration_store import load_given
-from transientcam_server.camera.events import (
-    Back,
     Captured,
+    Change,
     Event,
     Held,
+    Job,
+    Jobs,
+    Lease,
+    LeaseManager,
+    LightGuard,
     Lost,
     OriginChanged,
+    OriginLease,
     Released,
     SequenceChanged,
+    SharedAcquisition,
+    Timer,
+    load_given,
+    sensor_of,
+    twin_of,
 )
-from transientcam_server.camera.jobs import Job
-from transientcam_server.camera.lease import Change, Lease, Timer
-from transientcam_server.camera.light import LightGuard
-from transientcam_server.camera.origin_lease import OriginLease
-from transientcam_server.camera.shared import SharedAcquisition
-from transientcam_server.camera.source import sensor_of, twin_of
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.calibration import (
+from transientcam_server.errors import Problem, kinds
+from transientcam_server.imaging import (
     NOMINAL_ID,
     Calibration,
+    Frame,
+    History,
+    Intrinsics,
+    Pipeline,
+    SettingsVersion,
+    Workers,
     calibration_id,
+    known_intrinsics,
     load_calibration,
+    require_estimator,
+    suited,
 )
-from transientcam_server.imaging.frame import Frame
-from transientcam_server.imaging.history import History
-from transientcam_server.imaging.lens import Intrinsics, known_intrinsics
-from transientcam_server.imaging.pipeline import Pipeline
-from transientcam_server.imaging.recipe import SettingsVersion, require_estimator, suited
-from transientcam_server.imaging.workers import Workers
-from transientcam_server.planning import FrontCache, Looks, Planner
-from transientcam_server.planning.process import PlanningProcess
-from transientcam_server.planning.queue import PlanningQueue
-from transientcam_server.recording import Header, Library, RecordingOptions, ReplayCamera
-from transientcam_server.recording.frames import RecordedFramesCache
+from transientcam_server.planning import FrontCache, Looks, Planner, PlanningProcess, PlanningQueue
+from transientcam_server.recording import (
+    Header,
+    Library,
+    RecordedFramesCache,
+    RecordingOptions,
+    ReplayCamera,
+)
 from transientcam_server.relay import RelayCamera
 from transientcam_server.settings import ReconstructionSettings, Settings
 
-_log = logging.getLogger(__name__)
+_log = logging.getLogger("transientcam_server.service")
 VERSION: Final = version("transientcam")
 _CLOSING_S = 1.0
 _TURN_S = 0.2

@@ -1,4 +1,4 @@
-"""The settings of the service; `transientcam_server.daemon.configuration` reads them."""
+"""The settings of the service; `transientcam_server.daemon._configuration` reads them."""
 
 import os
 from ipaddress import ip_address
@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 import transientcam_moments as tm
 from transientcam.wire import FIRST_MESSAGE_WITHIN_S, MAX_SUBSCRIPTIONS
 from transientcam_moments.comparisons import TECHNIQUES
-from transientcam_moments.settings import ESTIMATORS, least_harmonics
+from transientcam_moments.reconstruction import ESTIMATORS, least_harmonics
 
 _DEFAULTS = tm.Settings()  # the paper's
 _Finite = Annotated[float, Field(allow_inf_nan=False)]

@@ -26,7 +26,7 @@ PANEL = ".panel-sequence"
 def few_families(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is searched is no concern of the page's: little, so that it is found quickly."""
     monkeypatch.setattr(served.service.planning, "_process", Here())
-    families = import_module("transientcam_server.planning.families")  # not the function
+    families = import_module("transientcam_server.planning._search.families")  # not the function
     monkeypatch.setattr(families, "HARMONICS", (1, 4))
     monkeypatch.setattr(families, "FREQUENCY_FACTORS", (1.0,))
     monkeypatch.setattr(families, "SEARCHED", ("single-frequency", "maximum-entropy"))

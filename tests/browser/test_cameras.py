@@ -7,7 +7,7 @@ from playwright.sync_api import Page, expect
 
 from tests.serving import Served
 from transientcam.discovery import FoundCamera, Search
-from transientcam_server.api.neighbours import NeighbourSearch
+from transientcam_server.api._neighbours import NeighbourSearch
 
 pytestmark = pytest.mark.shared_daemon
 

@@ -9,7 +9,8 @@ from playwright.sync_api import Browser, Page, expect
 from tests.browser.conftest import MIRRORS, SlowClock, Watch
 from tests.browser.dashboard import LIVE, choose_from, open_page, shows_frame
 from tests.serving import Served, serving
-from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
+from transientcam_server.api import Role, utc_now
+from transientcam_server.api._auth.tokens import TokenFile
 
 pytestmark = pytest.mark.shared_daemon
 

@@ -27,7 +27,7 @@ from tests.browser.dashboard import (
     transient_pixels,
 )
 from tests.serving import Served
-from transientcam.wire.codec import pack_with_array
+from transientcam.wire._codec import pack_with_array
 
 pytestmark = pytest.mark.shared_daemon
 

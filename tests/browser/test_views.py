@@ -23,7 +23,7 @@ from tests.browser.dashboard import (
 )
 from tests.browser.test_map import product, stop
 from tests.serving import Served
-from transientcam.wire.codec import pack_with_array
+from transientcam.wire._codec import pack_with_array
 
 pytestmark = pytest.mark.shared_daemon
 

@@ -42,7 +42,7 @@ def test_an_address_of_no_recording_is_refused(monkeypatch: pytest.MonkeyPatch, 
 
 
 def test_the_entry_point_of_this_distribution_is_where_its_function_is() -> None:
-    point = EntryPoint("hdf5", "transientcam_server.offline.opening:open_recording", opening.GROUP)
+    point = EntryPoint("hdf5", "transientcam_server.offline._opening:open_recording", opening.GROUP)
     project = Path(__file__).parents[2] / "pyproject.toml"
 
     assert callable(point.load())

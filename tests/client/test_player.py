@@ -9,8 +9,14 @@ import pytest
 
 import transientcam_moments as tm
 from tests.client.conftest import frame_meta
-from transientcam import Camera, Frame, MissingExtra, ParameterError, player
-from transientcam import density as client_density
+from transientcam import (
+    Camera,
+    Frame,
+    MissingExtra,
+    ParameterError,
+    density as client_density,
+    player,
+)
 
 MOMENTS = np.array([2.0, 1.0 + 0.5j, 0.3 - 0.2j]).reshape(3, 1, 1) * np.ones((1, 2, 3))
 

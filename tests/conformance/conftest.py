@@ -10,9 +10,9 @@ import pytest
 
 from tests.conformance.breaking import NOTHING, Breaker
 from tests.serving import Served, serving
-from transientcam.conformance import Device
-from transientcam.conformance.device import API
 from transientcam.wire import LEASE_HEADER
+from transientcam_conformance import Device
+from transientcam_conformance._device import API
 
 CAMERA = "sim:wall?noise=off"  # the scene that is rendered quickest
 

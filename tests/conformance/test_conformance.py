@@ -13,21 +13,22 @@ from tests.conformance.broken_promises import API, BROKEN, BROKEN_WITH_TOKENS
 from tests.conformance.conftest import Breakable, breakable_daemon
 from tests.serving import serving
 from transientcam.cli import run as command
-from transientcam.conformance import (
+from transientcam.errors import ParameterError, PromiseBroken, ServerUnreachable
+from transientcam.wire import LEASE_HEADER
+from transientcam_conformance import (
     CHECKS,
     GROUPS,
+    SLOW,
     Check,
     Device,
     Report,
+    _recording as recording,
     chosen,
-    recording,
     run,
 )
-from transientcam.conformance.rate import Rate, measured_rate
-from transientcam.conformance.running import SLOW
-from transientcam.errors import ParameterError, PromiseBroken, ServerUnreachable
-from transientcam.wire import LEASE_HEADER
-from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
+from transientcam_conformance._rate import Rate, measured_rate
+from transientcam_server.api import Role, utc_now
+from transientcam_server.api._auth.tokens import TokenFile
 
 LONG_S = 20.0
 SHORT_S = 2.5

@@ -7,15 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import Capabilities, ImageLabel, RawFrame, Sequence
+from transientcam_driver.camera import Status
+from transientcam_driver.cameras.open_usb import UsbCamera, open_transport
+from transientcam_driver.cameras.open_usb.protocol import (
+    STATUS_BYTES,
+    Request,
+    pack_capabilities,
+    unpack_status,
+)
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.protocol import Request, Status
-from transientcam_driver.protocol.capabilities import pack_capabilities
-from transientcam_driver.simulation.device.bus import SimulatedBus
-from transientcam_driver.simulation.device.firmware import Firmware
-from transientcam_driver.simulation.device.prototype import prototype
-from transientcam_driver.simulation.device.usb_device import EmulatedDevice
-from transientcam_driver.usb import open_transport
-from transientcam_driver.usb_camera import UsbCamera
+from transientcam_simulation.emulated._open_usb.bus import SimulatedBus
+from transientcam_simulation.emulated._open_usb.firmware import Firmware
+from transientcam_simulation.emulated._open_usb.prototype import prototype
+from transientcam_simulation.emulated._open_usb.usb_device import EmulatedDevice
 
 WIDTH, HEIGHT = 12, 5
 CAPABILITIES = replace(
@@ -98,8 +102,8 @@ class Bench:
         return self.device._firmware._status(self.clock.now_s()).light_on
 
     def status(self) -> Status:
-        answer = self.device.control(0xC0, Request.GET_STATUS, 0, 0, Status.BYTES, b"")
-        return Status.unpack(answer)
+        answer = self.device.control(0xC0, Request.GET_STATUS, 0, 0, STATUS_BYTES, b"")
+        return unpack_status(answer)
 
     def require_whole_and_right(self, frame: RawFrame) -> None:
         """Hold every byte of a frame against what the device sent."""

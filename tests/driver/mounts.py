@@ -7,15 +7,14 @@ from typing import Any, Protocol
 
 import usb.core
 
-from tests.driver.usbfs.processes import Program, emulated_camera
+from tests.driver.cameras.open_usb.usbfs.processes import Program, emulated_camera
 from transientcam_driver import Camera, CameraLost, CameraNotFound, Sequence, open_camera
+from transientcam_driver.cameras.open_usb import UsbCamera, open_transport
+from transientcam_driver.cameras.open_usb.protocol import STATUS_BYTES, Request, unpack_status
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.protocol import Request, Status
-from transientcam_driver.simulation.build import build, find_scene, without_noise
-from transientcam_driver.simulation.device.bus import SimulatedBus
-from transientcam_driver.simulation.device.faults import Fault
-from transientcam_driver.usb import open_transport
-from transientcam_driver.usb_camera import UsbCamera
+from transientcam_simulation.emulated import build, find_scene, without_noise
+from transientcam_simulation.emulated._open_usb.bus import SimulatedBus
+from transientcam_simulation.emulated._open_usb.faults import Fault
 
 
 class Mount(Protocol):
@@ -83,8 +82,8 @@ class PyusbMount:
 
     @property
     def lit(self) -> bool:
-        status = self._device.control(0xC0, Request.GET_STATUS, 0, 0, Status.BYTES, b"")
-        return Status.unpack(status).light_on
+        status = self._device.control(0xC0, Request.GET_STATUS, 0, 0, STATUS_BYTES, b"")
+        return unpack_status(status).light_on
 
     def do(self, command: str, *arguments: Any) -> None:
         match command, arguments:

@@ -22,14 +22,13 @@ from transientcam_driver import (
     Simulation,
     open_camera,
 )
+from transientcam_driver.cameras.open_usb import UsbCamera, open_transport
+from transientcam_driver.cameras.open_usb.protocol import Request
 from transientcam_driver.clock import RealClock, VirtualClock
-from transientcam_driver.protocol import Request
-from transientcam_driver.simulation import SimulationHandle
-from transientcam_driver.simulation.build import build, find_scene
-from transientcam_driver.simulation.device.bus import SimulatedBus
-from transientcam_driver.simulation.device.usb_device import EmulatedDevice
-from transientcam_driver.usb import open_transport
-from transientcam_driver.usb_camera import UsbCamera
+from transientcam_simulation import SimulationHandle
+from transientcam_simulation.emulated import build, find_scene
+from transientcam_simulation.emulated._open_usb.bus import SimulatedBus
+from transientcam_simulation.emulated._open_usb.usb_device import EmulatedDevice
 
 from .conftest import OpenCamera
 

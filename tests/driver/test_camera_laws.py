@@ -22,8 +22,8 @@ from transientcam_driver import (
     NotStreaming,
     Sequence,
 )
-from transientcam_driver.receiving.assembler import FrameAssembler
-from transientcam_driver.simulation.device.faults import Fault
+from transientcam_driver.cameras.open_usb._receiving.assembler import FrameAssembler
+from transientcam_simulation.emulated._open_usb.faults import Fault
 
 SEQUENCES = (
     Sequence(harmonics=1, zeroth="estimated"),

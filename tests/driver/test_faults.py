@@ -26,8 +26,8 @@ from transientcam_driver import (
     RawFrame,
     Sequence,
 )
-from transientcam_driver.simulation.device.bus import SimulatedBus
-from transientcam_driver.simulation.device.faults import Fault
+from transientcam_simulation.emulated._open_usb.bus import SimulatedBus
+from transientcam_simulation.emulated._open_usb.faults import Fault
 
 from .bench import CAPABILITIES, Bench, number_of
 

@@ -11,9 +11,9 @@ import pytest
 import yaml
 
 from tests.conftest import ROOT
-from transientcam_server.daemon.announcement import inside_container
-from transientcam_server.daemon.configuration import load_settings
-from transientcam_server.errors.exceptions import SettingsError
+from transientcam_server.daemon import load_settings
+from transientcam_server.daemon._announcement import inside_container
+from transientcam_server.errors import SettingsError
 
 _DOCKER = ROOT / "docker"
 _OURS = ("simulated", "usb", "camera-behind-tls")

@@ -13,8 +13,7 @@ import venv
 from collections.abc import Iterator
 from importlib.metadata import Distribution, PathDistribution, distribution
 from pathlib import Path
-from zipfile import Path as ZipPath
-from zipfile import ZipFile
+from zipfile import Path as ZipPath, ZipFile
 
 import httpx
 import numpy as np
@@ -25,7 +24,6 @@ from packaging.requirements import Requirement
 from tests.conftest import ROOT
 
 _PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
-_VERSION = _PROJECT["project"]["version"]
 _TARGETS = _PROJECT["tool"]["hatch"]["build"]["targets"]
 _EPOCH_S = "1795305600"
 _TWO_MINUTES_S = 120.0
@@ -40,6 +38,10 @@ def build(source: Path, to: Path) -> tuple[Path, Path]:
     (sdist,) = to.glob("*.tar.gz")
     (wheel,) = to.glob("*.whl")
     return sdist, wheel
+
+
+def version_of(built: tuple[Path, Path]) -> str:
+    return built[1].name.split("-")[1]
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +154,7 @@ def test_the_wheel_has_every_file_of_the_packages_and_nothing_else(
     built: tuple[Path, Path],
 ) -> None:
     names = ZipFile(built[1]).namelist()
-    within = f"transientcam-{_VERSION}.dist-info/"
+    within = f"transientcam-{version_of(built)}.dist-info/"
 
     assert {name for name in names if not name.startswith(within)} == files_of_packages()
     assert {f"{within}licenses/LICENSE", f"{within}entry_points.txt"} <= set(names)
@@ -178,12 +180,14 @@ def test_the_same_sources_give_the_same_bytes_elsewhere_and_later(
     assert digests[0] == digests[1]
 
 
-def test_a_daemon_of_the_wheel_serves_frames_and_its_page(url: str) -> None:
+def test_a_daemon_of_the_wheel_serves_frames_and_its_page(
+    url: str, built: tuple[Path, Path]
+) -> None:
     with httpx.Client(base_url=url, timeout=_TWO_MINUTES_S) as http:
         answer = http.get("/api/v1/frames/latest/range.npy", params={"wait_s": 10})
         page = http.get("/").text
         parts = re.findall(r'(?:src|href)="\.?(/[^"]+)"', page)
-        assert http.get("/api/v1/info").json()["version"] == _VERSION
+        assert http.get("/api/v1/info").json()["version"] == version_of(built)
         assert [http.get(each).status_code for each in parts] == [200] * len(parts)
         assert http.get("/docs").status_code == 200
 
@@ -215,7 +219,7 @@ def test_what_is_not_declared_is_not_there(installed: Path) -> None:
 
 
 def test_the_wheel_lists_the_licences_of_all_that_it_carries(built: tuple[Path, Path]) -> None:
-    within = f"transientcam-{_VERSION}.dist-info"
+    within = f"transientcam-{version_of(built)}.dist-info"
     with ZipFile(built[1]) as archive:
         metadata = archive.read(f"{within}/METADATA").decode()
         listed = [
@@ -263,7 +267,35 @@ def test_the_version_is_the_same_wherever_it_stands() -> None:
     changes = (ROOT / "CHANGELOG.md").read_text("utf-8")
     (version, date), *_ = re.findall(r"^## \[([\d.]+)\] - ([\d-]+)$", changes, re.MULTILINE)
 
-    assert version == _VERSION
-    assert citation["version"] == _VERSION
+    versions = _PROJECT["tool"]["hatch"]["version"]
+    assert versions["fallback-version"] == version
+    assert f"echo v{version}-" in versions["raw-options"]["git_describe_command"]
+    assert citation["version"] == version
     assert str(citation["date-released"]) == date
-    assert dashboard["version"] == _VERSION
+    assert dashboard["version"] == version
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is no repository")
+def test_a_version_tells_two_commits_apart_in_a_clone_without_tags(tmp_path: Path) -> None:
+    def git(*words: str) -> str:
+        who = ("-c", "user.name=a", "-c", "user.email=a@localhost")
+        done = subprocess.run(
+            ["git", "-C", tmp_path, *who, *words], capture_output=True, text=True, check=True
+        )
+        return done.stdout.strip()
+
+    def version() -> str:
+        command = [sys.executable, "-m", "hatchling", "version"]
+        return subprocess.run(
+            command, cwd=tmp_path, capture_output=True, text=True, check=True
+        ).stdout.strip()
+
+    git("init", "--quiet")
+    (tmp_path / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text("utf-8"))
+    git("add", "pyproject.toml")
+    git("commit", "--quiet", "--message", "one")
+    first = version()
+    git("commit", "--quiet", "--allow-empty", "--message", "another")
+
+    assert version() != first
+    assert version().endswith(f"+g{git('rev-parse', '--short=8', 'HEAD')}")

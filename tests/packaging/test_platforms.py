@@ -33,7 +33,7 @@ names = [each.name for each in pkgutil.walk_packages(package.__path__, package._
 left_out = (
     ".".join([package.__name__, "_kernels"]),  # compiled with numba where it is there
     # Rerun's library brings psutil, which chooses its own modules by the system
-    *(".".join([package.__name__, each]) for each in ("cli.rerun", "robotics.rerun")),
+    *(".".join([package.__name__, each]) for each in ("cli.rerun", "robotics._rerun")),
 )
 for name in names:
     if not name.startswith(left_out):

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from transientcam_driver.cameras.open_usb import UDEV_RULE
 from transientcam_driver.errors import UDEV_RULES_FILE
-from transientcam_driver.usb import UDEV_RULE
 
 _PACKAGING = Path(__file__).resolve().parents[2] / "packaging"
 _UNIT = _PACKAGING / "transientcam.service"

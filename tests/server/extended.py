@@ -16,8 +16,8 @@ wire.ENCODINGS[EIGHT_BITS.name] = EIGHT_BITS
 
 
 def _register() -> None:
-    from transientcam_server.imaging.encodings import ENCODINGS, Encoding
-    from transientcam_server.imaging.products import PRODUCTS, Product
+    from transientcam_server.imaging import PRODUCTS, Product
+    from transientcam_server.imaging._encodings import ENCODINGS, Encoding
 
     def text(frame: Frame) -> bytes:
         return repr(np.round(frame.array, 3).tolist()).encode()

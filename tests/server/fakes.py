@@ -4,9 +4,8 @@ from types import SimpleNamespace
 from typing import cast
 
 from transientcam import wire
-from transientcam_server.broadcast.channel import Channel
-from transientcam_server.imaging.frame import Frame
-from transientcam_server.imaging.products import PRODUCTS
+from transientcam_server.broadcast import Channel
+from transientcam_server.imaging import PRODUCTS, Frame
 
 
 def fake_frame(number: int, *, device_time_s: float | None = None, lost_images: int = 0) -> Frame:

@@ -16,7 +16,7 @@ from tests.server.streaming import streaming
 from tests.serving import Served
 from tests.waiting import wait_until
 from transientcam import wire
-from transientcam_server.broadcast.outbox import Delivery
+from transientcam_server.broadcast import Delivery
 
 LATEST = "/api/v1/frames/latest"
 PATIENCE_S = 60.0

@@ -7,9 +7,9 @@ import pytest
 
 from tests.server.streaming import PATIENCE_S, streaming
 from tests.serving import Served, serving
-from transientcam_server.broadcast.channel import Channel
+from transientcam_server.broadcast import Channel
 from transientcam_server.camera import AcquisitionStatus
-from transientcam_server.imaging.workers import Workers
+from transientcam_server.imaging import Workers
 
 HEALTHY: dict[str, Any] = {
     "state": "streaming",

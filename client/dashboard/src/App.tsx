@@ -1,18 +1,18 @@
-import { useEffect } from "preact/hooks";
 import { effect } from "@preact/signals";
+import { useEffect } from "preact/hooks";
 
 import { useStore } from "./store/store";
 import { Help } from "./ui/Help";
-import { Palette } from "./views/palette/Palette";
 import { shortcuts } from "./ui/shortcuts";
-import { ReplayBar } from "./views/replay/ReplayBar";
+import { Arrangement } from "./views/Arrangement";
 import { FileDrop } from "./views/files/FileDrop";
+import { Palette } from "./views/palette/Palette";
+import { ReplayBar } from "./views/replay/ReplayBar";
 import { Banner } from "./views/status/Banner";
 import { ControlDialog } from "./views/status/ControlDialog";
 import { LayoutDialog } from "./views/status/LayoutDialog";
 import { StatusBar } from "./views/status/StatusBar";
 import { TokenDialog } from "./views/status/TokenDialog";
-import { Arrangement } from "./views/Arrangement";
 
 /** The page: how things stand, what is wrong, and the views. */
 export function App({ onRetry }: { onRetry: () => void }) {
@@ -21,7 +21,7 @@ export function App({ onRetry }: { onRetry: () => void }) {
   useEffect(
     () =>
       effect(() => {
-        document.documentElement.dataset["stale"] = String(store.status.stale.value && !store.replay.active.value);
+        document.documentElement.dataset.stale = String(store.status.stale.value && !store.replay.active.value);
       }),
     [store],
   );

@@ -2,12 +2,12 @@
 import { createRenderer, hasGraphics } from "./gl/createRenderer";
 import type { DensityRenderer } from "./gl/renderer";
 import type { Coefficients } from "./physics/maximumEntropy";
-import { decodeMessage, type FrameMessage } from "./stream/protocol";
 import { frameOf } from "./store/frames";
-import { coefficientsOf, summarised } from "./stream/summary";
+import { LAYOUTS } from "./store/layout";
 import type { Store } from "./store/store";
-import { LAYOUTS } from "./views/layout";
-import { VIEW_NAMES } from "./views/names";
+import { VIEW_NAMES } from "./store/viewNames";
+import { decodeMessage, type FrameMessage } from "./stream/protocol";
+import { coefficientsOf, summarised } from "./stream/summary";
 
 /** A density read back from the renderer that the page's own pictures are made with. */
 interface Reading {

@@ -1,13 +1,13 @@
-import { render } from "preact";
+import "./base.css";
 import { effect } from "@preact/signals";
+import { render } from "preact";
 
 import { App } from "./App";
+import { AnimationLoop } from "./store/animation";
+import { StreamClient } from "./store/client";
 import { keepAddress } from "./store/permalink";
 import { Store, StoreContext } from "./store/store";
-import { StreamClient } from "./stream/client";
-import { AnimationLoop } from "./ui/animation";
 import "@fontsource-variable/inter/wght.css";
-import "./style.css";
 
 const loop = new AnimationLoop((callback) => requestAnimationFrame(callback));
 const store = new Store();
@@ -20,9 +20,7 @@ loop.add((elapsed_s) => store.replay.advance(elapsed_s));
 effect(() => {
   if (store.player.playing.value || store.player.scrubbed.value || store.replay.playing.value) loop.wake();
 });
-document.addEventListener("visibilitychange", () => {
-  stream.hid();
-});
+document.addEventListener("visibilitychange", () => stream.hid());
 store.player.playing.value = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 store.theme.show(document.documentElement);
@@ -31,27 +29,17 @@ const root = document.getElementById("app");
 if (root === null) throw new Error("The page has no place for the application.");
 render(
   <StoreContext.Provider value={store}>
-    <App
-      onRetry={() => {
-        stream.retryNow();
-      }}
-    />
+    <App onRetry={() => stream.retryNow()} />
   </StoreContext.Provider>,
   root,
 );
 
 const address = new URL("/api/v1/stream", window.location.href);
 address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
-void stream.learnAbsent().then(() => {
-  stream.open(address.href);
-});
+void stream.learnAbsent().then(() => stream.open(address.href));
 
-window.addEventListener("pagehide", () => {
-  store.lease.abandon();
-});
+window.addEventListener("pagehide", () => store.lease.abandon());
 
 if (new URLSearchParams(window.location.search).has("debug")) {
-  void import("./debug").then(({ expose }) => {
-    expose(store);
-  });
+  void import("./debug").then(({ expose }) => expose(store));
 }

@@ -28,20 +28,14 @@ export interface Return {
 /** b_0 to b_m of some returns over light spread evenly with weight `uniform` (Sec. 3.1). */
 export function momentsOf(returns: readonly Return[], uniform: number, m: number): Complex[] {
   return Array.from({ length: m + 1 }, (_, j) =>
-    returns.reduce(
-      (sum, { phase_rad, weight }) => add(sum, mul(complex(weight), cis(j * phase_rad))),
-      complex(j === 0 ? uniform : 0),
-    ),
+    returns.reduce((sum, { phase_rad, weight }) => add(sum, mul(complex(weight), cis(j * phase_rad))), complex(j === 0 ? uniform : 0)),
   );
 }
 
 /** x with B x = y, B[j][k] = b_(j-k), by Gaussian elimination with pivoting; y is e_0 unless given. */
 function solveToeplitz(b: readonly Complex[], y: readonly Complex[] = b.map((_, j) => complex(j === 0 ? 1 : 0))): Complex[] {
   const n = b.length;
-  const rows = Array.from({ length: n }, (_, j) => [
-    ...Array.from({ length: n }, (_, k) => (j >= k ? b[j - k] : conj(b[k - j]))),
-    y[j],
-  ]);
+  const rows = Array.from({ length: n }, (_, j) => [...Array.from({ length: n }, (_, k) => (j >= k ? b[j - k] : conj(b[k - j]))), y[j]]);
   for (let column = 0; column < n; column++) {
     let best = column;
     for (let row = column; row < n; row++) if (abs2(rows[row][column]) > abs2(rows[best][column])) best = row;
@@ -74,9 +68,7 @@ export function picture(pixels: readonly (readonly Complex[])[], width = pixels.
   const harmonics = pixels[0].length - 1;
   const planes = new Float32Array((2 * harmonics + 1) * pixels.length);
   pixels.forEach((moments, pixel) => {
-    coefficientsOf(moments).forEach((value, plane) => {
-      planes[plane * pixels.length + pixel] = value;
-    });
+    coefficientsOf(moments).forEach((value, plane) => (planes[plane * pixels.length + pixel] = value));
   });
   return { planes, harmonics, width, height: pixels.length / width, baseFrequency_hz: 23e6 };
 }
@@ -90,9 +82,7 @@ export function picture(pixels: readonly (readonly Complex[])[], width = pixels.
 export function boundsOf(b: readonly Complex[], phase_rad: number, radius: number): { lower: number; upper: number } {
   const m = b.length - 1;
   const W = b.map((_, j) => mul(complex(radius ** j), cis(j * phase_rad)));
-  const p = b.map((_, j) =>
-    W.slice(0, j).reduce((sum, w, k) => add(sum, mul(w, b[j - k])), mul(W[j], complex(b[0].re / 2))),
-  );
+  const p = b.map((_, j) => W.slice(0, j).reduce((sum, w, k) => add(sum, mul(w, b[j - k])), mul(W[j], complex(b[0].re / 2))));
   const dot = (x: readonly Complex[]): Complex => x.reduce((sum, value, j) => add(sum, mul(conj(W[j]), value)), complex(0));
   const kappa = dot(solveToeplitz(b, W)).re;
   const centre = (2 / kappa) * (1 / (1 - radius ** 2) - dot(solveToeplitz(b, p)).re);

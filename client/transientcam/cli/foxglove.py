@@ -9,7 +9,7 @@ from rich.console import Console
 from transientcam.camera import Camera
 from transientcam.cli.options import JsonOption, TokenOption, UrlArgument
 from transientcam.cli.showing import shown_on
-from transientcam.robotics.foxglove_bridge import SHOWN, FoxgloveBridge
+from transientcam.robotics import SHOWN, FoxgloveBridge
 
 
 def foxglove(

@@ -11,8 +11,7 @@ from rich.console import Console
 from transientcam.camera import Camera
 from transientcam.cli.options import JsonOption, TokenOption, UrlArgument, require_suffix
 from transientcam.cli.showing import shown_on
-from transientcam.robotics.rerun_bridge import BINS, SHOWN, RerunBridge
-from transientcam.robotics.rerun_messages import blueprint
+from transientcam.robotics import BINS, LOGGED, RerunBridge, blueprint
 
 _HERE: Final = "rerun+http://127.0.0.1:9876/proxy"
 
@@ -21,7 +20,7 @@ def rerun(
     url: UrlArgument,
     products: Annotated[
         list[str] | None,
-        typer.Argument(help=f"What is sent; {', '.join(SHOWN)}, if nothing is named."),
+        typer.Argument(help=f"What is sent; {', '.join(LOGGED)}, if nothing is named."),
     ] = None,
     spawn: Annotated[
         bool,
@@ -58,7 +57,7 @@ def rerun(
         bridge = RerunBridge(
             camera,
             recording,
-            products=products or SHOWN,
+            products=products or LOGGED,
             max_rate_hz=max_rate_hz,
             transient_rate_hz=transient_rate_hz,
             bins=bins,

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import typer
 from rich.console import Console
 
-from transientcam.robotics.reports import Report
+from transientcam.robotics import Report
 
 _STYLES = {"info": "green", "warning": "yellow", "error": "red"}
 

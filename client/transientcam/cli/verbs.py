@@ -19,6 +19,8 @@ _EXTRA_OF_PACKAGE: Final = {
     "matplotlib": "plot",
     "rerun": "rerun",
     "transientcam_driver": "driver",
+    "transientcam_simulation": "driver",
+    "transientcam_conformance": "conformance",
     "transientcam_moments": "server",
     "transientcam_server": "server",
 }

@@ -4,28 +4,6 @@
 Foxglove's, and `foxglove_bridge` serves them live.
 """
 
-from transientcam.robotics.messages import (
-    CAMERA_FRAME,
-    OPTICAL_FRAME,
-    Calibration,
-    Image,
-    Message,
-    Pinhole,
-    Points,
-    Transform,
-    messages_of,
-    viewable,
-)
+import lazy_loader
 
-__all__ = [
-    "CAMERA_FRAME",
-    "OPTICAL_FRAME",
-    "Calibration",
-    "Image",
-    "Message",
-    "Pinhole",
-    "Points",
-    "Transform",
-    "messages_of",
-    "viewable",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,24 +4,29 @@ Nothing here sends or receives: it converts between the network libraries and th
 `transientcam.requests`.
 """
 
-from transientcam.transport.address import parse_address
-from transientcam.transport.errors import translated
-from transientcam.transport.options import (
+from transientcam.transport._address import parse_address
+from transientcam.transport._deadline import Deadline
+from transientcam.transport._errors import media_type, translated
+from transientcam.transport._options import (
     DownloadProgress,
     Progress,
     answer_of,
     http_options,
     request_options,
+    set_lease,
     stream_options,
 )
 
 __all__ = [
+    "Deadline",
     "DownloadProgress",
     "Progress",
     "answer_of",
     "http_options",
+    "media_type",
     "parse_address",
     "request_options",
+    "set_lease",
     "stream_options",
     "translated",
 ]

@@ -1,9 +1,10 @@
 """The wire contract of docs/stream.md, for both ends: constants, products, messages, parsing."""
 
 from transientcam.frame import Frame, FrameMeta, PixelCounts, PredictedStd
-from transientcam.wire.arrays import DTYPES, array_document, parse_array
-from transientcam.wire.codec import ALIGNMENT, pack, unpack
-from transientcam.wire.contract import (
+from transientcam.wire import _fields as fields
+from transientcam.wire._arrays import DTYPES, array_document, parse_array
+from transientcam.wire._codec import ALIGNMENT, array_head, pack, unpack
+from transientcam.wire._contract import (
     F32,
     FIRST_MESSAGE_WITHIN_S,
     LEASE_HEADER,
@@ -21,7 +22,7 @@ from transientcam.wire.contract import (
     VERSION,
     CloseCode,
 )
-from transientcam.wire.encodings import (
+from transientcam.wire._encodings import (
     ENCODINGS,
     Coded,
     Encoding,
@@ -31,7 +32,7 @@ from transientcam.wire.encodings import (
     encode_u16,
     encoding_names,
 )
-from transientcam.wire.messages import (
+from transientcam.wire._messages import (
     Ack,
     Channel,
     ClientMessage,
@@ -43,15 +44,16 @@ from transientcam.wire.messages import (
     Subscription,
     encode,
     encode_frame,
+    frame_document,
 )
-from transientcam.wire.notices import NOTICES, NoticeKind
-from transientcam.wire.parsing import (
+from transientcam.wire._notices import NOTICES, NoticeKind
+from transientcam.wire._parsing import (
     parse_channels,
     parse_client_message,
     parse_frame,
     parse_server_message,
 )
-from transientcam.wire.products import PRODUCTS, Product
+from transientcam.wire._products import PRODUCTS, Product
 
 __all__ = [
     "ALIGNMENT",
@@ -93,6 +95,7 @@ __all__ = [
     "Subscribe",
     "Subscription",
     "array_document",
+    "array_head",
     "decode_reflection16",
     "decode_u16",
     "encode",
@@ -100,6 +103,8 @@ __all__ = [
     "encode_reflection16",
     "encode_u16",
     "encoding_names",
+    "fields",
+    "frame_document",
     "pack",
     "parse_array",
     "parse_channels",

@@ -1,16 +1,16 @@
 """Calibration measurements: how a camera captures one, and the file that keeps it."""
 
-from transientcam_driver.calibration.capture import (
+from transientcam_driver.calibration._capture import (
     DEFAULT_TAKES,
     capture_calibration,
     mean_of_takes,
 )
-from transientcam_driver.calibration.file import (
+from transientcam_driver.calibration._file import (
     DEVICE_FIELDS,
     CalibrationCapture,
     CalibrationSubject,
 )
-from transientcam_driver.calibration.sweep import LEAST_TAKES, SWEEP_STEPS
+from transientcam_driver.calibration._sweep import LEAST_TAKES, SWEEP_STEPS
 
 __all__ = [
     "DEFAULT_TAKES",

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Final
 
+from transientcam_driver.camera import open_camera, plugin_of
 from transientcam_driver.contract import CLAUSES, Bench, ContractBroken, ContractSkipped
 from transientcam_driver.errors import DriverError
-from transientcam_driver.opening import open_camera, plugin_of
 
 Reported = tuple[str, str, str, str | None]
 

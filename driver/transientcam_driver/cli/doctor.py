@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
+from transientcam_driver.camera import FoundCamera
+from transientcam_driver.cameras.open_usb import UDEV_RULE, list_cameras, system_libusb
+from transientcam_driver.cameras.open_usb.protocol import PRODUCT_ID, VENDOR_ID
 from transientcam_driver.cli import kinect2_checks
 from transientcam_driver.errors import UDEV_RULES_FILE, LibusbMissing
-from transientcam_driver.plugin import FoundCamera
-from transientcam_driver.protocol.requests import PRODUCT_ID, VENDOR_ID
-from transientcam_driver.usb import UDEV_RULE, list_cameras, system_libusb
 
 Reported = tuple[str, str, str, str | None]
 

@@ -10,11 +10,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from transientcam_driver.cameras.kinect2 import (
+    PACKET_BYTES,
+    PACKETS,
+    PRODUCT_IDS,
+    ROWS,
+    TRANSFERS,
+    UDEV_RULES,
+    VENDOR_ID,
+    libusb,
+)
 from transientcam_driver.errors import UDEV_RULES_FILE, CameraError
-from transientcam_driver.kinect2.link import PRODUCT_IDS, VENDOR_ID
-from transientcam_driver.kinect2.parameters import ROWS
-from transientcam_driver.kinect2.usb_link import PACKETS, TRANSFERS
-from transientcam_driver.kinect2.usb_port import PACKET_BYTES, UDEV_RULES, libusb
 
 Reported = tuple[str, str, str, str | None]
 

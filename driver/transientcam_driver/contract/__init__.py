@@ -13,9 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from transientcam_driver.contract import clauses
-from transientcam_driver.contract.bench import Bench
-from transientcam_driver.contract.expecting import ContractBroken, ContractSkipped
+from transientcam_driver.contract import _clauses as clauses
+from transientcam_driver.contract._bench import Bench
+from transientcam_driver.contract._expecting import ContractBroken, ContractSkipped
 from transientcam_driver.errors import DriverError
 
 __all__ = ["CLAUSES", "Bench", "Clause", "ContractBroken", "ContractSkipped"]

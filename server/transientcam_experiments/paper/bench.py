@@ -21,8 +21,7 @@ from transientcam_driver import (
     open_camera,
 )
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.imaging.calibration import Calibration, evaluate
-from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging import Calibration, Recipe, evaluate
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence, SubPhases, list_scenes
 from transientcam_experiments.paper.bench import Bench
-from transientcam_moments.comparisons.coded import Code, maximum_length_code
-from transientcam_moments.comparisons.coded import coded as estimate
+from transientcam_moments.comparisons import Code, coded as estimate, maximum_length_code
 
 _Array = NDArray[Any]
 SEQUENCE: Final = Sequence(

@@ -112,7 +112,7 @@ def samples(
 
 def _code_samples(contender: Contender, response: Response) -> _Array:
     """Correlate a finely divided response with the code, at 62 shifts."""
-    from transientcam_moments.comparisons.coded import equal_shifts_rad, maximum_length_code
+    from transientcam_moments.comparisons import equal_shifts_rad, maximum_length_code
 
     turn = 2 * np.pi * contender.base_frequency_hz
     period_s = 1 / contender.base_frequency_hz

@@ -14,7 +14,7 @@ from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S, Scheme
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Bench
 from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
-from transientcam_server.errors.exceptions import InputError
+from transientcam_server.errors import InputError
 
 _Array = NDArray[Any]
 _F_HZ: Final = 23e6

@@ -9,7 +9,7 @@ import transientcam_moments as tm
 from transientcam_experiments.paper import FIGURES, style
 from transientcam_experiments.paper.bench import Bench
 from transientcam_experiments.paper.page import document_of
-from transientcam_server.offline.job import require_versions
+from transientcam_server.offline import require_versions
 
 
 def made(number: int, bench: Bench) -> tuple[dict[str, Any], bytes]:

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import AppliedSequence, Camera, RawFrame, Truth
 from transientcam_experiments.tradeoff.truth import Sample, count_returns, cumulative
-from transientcam_server.imaging.deviation import MEDIAN_OF_NORMAL
-from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging import MEDIAN_OF_NORMAL, Recipe
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]

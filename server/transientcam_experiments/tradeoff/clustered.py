@@ -12,7 +12,7 @@ import transientcam_moments as tm
 from transientcam_experiments.tradeoff.grid import Grid
 from transientcam_experiments.tradeoff.measuring import Bench, points_of
 from transientcam_experiments.tradeoff.records import Record, Records
-from transientcam_server.offline.job import installed, require_versions
+from transientcam_server.offline import installed, require_versions
 
 UNTIMED: Final = "capture"
 Versions = tuple[tuple[str, str], ...]
@@ -48,7 +48,7 @@ def measure_on(
     SpecError, SceneError, SequenceError
         As `measure`.
     """
-    from transientcam_server.offline.cluster import completed
+    from transientcam_server.offline import completed
 
     points = points_of(grid, scene=scene, repetitions=repetitions, seed=seed)
     left = [

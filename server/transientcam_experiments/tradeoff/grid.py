@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from transientcam_driver import Sequence, SubPhases
-from transientcam_server.errors.exceptions import InputError
+from transientcam_server.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)

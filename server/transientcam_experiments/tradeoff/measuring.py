@@ -16,7 +16,7 @@ from transientcam_experiments.tradeoff.grid import Grid
 from transientcam_experiments.tradeoff.records import Record, Records, key_of
 from transientcam_experiments.tradeoff.truth import Sample, sample_pixels
 from transientcam_moments.comparisons import Technique
-from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging import Recipe
 from transientcam_server.settings import ReconstructionSettings
 
 SAMPLE_PIXELS: Final = 400

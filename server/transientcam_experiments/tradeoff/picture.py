@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from transientcam_server.planning.pareto import flat_from
+from transientcam_server.planning import flat_from
 
 
 def error_picture(

@@ -6,8 +6,8 @@ from io import BytesIO
 from typing import Any, Final
 
 from transientcam_experiments.tradeoff.records import Record
-from transientcam_server.errors.exceptions import MissingExtra
-from transientcam_server.planning.pareto import front
+from transientcam_server.errors import MissingExtra
+from transientcam_server.planning import front
 
 
 @dataclass(frozen=True, slots=True)

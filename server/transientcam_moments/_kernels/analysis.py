@@ -2,7 +2,7 @@
 
 Three kernels that are called from Python one after the other, a block of pixels at a time, acquire
 the interpreter's lock after each of them; for all pixels at a time, each finds what the one before
-wrote in memory instead of the caches (decision 1159).
+wrote in memory instead of the caches (decision 11).
 """
 
 from collections.abc import Callable

@@ -6,9 +6,7 @@ from numba import njit
 
 from transientcam_moments._kernels import portable, simd
 from transientcam_moments._kernels.returns import phase_of
-from transientcam_moments.likelihood import choice, sharp, tail
-from transientcam_moments.likelihood.arithmetic import logarithm, product_bank
-from transientcam_moments.likelihood.choice import (
+from transientcam_moments.likelihood import (
     CHI_SQUARE,
     COUNT,
     DELAY_RAD,
@@ -25,6 +23,11 @@ from transientcam_moments.likelihood.choice import (
     WEIGHT_VARIANCE,
     X,
     Y,
+    choice,
+    logarithm,
+    product_bank,
+    sharp,
+    tail,
 )
 
 __all__ = ["fit", "fit_one", "portable", "vary", "write"]  # portable gives arithmetic its meaning

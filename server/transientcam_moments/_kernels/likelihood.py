@@ -34,8 +34,7 @@ from transientcam_moments._kernels.stages import (
     step_late,
     take_three,
 )
-from transientcam_moments.likelihood import choice
-from transientcam_moments.likelihood.choice import MOST_RETURNS, TAIL_SHAPE
+from transientcam_moments.likelihood import MOST_RETURNS, TAIL_SHAPE, choice
 
 
 @njit(nogil=True, error_model="numpy")

@@ -52,7 +52,7 @@ def flag_and_bias(
         limit = simd.overflowing(b0) * (6.0 / (2.0 * m + 1.0))
         finite = (poison >= 0.0) & (largest < limit)
         dark = finite & ~(b0 > least)
-        # less by rounding doesn't count, see `transientcam_moments.biasing.ROUNDING`
+        # less by rounding doesn't count, see `ROUNDING` of `bias`
         biased = smallest < (epsilon - 4.0 * (m + 1.0) * simd.eps(b0)) * b0
         raised = simd.select(biased, (b0 - smallest) / (1.0 - epsilon), b0)
         flag = simd.load(one, saturated, p)

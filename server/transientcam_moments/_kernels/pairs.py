@@ -1,4 +1,4 @@
-"""Two returns by all pairs: `transientcam_moments.likelihood.pairs` in lanes."""
+"""Two returns by all pairs: `transientcam_moments.two_returns` in lanes."""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,18 +20,21 @@ from transientcam_moments._kernels.compiled_entry import (
     sizes_type,
 )
 from transientcam_moments._kernels.fits import fit_one, portable, vary, write
-from transientcam_moments.likelihood import choice, pair_fit, sharp
-from transientcam_moments.likelihood.choice import COUNT, SCORE
-from transientcam_moments.likelihood.pairs import (
+from transientcam_moments.likelihood import (
     COINCIDE,
+    COUNT,
     FINALISTS,
     FIRST_STEPS,
     LAST_STEPS,
     LEAST_GAIN,
     PEAKS,
+    SCORE,
     STARTS,
+    choice,
     grid,
     least_alike,
+    pair_fit,
+    sharp,
 )
 
 __all__ = ["pairs_lane", "portable"]  # which gives the fits' arithmetic its meaning

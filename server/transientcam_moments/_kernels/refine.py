@@ -4,8 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from transientcam_moments._arrays import in_turn
-from transientcam_moments.polishing import polish
+from transientcam_moments.arrays import in_turn
+from transientcam_moments.moment_problem import polish
 
 
 class Found(NamedTuple):
@@ -35,12 +35,12 @@ def redo(planes: Any, found: tuple[Any, ...], ill: Any, noise: float) -> None:
     noise : float
         Precision of the data.
     """
-    from transientcam_moments.pisarenko import _improved, _pisarenko
+    from transientcam_moments.moment_problem import first_returns, improved_returns
 
     part = planes[:, ill]
-    found64 = _pisarenko(part, noise=noise)
+    found64 = first_returns(part, noise=noise)
     if noise == np.finfo(np.float64).eps:
-        phase, weight, uniform, _ = _improved(part, found64)
+        phase, weight, uniform, _ = improved_returns(part, found64)
     else:
         with np.errstate(all="ignore"):
             phase, weight, uniform = polish(part, *found64[:3], tolerance=4 * len(planes) * noise)

@@ -265,7 +265,7 @@ def sort(order: Any, keys: Any, values: Any) -> None:
 def usual_steps(m: int, precision: str) -> int:
     """Return how many steps towards the roots all pixels are given: nine of ten need no more.
 
-    Fewest of processor time with m = 3, 4 and 8 in single precision (decision 1056).
+    Fewest of processor time with m = 3, 4 and 8 in single precision (decision 11).
     """
     return (3 if m < 6 else 5) + (precision == "d")
 

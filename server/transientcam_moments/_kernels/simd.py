@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 from llvmlite import binding, ir  # type: ignore[import-untyped]  # it has no annotations
-from numba import extending as numba_extending
-from numba import types as numba_types
+from numba import extending as numba_extending, types as numba_types
 from numba.core import cgutils as numba_cgutils
 from numba.core.typeconv.castgraph import Conversion
 from numba.core.typing import templates as numba_templates

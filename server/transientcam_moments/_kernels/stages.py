@@ -15,9 +15,17 @@ from transientcam_moments._kernels.fits import (
     write,
 )
 from transientcam_moments._kernels.packing import ROW, pack, put, take, unpack
-from transientcam_moments.likelihood import choice, sharp
-from transientcam_moments.likelihood.arithmetic import product_bank
-from transientcam_moments.likelihood.choice import FITTED, PLANES, PRIOR, SCORE, STEPS, TAIL_STEPS
+from transientcam_moments.likelihood import (
+    FITTED,
+    PLANES,
+    PRIOR,
+    SCORE,
+    STEPS,
+    TAIL_STEPS,
+    choice,
+    product_bank,
+    sharp,
+)
 
 TAIL_ROUNDS: Final = (3, 3, TAIL_STEPS - 6)
 """Steps of a tail after each of which the pixels are packed that go on."""

@@ -14,24 +14,29 @@ was not at hand; no label claims to be the authors' implementation.
 """
 
 from transientcam_moments.comparisons import (
-    coded,
-    dorrington,
-    frequency_domain,
-    godbaz,
-    high_frequency,
-    inverse_fourier,
-    logarithmic,
-    matching_pursuit,
-    matrix_pencil,
-    own,
-    regularised,
-    single_frequency,
-    spumic,
-    sra,
-    sra_table,
+    _coded,
+    _dorrington,
+    _frequency_domain,
+    _godbaz,
+    _high_frequency,
+    _inverse_fourier,
+    _logarithmic,
+    _matching_pursuit,
+    _matrix_pencil,
+    _own,
+    _regularised,
+    _single_frequency,
+    _spumic,
+    _sra,
+    _sra_table,
 )
-from transientcam_moments.comparisons._pixels import check_order
-from transientcam_moments.comparisons.estimate import (
+from transientcam_moments.comparisons._coded import (
+    Code,
+    coded,
+    equal_shifts_rad,
+    maximum_length_code,
+)
+from transientcam_moments.comparisons._estimate import (
     Estimate,
     GridEstimate,
     LikelihoodEstimate,
@@ -39,35 +44,37 @@ from transientcam_moments.comparisons.estimate import (
     SparseEstimate,
     grid_rad,
 )
-from transientcam_moments.comparisons.technique import Technique
+from transientcam_moments.comparisons._pixels import check_order
+from transientcam_moments.comparisons._technique import Technique
 
 TECHNIQUES: dict[str, Technique] = {
     technique.name: technique
     for technique in (
-        own.MAXIMUM_ENTROPY,
-        own.PISARENKO,
-        own.LIKELIHOOD,
-        own.MERGED,
-        single_frequency.TECHNIQUE,
-        inverse_fourier.TECHNIQUE,
-        godbaz.TECHNIQUE,
-        spumic.TECHNIQUE,
-        sra.TECHNIQUE,
-        sra_table.TECHNIQUE,
-        matrix_pencil.TECHNIQUE,
-        matching_pursuit.TECHNIQUE,
-        dorrington.TECHNIQUE,
-        regularised.TECHNIQUE,
-        coded.TECHNIQUE,
-        frequency_domain.TECHNIQUE,
-        logarithmic.TECHNIQUE,
-        high_frequency.TECHNIQUE,
+        _own.MAXIMUM_ENTROPY,
+        _own.PISARENKO,
+        _own.LIKELIHOOD,
+        _own.MERGED,
+        _single_frequency.TECHNIQUE,
+        _inverse_fourier.TECHNIQUE,
+        _godbaz.TECHNIQUE,
+        _spumic.TECHNIQUE,
+        _sra.TECHNIQUE,
+        _sra_table.TECHNIQUE,
+        _matrix_pencil.TECHNIQUE,
+        _matching_pursuit.TECHNIQUE,
+        _dorrington.TECHNIQUE,
+        _regularised.TECHNIQUE,
+        _coded.TECHNIQUE,
+        _frequency_domain.TECHNIQUE,
+        _logarithmic.TECHNIQUE,
+        _high_frequency.TECHNIQUE,
     )
 }
 """Every technique by its name; the paper's first."""
 
 __all__ = [
     "TECHNIQUES",
+    "Code",
     "Estimate",
     "GridEstimate",
     "LikelihoodEstimate",
@@ -75,5 +82,8 @@ __all__ = [
     "SparseEstimate",
     "Technique",
     "check_order",
+    "coded",
+    "equal_shifts_rad",
     "grid_rad",
+    "maximum_length_code",
 ]

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_moments.comparisons.estimate import Real
+from transientcam_moments.comparisons._estimate import Real
 
 _FAINT = 1e-7  # of the brightest bin: what solvers leave of zero
 

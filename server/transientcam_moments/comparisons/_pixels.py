@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_moments._arrays import Array, in_turn, moment_planes
-from transientcam_moments.comparisons.estimate import GridEstimate, Real, SparseEstimate
+from transientcam_moments.arrays import Array, in_turn, moment_planes
+from transientcam_moments.comparisons._estimate import GridEstimate, Real, SparseEstimate
 from transientcam_moments.errors import ParameterError
 
 Complex = NDArray[np.complexfloating[Any, Any]]

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from transientcam_moments._arrays import by_blocks
+from transientcam_moments.arrays import by_blocks
+from transientcam_moments.comparisons._estimate import Real
 from transientcam_moments.comparisons._pixels import Complex
-from transientcam_moments.comparisons.estimate import Real
 
 
 def nonnegative_weights(b: Complex, orders: Real, phase_rad: Real) -> Real:

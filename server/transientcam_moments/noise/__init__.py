@@ -12,11 +12,11 @@ through the estimator itself. ::
     range_std_m = tm.range_m(deviation.direct_phase_std_rad, 23e6)
 """
 
-from transientcam_moments.noise.ambient import ambient_light
-from transientcam_moments.noise.cramer_rao import CramerRao, cramer_rao
-from transientcam_moments.noise.density import DensityNoise, density_noise, density_std
-from transientcam_moments.noise.draws import draw
-from transientcam_moments.noise.moments import (
+from transientcam_moments.noise._ambient import ambient_light
+from transientcam_moments.noise._cramer_rao import CramerRao, cramer_rao
+from transientcam_moments.noise._density import DensityNoise, density_noise, density_std
+from transientcam_moments.noise._draws import draw
+from transientcam_moments.noise._moments import (
     MomentNoise,
     moment_noise,
     own_share,
@@ -25,9 +25,9 @@ from transientcam_moments.noise.moments import (
     smoothed_of,
     smoothing_factor,
 )
-from transientcam_moments.noise.returns import ReturnNoise, return_noise
-from transientcam_moments.noise.scatter import scatter
-from transientcam_moments.noise.sensor import Sensor
+from transientcam_moments.noise._returns import ReturnNoise, direct_phase_noise, return_noise
+from transientcam_moments.noise._scatter import scatter
+from transientcam_moments.noise._sensor import Sensor
 
 __all__ = [
     "CramerRao",
@@ -39,6 +39,7 @@ __all__ = [
     "cramer_rao",
     "density_noise",
     "density_std",
+    "direct_phase_noise",
     "draw",
     "moment_noise",
     "own_share",

@@ -4,3 +4,7 @@
 `middleware`, `stream` and `docs` are what the names say. `frame_query` and `frame_routes` serve the
 frames of the camera and of recordings alike, `problems` every answer.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

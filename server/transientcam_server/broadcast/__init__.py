@@ -4,8 +4,8 @@ The `Hub` hands each frame to the `Outbox` of every client, which holds few of t
 `Channel`s.
 """
 
-from transientcam_server.broadcast.channel import Channel
-from transientcam_server.broadcast.hub import Hub
-from transientcam_server.broadcast.outbox import Outbox
+from transientcam_server.broadcast._channel import UNNUMBERED, Channel, Lost
+from transientcam_server.broadcast._hub import Hub
+from transientcam_server.broadcast._outbox import Close, Delivery, Item, Outbox
 
-__all__ = ["Channel", "Hub", "Outbox"]
+__all__ = ["UNNUMBERED", "Channel", "Close", "Delivery", "Hub", "Item", "Lost", "Outbox"]

@@ -4,18 +4,71 @@
 which client may change it; `Jobs` run long work one after another; `Calibrator` is such work.
 """
 
-from transientcam_server.camera.acquisition import Acquisition
-from transientcam_server.camera.calibration_store import CalibrationStore
-from transientcam_server.camera.calibrator import Calibrator
-from transientcam_server.camera.jobs import Jobs
-from transientcam_server.camera.lease import LeaseManager
-from transientcam_server.camera.status import AcquisitionStatus
+from transientcam_server.camera import _lease as lease
+from transientcam_server.camera._acquisition import Acquisition
+from transientcam_server.camera._calibration_store import (
+    CalibrationStore,
+    StoredCalibration,
+    load_given,
+)
+from transientcam_server.camera._calibrator import CalibrationOptions, Calibrator, Drift
+from transientcam_server.camera._events import (
+    Back,
+    Captured,
+    Event,
+    Held,
+    Lost,
+    OriginChanged,
+    Released,
+    SequenceChanged,
+)
+from transientcam_server.camera._jobs import Job, Jobs
+from transientcam_server.camera._lease import (
+    DEFAULT_DURATION_S,
+    MAX_DURATION_S,
+    MIN_DURATION_S,
+    Change,
+    Lease,
+    LeaseManager,
+    Timer,
+)
+from transientcam_server.camera._light import LightGuard
+from transientcam_server.camera._origin_lease import OriginLease
+from transientcam_server.camera._shared import SharedAcquisition
+from transientcam_server.camera._source import sensor_of, start_with, twin_of
+from transientcam_server.camera._status import AcquisitionStatus
 
 __all__ = [
+    "DEFAULT_DURATION_S",
+    "MAX_DURATION_S",
+    "MIN_DURATION_S",
     "Acquisition",
     "AcquisitionStatus",
+    "Back",
+    "CalibrationOptions",
     "CalibrationStore",
     "Calibrator",
+    "Captured",
+    "Change",
+    "Drift",
+    "Event",
+    "Held",
+    "Job",
     "Jobs",
+    "Lease",
     "LeaseManager",
+    "LightGuard",
+    "Lost",
+    "OriginChanged",
+    "OriginLease",
+    "Released",
+    "SequenceChanged",
+    "SharedAcquisition",
+    "StoredCalibration",
+    "Timer",
+    "lease",
+    "load_given",
+    "sensor_of",
+    "start_with",
+    "twin_of",
 ]

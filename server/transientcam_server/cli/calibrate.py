@@ -17,7 +17,7 @@ from transientcam.cli.options import TokenOption, require_suffix
 
 if TYPE_CHECKING:
     from transientcam_driver import Camera
-    from transientcam_server.imaging.calibration import Calibration
+    from transientcam_server.imaging import Calibration
 
 
 def calibrate(
@@ -188,9 +188,8 @@ def _before_lens(change: Callable[..., object]) -> Iterator[None]:
 
 def _measured_here(order: _Order) -> dict[str, Any]:
     from transientcam_driver import Sequence, open_camera
-    from transientcam_server.camera.source import start_with
-    from transientcam_server.imaging.diffusor import judge
-    from transientcam_server.imaging.waveform import SWEEP_ON_A_SCENE, to_document
+    from transientcam_server.camera import start_with
+    from transientcam_server.imaging import SWEEP_ON_A_SCENE, judge, to_document
     from transientcam_server.settings import SequenceSettings
 
     requested = None
@@ -225,8 +224,7 @@ def _measure(camera: "Camera", order: _Order) -> "tuple[Calibration, str | None]
 
     import transientcam_moments as tm
     from transientcam_driver import capture_calibration
-    from transientcam_server.imaging.calibration import evaluate
-    from transientcam_server.imaging.waveform import SweepEvaluation
+    from transientcam_server.imaging import SweepEvaluation, evaluate
 
     sweep = SweepEvaluation(camera.capabilities, takes=order.takes)
     with Progress(console=Console(stderr=True)) as shown:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from transientcam_server.errors.exceptions import ClusterError, MissingExtra
+from transientcam_server.errors import ClusterError, MissingExtra
 
 WorkersOption = Annotated[
     int | None,

@@ -45,8 +45,7 @@ def convert(
     A .json holds no images but where they are in the file: by it Zarr readers read the recording
     from a disk or an object store (kerchunk).
     """
-    from transientcam_server.offline import convert_recording
-    from transientcam_server.offline.mcap import lens_of
+    from transientcam_server.offline import convert_recording, lens_of
     from transientcam_server.recording import Recording
 
     products = [name.strip() for text in product or ["raw"] for name in text.split(",")]

@@ -37,8 +37,7 @@ def import_kinect2(
     as_json: JsonOption = False,
 ) -> None:
     """Import raw frames of a Kinect v2 as a recording, to replay, reconstruct and convert."""
-    from transientcam_server.offline.kinect2 import import_kinect2 as imported
-    from transientcam_server.offline.kinect2 import read_lens
+    from transientcam_server.offline import import_kinect2 as imported, read_lens
 
     require_suffix(output, ".h5")
     known = None if lens is None else read_lens(lens, rows)

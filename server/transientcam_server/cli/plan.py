@@ -151,8 +151,7 @@ def plan(
 
 def _goal(asked: dict[str, Any], fixed: dict[str, Any]) -> "Goal":
     from transientcam_driver import Sequence
-    from transientcam_server.planning import Goal
-    from transientcam_server.planning.estimation import ESTIMATORS
+    from transientcam_server.planning import ESTIMATORS, Goal
 
     estimator = asked["estimator"]
     if estimator is not None and estimator not in ESTIMATORS:
@@ -166,7 +165,7 @@ def _by_camera(
 ) -> dict[str, Any]:
     """Plan here; where that is refused print what limits, and end with exit code 1."""
     from transientcam_server.cli.plan_here import by_camera
-    from transientcam_server.errors.exceptions import Problem
+    from transientcam_server.errors import Problem
 
     try:
         return by_camera(view, goal, console)

@@ -9,12 +9,18 @@ from rich.status import Status
 import transientcam_moments as tm
 from transientcam_driver import Camera, open_camera
 from transientcam_driver.clock import RealClock, VirtualClock
-from transientcam_server.camera.source import sensor_of
-from transientcam_server.errors.exceptions import Problem
-from transientcam_server.planning import Goal, Planner, Progress, SceneStatistics, uniform_scene
-from transientcam_server.planning.families import require_plannable
-from transientcam_server.planning.progress import Report
-from transientcam_server.planning.takes import predict_takes
+from transientcam_server.camera import sensor_of
+from transientcam_server.errors import Problem
+from transientcam_server.planning import (
+    Goal,
+    Planner,
+    Progress,
+    Report,
+    SceneStatistics,
+    predict_takes,
+    require_plannable,
+    uniform_scene,
+)
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 
 LOOK_S: Final = 60.0

@@ -61,7 +61,7 @@ def print_takes(predicted: Iterable[Mapping[str, Any]]) -> None:
 
 def _row(choice: Mapping[str, Any]) -> tuple[str, ...]:
     from transientcam_driver import Sequence
-    from transientcam_server.planning.choice import in_words
+    from transientcam_server.planning import in_words
 
     predicted = choice["predicted"]
     error = predicted["range_error_m"]

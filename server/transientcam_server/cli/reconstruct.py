@@ -173,7 +173,7 @@ def _print_cube(console: Console, document: dict[str, Any]) -> None:
 
 def _is_recording(path: Path) -> bool:
     """Whether a file is HDF5, and not an impulse response of tal."""
-    from transientcam_server.offline.impulse_responses import is_tal
+    from transientcam_server.offline import is_tal
 
     with path.open("rb") as file:
         is_hdf5 = file.read(len(_HDF5)) == _HDF5

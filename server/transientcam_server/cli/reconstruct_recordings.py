@@ -28,8 +28,7 @@ class Wanted:
 
     def options(self, header: "Header") -> "BatchOptions":
         """Return what to compute of a recording with this header."""
-        from transientcam_server.offline import BatchOptions
-        from transientcam_server.offline.recording import KNOWN_PRODUCTS, default_products
+        from transientcam_server.offline import KNOWN_PRODUCTS, BatchOptions, default_products
 
         for name in self.products:
             if name not in KNOWN_PRODUCTS:
@@ -61,9 +60,7 @@ def reconstruct_recording(
     Kernels are compiled first, as on a cluster, so that each run gives the same bits.
     """
     from transientcam_server import offline
-    from transientcam_server.offline.job import load_lanes
-    from transientcam_server.offline.place import recording_at
-    from transientcam_server.offline.recording import BatchReconstructor
+    from transientcam_server.offline import BatchReconstructor, load_lanes, recording_at
 
     with recording_at(place, token=token) as opened:
         options = wanted.options(opened.header)
@@ -87,8 +84,7 @@ def reconstruct_on_cluster(
     console = Console(stderr=True)
     outputs = _outputs(place, output)
     with cluster_client(workers, dask, console) as client:
-        from transientcam_server.offline.cluster import reconstruct_on
-        from transientcam_server.offline.place import recording_at
+        from transientcam_server.offline import reconstruct_on, recording_at
 
         for each, into in outputs.items():
             with recording_at(each, token=token) as opened:

@@ -59,7 +59,7 @@ def serve(
     as_json: JsonOption = False,
 ) -> None:
     """Run the daemon: a camera on the network, with its dashboard."""
-    from transientcam_server.daemon.configuration import load_settings
+    from transientcam_server.daemon import load_settings
 
     command_line = {
         "camera": camera,
@@ -79,17 +79,24 @@ def serve(
 
     import transientcam_moments as tm
     from transientcam_driver import open_camera
-    from transientcam_server.api.app import build_app
-    from transientcam_server.camera.source import start_with
-    from transientcam_server.daemon import server
+    from transientcam_server.api import build_app
+    from transientcam_server.camera import start_with
+    from transientcam_server.daemon import (
+        address,
+        configure_logging,
+        exit_without_joining,
+        freeze_startup_objects,
+        listen,
+        serve_app,
+    )
 
-    server.configure_logging(settings)
+    configure_logging(settings)
     # the address first: if another daemon has it, the camera stays untouched
     with (
-        server.exit_without_joining() as leave,
-        server.listen(settings.host, settings.port) as listener,
+        exit_without_joining() as leave,
+        listen(settings.host, settings.port) as listener,
     ):
-        url = server.address(listener, tls=settings.tls_certificate is not None)
+        url = address(listener, tls=settings.tls_certificate is not None)
         with open_camera(settings.camera) as opened:
             start_with(opened, settings.sequence)
             # NumPy serves until the compiled kernels are ready
@@ -99,41 +106,46 @@ def serve(
             compiling = tm.kernels.compile_in_background(orders, also=also)
             leave(compiling)
             app = build_app(opened, settings)
-            server.freeze_startup_objects(compiling)
+            freeze_startup_objects(compiling)
 
             def listening() -> None:
                 _announce(url, settings.camera, as_json=as_json)
                 app.state.service.planning.prepare()
 
-            server.serve(app, settings, listener, on_listening=listening)
+            serve_app(app, settings, listener, on_listening=listening)
 
 
 def _camera_names() -> list[str]:
     from transientcam_driver import list_scenes
-    from transientcam_driver.opening import kinds
+    from transientcam_driver.camera import kinds
 
     return [*kinds(), *(f"sim:{scene.name}" for scene in list_scenes())]
 
 
 def _check(command_line: dict[str, Any], config: Path | None, *, as_json: bool) -> None:
-    from transientcam_server.daemon import check as settings_check
-    from transientcam_server.daemon.configuration import load
-    from transientcam_server.errors.exceptions import SettingsError
+    from transientcam_server.daemon import (
+        load,
+        mistakes_document,
+        require_usable,
+        to_document,
+        to_toml,
+    )
+    from transientcam_server.errors import SettingsError
 
     try:
         configuration = load(command_line, file=config, environment=os.environ)
-        settings_check.require_usable(configuration)
+        require_usable(configuration)
     except SettingsError as error:
         if not as_json:
             raise
-        mistakes = settings_check.mistakes_document(error)
+        mistakes = mistakes_document(error)
         typer.echo(json.dumps({"valid": False, "mistakes": mistakes}, default=str))
         raise typer.Exit(code=1) from error
-    document = settings_check.to_document(configuration)
+    document = to_document(configuration)
     if as_json:
         typer.echo(json.dumps({"valid": True, "settings": document}))
         return
-    for line in settings_check.to_toml(document):
+    for line in to_toml(document):
         typer.echo(line)
 
 

@@ -44,7 +44,7 @@ def create(
     as_json: JsonOption = False,
 ) -> None:
     """Create a token and print it; it cannot be printed again."""
-    from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
+    from transientcam_server.api import Role, TokenFile, utc_now
 
     if not 1 <= len(name) <= 80 or not name.isprintable():
         raise typer.BadParameter("it must have 1 to 80 printable characters", param_hint="NAME")
@@ -70,7 +70,7 @@ def list_tokens(
     config: _Config = None, tokens_file: _File = None, as_json: JsonOption = False
 ) -> None:
     """List the tokens: ids, names, roles and ends, not the secrets."""
-    from transientcam_server.api.auth.tokens import TokenFile, utc_now
+    from transientcam_server.api import TokenFile, utc_now
 
     file = TokenFile(_path(config, tokens_file))
     tokens = file.tokens()
@@ -98,7 +98,7 @@ def revoke(
     as_json: JsonOption = False,
 ) -> None:
     """Make a token invalid; its open streams are closed."""
-    from transientcam_server.api.auth.tokens import TokenFile
+    from transientcam_server.api import TokenFile
 
     token = TokenFile(_path(config, tokens_file)).revoke(token_id)
     if as_json:
@@ -108,7 +108,7 @@ def revoke(
 
 
 def _path(config: Path | None, tokens_file: Path | None) -> Path:
-    from transientcam_server.daemon.configuration import tokens_file_of
+    from transientcam_server.daemon import tokens_file_of
 
     return tokens_file or tokens_file_of(config, environment=os.environ)
 

@@ -4,20 +4,64 @@
 be answered with, and `translation` turns errors of all packages of the project into problems.
 """
 
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import (
+from transientcam_server.errors import _kinds as kinds
+from transientcam_server.errors._exceptions import (
+    AddressUnavailable,
+    ClusterError,
+    DamagedFrame,
     InputError,
+    JobCancelled,
+    MissingExtra,
+    MixedVersions,
+    NotARecording,
+    NotConvertible,
+    OriginRefused,
     Problem,
     RecordingError,
+    RecordingInUse,
+    SequenceConflict,
     ServerError,
     SettingsError,
+    SettingsMistake,
+    StorageError,
+    TokenFileError,
+    UnknownToken,
+)
+from transientcam_server.errors._kinds import ProblemKind
+from transientcam_server.errors._translation import (
+    ProblemDocument,
+    plain,
+    problem_document,
+    problem_of,
+    shortened,
 )
 
 __all__ = [
+    "AddressUnavailable",
+    "ClusterError",
+    "DamagedFrame",
     "InputError",
+    "JobCancelled",
+    "MissingExtra",
+    "MixedVersions",
+    "NotARecording",
+    "NotConvertible",
+    "OriginRefused",
     "Problem",
+    "ProblemDocument",
+    "ProblemKind",
     "RecordingError",
+    "RecordingInUse",
+    "SequenceConflict",
     "ServerError",
     "SettingsError",
+    "SettingsMistake",
+    "StorageError",
+    "TokenFileError",
+    "UnknownToken",
     "kinds",
+    "plain",
+    "problem_document",
+    "problem_of",
+    "shortened",
 ]

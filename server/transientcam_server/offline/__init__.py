@@ -5,23 +5,50 @@ of another format. `offline.opening` has it as a sequence of frames, for `transi
 `offline.plot` draws, where matplotlib is installed.
 """
 
-from transientcam_server.offline.convert import convert_recording
-from transientcam_server.offline.measurement import (
+from transientcam_server.offline import _plot as plot
+from transientcam_server.offline._cluster import completed, reconstruct_on
+from transientcam_server.offline._convert import convert_recording
+from transientcam_server.offline._impulse_responses import is_tal
+from transientcam_server.offline._job import installed, load_lanes, require_versions
+from transientcam_server.offline._kinect2 import import_kinect2, read_lens
+from transientcam_server.offline._mcap import lens_of
+from transientcam_server.offline._measurement import (
     Measurement,
     TransientCube,
     load_measurement,
     reconstruct_measurement,
     save_cube,
 )
-from transientcam_server.offline.recording import BatchOptions, reconstruct_recording
+from transientcam_server.offline._place import recording_at
+from transientcam_server.offline._recording import (
+    KNOWN_PRODUCTS,
+    BatchOptions,
+    BatchReconstructor,
+    default_products,
+    reconstruct_recording,
+)
 
 __all__ = [
+    "KNOWN_PRODUCTS",
     "BatchOptions",
+    "BatchReconstructor",
     "Measurement",
     "TransientCube",
+    "completed",
     "convert_recording",
+    "default_products",
+    "import_kinect2",
+    "installed",
+    "is_tal",
+    "lens_of",
+    "load_lanes",
     "load_measurement",
+    "plot",
+    "read_lens",
     "reconstruct_measurement",
+    "reconstruct_on",
     "reconstruct_recording",
+    "recording_at",
+    "require_versions",
     "save_cube",
 ]

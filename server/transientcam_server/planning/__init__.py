@@ -5,21 +5,40 @@ bias and outliers of any sequence, recommends the best for a `Goal` (`Plan`), or
 other beats.
 """
 
-from transientcam_server.planning.front import FrontCache
-from transientcam_server.planning.goal import Goal
-from transientcam_server.planning.looks import Looks
-from transientcam_server.planning.plan import Plan
-from transientcam_server.planning.planner import Planner
-from transientcam_server.planning.progress import Progress
-from transientcam_server.planning.scene import SceneStatistics, uniform_scene
+from transientcam_server.planning._front import FrontCache
+from transientcam_server.planning._looks import Looks
+from transientcam_server.planning._planner import Planner
+from transientcam_server.planning._prediction.takes import predict_takes, takes_of
+from transientcam_server.planning._process.process import PlanningProcess
+from transientcam_server.planning._process.progress import Progress, Report
+from transientcam_server.planning._process.queue import PlanningQueue
+from transientcam_server.planning._scene.estimation import ESTIMATORS
+from transientcam_server.planning._scene.scene import SceneStatistics, uniform_scene
+from transientcam_server.planning._search import families
+from transientcam_server.planning._search.choice import in_words
+from transientcam_server.planning._search.families import require_plannable
+from transientcam_server.planning._search.goal import Goal
+from transientcam_server.planning._search.pareto import flat_from, front
+from transientcam_server.planning._search.plan import Plan
 
 __all__ = [
+    "ESTIMATORS",
     "FrontCache",
     "Goal",
     "Looks",
     "Plan",
     "Planner",
+    "PlanningProcess",
+    "PlanningQueue",
     "Progress",
+    "Report",
     "SceneStatistics",
+    "families",
+    "flat_from",
+    "front",
+    "in_words",
+    "predict_takes",
+    "require_plannable",
+    "takes_of",
     "uniform_scene",
 ]

@@ -4,21 +4,62 @@
 died, `ReplayCamera` plays one as a camera. `Library` is the directory of a running service.
 """
 
-from transientcam_server.recording.layout import Header
-from transientcam_server.recording.library import Library, RecordingOptions
-from transientcam_server.recording.reader import Recording
-from transientcam_server.recording.recorder import Limits
-from transientcam_server.recording.recovery import recover
-from transientcam_server.recording.replay import ReplayCamera
-from transientcam_server.recording.writer import RecordingWriter
+from transientcam_server.recording import _recovery as recovery, _swmr as swmr
+from transientcam_server.recording._columns import AXES, as_json, attributes_of, columns_of
+from transientcam_server.recording._frames import (
+    Find,
+    RecordedFramesCache,
+    SettingsChoice,
+    open_found,
+    timeline,
+)
+from transientcam_server.recording._heaps import require_sound_heaps
+from transientcam_server.recording._layout import Header
+from transientcam_server.recording._library import Library, RecordingOptions
+from transientcam_server.recording._product_stores import (
+    FORMAT,
+    METADATA,
+    ProductStore,
+    ProductStores,
+)
+from transientcam_server.recording._reader import Recording
+from transientcam_server.recording._recipe import recorded_recipe
+from transientcam_server.recording._recorder import Limits
+from transientcam_server.recording._recovery import recover
+from transientcam_server.recording._replay import ReplayCamera
+from transientcam_server.recording._salvage import salvage
+from transientcam_server.recording._storage import Storage, open_unknown
+from transientcam_server.recording._writer import RecordingWriter
+from transientcam_server.recording._zarr_keys import ZarrKeys
 
 __all__ = [
+    "AXES",
+    "FORMAT",
+    "METADATA",
+    "Find",
     "Header",
     "Library",
     "Limits",
+    "ProductStore",
+    "ProductStores",
+    "RecordedFramesCache",
     "Recording",
     "RecordingOptions",
     "RecordingWriter",
     "ReplayCamera",
+    "SettingsChoice",
+    "Storage",
+    "ZarrKeys",
+    "as_json",
+    "attributes_of",
+    "columns_of",
+    "open_found",
+    "open_unknown",
+    "recorded_recipe",
     "recover",
+    "recovery",
+    "require_sound_heaps",
+    "salvage",
+    "swmr",
+    "timeline",
 ]

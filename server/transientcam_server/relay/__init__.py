@@ -4,8 +4,8 @@
 `plugin` what opens ``relay:http://HOST:PORT``.
 """
 
-from transientcam_server.relay.camera import RelayCamera
-from transientcam_server.relay.origin import Described, Origin
-from transientcam_server.relay.plugin import PLUGIN
+from transientcam_server.relay._camera import RelayCamera
+from transientcam_server.relay._origin import Described, Origin
+from transientcam_server.relay._plugin import PLUGIN
 
 __all__ = ["PLUGIN", "Described", "Origin", "RelayCamera"]

@@ -11,9 +11,11 @@ from transientcam.cli import devices, run
 from transientcam.discovery import FoundCamera
 from transientcam.errors import ServerUnreachable
 from transientcam_driver import CameraUnreachable, LibusbMissing
-from transientcam_driver.entries import kinect2, tofcam660, usb
-from transientcam_driver.plugin import FoundCamera as Camera
-from transientcam_driver.tofcam660.wire import Answer, AnswerType
+from transientcam_driver.camera import FoundCamera as Camera
+from transientcam_driver.cameras.open_usb import _plugin as usb
+from transientcam_driver.cameras.tofcam660 import AnswerType
+from transientcam_driver.cameras.tofcam660._wire import Answer
+from transientcam_simulation.entries import kinect2, tofcam660
 
 FREE = Camera("usb:A-17", "A-17", "AMCW lidar", "/dev/bus/usb/001/004")
 FORBIDDEN = Camera("usb", node="/dev/bus/usb/001/005", problem="no permission to open it")
@@ -193,7 +195,7 @@ def test_a_plug_in_that_fails_hides_no_other(
 ) -> None:
     points = [
         EntryPoint("odd", value, devices.GROUP),
-        EntryPoint("usb", "transientcam_driver.entries.usb:PLUGIN", devices.GROUP),
+        EntryPoint("usb", "transientcam_driver.cameras.open_usb._plugin:PLUGIN", devices.GROUP),
     ]
     monkeypatch.setattr(devices, "entry_points", lambda **_: points)
     plug(monkeypatch, FREE)

@@ -9,8 +9,8 @@ import pytest
 from tests.client.conftest import Recording
 from transientcam import wire
 from transientcam.errors import ParameterError, ProtocolError
-from transientcam.requests import Answer, Request, frames
-from transientcam.requests.frames import FileFormat, Part, Which
+from transientcam.requests import Answer, Part, Request, Which, frames
+from transientcam.requests._frames import FileFormat
 
 
 def test_times_of_flight_keep_every_digit() -> None:

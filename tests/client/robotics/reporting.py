@@ -2,7 +2,7 @@
 
 import queue
 
-from transientcam.robotics.reports import Report
+from transientcam.robotics import Report
 
 WAIT_S = 120.0
 """For an event that comes, on a machine that is laden; not a measurement."""

@@ -18,8 +18,7 @@ from tests.client.robotics.viewer import viewing
 from tests.serving import Served, serving
 from transientcam import Camera, Notice, ParameterError
 from transientcam.cli import foxglove as verb
-from transientcam.robotics.foxglove_bridge import FoxgloveBridge
-from transientcam.robotics.reports import Report
+from transientcam.robotics import FoxgloveBridge, Report
 
 SPEC = "sim:mirrors?noise=off"
 SEQUENCE: dict[str, Any] = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}

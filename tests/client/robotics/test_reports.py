@@ -1,6 +1,6 @@
 import pytest
 
-from transientcam.robotics.reports import report_of
+from transientcam.robotics._reports import report_of
 from transientcam.wire import Notice
 
 

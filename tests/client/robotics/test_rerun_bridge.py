@@ -18,9 +18,9 @@ from tests.client.robotics.reporting import WAIT_S, said
 from tests.serving import Served, serving
 from transientcam import Camera, ParameterError, transient
 from transientcam.cli import rerun as verb
-from transientcam.robotics.reports import Report
-from transientcam.robotics.rerun_bridge import FLUSH_S, RerunBridge
-from transientcam.robotics.scatter import FRAMES
+from transientcam.robotics import Report, RerunBridge
+from transientcam.robotics._rerun_bridge import FLUSH_S
+from transientcam.robotics._scatter import FRAMES
 
 SEQUENCE: dict[str, Any] = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
 

@@ -3,7 +3,7 @@
 import pytest
 
 from transientcam.errors import ParameterError
-from transientcam.transport.address import parse_address
+from transientcam.transport import parse_address
 
 
 @pytest.mark.parametrize(

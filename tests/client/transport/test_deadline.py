@@ -1,6 +1,6 @@
 """Deadlines."""
 
-from transientcam.transport.deadline import Deadline
+from transientcam.transport import Deadline
 
 
 def test_a_deadline_runs_by_its_clock_and_never_below_zero() -> None:

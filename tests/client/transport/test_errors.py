@@ -21,7 +21,8 @@ from transientcam.errors import (
     StreamClosed,
     TransientcamError,
 )
-from transientcam.transport.errors import translate, translated
+from transientcam.transport import translated
+from transientcam.transport._errors import translate
 
 _URL = "http://127.0.0.1:8000"
 

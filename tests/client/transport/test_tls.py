@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 import pytest
 import trustme
 
-from transientcam.transport.tls import SharedSocket, shared_context
+from transientcam.transport._tls import SharedSocket, shared_context
 
 PATIENCE_S = 30.0
 MEGABYTE = bytes(range(256)) * 4096

@@ -6,12 +6,11 @@ from typing import Any
 import msgpack  # type: ignore[import-untyped]  # it ships no types
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from transientcam.errors import ProtocolError
 from transientcam.wire import ALIGNMENT, pack, unpack
-from transientcam.wire.codec import pack_with_array
+from transientcam.wire._codec import pack_with_array
 
 _PLAIN = st.recursive(
     st.none()

@@ -5,15 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from transientcam import density, wire
 from transientcam.density import step_up
 from transientcam.errors import ProtocolError
-from transientcam.wire.encodings import decoded
+from transientcam.wire._encodings import decoded
 
 _PHASES_RAD = np.linspace(0.0, 2.0 * np.pi, 256, endpoint=False)
 

@@ -9,11 +9,11 @@ import pytest
 import usb.backend.libusb1
 import usb.core
 
+from transientcam_driver.cameras.open_usb import UDEV_RULE
 from transientcam_driver.cli.doctor import Reported, checks
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.simulation.build import build, find_scene
-from transientcam_driver.simulation.device.bus import SimulatedBus
-from transientcam_driver.usb import UDEV_RULE
+from transientcam_simulation.emulated import build, find_scene
+from transientcam_simulation.emulated._open_usb.bus import SimulatedBus
 
 
 def found(root: Path, bus: SimulatedBus | None = None) -> dict[str, Reported]:

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from transientcam_driver import CameraError
+from transientcam_driver.cameras.kinect2 import UDEV_RULES
 from transientcam_driver.cli.kinect2_checks import Reported, checks
-from transientcam_driver.kinect2.usb_port import UDEV_RULES
 
 
 def plug(root: Path, name: str = "2-1", *, product: str = "02d8", speed: str = "5000") -> None:

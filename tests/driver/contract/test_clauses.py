@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from tests.driver.triggered.scripted import Cable, ScriptedDevice
+from tests.driver.cameras.triggered.scripted import Cable, ScriptedDevice
 from transientcam_driver import AppliedSequence, RawFrame, Sequence, TriggeredCamera
 from transientcam_driver.contract import CLAUSES, Bench, Clause, ContractBroken, ContractSkipped
 

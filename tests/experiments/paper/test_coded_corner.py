@@ -5,7 +5,7 @@ import pytest
 
 from transientcam_experiments.paper import Bench, coded_corner
 from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS
-from transientcam_moments.comparisons.coded import maximum_length_code
+from transientcam_moments.comparisons import maximum_length_code
 
 
 @pytest.fixture(scope="module")

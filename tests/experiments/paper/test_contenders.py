@@ -7,8 +7,7 @@ from tests.moments import oracles
 from transientcam_experiments.paper.contenders import CONTENDERS, OURS, PRINTED, Contender, samples
 from transientcam_experiments.paper.figure12 import ENTRIES
 from transientcam_experiments.paper.synthetic import CONTINUOUS, SPARSE, Response
-from transientcam_moments.comparisons import TECHNIQUES
-from transientcam_moments.comparisons.coded import maximum_length_code
+from transientcam_moments.comparisons import TECHNIQUES, maximum_length_code
 
 CODED = next(each for each in CONTENDERS if each.name == "coded")
 

@@ -7,9 +7,9 @@ import numpy as np
 import transientcam_moments as tm
 from transientcam_driver import Sequence, SubPhases, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_driver.simulation import scenes
 from transientcam_experiments.tradeoff.capture import capture
-from transientcam_moments.comparisons.coded import Code, coded, maximum_length_code
+from transientcam_moments.comparisons import Code, coded, maximum_length_code
+from transientcam_simulation import scenes
 
 BASE_HZ = 11.5e6
 HIGHEST = 9  # harmonic of a waveform that the simulated camera has

@@ -6,7 +6,7 @@ import pytest
 
 from transientcam_driver import Sequence, SequenceError
 from transientcam_experiments import tradeoff
-from transientcam_server.errors.exceptions import InputError
+from transientcam_server.errors import InputError
 
 
 def test_named_grids_hold_the_papers_settings() -> None:

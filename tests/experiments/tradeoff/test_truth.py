@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import Truth
-from transientcam_driver.simulation.responses import SparseResponses
 from transientcam_experiments.tradeoff.truth import count_returns, cumulative, sample_pixels
+from transientcam_simulation.base import SparseResponses
 
 Array = NDArray[Any]
 

@@ -5,12 +5,7 @@ import pytest
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from transientcam_moments.comparisons.coded import (
-    Code,
-    coded,
-    equal_shifts_rad,
-    maximum_length_code,
-)
+from transientcam_moments.comparisons import Code, coded, equal_shifts_rad, maximum_length_code
 
 SHIFTS = equal_shifts_rad(62)
 

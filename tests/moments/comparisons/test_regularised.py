@@ -7,7 +7,7 @@ from scipy.optimize import approx_fprime
 import transientcam_moments as tm
 from tests.moments import oracles
 from transientcam_moments.comparisons._pixels import pixels_of
-from transientcam_moments.comparisons.regularised import Problem, regularised
+from transientcam_moments.comparisons._regularised import Problem, regularised
 
 
 def image(*, noise: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

@@ -8,10 +8,10 @@ import pytest
 import transientcam_moments as tm
 from tests.moments import oracles
 from tests.moments.comparisons import signals
-from transientcam_moments.comparisons import sra_table as sra_table_module
-from transientcam_moments.comparisons.logarithmic import logarithmic
-from transientcam_moments.comparisons.sra import program, sra
-from transientcam_moments.comparisons.sra_table import sra_table
+from transientcam_moments.comparisons import _sra_table as sra_table_module
+from transientcam_moments.comparisons._logarithmic import logarithmic
+from transientcam_moments.comparisons._sra import program, sra
+from transientcam_moments.comparisons._sra_table import sra_table
 
 
 def waves(m: int, bins: int) -> np.ndarray:

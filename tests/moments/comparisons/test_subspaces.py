@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.moments import oracles
-from transientcam_moments.comparisons.matrix_pencil import matrix_pencil
+from transientcam_moments.comparisons._matrix_pencil import matrix_pencil
 
 Complex = NDArray[Any]
 Real = NDArray[Any]

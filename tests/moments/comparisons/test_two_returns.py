@@ -9,11 +9,11 @@ import transientcam_moments as tm
 from tests.moments import oracles
 from tests.moments.comparisons import signals
 from transientcam_moments.comparisons import SparseEstimate
-from transientcam_moments.comparisons.dorrington import dorrington
-from transientcam_moments.comparisons.godbaz import godbaz
-from transientcam_moments.comparisons.matrix_pencil import matrix_pencil
-from transientcam_moments.comparisons.spumic import spumic
-from transientcam_moments.comparisons.sra import sra
+from transientcam_moments.comparisons._dorrington import dorrington
+from transientcam_moments.comparisons._godbaz import godbaz
+from transientcam_moments.comparisons._matrix_pencil import matrix_pencil
+from transientcam_moments.comparisons._spumic import spumic
+from transientcam_moments.comparisons._sra import sra
 
 Estimator = Callable[..., SparseEstimate]
 BASE_HZ = 11e6  # as the paper measures for them (Fig. 11)

@@ -12,9 +12,9 @@ import pytest
 
 from tests.serving import Served, serving
 from transientcam import wire
-from transientcam_server.api.middleware.answers import AnswerBudget
+from transientcam_server.api._middleware.answers import AnswerBudget
 from transientcam_server.errors import Problem
-from transientcam_server.imaging.frame import Frame
+from transientcam_server.imaging import Frame
 from transientcam_server.settings import LimitSettings
 
 LATEST = "/api/v1/frames/latest"

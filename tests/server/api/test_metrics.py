@@ -13,8 +13,8 @@ from tests.serving import Served, serving
 from tests.waiting import wait_until
 from transientcam import wire
 from transientcam_driver import RawFrame
-from transientcam_server.api.metrics import Metrics
-from transientcam_server.camera.events import Captured, Lost
+from transientcam_server.api._metrics import Metrics
+from transientcam_server.camera import Captured, Lost
 
 Samples = dict[str, float]
 

@@ -8,7 +8,7 @@ import pytest
 
 from transientcam.discovery import MAX_CAMERAS, FoundCamera, Search
 from transientcam.errors import ServerUnreachable
-from transientcam_server.api.neighbours import FRESH_S, KEPT_S, OFF, NeighbourSearch
+from transientcam_server.api._neighbours import FRESH_S, KEPT_S, OFF, NeighbourSearch
 from transientcam_server.settings import Settings
 
 

@@ -8,8 +8,8 @@ import pytest
 
 from tests.server.contract import find_operation, validate
 from tests.serving import Served
-from transientcam_server.api.documents.document import EXAMPLES
-from transientcam_server.errors.kinds import KINDS
+from transientcam_server.api._documents.document import EXAMPLES
+from transientcam_server.errors._kinds import KINDS
 
 PROBLEM = "application/problem+json"
 

@@ -9,9 +9,9 @@ from pydantic import AfterValidator, BaseModel, Field, ValidationError
 
 from transientcam.errors import ProtocolError
 from transientcam_driver import CameraFault, CameraLost, CameraNotFound, FrameTimeout, SequenceError
-from transientcam_server.api.problems import _of_validation, documented, problem_response
-from transientcam_server.errors import Problem, kinds
-from transientcam_server.errors.translation import problem_document, problem_of
+from transientcam_server.api import problem_response
+from transientcam_server.api._problems import _of_validation, documented
+from transientcam_server.errors import Problem, kinds, problem_document, problem_of
 
 
 @pytest.mark.parametrize(

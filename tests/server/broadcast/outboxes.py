@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 
 from tests.server.fakes import channel
-from transientcam_server.broadcast.outbox import Delivery, Item, Outbox
+from transientcam_server.broadcast import Delivery, Item, Outbox
 
 
 def run(test: Callable[[], object]) -> None:

@@ -1,11 +1,8 @@
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from transientcam_server.broadcast.channel import UNNUMBERED, Channel, ChannelNumbers
-from transientcam_server.imaging.encodings.compact import stream_encoding
-from transientcam_server.imaging.encodings.encoding import MSGPACK, Encoding
-from transientcam_server.imaging.products import PRODUCTS
-from transientcam_server.imaging.view import WHOLE, Crop
+from transientcam_server.broadcast import UNNUMBERED, Channel
+from transientcam_server.broadcast._channel import ChannelNumbers
+from transientcam_server.imaging import MSGPACK, PRODUCTS, WHOLE, Crop, Encoding, stream_encoding
 
 _U16 = stream_encoding("u16")
 

@@ -5,9 +5,8 @@ import pytest
 from tests.server.broadcast.outboxes import numbers, run, subscribed, waiting
 from tests.server.fakes import fake_frame
 from transientcam import wire
-from transientcam_server.broadcast.hub import Hub
-from transientcam_server.broadcast.outbox import Close, Outbox
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.broadcast import Close, Hub, Outbox
+from transientcam_server.errors import Problem
 
 
 def test_every_subscriber_gets_frames_and_notices_but_not_before_it_subscribed() -> None:

@@ -3,21 +3,14 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tests.server.broadcast.outboxes import lost, numbers, run, subscribed, waiting
 from tests.server.fakes import NOTICE, channel, fake_frame
 from transientcam import wire
-from transientcam_server.broadcast.outbox import (
-    MAX_WAITING_MESSAGES,
-    Close,
-    Delivery,
-    Item,
-    Outbox,
-)
-from transientcam_server.imaging.frame import Frame
-from transientcam_server.imaging.view import Crop
+from transientcam_server.broadcast import Close, Delivery, Item, Outbox
+from transientcam_server.broadcast._outbox import MAX_WAITING_MESSAGES
+from transientcam_server.imaging import Crop, Frame
 
 
 def test_the_newest_frames_wait_and_the_dropped_ones_are_counted() -> None:

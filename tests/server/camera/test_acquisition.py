@@ -21,10 +21,9 @@ from transientcam_driver import (
     Sequence,
     SequenceError,
 )
-from transientcam_server.camera.acquisition import STALLED_MIN_S, Acquisition
-from transientcam_server.camera.events import Back, Captured, Event, Lost, SequenceChanged
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import JobCancelled, Problem, SequenceConflict
+from transientcam_server.camera import Acquisition, Back, Captured, Event, Lost, SequenceChanged
+from transientcam_server.camera._acquisition import STALLED_MIN_S
+from transientcam_server.errors import JobCancelled, Problem, SequenceConflict, kinds
 
 PATIENCE_S = 60.0
 APPLIED = AppliedSequence(

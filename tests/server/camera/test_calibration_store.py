@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from transientcam_server.camera.calibration_store import CalibrationStore
-from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.calibration import NOMINAL_ID
+from transientcam_server.camera import CalibrationStore
+from transientcam_server.errors import Problem
+from transientcam_server.imaging import NOMINAL_ID
 from transientcam_server.settings import CalibrationSettings
 
 

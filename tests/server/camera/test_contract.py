@@ -8,20 +8,18 @@ from pathlib import Path
 import pytest
 
 import transientcam
-from tests.driver.kinect2.standing import READ_S, camera_of, emulated
+from tests.driver.cameras.kinect2.standing import READ_S, camera_of, emulated
 from tests.driver.mounts import PyusbMount
-from tests.driver.opt8241 import standing as opt8241
+from tests.opt8241 import standing as opt8241
 from tests.server.recording.made import record
 from tests.serving import serving
 from transientcam_driver import Camera, TriggeredCamera, open_camera
+from transientcam_driver.camera import kinds
+from transientcam_driver.cameras.tofcam660 import DeviceOptions, Region, Tofcam660
 from transientcam_driver.clock import RealClock, VirtualClock
 from transientcam_driver.contract import CLAUSES, Bench, Clause, ContractSkipped
-from transientcam_driver.opening import kinds
-from transientcam_driver.simulation.build import find_scene, without_noise
-from transientcam_driver.simulation.device import Fault
-from transientcam_driver.simulation.tofcam660 import build_tofcam660
-from transientcam_driver.tofcam660 import DeviceOptions, Region, Tofcam660
 from transientcam_server.relay import Origin, RelayCamera
+from transientcam_simulation.emulated import Fault, build_tofcam660, find_scene, without_noise
 
 SKIPPED = {
     "recording": {

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from transientcam_server.camera.jobs import MAX_UNFINISHED, REMEMBERED, Job, Jobs
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.camera import Job, Jobs
+from transientcam_server.camera._jobs import MAX_UNFINISHED, REMEMBERED
+from transientcam_server.errors import Problem, kinds
 
 Work = Callable[[Job], Awaitable[dict[str, Any]]]
 LONG_S = 10.0

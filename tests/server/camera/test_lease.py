@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 import pytest
 
-from transientcam_server.camera.lease import Change, Lease, LeaseManager, OnLapse
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.camera import Change, Lease, LeaseManager
+from transientcam_server.camera._lease import OnLapse
+from transientcam_server.errors import Problem
 
 
 class Time:

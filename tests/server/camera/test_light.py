@@ -6,9 +6,8 @@ from typing import cast
 
 from tests.server.camera.test_acquisition import PATIENCE_S, ScriptedCamera
 from transientcam_driver import Camera
-from transientcam_server.camera.acquisition import Acquisition
-from transientcam_server.camera.events import Event, Held, Released
-from transientcam_server.camera.light import LATE_S, LightGuard
+from transientcam_server.camera import Acquisition, Event, Held, LightGuard, Released
+from transientcam_server.camera._light import LATE_S
 
 
 class Clock:

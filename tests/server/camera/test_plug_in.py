@@ -13,11 +13,9 @@ import pytest
 from tests.server.camera.plug_in import block, install
 from tests.serving import Served, serving
 from transientcam import Camera
-from transientcam.cli import findings
-from transientcam.cli import run as command
-from transientcam.conformance import Device, Report, chosen
-from transientcam.conformance import run as check
+from transientcam.cli import findings, run as command
 from transientcam.errors import ProblemError
+from transientcam_conformance import Device, Report, chosen, run as check
 from transientcam_driver import CameraNotFound, SpecError, open_camera
 from transientcam_driver.contract import CLAUSES, Bench, Clause, ContractSkipped
 

@@ -5,7 +5,7 @@ import logging
 import pytest
 
 from transientcam_driver import Sequence, open_camera
-from transientcam_server.camera.source import start_with
+from transientcam_server.camera import start_with
 from transientcam_server.settings import SequenceSettings, Settings
 
 

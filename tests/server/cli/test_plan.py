@@ -37,7 +37,7 @@ def kept(daemon: Served, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 @pytest.fixture
 def few_families(daemon: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     """Search one family in this process, so that a front takes a second."""
-    families = import_module("transientcam_server.planning.families")  # not the function
+    families = import_module("transientcam_server.planning._search.families")  # not the function
     monkeypatch.setattr(daemon.service.planning, "_process", Here())
     monkeypatch.setattr(families, "HARMONICS", (1,))
 
@@ -104,7 +104,9 @@ def test_the_front_of_a_daemon_is_a_table_and_a_sentence(
 def test_the_front_of_a_given_scene_needs_no_daemon(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(import_module("transientcam_server.planning.families"), "HARMONICS", (1,))
+    monkeypatch.setattr(
+        import_module("transientcam_server.planning._search.families"), "HARMONICS", (1,)
+    )
 
     assert run(["plan", "--front", "--brightness-dn-per-s", "8e5", "--json"]) == 0
 

@@ -9,7 +9,7 @@ from zarr.core.sync import cleanup_resources
 
 from tests.server.recording.made import APPLIED, record
 from transientcam.cli import run
-from transientcam_server.offline import job
+from transientcam_server import offline
 
 
 @pytest.fixture(autouse=True)
@@ -17,7 +17,7 @@ def compiled_for(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Compile nothing, and return the orders that were to be compiled for."""
     orders: list[int] = []
     take = lambda recipe: orders.append(recipe.applied.sequence.harmonics)  # noqa: E731
-    monkeypatch.setattr(job, "load_lanes", take)
+    monkeypatch.setattr(offline, "load_lanes", take)
     return orders
 
 

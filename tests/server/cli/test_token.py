@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from transientcam.cli import run
-from transientcam_server.api.auth.tokens import TokenFile, utc_now
+from transientcam_server.api import utc_now
+from transientcam_server.api._auth.tokens import TokenFile
 
 
 @pytest.fixture(autouse=True)

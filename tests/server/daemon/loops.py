@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any, cast
 
-from transientcam_server.daemon.turns import Account, Turns
+from transientcam_server.daemon._fair_queue import Account, Turns
 
 SHARE = 0.3
 STEP_S = 0.0005

@@ -10,7 +10,7 @@ from fastapi import FastAPI
 
 from transientcam.cli import main
 from transientcam_driver import Camera
-from transientcam_server.api import app as application
+from transientcam_server.api import _app as application
 from transientcam_server.settings import Settings
 
 _build = application.build_app

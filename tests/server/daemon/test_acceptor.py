@@ -15,7 +15,7 @@ import trustme
 
 from tests.server.daemon.loops import Client, Loop
 from tests.serving import serving
-from transientcam_server.daemon.acceptor import Admission, turns_of_requests
+from transientcam_server.daemon._acceptor import Admission, turns_of_requests
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.settings import LimitSettings
 

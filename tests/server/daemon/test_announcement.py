@@ -11,8 +11,13 @@ from tests.serving import serving
 from tests.waiting import wait_until
 from transientcam import Camera, discover
 from transientcam.discovery import FoundCamera
-from transientcam_server.daemon import announcement
-from transientcam_server.daemon.announcement import _addresses, _instance, enabled, inside_container
+from transientcam_server.daemon import _announcement as announcement
+from transientcam_server.daemon._announcement import (
+    _addresses,
+    _instance,
+    enabled,
+    inside_container,
+)
 from transientcam_server.settings import Settings
 
 LOOPBACK = ["127.0.0.1"]

@@ -10,7 +10,8 @@ import pytest
 
 from tests.server.recording.made import record
 from transientcam.cli import run
-from transientcam_server.daemon.configuration import ENVIRONMENT_PREFIX, load_settings
+from transientcam_server.daemon import load_settings
+from transientcam_server.daemon._configuration import ENVIRONMENT_PREFIX
 
 
 @pytest.fixture(autouse=True)

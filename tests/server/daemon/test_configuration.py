@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from transientcam_server.api.auth.tokens import Role, TokenFile, utc_now
-from transientcam_server.daemon.configuration import OTHER_VARIABLES, load_settings
-from transientcam_server.daemon.configuration import load as load_with_places
+from transientcam_server.api import Role, utc_now
+from transientcam_server.api._auth.tokens import TokenFile
+from transientcam_server.daemon import load as load_with_places, load_settings
+from transientcam_server.daemon._configuration import OTHER_VARIABLES
 from transientcam_server.errors import SettingsError
 from transientcam_server.settings import Settings
 

@@ -14,10 +14,10 @@ import pytest
 
 from tests.server.streaming import streaming
 from tests.serving import Served, serving
-from transientcam_server.api.middleware.security import SECURITY_HEADERS
-from transientcam_server.daemon.connections import BoundedConnection
-from transientcam_server.daemon.intake import PORTION_BYTES
-from transientcam_server.daemon.stalls import StallTimer
+from transientcam_server.api import SECURITY_HEADERS
+from transientcam_server.daemon._connections import BoundedConnection
+from transientcam_server.daemon._read_limiter import PORTION_BYTES
+from transientcam_server.daemon._stalls import StallTimer
 from transientcam_server.settings import LimitSettings
 
 PATIENCE_S = 60.0

@@ -10,9 +10,9 @@ import pytest
 
 import transientcam_moments as tm
 from tests.serving import serving
-from transientcam_server.daemon import doctor
-from transientcam_server.daemon.configuration import ENVIRONMENT_PREFIX
-from transientcam_server.daemon.doctor import Reported, checks
+from transientcam_server.daemon import _doctor as doctor
+from transientcam_server.daemon._configuration import ENVIRONMENT_PREFIX
+from transientcam_server.daemon._doctor import Reported, checks
 
 
 @pytest.fixture(autouse=True)

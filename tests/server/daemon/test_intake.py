@@ -5,8 +5,8 @@ import threading
 from typing import Any, cast
 
 from tests.server.daemon.loops import SHARE, Loop
-from transientcam_server.daemon.intake import PORTION_BYTES, Intake
-from transientcam_server.daemon.turns import BURST_S, Turns
+from transientcam_server.daemon._fair_queue import BURST_S, Turns
+from transientcam_server.daemon._read_limiter import PORTION_BYTES, Intake
 
 
 class Transport:

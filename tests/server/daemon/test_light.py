@@ -19,7 +19,7 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.driver.usbfs.processes import EmulatedCamera, emulated_camera
+from tests.driver.cameras.open_usb.usbfs.processes import EmulatedCamera, emulated_camera
 from tests.server.streaming import Client, streaming
 from tests.waiting import wait_until
 

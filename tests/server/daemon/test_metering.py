@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from tests.server.daemon.loops import Loop
-from transientcam_server.daemon.metering import CountingExecutor, Metered, in_turns
-from transientcam_server.daemon.turns import BURST_S, Turns
+from transientcam_server.daemon._fair_queue import BURST_S, Turns
+from transientcam_server.daemon._metering import CountingExecutor, Metered, in_turns
 
 Application = Callable[[Any, Any, Any], Awaitable[None]]
 

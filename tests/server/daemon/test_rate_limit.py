@@ -1,7 +1,6 @@
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from transientcam_server.daemon.rate_limit import BURST_S, MOST_ANSWERS, RateLimiter
+from transientcam_server.daemon._rate_limit import BURST_S, MOST_ANSWERS, RateLimiter
 
 
 class Clock:

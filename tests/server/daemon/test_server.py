@@ -19,9 +19,9 @@ import pytest
 from tests.server.streaming import streaming
 from transientcam import wire
 from transientcam_driver import open_camera
-from transientcam_server.api.app import build_app
-from transientcam_server.daemon.configuration import ENVIRONMENT_PREFIX
-from transientcam_server.daemon.server import (
+from transientcam_server.api import build_app
+from transientcam_server.daemon._configuration import ENVIRONMENT_PREFIX
+from transientcam_server.daemon._server import (
     NOTSENT_LOWAT_BYTES,
     USER_TIMEOUT_MS,
     Server,
@@ -30,7 +30,7 @@ from transientcam_server.daemon.server import (
     freeze_startup_objects,
     listen,
 )
-from transientcam_server.errors.exceptions import AddressUnavailable
+from transientcam_server.errors import AddressUnavailable
 from transientcam_server.recording import Recording
 from transientcam_server.service import Service
 from transientcam_server.settings import Settings
@@ -186,7 +186,7 @@ def test_an_address_that_is_not_of_this_machine_leaves_no_socket_behind() -> Non
 def test_the_end_does_not_wait_for_a_compiler() -> None:
     program = """
 import threading
-from transientcam_server.daemon.server import exit_without_joining
+from transientcam_server.daemon._server import exit_without_joining
 
 with exit_without_joining() as leave:
     compiler = threading.Thread(target=threading.Event().wait)  # for ever

@@ -18,8 +18,8 @@ from tests.server.api.stream.test_fuzz import (
 )
 from tests.serving import Served, serving
 from transientcam import wire
-from transientcam_server.daemon.intake import PORTION_BYTES
-from transientcam_server.daemon.streams import BoundedStream
+from transientcam_server.daemon._read_limiter import PORTION_BYTES
+from transientcam_server.daemon._streams import BoundedStream
 
 RATE_HZ = 20.0
 MANY = 100_000

@@ -17,8 +17,8 @@ import pytest
 
 from tests.server.daemon.test_server import environment
 from transientcam_server.camera import Acquisition, AcquisitionStatus
-from transientcam_server.camera.status import State
-from transientcam_server.daemon.systemd import ServiceManager, status_line, supervised
+from transientcam_server.camera._status import State
+from transientcam_server.daemon._systemd import ServiceManager, status_line, supervised
 
 PATIENCE_S = 60.0
 

@@ -8,7 +8,7 @@ import trustme
 from tests.serving import serving
 from transientcam import Camera
 from transientcam.errors import ServerUnreachable
-from transientcam_server.daemon.configuration import load_settings
+from transientcam_server.daemon import load_settings
 from transientcam_server.errors import SettingsError
 
 

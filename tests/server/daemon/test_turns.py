@@ -6,7 +6,7 @@ from functools import partial
 import pytest
 
 from tests.server.daemon.loops import SHARE, STEP_S, Client, Loop
-from transientcam_server.daemon.turns import (
+from transientcam_server.daemon._fair_queue import (
     BURST_OF_ONE_S,
     BURST_S,
     MOST_DEBT_S,

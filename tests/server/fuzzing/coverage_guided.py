@@ -10,7 +10,7 @@ import atheris  # type: ignore[import-untyped]  # its stubs are another package
 
 # what is imported within is watched
 with atheris.instrument_imports(
-    include=["transientcam.wire", "transientcam_driver.calibration.file"]
+    include=["transientcam.wire", "transientcam_driver.calibration._file"]
 ):
     from tests.server.fuzzing.targets import TARGETS
 

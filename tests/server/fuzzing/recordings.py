@@ -37,9 +37,9 @@ from tests.server.recording.made import (
     rewrite_texts_at_the_end,
 )
 from transientcam_driver import DriverError, open_camera
-from transientcam_server.api.app import build_app
-from transientcam_server.api.documents.recording import document
-from transientcam_server.errors.exceptions import RecordingError
+from transientcam_server.api import build_app
+from transientcam_server.api._documents.recording import document
+from transientcam_server.errors import RecordingError
 from transientcam_server.recording import Library, RecordingWriter, ReplayCamera, recover
 from transientcam_server.settings import CalibrationSettings, RecordingSettings, Settings
 

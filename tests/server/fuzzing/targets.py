@@ -8,10 +8,10 @@ from typing import Final
 
 from transientcam import wire
 from transientcam.errors import ProtocolError
-from transientcam_driver.calibration.file import CalibrationCapture
+from transientcam_driver.calibration import CalibrationCapture
 from transientcam_driver.errors import CalibrationError
-from transientcam_server.api import downloads
-from transientcam_server.errors.exceptions import Problem
+from transientcam_server.api import _downloads as downloads
+from transientcam_server.errors import Problem
 
 SMALL_BYTES: Final = 1024 * 1024
 

@@ -12,15 +12,14 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.conftest import ROOT
 from tests.server.fuzzing.targets import SMALL_BYTES, TARGETS
 from tests.serving import serving
 from transientcam import wire
 from transientcam_driver import Sequence, capture_calibration, open_camera
-from transientcam_driver.calibration.file import CalibrationCapture
+from transientcam_driver.calibration import CalibrationCapture
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.errors import CalibrationError
 

@@ -9,10 +9,8 @@ import pytest
 import transientcam_moments as tm
 from transientcam_driver import RawFrame, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.camera.source import sensor_of, start_with
-from transientcam_server.imaging.meta import frame_meta
-from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.imaging.stages import Computed, compute
+from transientcam_server.camera import sensor_of, start_with
+from transientcam_server.imaging import Computed, Recipe, compute, frame_meta
 from transientcam_server.settings import ReconstructionSettings, SensorSettings, SequenceSettings
 
 CAPTURES = 12

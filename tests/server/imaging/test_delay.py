@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver import AppliedSequence, RawFrame, Sequence, SubPhases, open_camera
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
-from transientcam_server.imaging.calibration import nominal_gains
-from transientcam_server.imaging.labelling import moment_columns
-from transientcam_server.imaging.recipe import Recipe
+from transientcam_server.imaging import Recipe, moment_columns, nominal_gains
 from transientcam_server.settings import ReconstructionSettings
 
 REGION = (120, 90, 200, 150)

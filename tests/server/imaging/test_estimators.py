@@ -14,10 +14,10 @@ from transientcam import Camera
 from transientcam_driver import AppliedSequence, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.tradeoff.capture import FrameWithTruth, capture
-from transientcam_moments.comparisons import sra_table
-from transientcam_moments.settings import OF_ANY_MULTIPLES
-from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.planning.timing import ReconstructionTimer
+from transientcam_moments.comparisons import _sra_table as sra_table
+from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
+from transientcam_server.imaging import Recipe
+from transientcam_server.planning._prediction.timing import ReconstructionTimer
 from transientcam_server.settings import Estimator, ReconstructionSettings
 
 PATH = "/api/v1/reconstruction"

@@ -21,15 +21,15 @@ import transientcam
 import transientcam_moments as tm
 from tests.server.recording.made import record
 from transientcam.cli import run
-from transientcam_server.errors.exceptions import (
-    ClusterError,
-    InputError,
-    MixedVersions,
-    StorageError,
+from transientcam_server.errors import ClusterError, InputError, MixedVersions, StorageError
+from transientcam_server.offline import (
+    BatchOptions,
+    _cluster as cluster,
+    _job as job,
+    reconstruct_on,
+    reconstruct_recording,
 )
-from transientcam_server.offline import BatchOptions, cluster, job, reconstruct_recording
-from transientcam_server.offline.cluster import reconstruct_on
-from transientcam_server.offline.job import BLOCK_FRAMES, Job, spans
+from transientcam_server.offline._job import BLOCK_FRAMES, Job, spans
 from transientcam_server.recording import Recording
 from transientcam_server.settings import ReconstructionSettings
 

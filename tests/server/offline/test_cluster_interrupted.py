@@ -9,15 +9,20 @@ import zarr
 
 from tests.interrupting import Hold, interrupt
 from tests.server.recording.made import record
-from transientcam_server.offline import BatchOptions, job, reconstruct_recording
-from transientcam_server.offline.cluster import COUNTING, MISSING, reconstruct_on
-from transientcam_server.offline.job import BLOCK_FRAMES
+from transientcam_server.offline import (
+    BatchOptions,
+    _job as job,
+    reconstruct_on,
+    reconstruct_recording,
+)
+from transientcam_server.offline._cluster import COUNTING, MISSING
+from transientcam_server.offline._job import BLOCK_FRAMES
 from transientcam_server.recording import Recording
 
 FRAMES = 2 * BLOCK_FRAMES + 4
 OPTIONS = BatchOptions(("range",))
 HOLD = Hold(
-    "transientcam_server.offline.cluster",
+    "transientcam_server.offline._cluster",
     "computed",
     f"lambda job, first, last: first >= {BLOCK_FRAMES}",  # tasks behind the first
 )

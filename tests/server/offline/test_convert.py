@@ -16,7 +16,7 @@ from zarr.core.sync import cleanup_resources
 
 import transientcam_moments as tm
 from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, frame, record
-from transientcam_server.errors.exceptions import DamagedFrame, MissingExtra, NotConvertible
+from transientcam_server.errors import DamagedFrame, MissingExtra, NotConvertible
 from transientcam_server.offline import convert_recording
 from transientcam_server.recording import Recording
 

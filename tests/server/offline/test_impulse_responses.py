@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from transientcam.cli import run
-from transientcam_server.errors.exceptions import InputError
-from transientcam_server.offline.measurement import load_measurement
+from transientcam_server.errors import InputError
+from transientcam_server.offline import load_measurement
 
 F_HZ = 20e6
 LIGHT_M_S = 299_792_458.0

@@ -9,7 +9,7 @@ import pytest
 import xarray
 
 from tests.server.recording.made import header, record
-from transientcam_server.errors.exceptions import InputError
+from transientcam_server.errors import InputError
 from transientcam_server.offline import convert_recording
 from transientcam_server.recording import Recording, RecordingWriter
 

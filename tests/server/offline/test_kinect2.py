@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 import transientcam_moments as tm
-from transientcam_driver.kinect2 import codes, encoder
-from transientcam_driver.kinect2.layout import SUB_IMAGE_BYTES
-from transientcam_driver.kinect2.tables import P0Tables
+from transientcam_driver.cameras.kinect2 import SUB_IMAGE_BYTES, P0Tables, codes, encoder
 from transientcam_server.cli.import_kinect2 import import_kinect2 as verb
-from transientcam_server.errors.exceptions import InputError
-from transientcam_server.offline.kinect2 import import_kinect2, read_lens
-from transientcam_server.offline.opening import open_recording
+from transientcam_server.errors import InputError
+from transientcam_server.offline import import_kinect2, read_lens
+from transientcam_server.offline._opening import open_recording
 
 FREQUENCIES_HZ = np.array([16e6, 80e6, 120e6])[:, None, None]
 Array = NDArray[Any]

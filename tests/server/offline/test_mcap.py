@@ -16,9 +16,9 @@ from rosbags.typesys import Stores, get_typestore
 
 import transientcam
 from tests.server.recording.made import HEIGHT, WIDTH, frame, record
-from transientcam_server.errors.exceptions import InputError
+from transientcam_server.errors import InputError
 from transientcam_server.offline import convert_recording
-from transientcam_server.offline.mcap import PRODUCTS
+from transientcam_server.offline._mcap import PRODUCTS
 from transientcam_server.recording import Recording
 
 FRAMES = 2

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from transientcam_server.errors.exceptions import InputError
-from transientcam_server.offline.measurement import (
+from transientcam_server.errors import InputError
+from transientcam_server.offline import (
     Measurement,
     TransientCube,
     load_measurement,
-    moments_of,
     reconstruct_measurement,
     save_cube,
 )
+from transientcam_server.offline._measurement import moments_of
 from transientcam_server.settings import ReconstructionSettings
 
 F_HZ = 23e6

@@ -17,8 +17,8 @@ from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, frame, header, r
 from tests.serving import Served, serving
 from tests.waiting import wait_until
 from transientcam import ParameterError, ProblemError, opening
-from transientcam_server.errors.exceptions import DamagedFrame, InputError, NotARecording
-from transientcam_server.imaging.calibration import nominal_gains
+from transientcam_server.errors import DamagedFrame, InputError, NotARecording
+from transientcam_server.imaging import nominal_gains
 from transientcam_server.recording import RecordingWriter
 
 FRAMES = 4
@@ -28,7 +28,7 @@ OF_NEW_FILES = ("gain", "weight", "modulus", "kind", "moment", "sub_phase_rad", 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
     """The entry point as it is in pyproject.toml, whichever version is installed."""
-    point = EntryPoint("hdf5", "transientcam_server.offline.opening:open_recording", opening.GROUP)
+    point = EntryPoint("hdf5", "transientcam_server.offline._opening:open_recording", opening.GROUP)
     monkeypatch.setattr(opening, "entry_points", lambda group: [point])
 
 

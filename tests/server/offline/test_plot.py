@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from transientcam_server.errors.exceptions import MissingExtra
+from transientcam_server.errors import MissingExtra
 from transientcam_server.offline import Measurement, plot, reconstruct_measurement
 from transientcam_server.settings import ReconstructionSettings
 

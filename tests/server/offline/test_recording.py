@@ -7,12 +7,11 @@ import pytest
 import transientcam_moments as tm
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.errors.exceptions import InputError
-from transientcam_server.imaging.products import PRODUCTS
-from transientcam_server.imaging.recipe import Recipe
-from transientcam_server.imaging.view import EVERYTHING
+from transientcam_server.errors import InputError
+from transientcam_server.imaging import PRODUCTS, Recipe
+from transientcam_server.imaging._products.view import EVERYTHING
 from transientcam_server.offline import BatchOptions, reconstruct_recording
-from transientcam_server.offline.recording import DEFAULT_PRODUCTS
+from transientcam_server.offline._recording import DEFAULT_PRODUCTS
 from transientcam_server.recording import Header, Recording, RecordingWriter
 from transientcam_server.settings import ReconstructionSettings
 

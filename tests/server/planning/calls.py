@@ -5,8 +5,7 @@ import threading
 from collections.abc import Callable
 from typing import NoReturn, TypeVar
 
-from transientcam_server.errors import kinds
-from transientcam_server.errors.exceptions import JobCancelled, Problem
+from transientcam_server.errors import JobCancelled, Problem, kinds
 from transientcam_server.planning import Progress
 
 _T = TypeVar("_T")

@@ -8,10 +8,10 @@ import numpy as np
 
 from transientcam_driver import Capabilities, Sequence, SequenceError
 from transientcam_server.planning import Goal, Plan, uniform_scene
-from transientcam_server.planning.families import EXPOSURES, HARMONICS, TAKES, families
-from transientcam_server.planning.intervals import Figure
-from transientcam_server.planning.plan import plan
-from transientcam_server.planning.prediction import Prediction, Predictor
+from transientcam_server.planning._prediction.intervals import Figure
+from transientcam_server.planning._prediction.prediction import Prediction, Predictor
+from transientcam_server.planning._search.families import EXPOSURES, HARMONICS, TAKES, families
+from transientcam_server.planning._search.plan import plan
 
 SPREAD = 1.1
 MARGIN = 1.05

@@ -2,7 +2,7 @@
 
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.camera.source import sensor_of
+from transientcam_server.camera import sensor_of
 from transientcam_server.planning import Planner, SceneStatistics
 from transientcam_server.settings import ReconstructionSettings, SensorSettings
 

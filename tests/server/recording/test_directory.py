@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from transientcam_server.recording.directory import Directory
+from transientcam_server.recording._directory import Directory
 
 
 def test_a_recording_that_is_finished_while_its_directory_is_read_is_found(

@@ -9,13 +9,9 @@ import numpy as np
 import pytest
 
 from tests.server.recording.made import frame, record, rewrite_texts_at_the_end
-from transientcam_server.errors.exceptions import NotARecording
-from transientcam_server.recording import Recording, recover
-from transientcam_server.recording.heaps import (
-    MAX_HEAP_BYTES,
-    CheckedReader,
-    require_sound_heaps,
-)
+from transientcam_server.errors import NotARecording
+from transientcam_server.recording import Recording, recover, require_sound_heaps
+from transientcam_server.recording._heaps import MAX_HEAP_BYTES, CheckedReader
 
 
 def heap(*objects: tuple[int, int, int], size: int = 4096) -> io.BytesIO:

@@ -10,11 +10,16 @@ import pytest
 
 from tests.server.recording.made import APPLIED, frame, header, record
 from tests.server.recording.test_recovery import abandoned
-from transientcam_server.errors.exceptions import Problem
-from transientcam_server.recording import Header, descriptions, layout
-from transientcam_server.recording.descriptions import Descriptions
-from transientcam_server.recording.directory import Directory
-from transientcam_server.recording.library import Library, RecordingOptions
+from transientcam_server.errors import Problem
+from transientcam_server.recording import (
+    Header,
+    Library,
+    RecordingOptions,
+    _descriptions as descriptions,
+    _layout as layout,
+)
+from transientcam_server.recording._descriptions import Descriptions
+from transientcam_server.recording._directory import Directory
 from transientcam_server.settings import RecordingSettings
 
 IDS = [f"20261120T08150{number}Z-3f9c2a" for number in range(4)]

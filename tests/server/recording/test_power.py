@@ -8,9 +8,9 @@ import pytest
 
 from tests.server.recording.made import assert_same, frame, header
 from tests.server.recording.power import DISKS, Event, Write, cut, moments, traced
-from transientcam_server.errors.exceptions import NotARecording
+from transientcam_server.errors import NotARecording
 from transientcam_server.recording import Recording, RecordingWriter, recover
-from transientcam_server.recording.seal import sealed_frames
+from transientcam_server.recording._seal import sealed_frames
 
 FRAMES = 22
 CUTS = 2

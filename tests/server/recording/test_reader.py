@@ -9,17 +9,20 @@ import h5py
 import numpy as np
 import pytest
 from h5py._objects import phil
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from hypothesis.extra import numpy as of_numpy
 from isal import isal_zlib
 
 from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, assert_same, frame, header, record
 from transientcam_driver import RawFrame
-from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
-from transientcam_server.recording import Recording, RecordingWriter, swmr
-from transientcam_server.recording import layout as recording_layout
-from transientcam_server.recording.directory import Directory
+from transientcam_server.errors import DamagedFrame, NotARecording
+from transientcam_server.recording import (
+    Recording,
+    RecordingWriter,
+    _layout as recording_layout,
+    swmr,
+)
+from transientcam_server.recording._directory import Directory
 
 SHAPE = (APPLIED.images, HEIGHT, WIDTH)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from transientcam_server.recording.readers import Readers
+from transientcam_server.recording._readers import Readers
 
 
 @pytest.fixture

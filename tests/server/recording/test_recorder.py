@@ -10,8 +10,8 @@ import pytest
 from tests.server.recording.made import APPLIED, CAPABILITIES, assert_same, frame, header
 from tests.server.recording.test_recovery import limited_files
 from transientcam_driver import Sequence
-from transientcam_server.recording import Recording, RecordingWriter, recover
-from transientcam_server.recording.recorder import Limits, Recorder
+from transientcam_server.recording import Limits, Recording, RecordingWriter, recover
+from transientcam_server.recording._recorder import Recorder
 
 PATIENCE_S = 30.0
 PLENTY = 10**15

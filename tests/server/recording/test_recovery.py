@@ -16,9 +16,16 @@ import pytest
 
 from tests.conftest import ROOT
 from tests.server.recording.made import HEIGHT, WIDTH, assert_same, frame, header, record
-from transientcam_server.errors.exceptions import NotARecording, RecordingInUse
-from transientcam_server.recording import Recording, RecordingWriter, layout, lock, recover, swmr
-from transientcam_server.recording.recovery import recover_all, unfinished
+from transientcam_server.errors import NotARecording, RecordingInUse
+from transientcam_server.recording import (
+    Recording,
+    RecordingWriter,
+    _layout as layout,
+    _lock as lock,
+    recover,
+    swmr,
+)
+from transientcam_server.recording._recovery import recover_all, unfinished
 
 KILLS = 20
 

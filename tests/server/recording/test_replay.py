@@ -18,8 +18,9 @@ from transientcam_driver import (
     open_camera,
 )
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.errors.exceptions import DamagedFrame, NotARecording
-from transientcam_server.recording.replay import ReplayCamera, ReplaySpec, parse_replay
+from transientcam_server.errors import DamagedFrame, NotARecording
+from transientcam_server.recording import ReplayCamera
+from transientcam_server.recording._replay import ReplaySpec, parse_replay
 
 
 @pytest.fixture(scope="module")

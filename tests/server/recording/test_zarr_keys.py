@@ -12,10 +12,10 @@ import zarr
 from numpy.typing import NDArray
 
 from tests.server.recording.made import frame, header, record
-from transientcam_server.errors.exceptions import DamagedFrame
-from transientcam_server.recording import Recording, RecordingWriter
-from transientcam_server.recording.storage import place_of_chunk
-from transientcam_server.recording.zarr_keys import GROUP_KEYS, ZarrKeys
+from transientcam_server.errors import DamagedFrame
+from transientcam_server.recording import Recording, RecordingWriter, ZarrKeys
+from transientcam_server.recording._storage import place_of_chunk
+from transientcam_server.recording._zarr_keys import GROUP_KEYS
 
 FRAMES = 3
 pytestmark = pytest.mark.usefixtures("zarr_clients")

@@ -9,8 +9,8 @@ import pytest
 import transientcam
 import transientcam_moments as tm
 from transientcam_driver import ProtocolError, RawFrame
-from transientcam_server.imaging.moment_frame import OF_IMAGES, MomentFrame
-from transientcam_server.relay.frames import MOMENTS, SUBSCRIBED, Collector, Parts, capture_of
+from transientcam_server.imaging import OF_IMAGES, MomentFrame
+from transientcam_server.relay._frames import MOMENTS, SUBSCRIBED, Collector, Parts, capture_of
 
 HEIGHT, WIDTH, M = 2, 3, 2
 TIMES = dict.fromkeys(("device_time_s", "host_time_s", "capture_s", "temperature_c"), 0.0)

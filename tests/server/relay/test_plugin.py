@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from transientcam_driver import CameraLost, CameraName, SpecError
-from transientcam_driver.receiving import Hop
+from transientcam_driver.camera import Hop
 from transientcam_server.relay import PLUGIN, Origin, RelayCamera
-from transientcam_server.relay.reports import hops_of
+from transientcam_server.relay._reports import hops_of
 
 
 @pytest.mark.parametrize(

@@ -15,11 +15,12 @@ from tests.server.streaming import VIDEO
 from tests.serving import Served, serving
 from tests.waiting import wait_until
 from transientcam_driver import CameraLost
-from transientcam_server.api.auth import Role
-from transientcam_server.api.auth.tokens import TokenFile, utc_now
+from transientcam_server.api import utc_now
+from transientcam_server.api._auth import Role
+from transientcam_server.api._auth.tokens import TokenFile
 from transientcam_server.recording import Recording
 from transientcam_server.relay import Origin, RelayCamera
-from transientcam_server.relay.plugin import TOKEN_VARIABLE
+from transientcam_server.relay._plugin import TOKEN_VARIABLE
 
 ORIGIN = "sim:wall?noise=off"
 PATIENCE_S = 60.0

@@ -1,9 +1,9 @@
 /** The colours of light in flight, as the shader has them, for whatever draws without it. */
 import { densityImage } from "../physics/densityImage";
 import type { Coefficients } from "../physics/maximumEntropy";
-import { colourTable, LEVELS, type ColourMapName } from "../ui/colourMaps";
+import { type ColourMapName, colourTable, LEVELS } from "../scales/colourMaps";
+import { backdropGrey, strength, type ToneKind, toned } from "../scales/tone";
 import type { Backdrop, Exposure } from "./renderer";
-import { backdropGrey, strength, toned, type ToneKind } from "./tone";
 
 const OPAQUE = 0xff000000;
 /** Steps of the place on the colour map, many to each colour: what light adds to the scene is within 0.07 of 255 there. */
@@ -61,7 +61,7 @@ function placesOf(kind: ToneKind, white: number, density: Float32Array): void {
   const root = kind === "root";
   for (let pixel = 0; pixel < density.length; pixel++) {
     const share = density[pixel] / white;
-    const bounded = share > 0 ? (share < 1 ? share : 1) : 0; // NaN: no density, no light
+    const bounded = share > 0 ? Math.min(share, 1) : 0; // NaN: no density, no light
     density[pixel] = root ? Math.sqrt(bounded) : bounded;
   }
 }

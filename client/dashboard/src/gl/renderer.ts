@@ -1,6 +1,6 @@
 import type { Coefficients } from "../physics/maximumEntropy";
-import type { ColourMapName } from "../ui/colourMaps";
-import type { Tone } from "./tone";
+import type { ColourMapName } from "../scales/colourMaps";
+import type { Tone } from "../scales/tone";
 
 /** The still scene behind the light: one brightness a pixel, `white` shown brightest. */
 export interface Backdrop {

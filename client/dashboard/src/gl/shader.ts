@@ -1,4 +1,4 @@
-import { BACKDROP_GAIN, DECADES, FULL_LIGHT } from "./tone";
+import { BACKDROP_GAIN, DECADES, FULL_LIGHT } from "../scales/tone";
 
 /** One triangle that covers the canvas, from the vertex number alone. */
 export const VERTEX_SHADER = `#version 300 es

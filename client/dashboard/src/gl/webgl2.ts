@@ -1,13 +1,11 @@
 import type { Coefficients } from "../physics/maximumEntropy";
-import { colourTable, LEVELS, type ColourMapName } from "../ui/colourMaps";
+import { type ColourMapName, colourTable, LEVELS } from "../scales/colourMaps";
+import { toneIndex } from "../scales/tone";
 import type { Backdrop, DensityRenderer, Exposure } from "./renderer";
 import { FRAGMENT_SHADER, VERTEX_SHADER } from "./shader";
 import { layersOf, packTexels } from "./texels";
-import { toneIndex } from "./tone";
 
-const UNIFORMS = [
-  "coefficients", "backdrop", "colours", "layers", "z", "baseFrequencyHz", "white", "backdropWhite", "tone", "asNumbers",
-] as const; // prettier-ignore
+const UNIFORMS = ["coefficients", "backdrop", "colours", "layers", "z", "baseFrequencyHz", "white", "backdropWhite", "tone", "asNumbers"] as const;
 
 type Uniforms = Record<(typeof UNIFORMS)[number], WebGLUniformLocation | null>;
 
@@ -47,9 +45,7 @@ export class WebGl2Renderer implements DensityRenderer {
     this.#gl = gl;
     const program = link(gl);
     gl.useProgram(program);
-    this.#uniforms = Object.fromEntries(
-      UNIFORMS.map((name) => [name, gl.getUniformLocation(program, name)]),
-    ) as Uniforms;
+    this.#uniforms = Object.fromEntries(UNIFORMS.map((name) => [name, gl.getUniformLocation(program, name)])) as Uniforms;
     gl.uniform1i(this.#uniforms.coefficients, COEFFICIENTS);
     gl.uniform1i(this.#uniforms.backdrop, BACKDROP);
     gl.uniform1i(this.#uniforms.colours, COLOURS);
@@ -110,9 +106,7 @@ export class WebGl2Renderer implements DensityRenderer {
     this.#gl.getExtension("WEBGL_lose_context")?.loseContext();
   }
 
-  readonly #onContextLost = (): void => {
-    this.#lost?.();
-  };
+  readonly #onContextLost = (): void => this.#lost?.();
 
   #shade(coefficients: Coefficients, phase_rad: number): void {
     const gl = this.#gl;

@@ -1,5 +1,5 @@
 /** Speed of light in vacuum, exact by definition of the metre. */
-export const SPEED_OF_LIGHT_M_S = 299_792_458;
+const SPEED_OF_LIGHT_M_S = 299_792_458;
 
 /** Range of a direct return that arrives `time_s` after emission: light goes there and back. */
 export function rangeOfTime_m(time_s: number): number {

@@ -37,8 +37,7 @@ export function peaks(c: Coefficients, pixel: number): Peak[] {
   if (!scan.every((value) => value > 0 && Number.isFinite(value))) return [];
 
   const at = (n: number): number => scan[(n + count) % count];
-  const refine = (n: number, f: (phase_rad: number) => number): number =>
-    maximise(f, (n - 1) * step_rad, (n + 1) * step_rad);
+  const refine = (n: number, f: (phase_rad: number) => number): number => maximise(f, (n - 1) * step_rad, (n + 1) * step_rad);
   const tops: number[] = [];
   const bottoms: number[] = [];
   for (let n = 0; n < count; n++) {

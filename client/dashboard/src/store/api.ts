@@ -1,6 +1,7 @@
 /** The REST side of the service: requests, and problems in plain words. */
-import type { AppliedSequence, CameraDocument, PixelDocument, Problem, SequenceDocument } from "../stream/protocol";
+
 import { frameUrl } from "../stream/frameUrl";
+import type { AppliedSequence, CameraDocument, PixelDocument, Problem, SequenceDocument } from "../stream/protocol";
 import { Credentials } from "./credentials";
 import type {
   AcquisitionDocument,

@@ -27,9 +27,7 @@ export class Calibrations {
     void this.refresh();
     void this.#findJob();
     const timer = setInterval(() => void this.refresh(), 1000 * DRIFT_S);
-    return () => {
-      clearInterval(timer);
-    };
+    return () => clearInterval(timer);
   }
 
   async refresh(): Promise<void> {
@@ -97,10 +95,10 @@ export class Calibrations {
 function outcomeOf({ state, problem, result }: JobDocument): { words: string; good: boolean } {
   if (state === "cancelled") return { words: "The measurement was cancelled.", good: false };
   if (state === "failed") return { words: problem === null ? "The measurement failed." : plainWords(problem), good: false };
-  const [bad, rejected] = [Number(result?.["bad_pixels"] ?? 0), Number(result?.["rejected_images"] ?? 0)];
+  const [bad, rejected] = [Number(result?.bad_pixels ?? 0), Number(result?.rejected_images ?? 0)];
   const words = `${bad} bad ${bad === 1 ? "pixel" : "pixels"}, ${rejected} ${rejected === 1 ? "image" : "images"} left out as unlike the others.`;
-  const verdict = result?.["verdict"] as VerdictDocument | undefined;
+  const verdict = result?.verdict as VerdictDocument | undefined;
   if (verdict === undefined || verdict.verdict === "diffusor") return { words: `Measured: ${words}`, good: true };
-  const use = result?.["activated"] === true ? "It is used, as it was forced." : "It is kept, but not used.";
+  const use = result?.activated === true ? "It is used, as it was forced." : "It is kept, but not used.";
   return { words: `Measured on ${verdict.verdict === "scene" ? "a scene, not a diffusor" : "what may be no diffusor"}: ${use}`, good: false };
 }

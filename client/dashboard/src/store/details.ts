@@ -1,4 +1,4 @@
-import { effect, signal, untracked, type ReadonlySignal } from "@preact/signals";
+import { effect, type ReadonlySignal, signal, untracked } from "@preact/signals";
 
 import type { PixelDocument } from "../stream/protocol";
 import { type Api, LIVE, liveFrame, RequestError } from "./api";

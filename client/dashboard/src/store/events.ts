@@ -1,13 +1,12 @@
 /** What happened, for people: notices of the service and what this page noticed, the newest last. */
 import { signal } from "@preact/signals";
-
+import { engineering, grouped } from "../scales/format";
 import type { AppliedSequence, Notice } from "../stream/protocol";
-import { engineering, grouped } from "../ui/format";
 
 export type EventTone = "plain" | "good" | "bad";
 
 /** What can be done about what happened. */
-export interface Remedy {
+interface Remedy {
   readonly word: string;
   readonly run: () => void;
 }

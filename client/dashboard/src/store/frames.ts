@@ -1,7 +1,8 @@
-import { computed, signal, type Signal } from "@preact/signals";
+import { computed, type Signal, signal } from "@preact/signals";
 
 import type { Coefficients } from "../physics/maximumEntropy";
-import type { FrameMeta, Numbers } from "../stream/protocol";
+import type { Numbers } from "../stream/compact";
+import type { FrameMeta } from "../stream/protocol";
 import { coefficientsOf, type FrameReport, type LightSummary, type MapSummary } from "../stream/summary";
 import { LIVE } from "./api";
 
@@ -32,7 +33,7 @@ export class Frames {
   /** Products that a view shows and that can be had, sorted. */
   readonly wanted = computed(() => this.#claimed.value.filter((product) => this.absent.value[product] === undefined));
   /** The product that says how much light a pixel has. */
-  readonly amplitude = computed(() => (this.absent.value["brightness"] === undefined ? "brightness" : "direct"));
+  readonly amplitude = computed(() => (this.absent.value.brightness === undefined ? "brightness" : "direct"));
   readonly #claimed = signal<readonly string[]>([]);
   readonly #claims = new Map<string, number>();
   readonly #newest = new Map<string, Signal<Frame | null>>();

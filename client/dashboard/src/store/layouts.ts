@@ -1,9 +1,8 @@
 /** Layouts that the user named, and the way back from changes. */
-import { computed, effect, signal, untracked, type Signal } from "@preact/signals";
+import { computed, effect, type Signal, signal, untracked } from "@preact/signals";
 
-import { isLayout, type Layout } from "../views/layout";
-import { VIEW_NAMES } from "../views/names";
-import { remembered, type Shelf } from "./settings";
+import { isLayout, type Layout } from "./layout";
+import type { Settings } from "./settings";
 
 /** Changes that can be undone, the last first. */
 const MOST_STEPS = 50;
@@ -20,16 +19,14 @@ export class Layouts {
   readonly #former = signal<readonly Layout[]>([]);
   #last: Layout;
 
-  constructor(shelf: Shelf | null, current: Signal<Layout>) {
+  constructor(settings: Settings, current: Signal<Layout>) {
     this.#current = current;
     this.#last = current.peek();
-    this.named = remembered<Named>(shelf, "layouts", {}, isNamed);
+    this.named = settings.of<Named>({ key: "layouts", initial: {}, accepts: isNamed });
     effect(() => {
       const [before, now] = [this.#last, current.value];
       this.#last = now;
-      untracked(() => {
-        this.#keep(before, now);
-      });
+      untracked(() => this.#keep(before, now));
     });
   }
 
@@ -67,5 +64,5 @@ function placesOf(layout: Layout): string {
 }
 
 function isNamed(value: unknown): value is Named {
-  return typeof value === "object" && value !== null && Object.values(value).every((each) => isLayout(each, VIEW_NAMES));
+  return typeof value === "object" && value !== null && Object.values(value).every((each) => isLayout(each));
 }

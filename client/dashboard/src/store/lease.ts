@@ -46,9 +46,7 @@ export class Lease {
     this.#now_s = now_s;
     effect(() => {
       const control = this.control.value;
-      untracked(() => {
-        this.#arm(control);
-      });
+      untracked(() => this.#arm(control));
     });
   }
 

@@ -2,8 +2,8 @@
 import { computed, type ReadonlySignal } from "@preact/signals";
 
 import { summariseMap } from "../stream/summary";
-import { type MapProduct } from "../views/map/catalogue";
 import type { Frame, Frames } from "./frames";
+import type { MapProduct } from "./mapCatalogue";
 import type { Noises } from "./noise";
 
 /** The newest frame of a map; null until one arrived. Computed only while a view shows it. */

@@ -1,7 +1,7 @@
-import { computed, signal, type ReadonlySignal } from "@preact/signals";
+import { computed, type ReadonlySignal, signal } from "@preact/signals";
 
 /** Nanoseconds of flight that pass in a second of watching. */
-export const SPEEDS_NS = [0.5, 1, 2, 5, 10, 20] as const;
+export const SPEEDS_NS: readonly number[] = [0.5, 1, 2, 5, 10, 20];
 
 /** An arrival as near as this, in shares of the period, is where the light is already. */
 const NEAR = 1e-3;

@@ -1,5 +1,5 @@
 /** How far the range of the median pixel is off, as one figure for the whole page. */
-import { computed, effect, signal, untracked, type ReadonlySignal } from "@preact/signals";
+import { computed, effect, type ReadonlySignal, signal, untracked } from "@preact/signals";
 
 import type { FrameMeta } from "../stream/protocol";
 import { LIVE, RequestError } from "./api";
@@ -7,7 +7,7 @@ import type { Frames } from "./frames";
 import type { FrameLoader } from "./replay";
 import type { Status } from "./status";
 
-export interface RangeError {
+export interface RangeErrorFigure {
   readonly error_m: number;
   /** What it holds: 1 σ of the noise and the bias together, or the noise alone where the bias is unknown. */
   readonly of: "noise and bias" | "noise";
@@ -24,7 +24,7 @@ const PRODUCT = "range_error";
  */
 export class RangeErrors {
   /** Null before a range was computed. */
-  readonly now: ReadonlySignal<RangeError | null>;
+  readonly now: ReadonlySignal<RangeErrorFigure | null>;
   /** Set by what talks to the worker. */
   loader: FrameLoader | null = null;
   /** The last statement of noise and bias, and for which sequence. */

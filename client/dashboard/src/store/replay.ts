@@ -3,9 +3,9 @@ import { batch, computed, effect, signal, untracked } from "@preact/signals";
 
 import { LEAST_PRODUCTS } from "../stream/protocol";
 import type { FrameReport } from "../stream/summary";
-import { type Api, recordingPath, RequestError } from "./api";
+import { type Api, RequestError, recordingPath } from "./api";
 import type { RecordingDocument, TimelineDocument } from "./documents";
-import { frameOf, type Frames } from "./frames";
+import { type Frames, frameOf } from "./frames";
 import type { Status } from "./status";
 
 /** Brings products of the frame at a path of the service; raises RequestError. */
@@ -180,7 +180,11 @@ export class Replay {
       for (const report of reports) this.#frames.put(frameOf(report, path));
       this.shown.value = frame;
       const meta = reports.at(-1)?.message.meta;
-      if (meta !== undefined) this.#status.frameReplayed(meta, reports.reduce((sum, { message }) => sum + message.encode_s, 0));
+      if (meta !== undefined)
+        this.#status.frameReplayed(
+          meta,
+          reports.reduce((sum, { message }) => sum + message.encode_s, 0),
+        );
     });
   }
 

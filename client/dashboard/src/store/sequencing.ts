@@ -1,4 +1,4 @@
-import { computed, signal, type Signal } from "@preact/signals";
+import { computed, type Signal, signal } from "@preact/signals";
 
 import type { AppliedSequence, Choice, SequenceDocument } from "../stream/protocol";
 import { type Api, RequestError } from "./api";
@@ -71,7 +71,7 @@ export class Sequencing {
   async #estimateBy(estimator: string): Promise<string | null> {
     const { document, tag } = await this.#api.reconstruction();
     const { reconstruction_id: _, ...settings } = document;
-    const before = String(settings["estimator"]);
+    const before = String(settings.estimator);
     if (before === estimator) return null;
     await this.#api.setReconstruction({ ...settings, estimator }, tag);
     return before;

@@ -8,7 +8,7 @@ import { CREDIBLE_LATENCY_S, type Status } from "./status";
 export const KEPT_S = 60;
 const APART_S = 0.5;
 /** Samples further apart than this have a time without frames between them. */
-export const GAP_S = 5;
+const GAP_S = 5;
 
 /** The figures that are followed; NaN where one is not known. */
 export interface Sample {

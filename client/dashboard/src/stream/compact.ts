@@ -1,5 +1,6 @@
 /** Arrays of frames in fewer bytes, back to what the page works with: codes of 16 bits, and parts of the picture. */
-import type { Numbers } from "./protocol";
+
+export type Numbers = Float32Array | Float64Array | Uint16Array | Uint8Array;
 
 /** A product's encoding in codes; null where it has none. As `docs/stream.md` has them. */
 export function codesFor(axes: readonly string[], dtype: string): string | null {

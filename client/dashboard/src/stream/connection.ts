@@ -18,8 +18,8 @@ import {
   LEAST_PRODUCTS,
   ProtocolError,
   type ServerMessage,
-  type Subscription,
   SUBPROTOCOL,
+  type Subscription,
 } from "./protocol";
 
 /** What of a WebSocket is used. */
@@ -112,12 +112,8 @@ export class StreamConnection {
     this.#emit = emit;
     this.#announced = new Announced(
       (announcement) => around.bring(announcement, queryOf(this.#cut)),
-      (body) => {
-        this.#receive(body);
-      },
-      ({ frame }, error) => {
-        this.#missed(frame, error);
-      },
+      (body) => this.#receive(body),
+      ({ frame }, error) => this.#missed(frame, error),
     );
   }
 
@@ -192,17 +188,13 @@ export class StreamConnection {
       this.#emit({ type: "open" });
       this.#listen();
     };
-    socket.onmessage = ({ data }) => {
-      this.#receive(data);
-    };
+    socket.onmessage = ({ data }) => this.#receive(data);
     socket.onclose = ({ code, reason }) => {
       if (code === NOT_LET_IN) this.#refuse();
       else this.#lost(reason || CLOSE_REASONS[code] || "The connection was closed.");
     };
     // An attempt that neither opens nor fails (a firewall that swallows it) ends here.
-    this.#rearm(() => {
-      this.#lost("The service does not answer.");
-    }, LONGEST_RETRY_S);
+    this.#rearm(() => this.#lost("The service does not answer."), LONGEST_RETRY_S);
   }
 
   #subscribe(): void {
@@ -210,7 +202,13 @@ export class StreamConnection {
     this.#inFlight.clear(); // the service forgets them too
     this.#announced.clear();
     this.#link.restart();
-    this.#socket?.send(encodeSubscribe(products.map((product) => this.#subscriptionOf(product)), CREDITS, this.#token));
+    this.#socket?.send(
+      encodeSubscribe(
+        products.map((product) => this.#subscriptionOf(product)),
+        CREDITS,
+        this.#token,
+      ),
+    );
   }
 
   #subscriptionOf(product: string): Subscription {

@@ -5,13 +5,11 @@
  */
 import { decode, encode } from "@msgpack/msgpack";
 
-import { decodeReflection16, decodeU16, whole } from "./compact";
+import { decodeReflection16, decodeU16, type Numbers, whole } from "./compact";
 
 export const SUBPROTOCOL = "transientcam.v1.msgpack";
 
 export type Dtype = "<f4" | "<f8" | "<c8" | "<u2" | "|u1";
-
-export type Numbers = Float32Array | Float64Array | Uint16Array | Uint8Array;
 
 /** An array in C order. Complex numbers ("<c8") lie as pairs of float32: real, imaginary. */
 export interface NdArray {
@@ -269,10 +267,10 @@ export function decodeMessage(buffer: ArrayBuffer): ServerMessage | null {
   } catch (error) {
     throw new ProtocolError(`The message is not msgpack: ${String(error)}`);
   }
-  if (!isMap(message) || typeof message["type"] !== "string") {
+  if (!isMap(message) || typeof message.type !== "string") {
     throw new ProtocolError("The message is not a map with a type.");
   }
-  switch (message["type"]) {
+  switch (message.type) {
     case "frame":
       return frameOf(message);
     case "hello":
@@ -288,8 +286,8 @@ export function decodeMessage(buffer: ArrayBuffer): ServerMessage | null {
 function frameOf(message: Record<string, unknown>): FrameMessage | AnnouncementMessage {
   const announced = announcementOf(message);
   if (announced !== null) return announced;
-  const axes = Array.isArray(message["axes"]) ? message["axes"] : [];
-  const frame = { ...message, axes, array: decoded(message, ndArray(message["array"])) } as unknown as FrameMessage;
+  const axes = Array.isArray(message.axes) ? message.axes : [];
+  const frame = { ...message, axes, array: decoded(message, ndArray(message.array)) } as unknown as FrameMessage;
   const { meta, array } = frame;
   const { region, decimation, width, height }: Partial<FrameMeta> = isMap(meta) ? meta : {};
   if (region === undefined || decimation === undefined || width === undefined || height === undefined) return frame;

@@ -1,7 +1,7 @@
 /** What a view needs to know of a whole frame before it draws: computed in the worker. */
 import { densityImage } from "../physics/densityImage";
 import type { Coefficients } from "../physics/maximumEntropy";
-import type { Span } from "../ui/scale";
+import type { Span } from "../scales/scale";
 import type { FrameMessage } from "./protocol";
 
 /** Summary of a map: where most of its values lie. */

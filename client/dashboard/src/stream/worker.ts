@@ -1,8 +1,9 @@
 /** The worker: owns the socket, decodes, summarises, and hands buffers to the page without copying. */
+
+import type { Announcement } from "./announced";
+import { type ConnectionEvent, FrameGone, StreamConnection } from "./connection";
 import type { FluencyReport } from "./fluency";
 import { frameUrl } from "./frameUrl";
-import type { Announcement } from "./announced";
-import { FrameGone, StreamConnection, type ConnectionEvent } from "./connection";
 import { type CameraDocument, decodeMessage, type Problem, ProtocolError } from "./protocol";
 import { type FrameReport, summarised } from "./summary";
 
@@ -100,9 +101,7 @@ scope.onmessage = ({ data: command }) => {
         {
           openSocket: (url, protocol) => new WebSocket(url, protocol),
           setTimer: (action, delay_s) => setTimeout(action, 1000 * delay_s) as unknown as number,
-          clearTimer: (timer) => {
-            clearTimeout(timer);
-          },
+          clearTimer: (timer) => clearTimeout(timer),
           now_s: () => performance.now() / 1000,
           random: Math.random,
           probe: askForCamera,

@@ -1,6 +1,7 @@
 import { useId, useRef } from "preact/hooks";
 
 import { placeBeside } from "./popover";
+import "./ActionMenu.css";
 
 export interface Action {
   readonly text: string;
@@ -41,14 +42,29 @@ export function ActionMenu({ label, groups }: { label: string; groups: readonly 
     event.stopPropagation(); // keys of the page would move the light
     if (event.key === "Tab") menu.current?.hidePopover();
     const all = entries();
-    const next = neighbour(all.map((entry) => entry.textContent ?? ""), all.indexOf(document.activeElement as HTMLElement), event.key);
+    const next = neighbour(
+      all.map((entry) => entry.textContent ?? ""),
+      all.indexOf(document.activeElement as HTMLElement),
+      event.key,
+    );
     if (next === null) return;
     event.preventDefault();
     all[next]?.focus();
   };
   return (
     <>
-      <button ref={button} type="button" class="action-menu" aria-label={label} title={label} aria-haspopup="menu" aria-controls={id} popovertarget={id} popovertargetaction="toggle" onKeyDown={onButtonKey}>
+      <button
+        ref={button}
+        type="button"
+        class="action-menu"
+        aria-label={label}
+        title={label}
+        aria-haspopup="menu"
+        aria-controls={id}
+        popovertarget={id}
+        popovertargetaction="toggle"
+        onKeyDown={onButtonKey}
+      >
         ⋯
       </button>
       <div

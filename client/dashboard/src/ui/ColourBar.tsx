@@ -1,13 +1,14 @@
-import { computed, useSignal, type ReadonlySignal } from "@preact/signals";
+import { computed, type ReadonlySignal, useSignal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 
-import { beyond, colourTable, LEVELS, levelOf, type ColourMapName } from "./colourMaps";
-import { fixed, significant, withUnit } from "./format";
+import { beyond, type ColourMapName, colourTable, LEVELS, levelOf } from "../scales/colourMaps";
+import { fixed, significant, withUnit } from "../scales/format";
+import { decimalsFor, fraction, histogram, niceStep, type Scale, type Span, ticks, valueAt } from "../scales/scale";
 import { useDrawing } from "./hooks";
-import { decimalsFor, fraction, histogram, niceStep, ticks, valueAt, type Scale, type Span } from "./scale";
+import "./ColourBar.css";
 
 /** Share of the scale's length that the bar goes on beyond either end: for what lies there, and for handles to be drawn to. */
-export const MARGIN = 0.1;
+const MARGIN = 0.1;
 const LENGTH = 1 + 2 * MARGIN;
 /** Rows of the canvas; bins of the histogram. */
 const ROWS = 240;
@@ -71,13 +72,13 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
   const write = (value: number): string => (base.kind === "linear" ? fixed(value, decimals) : significant(value, 1));
   const ends = onLimit === undefined ? [] : (["low", "high"] as const);
   return (
-    <div class={`colour-bar ${values === undefined ? "colour-bar-bare" : ""}`} role="group" aria-label={`Colour scale from ${write(scale.low)} to ${withUnit(write(scale.high), unit)}`}>
+    <div
+      class={`colour-bar ${values === undefined ? "colour-bar-bare" : ""}`}
+      role="group"
+      aria-label={`Colour scale from ${write(scale.low)} to ${withUnit(write(scale.high), unit)}`}
+    >
       <p class="colour-bar-unit">{unit === "1" ? "" : unit}</p>
-      <div
-        class="colour-bar-body"
-        title={onLimit === undefined ? undefined : "Drag the handles; double click lets the ends follow the data"}
-        onDblClick={() => onLimit?.(null)}
-      >
+      <div class="colour-bar-body" title={onLimit === undefined ? undefined : "Drag the handles; double click lets the ends follow the data"} onDblClick={() => onLimit?.(null)}>
         <canvas ref={canvas} width={COLOURS_PX + (values === undefined ? 0 : HISTOGRAM_PX)} height={ROWS} aria-hidden="true" />
         {numbers.map((value) => (
           <span key={value} class="colour-bar-tick" style={{ bottom: `${100 * onBar(base, value)}%` }}>

@@ -1,6 +1,6 @@
 import type { Signal } from "@preact/signals";
 
-import { COLOUR_MAPS, type ColourMapName } from "./colourMaps";
+import { COLOUR_MAPS, type ColourMapName } from "../scales/colourMaps";
 import { Choice } from "./controls";
 
 /** Which colours a picture has, by the names of the colour maps. */

@@ -1,8 +1,8 @@
 import { useSignal } from "@preact/signals";
-
+import type { Span } from "../scales/scale";
 import type { Look, Looks } from "../store/looks";
 import { Check } from "./controls";
-import type { Span } from "./scale";
+import "./LimitFields.css";
 
 /** Limits with one end typed anew, or why they make no sense. */
 export function typed({ low, high }: Span, end: keyof Span, text: string): Span | string {
@@ -29,9 +29,7 @@ export function LimitFields({ look, looks }: { look: Look; looks: Looks }) {
       aria-label={`${name} end of the scale in ${look.product.unit}`}
       aria-invalid={wrong.value?.end === end}
       value={Number(scale[end].toPrecision(4))}
-      onChange={(event) => {
-        set(end, event.currentTarget.value);
-      }}
+      onChange={(event) => set(end, event.currentTarget.value)}
     />
   );
   const { unit } = look.product;
@@ -57,7 +55,7 @@ export function LimitFields({ look, looks }: { look: Look; looks: Looks }) {
       >
         Limits follow the data
       </Check>
-      <Check checked={looks.locked.value} onChange={(locked) => { looks.lock(look, locked); }}>
+      <Check checked={looks.locked.value} onChange={(locked) => looks.lock(look, locked)}>
         The same limits for all maps{unit === "1" ? " without a unit" : ` in ${unit}`}
       </Check>
     </>

@@ -1,7 +1,8 @@
-import { createContext, type ComponentChildren } from "preact";
+import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
 
-import { ActionMenu, type Action, type ActionGroup } from "./ActionMenu";
+import { type Action, type ActionGroup, ActionMenu } from "./ActionMenu";
+import "./Panel.css";
 
 interface PanelProps {
   readonly name: string;
@@ -25,7 +26,9 @@ export function Panel({ name, title, tools, downloads = [], children }: PanelPro
     <section class={`panel panel-${name}`} aria-label={name} data-view={name}>
       <header class="panel-head">
         {/* onto another panel, to change places with it; the menu does the same */}
-        <div class="panel-title" draggable onDragStart={(event) => event.dataTransfer?.setData(DRAGGED, name)}>{title}</div>
+        <div class="panel-title" draggable onDragStart={(event) => event.dataTransfer?.setData(DRAGGED, name)}>
+          {title}
+        </div>
         <div class="panel-tools">
           {tools}
           <ActionMenu label={`Panel ${name}: views and downloads`} groups={[{ title: "Download", actions: downloads }, ...slot]} />

@@ -1,12 +1,13 @@
+import { computed } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { useEffect, useMemo, useRef } from "preact/hooks";
-import { computed } from "@preact/signals";
 
 import { regionOf } from "../store/measures";
 import { type Pixel, stepped } from "../store/pixel";
 import { useStore } from "../store/store";
-import { placeIn, WHOLE, type Point } from "../store/viewport";
+import { type Point, placeIn, WHOLE } from "../store/viewport";
 import { Marks } from "./Marks";
+import "./Stage.css";
 
 interface StageProps {
   /** Size of the picture in pixels of the sensor. */
@@ -63,9 +64,7 @@ export function Stage({ width, height, label, children }: StageProps) {
       viewport.zoomAt(shareAt(event), ZOOM_PER_UNIT ** -event.deltaY);
     };
     target?.addEventListener("wheel", onWheel, { passive: false });
-    return () => {
-      target?.removeEventListener("wheel", onWheel);
-    };
+    return () => target?.removeEventListener("wheel", onWheel);
   }, [viewport]);
 
   const onPointerDown = (event: PointerEvent): void => {
@@ -139,9 +138,7 @@ export function Stage({ width, height, label, children }: StageProps) {
         onPointerDown={onPointerDown}
         onPointerUp={onPointerUp}
         onPointerCancel={() => (drag.current = null)}
-        onDblClick={() => {
-          viewport.reset();
-        }}
+        onDblClick={() => viewport.reset()}
         onKeyDown={onKeyDown}
       >
         <div class="stage-zoom" style={style.value}>

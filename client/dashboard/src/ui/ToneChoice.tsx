@@ -1,6 +1,6 @@
 import type { Signal } from "@preact/signals";
 
-import { TONES, type ToneKind } from "../gl/tone";
+import { TONES, type ToneKind } from "../scales/tone";
 import { Choice } from "./controls";
 
 const NAMES: Readonly<Record<ToneKind, string>> = { linear: "linear", root: "square root", logarithmic: "logarithmic" };

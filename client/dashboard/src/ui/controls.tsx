@@ -1,4 +1,5 @@
 import type { ComponentChildren } from "preact";
+import "./controls.css";
 
 interface ChoiceProps<T extends string | number> {
   readonly label: string;
@@ -91,13 +92,7 @@ interface CheckProps {
 export function Check({ checked, title, onChange, children }: CheckProps) {
   return (
     <label class="check" title={title}>
-      <input
-        type="checkbox"
-        checked={checked}
-        onChange={(event) => {
-          onChange(event.currentTarget.checked);
-        }}
-      />
+      <input type="checkbox" checked={checked} onChange={(event) => onChange(event.currentTarget.checked)} />
       <span>{children}</span>
     </label>
   );

@@ -8,9 +8,7 @@ export function save(name: string, content: Blob): void {
   link.download = name;
   link.click();
   // The browser reads the address in a task of its own.
-  setTimeout(() => {
-    URL.revokeObjectURL(link.href);
-  }, 10_000);
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
 /** A canvas as PNG, in its own pixels. Of WebGL only in the task that drew it. */

@@ -1,8 +1,9 @@
 /** A picture as a figure: with axes, colour bar, unit and words, as SVG that stands by itself. */
+
+import { type ColourMapName, colourTable, LEVELS, levelOf } from "../scales/colourMaps";
+import { engineering, fixed, significant, withUnit } from "../scales/format";
+import { decimalsFor, fraction, niceStep, type Scale, ticks } from "../scales/scale";
 import type { FrameMeta } from "../stream/protocol";
-import { colourTable, LEVELS, levelOf, type ColourMapName } from "./colourMaps";
-import { engineering, fixed, significant, withUnit } from "./format";
-import { decimalsFor, fraction, niceStep, ticks, type Scale } from "./scale";
 
 export interface Figure {
   /** The picture as an address that stands in the file; null leaves its place empty. */
@@ -50,7 +51,10 @@ export function figureSvg(figure: Figure, layout: FigureLayout): string {
   const { width, height, left, top, pictureWidth, pictureHeight } = layout;
   const ink = figure.ground === "black" ? "#e4e9ee" : "#1a2129";
   const [right, foot] = [left + pictureWidth, top + pictureHeight];
-  const picture = figure.picture === null ? "" : `<image x="${left}" y="${top}" width="${pictureWidth}" height="${pictureHeight}" preserveAspectRatio="none" style="image-rendering:pixelated" href="${figure.picture}"/>`;
+  const picture =
+    figure.picture === null
+      ? ""
+      : `<image x="${left}" y="${top}" width="${pictureWidth}" height="${pictureHeight}" preserveAspectRatio="none" style="image-rendering:pixelated" href="${figure.picture}"/>`;
   const parts = [
     `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}" font-family="Inter, Helvetica, Arial, sans-serif" font-size="12" fill="${ink}">`,
     `<rect width="${width}" height="${height}" fill="${figure.ground === "black" ? "#000" : "#fff"}"/>`,

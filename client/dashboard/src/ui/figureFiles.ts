@@ -1,6 +1,6 @@
 /** Figures as files and as pictures: what needs a browser. */
 import { save } from "./download";
-import { figureLayout, figureSvg, type Figure } from "./figure";
+import { type Figure, figureLayout, figureSvg } from "./figure";
 
 /** Width of a figure's picture, in px; a PNG has `PNG_SCALE` times as many. */
 const FIGURE_PX = 640;
@@ -26,9 +26,7 @@ export async function saveFigure(name: string, canvas: HTMLCanvasElement | null,
   // The picture again, pixel by pixel: a browser may smooth what is within an SVG.
   context.imageSmoothingEnabled = false;
   context.drawImage(canvas, PNG_SCALE * layout.left, PNG_SCALE * layout.top, PNG_SCALE * layout.pictureWidth, PNG_SCALE * layout.pictureHeight);
-  const content = await new Promise<Blob | null>((done) => {
-    drawn.toBlob(done, "image/png");
-  });
+  const content = await new Promise<Blob | null>((done) => drawn.toBlob(done, "image/png"));
   if (content !== null) save(`${name}.png`, content);
 }
 

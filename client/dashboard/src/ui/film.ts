@@ -53,7 +53,7 @@ function webmRecorder(canvas: HTMLCanvasElement): Recorder {
   const recorder = new MediaRecorder(stream, { mimeType, videoBitsPerSecond: WEBM_BITS_PER_S });
   const parts: Blob[] = [];
   recorder.ondataavailable = ({ data }) => parts.push(data);
-  const stopped = new Promise<void>((done) => (recorder.onstop = () => { done(); })); // prettier-ignore
+  const stopped = new Promise<void>((done) => (recorder.onstop = () => done()));
   recorder.start();
   return {
     add: async (duration_s) => {

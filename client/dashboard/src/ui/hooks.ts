@@ -1,4 +1,4 @@
-import { effect, useSignal, type Signal } from "@preact/signals";
+import { effect, type Signal, useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 
 import { useStore } from "../store/store";
@@ -10,13 +10,7 @@ import { useStore } from "../store/store";
 export function useDrawing(draw: () => void, inputs: readonly unknown[]): void {
   const latest = useRef(draw);
   latest.current = draw;
-  useEffect(
-    () =>
-      effect(() => {
-        latest.current();
-      }),
-    inputs,
-  );
+  useEffect(() => effect(() => latest.current()), inputs);
 }
 
 /** Has products streamed for as long as the view stands. */
@@ -35,9 +29,7 @@ export function useSize(target: { readonly current: Element | null }, size: Sign
       size.value = { width: Math.round(width), height: Math.round(height) };
     });
     observer.observe(element);
-    return () => {
-      observer.disconnect();
-    };
+    return () => observer.disconnect();
   }, [target, size]);
 }
 
@@ -46,9 +38,7 @@ export function useNow(every_s: number): number {
   const now_s = useSignal(Date.now() / 1000);
   useEffect(() => {
     const timer = setInterval(() => (now_s.value = Date.now() / 1000), 1000 * every_s);
-    return () => {
-      clearInterval(timer);
-    };
+    return () => clearInterval(timer);
   }, [now_s, every_s]);
   return now_s.value;
 }

@@ -1,5 +1,5 @@
-import { beyond, colourTable, levelOf, type ColourMapName } from "./colourMaps";
-import { fraction, type Scale } from "./scale";
+import { beyond, type ColourMapName, colourTable, levelOf } from "../scales/colourMaps";
+import { fraction, type Scale } from "../scales/scale";
 
 /** Writes the colours of `values` into RGBA bytes; what lies beyond the scale has a colour of its own, a pixel without a value stays clear. */
 export function paint(values: ArrayLike<number>, scale: Scale, colours: ColourMapName, rgba: Uint8ClampedArray): void {

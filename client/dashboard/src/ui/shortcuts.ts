@@ -1,7 +1,7 @@
-import type { Store } from "../store/store";
+import { LAYOUTS } from "../store/layout";
+import { MAP_PRODUCTS } from "../store/mapCatalogue";
 import { SPEEDS_NS } from "../store/player";
-import { MAP_PRODUCTS } from "../views/map/catalogue";
-import { LAYOUTS } from "../views/layout";
+import type { Store } from "../store/store";
 
 /** Flight passed by one press of an arrow key, in s. */
 const STEP_S = 0.1e-9;
@@ -25,38 +25,43 @@ function scrub({ player }: Store, flight_s: number): void {
 }
 
 function speedUp({ player }: Store, by: number): void {
-  const at = SPEEDS_NS.findIndex((speed) => speed === player.speed_ns.peek()) + by;
+  const at = SPEEDS_NS.indexOf(player.speed_ns.peek()) + by;
   player.speed_ns.value = SPEEDS_NS[Math.min(SPEEDS_NS.length - 1, Math.max(0, at))];
 }
 
 /** The panel that keys are meant for: the one with the focus, or under the pointer. */
 function panelNow(): string | null {
   const panel = document.querySelector<HTMLElement>(".panel:focus-within") ?? document.querySelector<HTMLElement>(".panel:hover");
-  return panel?.dataset["view"] ?? null;
+  return panel?.dataset.view ?? null;
 }
 
 /** All keys of the page, in the order they are listed. */
 export const SHORTCUTS: readonly Shortcut[] = [
-  { keys: [" "], shown: "Space", words: "play or pause the light", run: ({ player }) => { player.toggle(); } },
-  { keys: ["ArrowLeft"], shown: "←", words: "back by 0.1 ns, with Shift by 1 ns", run: (store, { shiftKey }) => { scrub(store, shiftKey ? -LONG_STEP_S : -STEP_S); } },
-  { keys: ["ArrowRight"], shown: "→", words: "on by 0.1 ns, with Shift by 1 ns", run: (store, { shiftKey }) => { scrub(store, shiftKey ? LONG_STEP_S : STEP_S); } },
-  { keys: ["Home"], shown: "Home", words: "to the start of the flight", run: ({ player }) => { player.seek(0); } },
-  { keys: ["n"], shown: "N", words: "to the next arrival of light", run: ({ player }) => { player.jump(true); } },
-  { keys: ["b"], shown: "B", words: "to the arrival before", run: ({ player }) => { player.jump(false); } },
-  { keys: [","], shown: ",", words: "slower", run: (store) => { speedUp(store, -1); } },
-  { keys: ["."], shown: ".", words: "faster", run: (store) => { speedUp(store, 1); } },
-  { keys: ["h"], shown: "H", words: "hold the frame, or let it go", run: ({ held }) => { held.value = !held.peek(); } },
-  { keys: MAP_PRODUCTS.map((_, at) => String(at + 1)), shown: `1 to ${MAP_PRODUCTS.length}`, words: MAP_PRODUCTS.map(({ name }) => name.toLowerCase()).join(", "), run: ({ mapProduct }, { key }) => { mapProduct.value = MAP_PRODUCTS[Number(key) - 1].product; } },
-  { keys: ["p"], shown: "P", words: "play or pause the recording that is shown", run: ({ replay }) => { replay.toggle(); } },
-  { keys: ["["], shown: "[", words: "one frame back in the recording", run: ({ replay }) => { replay.step(-1); } },
-  { keys: ["]"], shown: "]", words: "one frame on in the recording", run: ({ replay }) => { replay.step(1); } },
-  { keys: ["f"], shown: "F", words: "show the panel under the pointer alone, or all again", run: ({ alone }) => { alone.value = alone.peek() === null ? panelNow() : null; } },
-  { keys: ["l"], shown: "L", words: "the next layout", run: (store) => { nextLayout(store); } },
-  { keys: ["z"], shown: "Z", words: "undo the last change of the layout", withControl: true, run: ({ layouts }) => { layouts.undo(); } },
-  { keys: ["k"], shown: "K", words: "all commands, to be searched", withControl: true, run: ({ palette }) => { palette.value = true; } },
-  { keys: ["t"], shown: "T", words: "light, dark, or as the system", run: ({ theme }) => { theme.next(); } },
-  { keys: ["?"], shown: "?", words: "this list", run: ({ help }) => { help.value = !help.peek(); } },
-]; // prettier-ignore
+  { keys: [" "], shown: "Space", words: "play or pause the light", run: ({ player }) => player.toggle() },
+  { keys: ["ArrowLeft"], shown: "←", words: "back by 0.1 ns, with Shift by 1 ns", run: (store, { shiftKey }) => scrub(store, shiftKey ? -LONG_STEP_S : -STEP_S) },
+  { keys: ["ArrowRight"], shown: "→", words: "on by 0.1 ns, with Shift by 1 ns", run: (store, { shiftKey }) => scrub(store, shiftKey ? LONG_STEP_S : STEP_S) },
+  { keys: ["Home"], shown: "Home", words: "to the start of the flight", run: ({ player }) => player.seek(0) },
+  { keys: ["n"], shown: "N", words: "to the next arrival of light", run: ({ player }) => player.jump(true) },
+  { keys: ["b"], shown: "B", words: "to the arrival before", run: ({ player }) => player.jump(false) },
+  { keys: [","], shown: ",", words: "slower", run: (store) => speedUp(store, -1) },
+  { keys: ["."], shown: ".", words: "faster", run: (store) => speedUp(store, 1) },
+  { keys: ["h"], shown: "H", words: "hold the frame, or let it go", run: ({ held }) => (held.value = !held.peek()) },
+  {
+    keys: MAP_PRODUCTS.map((_, at) => String(at + 1)),
+    shown: `1 to ${MAP_PRODUCTS.length}`,
+    words: MAP_PRODUCTS.map(({ name }) => name.toLowerCase()).join(", "),
+    run: ({ mapProduct }, { key }) => (mapProduct.value = MAP_PRODUCTS[Number(key) - 1].product),
+  },
+  { keys: ["p"], shown: "P", words: "play or pause the recording that is shown", run: ({ replay }) => replay.toggle() },
+  { keys: ["["], shown: "[", words: "one frame back in the recording", run: ({ replay }) => replay.step(-1) },
+  { keys: ["]"], shown: "]", words: "one frame on in the recording", run: ({ replay }) => replay.step(1) },
+  { keys: ["f"], shown: "F", words: "show the panel under the pointer alone, or all again", run: ({ alone }) => (alone.value = alone.peek() === null ? panelNow() : null) },
+  { keys: ["l"], shown: "L", words: "the next layout", run: (store) => nextLayout(store) },
+  { keys: ["z"], shown: "Z", words: "undo the last change of the layout", withControl: true, run: ({ layouts }) => layouts.undo() },
+  { keys: ["k"], shown: "K", words: "all commands, to be searched", withControl: true, run: ({ palette }) => (palette.value = true) },
+  { keys: ["t"], shown: "T", words: "light, dark, or as the system", run: ({ theme }) => theme.next() },
+  { keys: ["?"], shown: "?", words: "this list", run: ({ help }) => (help.value = !help.peek()) },
+];
 
 function nextLayout(store: Store): void {
   const all = Object.values({ ...LAYOUTS, ...store.layouts.named.peek() });

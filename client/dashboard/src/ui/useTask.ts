@@ -1,4 +1,4 @@
-import { signal, type ReadonlySignal } from "@preact/signals";
+import { type ReadonlySignal, signal } from "@preact/signals";
 import { useMemo } from "preact/hooks";
 
 import { RequestError } from "../store/api";
@@ -14,7 +14,7 @@ export interface Task {
   readonly dismiss: () => void;
 }
 
-export function makeTask(): Task {
+function makeTask(): Task {
   const busy = signal<string | null>(null);
   const refusal = signal<string | null>(null);
   const run = async (words: string, work: () => Promise<unknown>): Promise<boolean> => {

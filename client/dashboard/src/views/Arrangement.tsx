@@ -1,11 +1,11 @@
-import { Fragment } from "preact";
 import { useComputed } from "@preact/signals";
+import { Fragment } from "preact";
 import { useRef } from "preact/hooks";
-
-import { useStore, type Store } from "../store/store";
+import { below, beside, closed, isStack, type Layout, type Row, replaced, type Slot, type Stack, split, viewsOf } from "../store/layout";
+import { type Store, useStore } from "../store/store";
 import { DRAGGED, Panel, SlotContext } from "../ui/Panel";
-import { below, beside, closed, isStack, replaced, split, viewsOf, type Layout, type Row, type Slot, type Stack } from "./layout";
 import { VIEWS } from "./registry";
+import "./Arrangement.css";
 
 /** The views in their places, with splitters between them. */
 export function Arrangement() {
@@ -22,12 +22,7 @@ export function Arrangement() {
       {rows.map((row, at) => (
         <Fragment key={at}>
           {at > 0 && <Splitter kind="rows" place={rows[at - 1].share / (rows[at - 1].share + row.share)} onMove={(place) => change(split(rows, at - 1, place))} />}
-          <RowOfViews
-            row={row}
-            onChange={(made) => {
-              change(rows.map((each, n) => (n === at ? made : each)));
-            }}
-          />
+          <RowOfViews row={row} onChange={(made) => change(rows.map((each, n) => (n === at ? made : each)))} />
         </Fragment>
       ))}
     </main>
@@ -49,18 +44,11 @@ function RowOfViews({ row, onChange }: { row: Row; onChange: (row: Row) => void 
             <Splitter
               kind="columns"
               place={row.slots[at - 1].share / (row.slots[at - 1].share + place.share)}
-              onMove={(share) => {
-                onChange({ ...row, slots: split(row.slots, at - 1, share) });
-              }}
+              onMove={(share) => onChange({ ...row, slots: split(row.slots, at - 1, share) })}
             />
           )}
           {isStack(place) ? (
-            <StackOfViews
-              stack={place}
-              onChange={(made) => {
-                onChange({ ...row, slots: row.slots.map((each, n) => (n === at ? made : each)) });
-              }}
-            />
+            <StackOfViews stack={place} onChange={(made) => onChange({ ...row, slots: row.slots.map((each, n) => (n === at ? made : each)) })} />
           ) : (
             <Place {...place} />
           )}
@@ -77,13 +65,7 @@ function StackOfViews({ stack, onChange }: { stack: Stack; onChange: (stack: Sta
       {slots.map((slot, at) => (
         <Fragment key={slot.view}>
           {at > 0 && (
-            <Splitter
-              kind="rows"
-              place={slots[at - 1].share / (slots[at - 1].share + slot.share)}
-              onMove={(share) => {
-                onChange({ ...stack, slots: split(slots, at - 1, share) });
-              }}
-            />
+            <Splitter kind="rows" place={slots[at - 1].share / (slots[at - 1].share + slot.share)} onMove={(share) => onChange({ ...stack, slots: split(slots, at - 1, share) })} />
           )}
           <Place {...slot} />
         </Fragment>
@@ -107,7 +89,13 @@ function Place({ view, share }: Slot) {
   const free = VIEWS.filter(({ name }) => !viewsOf(layout).includes(name));
   const room = (made: (wanted: string) => Layout | null) => free.filter(({ name }) => made(name) !== null);
   const groups = [
-    { title: "Show here", actions: VIEWS.filter(({ name }) => name !== view).map(({ name, title }) => ({ text: title, run: store.alone.value === null ? set(replaced(layout, view, name)) : () => (store.alone.value = name) })) },
+    {
+      title: "Show here",
+      actions: VIEWS.filter(({ name }) => name !== view).map(({ name, title }) => ({
+        text: title,
+        run: store.alone.value === null ? set(replaced(layout, view, name)) : () => (store.alone.value = name),
+      })),
+    },
     { title: "Add to the right", actions: room((name) => beside(layout, view, name)).map(({ name, title }) => ({ text: `${title} →`, run: set(beside(layout, view, name)) })) },
     { title: "Add below", actions: room((name) => below(layout, view, name)).map(({ name, title }) => ({ text: `${title} ↓`, run: set(below(layout, view, name)) })) },
     {
@@ -117,7 +105,7 @@ function Place({ view, share }: Slot) {
         ...(viewsOf(layout).length > 1 ? [{ text: "Close", run: set(closed(layout, view)) }] : []),
       ],
     },
-  ]; // prettier-ignore
+  ];
   return (
     <div
       class="place"
@@ -133,9 +121,7 @@ function Place({ view, share }: Slot) {
         set(replaced(layout, view, dragged))();
       }}
     >
-      <SlotContext.Provider value={groups}>
-        {obstacle === undefined ? <View /> : <AbsentView name={view} title={shown.title} reason={obstacle} />}
-      </SlotContext.Provider>
+      <SlotContext.Provider value={groups}>{obstacle === undefined ? <View /> : <AbsentView name={view} title={shown.title} reason={obstacle} />}</SlotContext.Provider>
     </div>
   );
 }
@@ -160,9 +146,7 @@ function Splitter({ kind, place, onMove }: { kind: "rows" | "columns"; place: nu
   const placeOf = (event: PointerEvent): number => {
     const [before, after] = [bar.current?.previousElementSibling, bar.current?.nextElementSibling].map((each) => each?.getBoundingClientRect());
     if (before === undefined || after === undefined) return place;
-    return across
-      ? (event.clientX - before.left) / (after.right - before.left)
-      : (event.clientY - before.top) / (after.bottom - before.top);
+    return across ? (event.clientX - before.left) / (after.right - before.left) : (event.clientY - before.top) / (after.bottom - before.top);
   };
   const keys: Readonly<Record<string, number | undefined>> = across ? { ArrowLeft: -KEY_STEP, ArrowRight: KEY_STEP } : { ArrowUp: -KEY_STEP, ArrowDown: KEY_STEP };
   return (
@@ -187,9 +171,7 @@ function Splitter({ kind, place, onMove }: { kind: "rows" | "columns"; place: nu
         event.stopPropagation();
         onMove(place + step);
       }}
-      onDblClick={() => {
-        onMove(0.5);
-      }}
+      onDblClick={() => onMove(0.5)}
     />
   );
 }

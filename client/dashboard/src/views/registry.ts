@@ -1,5 +1,5 @@
 import type { ComponentType } from "preact";
-
+import type { ViewName } from "../store/viewNames";
 import { CalibrationView } from "./calibration/CalibrationView";
 import { EventsView } from "./events/EventsView";
 import { MapView, SecondMapView } from "./map/MapView";
@@ -13,7 +13,6 @@ import { SimulationView } from "./simulation/SimulationView";
 import { StreakView } from "./streak/StreakView";
 import { TransientView } from "./transient/TransientView";
 import { ValidityView } from "./validity/ValidityView";
-import type { ViewName } from "./names";
 
 interface View {
   readonly name: ViewName;

@@ -9,9 +9,9 @@ import { computed, effect, signal } from "@preact/signals";
 import { createRenderer } from "../gl/createRenderer";
 import { rangeOfTime_m } from "../physics/constants";
 import type { Coefficients } from "../physics/maximumEntropy";
+import { AnimationLoop } from "../store/animation";
 import { Player } from "../store/player";
 import { summariseLight } from "../stream/summary";
-import { AnimationLoop } from "../ui/animation";
 import { timeWords } from "../ui/figure";
 import { litOf } from "../views/transient/arrivals";
 import STYLE from "./player.css?inline";
@@ -100,7 +100,7 @@ export function render({ model, el }: { readonly model: Model; readonly el: HTML
     coefficients.value = coefficientsIn(model);
     number.value = `Frame ${(model.get("shape") as Shape).frame}`;
     problem.textContent = model.get("problem") as string;
-    canvas.dataset["frame"] = String((model.get("shape") as Shape).frame);
+    canvas.dataset.frame = String((model.get("shape") as Shape).frame);
     later();
   };
 

@@ -2,9 +2,9 @@ import { describe, expect, test } from "vitest";
 
 import { LightPainter } from "../../src/gl/paintLight";
 import type { Backdrop } from "../../src/gl/renderer";
-import { backdropGrey, strength, TONES, toned } from "../../src/gl/tone";
 import { densityAt } from "../../src/physics/maximumEntropy";
-import { colourTable, levelOf } from "../../src/ui/colourMaps";
+import { colourTable, levelOf } from "../../src/scales/colourMaps";
+import { backdropGrey, strength, TONES, toned } from "../../src/scales/tone";
 import { momentsOf, picture } from "../oracle";
 
 const PIXELS = 60;
@@ -32,9 +32,7 @@ describe("painted light", () => {
       painter.paint(LIGHT, { phase_rad: PHASE_RAD, tone: { kind, white }, colours: "inferno", backdrop }, new Uint32Array(rgba.buffer));
       for (let pixel = 0; pixel < PIXELS; pixel++) {
         expect(rgba[4 * pixel + 3]).toBe(255);
-        expected(pixel, white, kind, backdrop).forEach((value, channel) => {
-          expect(Math.abs(rgba[4 * pixel + channel] - value)).toBeLessThan(0.51);
-        });
+        expected(pixel, white, kind, backdrop).forEach((value, channel) => expect(Math.abs(rgba[4 * pixel + channel] - value)).toBeLessThan(0.51));
       }
     }
   });

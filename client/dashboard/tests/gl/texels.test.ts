@@ -9,9 +9,7 @@ describe("texels", () => {
     [3, 2],
     [4, 3],
     [8, 5],
-  ])("of %i harmonics need %i layers", (harmonics, layers) => {
-    expect(layersOf(harmonics)).toBe(layers);
-  });
+  ])("of %i harmonics need %i layers", (harmonics, layers) => expect(layersOf(harmonics)).toBe(layers));
 
   test("hold two complex numbers each, with E in the place of a_0", () => {
     // Planes [E, Re a_1, Im a_1, Re a_2, Im a_2] of two pixels.

@@ -69,9 +69,7 @@ describe("a sampled impulse response", () => {
     const { time_s, density } = impulseResponse(c, 0, phasesAround(c, 129, [{ pixel: 0, peaks: peaks(c, 0) }]));
     expect(time_s[0]).toBe(0);
     expect(time_s[time_s.length - 1]).toBeCloseTo(1 / F_HZ, 15);
-    time_s.slice(1).forEach((t, n) => {
-      expect(t).toBeGreaterThanOrEqual(time_s[n]);
-    });
+    time_s.slice(1).forEach((t, n) => expect(t).toBeGreaterThanOrEqual(time_s[n]));
     expect(density[40]).toBeCloseTo(densityAt(c, 0, 2 * Math.PI * F_HZ * time_s[40]), -2);
   });
 });

@@ -15,7 +15,11 @@ function square(u: number[], v: number[], normal: number[], lift: (x: number, y:
 
 describe("the plane through points", () => {
   // an orthonormal triple of rational numbers
-  const [u, v, normal] = [[2 / 3, -2 / 3, 1 / 3], [2 / 3, 1 / 3, -2 / 3], [1 / 3, 2 / 3, 2 / 3]]; // prettier-ignore
+  const [u, v, normal] = [
+    [2 / 3, -2 / 3, 1 / 3],
+    [2 / 3, 1 / 3, -2 / 3],
+    [1 / 3, 2 / 3, 2 / 3],
+  ];
 
   test("has the points' normal, and the deviation of what stands off it", () => {
     // a checkerboard of +1 and -1 mm: of mean zero and without slope in any direction
@@ -39,8 +43,11 @@ describe("the plane through points", () => {
     expect(planeThrough(Array.from({ length: 30 }, () => 2))).toBeNull();
   });
 
-  test.each([[[1, 0, 0], [0, 1, 0], [0, 0, 1], 0], [[1, 0, 0], [0, 0, 1], [0, 1, 0], Math.PI / 2]])("may stand along the axes: %j %j", (across, down, off, tilt_rad) => {
+  test.each([
+    [[1, 0, 0], [0, 1, 0], [0, 0, 1], 0],
+    [[1, 0, 0], [0, 0, 1], [0, 1, 0], Math.PI / 2],
+  ])("may stand along the axes: %j %j", (across, down, off, tilt_rad) => {
     const plane = planeThrough(square(across, down, off, () => 0));
     expect(tiltOf(plane as NonNullable<typeof plane>)).toBeCloseTo(tilt_rad, 7);
-  }); // prettier-ignore
+  });
 });

@@ -30,7 +30,13 @@ describe("light up to a time", () => {
 
   test("is the same from where the poles of another frame stood", () => {
     const [one, other] = [0.4, 0.5].map((shift) =>
-      picture([momentsOf(RETURNS.map((each) => ({ ...each, phase_rad: each.phase_rad + shift })), 40, 4)]),
+      picture([
+        momentsOf(
+          RETURNS.map((each) => ({ ...each, phase_rad: each.phase_rad + shift })),
+          40,
+          4,
+        ),
+      ]),
     );
     const [fresh, warm] = [new Poles(4, 1), new Poles(4, 1)];
     fresh.find(other);

@@ -4,7 +4,16 @@ import { Accuracy } from "../../src/store/accuracy";
 import { type Api, RequestError } from "../../src/store/api";
 import type { JobDocument } from "../../src/store/documents";
 
-const job = (state: JobDocument["state"], more: Partial<JobDocument> = {}): JobDocument => ({ id: "j", kind: "tradeoff", state, progress: 0.5, step: "…", result: null, problem: null, ...more });
+const job = (state: JobDocument["state"], more: Partial<JobDocument> = {}): JobDocument => ({
+  id: "j",
+  kind: "tradeoff",
+  state,
+  progress: 0.5,
+  step: "…",
+  result: null,
+  problem: null,
+  ...more,
+});
 const front = (...times_s: number[]): JobDocument["result"] => ({ front: times_s.map((capture_s) => ({ capture_s })), summary: "So far." });
 
 let answers: (JobDocument | RequestError)[];
@@ -28,9 +37,7 @@ beforeEach(() => {
     },
   } as unknown as Api);
 });
-afterEach(() => {
-  vi.useRealTimers();
-});
+afterEach(() => vi.useRealTimers());
 
 const times = (): number[] | undefined => accuracy.tradeoff.value?.front.map(({ capture_s }) => capture_s);
 

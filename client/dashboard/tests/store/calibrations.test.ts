@@ -4,7 +4,16 @@ import { type Api, RequestError } from "../../src/store/api";
 import { Calibrations } from "../../src/store/calibrations";
 import type { JobDocument } from "../../src/store/documents";
 
-const job = (state: JobDocument["state"], more: Partial<JobDocument> = {}): JobDocument => ({ id: "j", kind: "calibration", state, progress: 0.5, step: "capturing", result: null, problem: null, ...more });
+const job = (state: JobDocument["state"], more: Partial<JobDocument> = {}): JobDocument => ({
+  id: "j",
+  kind: "calibration",
+  state,
+  progress: 0.5,
+  step: "capturing",
+  result: null,
+  problem: null,
+  ...more,
+});
 
 let answers: (JobDocument | RequestError)[];
 let lists: number;
@@ -27,9 +36,7 @@ beforeEach(() => {
     },
   } as unknown as Api);
 });
-afterEach(() => {
-  vi.useRealTimers();
-});
+afterEach(() => vi.useRealTimers());
 
 test("a measurement is followed to its end, and the list read anew then", async () => {
   await calibrations.measure({ name: "", frames: 40, activate: true });

@@ -38,7 +38,7 @@ test("a token that is refused is said so, until another is shown", async () => {
   const problem = { type: "/problems/token-refused", title: "Invalid token", status: 401 };
   const sent: unknown[] = [];
   const api = new Api((_, init) => {
-    sent.push((init?.headers as Record<string, string>)["Authorization"]);
+    sent.push(new Headers(init?.headers).get("Authorization"));
     return Promise.resolve(Response.json(problem, { status: 401 }));
   });
   api.credentials.use("wrong");

@@ -60,9 +60,7 @@ test("what is known of one pixel is not shown as another's", async () => {
   pixel.value = { x: 5, y: 5 };
   expect(details.document.value).toBeNull();
   pixel.value = { x: 6, y: 6 }; // while the question about 5, 5 is on its way
-  await vi.waitFor(() => {
-    expect(details.document.value?.x).toBe(6);
-  });
+  await vi.waitFor(() => expect(details.document.value?.x).toBe(6));
   expect(asked).toEqual(["3,4", "5,5", "6,6"]);
   end();
 });
@@ -86,9 +84,7 @@ test.each([
   const { api, asked } = keeping();
   const details = new Details(api);
   const end = details.follow(signal<Pixel | null>({ x: 3, y: 4 }), signal<Frame | null>(frame(held)));
-  await vi.waitFor(() => {
-    expect(details.document.value?.meta.frame).toBe(answered);
-  });
+  await vi.waitFor(() => expect(details.document.value?.meta.frame).toBe(answered));
   expect(asked).toEqual(addresses);
   end();
 });

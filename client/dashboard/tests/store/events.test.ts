@@ -41,9 +41,8 @@ describe("what happened", () => {
     expect(words({ kind: "calibration-changed", calibration_id: "c1", reason: null })).toContain("c1");
   });
 
-  test("to a recording is said with why it ended", () => {
-    expect(words({ kind: "recording-stopped", recording: "r", reason: "disk-space", problem: null })).toBe("The recording ended because the disk is nearly full.");
-  });
+  test("to a recording is said with why it ended", () =>
+    expect(words({ kind: "recording-stopped", recording: "r", reason: "disk-space", problem: null })).toBe("The recording ended because the disk is nearly full."));
 
   test("is not said of drops, which have their figure, nor of kinds this page does not know", () => {
     expect(words({ kind: "dropped", channel: 0, count: 1, total: 1 })).toBeUndefined();

@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 
-import { Api, RequestError } from "../../src/store/api";
+import { Api, type RequestError } from "../../src/store/api";
 import { Lease } from "../../src/store/lease";
 
 /** A service with one lease, as the real one keeps it. */
@@ -57,9 +57,7 @@ beforeEach(() => {
   vi.useFakeTimers();
   desk = new Desk();
 });
-afterEach(() => {
-  vi.useRealTimers();
-});
+afterEach(() => vi.useRealTimers());
 
 describe("the lease", () => {
   test("is taken, shown with every change, and given back", async () => {
@@ -129,9 +127,7 @@ describe("the lease", () => {
     await desk.lease.take("bench 2", false);
     desk.held = null;
     desk.lease.refused("lease-lost");
-    await vi.waitFor(() => {
-      expect(desk.lease.control.value).toEqual({ kind: "free" });
-    });
+    await vi.waitFor(() => expect(desk.lease.control.value).toEqual({ kind: "free" }));
     expect(desk.lease.lost.value).toBe("This page's control has lapsed.");
   });
 

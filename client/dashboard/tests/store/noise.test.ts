@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import { Frames, type Frame } from "../../src/store/frames";
+import { type Frame, Frames } from "../../src/store/frames";
 import { FEWEST, Noise, Noises, WINDOW } from "../../src/store/noise";
 
 const frame = (values: readonly number[], sequence_id = 1, origin = "/frames/latest"): Frame =>
@@ -44,7 +44,10 @@ describe("noise over frames", () => {
     expect(noise.std(99)).toBeNaN();
   });
 
-  test.each([[2, "/frames/latest"], [1, "/recordings/r/frames/3"]])("begins anew with sequence %i of %s", (sequence_id, origin) => {
+  test.each([
+    [2, "/frames/latest"],
+    [1, "/recordings/r/frames/3"],
+  ])("begins anew with sequence %i of %s", (sequence_id, origin) => {
     const noise = new Noise();
     for (let n = 0; n < 9; n++) noise.take(frame([n]));
     noise.take(frame([100], sequence_id, origin));

@@ -8,12 +8,8 @@ import { Status } from "../../src/store/status";
 import type { FrameMeta } from "../../src/stream/protocol";
 import type { FrameReport } from "../../src/stream/summary";
 
-beforeEach(() => {
-  vi.useFakeTimers();
-});
-afterEach(() => {
-  vi.useRealTimers();
-});
+beforeEach(() => vi.useFakeTimers());
+afterEach(() => vi.useRealTimers());
 
 const meta = (sequence_id: number, range_error_m: number | null = null): FrameMeta =>
   ({ sequence_id, frame: sequence_id, predicted_range_std_m: { median: 1e-3, p90: 2e-3 }, accuracy: range_error_m === null ? null : { range_error_m } }) as FrameMeta;

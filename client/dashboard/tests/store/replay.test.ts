@@ -5,7 +5,7 @@ import { Frames } from "../../src/store/frames";
 import { Replay } from "../../src/store/replay";
 import { Status } from "../../src/store/status";
 import type { FrameMessage } from "../../src/stream/protocol";
-import { summarised, type FrameReport } from "../../src/stream/summary";
+import { type FrameReport, summarised } from "../../src/stream/summary";
 
 const TIMES = [0, 0.1, 0.2, 0.3, 1.4, 1.5]; // the camera was lost for a second
 
@@ -24,7 +24,12 @@ class Screen {
   readonly replay = new Replay(
     {
       recording: (id: string) => Promise.resolve({ id, name: "corner", state: "complete" }),
-      timeline: (id: string) => Promise.resolve(id === "empty" ? { first: null, last: null, count: 0, times_s: [], times_step: 1 } : { first: 1, last: 6, count: 6, duration_s: 1.5, host_time_s: 5, times_s: TIMES, times_step: 1 }),
+      timeline: (id: string) =>
+        Promise.resolve(
+          id === "empty"
+            ? { first: null, last: null, count: 0, times_s: [], times_step: 1 }
+            : { first: 1, last: 6, count: 6, duration_s: 1.5, host_time_s: 5, times_s: TIMES, times_step: 1 },
+        ),
     } as unknown as Api,
     this.frames,
     this.status,
@@ -147,7 +152,5 @@ describe("a recording on the page", () => {
     expect(screen.waiting).toHaveLength(0);
   });
 
-  test("without frames is not opened", async () => {
-    await expect(screen.replay.open("empty")).rejects.toThrow("corner holds no frames.");
-  });
+  test("without frames is not opened", async () => await expect(screen.replay.open("empty")).rejects.toThrow("corner holds no frames."));
 });

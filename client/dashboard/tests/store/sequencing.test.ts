@@ -6,7 +6,8 @@ import { Events } from "../../src/store/events";
 import { Sequencing } from "../../src/store/sequencing";
 import type { AppliedSequence, Choice } from "../../src/stream/protocol";
 
-const sequence = (harmonics: number, sequence_id: number): AppliedSequence => ({ base_frequency_hz: 23e6, harmonics, exposure_s: 1e-3, images: 4 * harmonics, sequence_id }) as AppliedSequence;
+const sequence = (harmonics: number, sequence_id: number): AppliedSequence =>
+  ({ base_frequency_hz: 23e6, harmonics, exposure_s: 1e-3, images: 4 * harmonics, sequence_id }) as AppliedSequence;
 const choice = (harmonics: number, estimator: string): Choice => ({ sequence: sequence(harmonics, 0), estimator }) as unknown as Choice;
 
 /** A service that sets what it is sent, unless it refuses. */

@@ -1,11 +1,10 @@
+import { signal } from "@preact/signals";
 import { describe, expect, test } from "vitest";
-
 import { Frames } from "../../src/store/frames";
 import { RangeErrors } from "../../src/store/rangeErrors";
 import { Status } from "../../src/store/status";
-import { KEPT_S, linesOf, Trends, type Sample } from "../../src/store/trends";
+import { KEPT_S, linesOf, type Sample, Trends } from "../../src/store/trends";
 import type { FrameMeta } from "../../src/stream/protocol";
-import { signal } from "@preact/signals";
 
 const meta = (frame: number, host_time_s: number): FrameMeta => ({ frame, host_time_s, sequence_id: 1, accuracy: { range_error_m: 0.004 } }) as FrameMeta;
 
@@ -51,7 +50,14 @@ describe("the line of a figure", () => {
     const samples = [sample(0, 5), sample(1, 10), sample(2, NaN), sample(3, 2), sample(30, 4)];
     expect(linesOf(samples, "rate_hz")).toEqual({
       most: 10,
-      lines: [[{ x: 0.5, y: 0.5 }, { x: 1 - 29 / 60, y: 1 }], [{ x: 1 - 27 / 60, y: 0.2 }], [{ x: 1, y: 0.4 }]], // prettier-ignore
+      lines: [
+        [
+          { x: 0.5, y: 0.5 },
+          { x: 1 - 29 / 60, y: 1 },
+        ],
+        [{ x: 1 - 27 / 60, y: 0.2 }],
+        [{ x: 1, y: 0.4 }],
+      ],
     });
     expect(linesOf(samples, "error_m")).toEqual({ most: 0, lines: [] });
     expect(linesOf([sample(7, 0)], "rate_hz")).toEqual({ most: 0, lines: [[{ x: 1, y: 0 }]] });

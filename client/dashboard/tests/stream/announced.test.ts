@@ -39,9 +39,7 @@ const settled = async (): Promise<void> => {
 };
 
 let service: Service;
-beforeEach(() => {
-  service = new Service();
-});
+beforeEach(() => (service = new Service()));
 
 describe("products that are announced", () => {
   test("are requested one after another", async () => {

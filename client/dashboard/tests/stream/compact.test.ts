@@ -16,21 +16,36 @@ function codesOf(reflection: readonly (readonly [number, number])[], at: number,
 describe("coefficients in codes", () => {
   test("have the brightness and the reflection coefficients that were coded", () => {
     const pixels = [
-      { light: 1200, reflection: [[0.5, -0.3], [-0.2, 0.7], [0.1, 0.05], [0, -0.6]] },
-      { light: 3, reflection: [[-0.98, 0.1], [0, 0], [0.3, 0.3], [0.7, 0.7]] },
-    ] as const; // prettier-ignore
+      {
+        light: 1200,
+        reflection: [
+          [0.5, -0.3],
+          [-0.2, 0.7],
+          [0.1, 0.05],
+          [0, -0.6],
+        ],
+      },
+      {
+        light: 3,
+        reflection: [
+          [-0.98, 0.1],
+          [0, 0],
+          [0.3, 0.3],
+          [0.7, 0.7],
+        ],
+      },
+    ] as const;
     const codes = new Uint16Array(8 * pixels.length);
-    pixels.forEach(({ reflection }, at) => {
-      codesOf(reflection, at, pixels.length, codes);
-    });
-    const planes = decodeReflection16(codes, Float32Array.from(pixels, ({ light }) => light));
+    pixels.forEach(({ reflection }, at) => codesOf(reflection, at, pixels.length, codes));
+    const planes = decodeReflection16(
+      codes,
+      Float32Array.from(pixels, ({ light }) => light),
+    );
     const c = { planes, harmonics: 4, width: 2, height: 1, baseFrequency_hz: 23e6 };
     pixels.forEach(({ light, reflection }, at) => {
       const found = pixelOf(c, at);
       expect(found?.moments[0]).toBeCloseTo(light, 2);
-      reflection.flat().forEach((part, n) => {
-        expect(found?.reflection[n]).toBeCloseTo(part, 3);
-      });
+      reflection.flat().forEach((part, n) => expect(found?.reflection[n]).toBeCloseTo(part, 3));
     });
   });
 
@@ -45,7 +60,10 @@ describe("coefficients in codes", () => {
 describe("part of a picture", () => {
   test("has each of its pixels in the place of those that were left out, also at the ends", () => {
     const codes = Float32Array.from([1, 2, 3, 4, 5, 6, 7, 8]); // two planes of 2 x 2
-    const [one, other] = [[1, 1, 2, 1, 1, 2, 3, 3, 4], [5, 5, 6, 5, 5, 6, 7, 7, 8]];
+    const [one, other] = [
+      [1, 1, 2, 1, 1, 2, 3, 3, 4],
+      [5, 5, 6, 5, 5, 6, 7, 7, 8],
+    ];
     expect([...whole(codes, [2, 2, 2], { region: [0, 0, 3, 3], decimation: 2 }, 3, 3)]).toEqual([...one, ...other]);
     const within = [...whole(codes.slice(0, 4), [2, 2], { region: [1, 0, 3, 3], decimation: 2 }, 4, 4)];
     expect(within.map((value) => (Number.isNaN(value) ? 0 : value))).toEqual([0, 1, 1, 2, 0, 1, 1, 2, 0, 3, 3, 4, 0, 0, 0, 0]);

@@ -1,8 +1,7 @@
 import { decode, encode } from "@msgpack/msgpack";
 import { beforeEach, describe, expect, test } from "vitest";
-
-import type { CameraDocument, CameraState } from "../../src/stream/protocol";
 import { type ConnectionEvent, CREDITS, FrameGone, type Socket, StreamConnection } from "../../src/stream/connection";
+import type { CameraDocument, CameraState } from "../../src/stream/protocol";
 
 class FakeSocket implements Socket {
   binaryType: BinaryType = "blob";
@@ -59,9 +58,7 @@ class World {
         this.#timers.set(this.#next, { due_s: this.#now_s + delay_s, action });
         return this.#next++;
       },
-      clearTimer: (timer) => {
-        this.#timers.delete(timer);
-      },
+      clearTimer: (timer) => this.#timers.delete(timer),
       now_s: () => this.#now_s,
       random: () => 0.5,
       probe: () => {
@@ -108,13 +105,14 @@ const frame = (number: number): unknown => ({
 });
 
 /** The message of all of a large frame. */
-const large = (frame: number, product: string): ArrayBuffer => encode({
-  type: "frame",
-  product,
-  axes: ["y", "x"],
-  meta: { frame, width: 640, height: 480, region: [0, 0, 640, 480], decimation: 1 },
-  array: { dtype: "|u1", shape: [480, 640], data: new Uint8Array(480 * 640) },
-}).slice().buffer;
+const large = (frame: number, product: string): ArrayBuffer =>
+  encode({
+    type: "frame",
+    product,
+    axes: ["y", "x"],
+    meta: { frame, width: 640, height: 480, region: [0, 0, 640, 480], decimation: 1 },
+    array: { dtype: "|u1", shape: [480, 640], data: new Uint8Array(480 * 640) },
+  }).slice().buffer;
 
 let world: World;
 beforeEach(() => {
@@ -130,7 +128,7 @@ describe("over a thin link", () => {
     meta: { frame: number },
     array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) },
   });
-  const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.["subscriptions"];
+  const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.subscriptions;
   /** A frame every 2 s of a camera that takes ten a second, drawn at once. */
   const starves = async (): Promise<void> => {
     for (let frame = 1; frame <= 5; frame++) {
@@ -166,7 +164,7 @@ describe("over a thin link", () => {
 });
 
 describe("with a slow browser", () => {
-  const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.["subscriptions"];
+  const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.subscriptions;
   const stutters = (): void => {
     for (let window = 0; window < 2; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: 16, camera_hz: 16 });
   };
@@ -198,7 +196,12 @@ describe("with a slow browser", () => {
     world.connection.look([3, 4, 50, 60]);
     expect(asked()).toEqual([{ product: "range", max_rate_hz: expect.closeTo(0.7, 6) as number, region: [3, 4, 50, 60] }]);
     world.socket.receives({ type: "hello", channels: [{ product: "range", shape: [480, 640] }] });
-    world.socket.receives({ type: "frame", product: "range", meta: { frame: 7, width: 640, height: 480, region: [0, 0, 1, 1], decimation: 1 }, array: { dtype: "|u1", shape: [1, 1], data: new Uint8Array(1) } });
+    world.socket.receives({
+      type: "frame",
+      product: "range",
+      meta: { frame: 7, width: 640, height: 480, region: [0, 0, 1, 1], decimation: 1 },
+      array: { dtype: "|u1", shape: [1, 1], data: new Uint8Array(1) },
+    });
     expect(world.requested).toEqual(["7 range?region=3,4,50,60"]);
   });
 
@@ -237,8 +240,8 @@ describe("with a slow browser", () => {
 });
 
 describe("of large frames", () => {
-  const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.["subscriptions"];
-  const acknowledged = (): unknown[] => world.socket.sent.filter(({ type }) => type === "ack").map((message) => message["frame"]);
+  const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.subscriptions;
+  const acknowledged = (): unknown[] => world.socket.sent.filter(({ type }) => type === "ack").map((message) => message.frame);
   const greets = (...shape: number[]): void => {
     world.socket.receives({ type: "hello", channels: [{ product: "range", shape }] });
   };
@@ -319,7 +322,7 @@ describe("a stream", () => {
     expect(world.socket.sent).toEqual([]);
     world.socket.opens();
     world.connection.want(["coefficients", "range"]);
-    const wanted = world.socket.sent.map((message) => message["subscriptions"]);
+    const wanted = world.socket.sent.map((message) => message.subscriptions);
     expect(wanted).toEqual([
       [{ product: "range", max_rate_hz: null }],
       [
@@ -432,7 +435,7 @@ describe("silence", () => {
 });
 
 describe("a service that asks for a token", () => {
-  const tokens = (): unknown[] => world.sockets.flatMap(({ sent }) => sent.map((message) => message["token"]));
+  const tokens = (): unknown[] => world.sockets.flatMap(({ sent }) => sent.map((message) => message.token));
 
   beforeEach(() => {
     world.socket.opens();

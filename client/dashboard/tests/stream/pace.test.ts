@@ -84,9 +84,8 @@ describe("of the frames", () => {
     expect(control.maxRate_hz).toBeCloseTo(2.8, 6);
   });
 
-  test("a camera's that are few already, half are taken at least", () => {
-    expect(new Watched().plays(20, { camera_hz: 4, frame_s: 0.1, picture_s: 0.03 }).control.maxRate_hz).toBe(2);
-  });
+  test("a camera's that are few already, half are taken at least", () =>
+    expect(new Watched().plays(20, { camera_hz: 4, frame_s: 0.1, picture_s: 0.03 }).control.maxRate_hz).toBe(2));
 
   test("all are taken again once there is room", () => {
     const watched = new Watched().plays(10, SLOW);

@@ -2,13 +2,7 @@ import { decode, encode } from "@msgpack/msgpack";
 import { describe, expect, test } from "vitest";
 
 import specification from "../../../../docs/stream.md?raw";
-import {
-  decodeMessage,
-  encodeAck,
-  encodeSubscribe,
-  type FrameMessage,
-  ProtocolError,
-} from "../../src/stream/protocol";
+import { decodeMessage, encodeAck, encodeSubscribe, type FrameMessage, ProtocolError } from "../../src/stream/protocol";
 
 /** The bytes recorded in the specification, which the service is held to as well. */
 function recorded(name: string): ArrayBuffer {
@@ -94,9 +88,7 @@ describe("messages of the service", () => {
     expect([...message.array.data]).toEqual([NaN, 1, 1, 2, NaN, NaN, 1, 1, 2, NaN, NaN, 3, 3, 4, NaN]);
   });
 
-  test("a kind of message from a later service is passed over", () => {
-    expect(decodeMessage(encode({ type: "poem" }).slice().buffer)).toBeNull();
-  });
+  test("a kind of message from a later service is passed over", () => expect(decodeMessage(encode({ type: "poem" }).slice().buffer)).toBeNull());
 
   test.each([
     ["no msgpack", new Uint8Array([0xc1]).buffer, /not msgpack/],
@@ -114,9 +106,7 @@ describe("messages of the service", () => {
 });
 
 describe("messages to the service", () => {
-  test("an acknowledgement has the recorded bytes", () => {
-    expect(encodeAck(17)).toEqual(new Uint8Array(recorded("ack")));
-  });
+  test("an acknowledgement has the recorded bytes", () => expect(encodeAck(17)).toEqual(new Uint8Array(recorded("ack"))));
 
   test("a subscription has the form of the recorded one", () => {
     const form = decode(recorded("subscribe")) as { subscriptions: { product: string }[] };

@@ -38,7 +38,7 @@ describe("the summary of light", () => {
 
   test("arrives when it does in the pixels", () => {
     const brightest = light.arrivals.indexOf(Math.max(...light.arrivals));
-    expect(Math.abs((2 * Math.PI * brightest) / ARRIVAL_TIMES - phase_rad)).toBeLessThan(2 * Math.PI / ARRIVAL_TIMES);
+    expect(Math.abs((2 * Math.PI * brightest) / ARRIVAL_TIMES - phase_rad)).toBeLessThan((2 * Math.PI) / ARRIVAL_TIMES);
   });
 
   test("adds up to the brightness of a lit pixel", () => {
@@ -47,7 +47,5 @@ describe("the summary of light", () => {
     expect(total / 110).toBeCloseTo(1, 2);
   });
 
-  test("is metered by its peaks", () => {
-    expect(light.peak / Math.max(...light.arrivals)).toBeCloseTo(1, 5);
-  });
+  test("is metered by its peaks", () => expect(light.peak / Math.max(...light.arrivals)).toBeCloseTo(1, 5));
 });

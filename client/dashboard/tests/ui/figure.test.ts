@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 
 import type { FrameMeta } from "../../src/stream/protocol";
-import { captionOf, figureLayout, figureSvg, type Figure } from "../../src/ui/figure";
+import { captionOf, type Figure, figureLayout, figureSvg } from "../../src/ui/figure";
 
 const FIGURE: Figure = {
   picture: "data:image/png;base64,AA",
@@ -23,9 +23,7 @@ describe("a figure", () => {
   const layout = figureLayout(163, 120, 640);
   const svg = figureSvg(FIGURE, layout);
 
-  test("shows every pixel as a square of whole size", () => {
-    expect([layout.pictureWidth, layout.pictureHeight]).toEqual([652, 480]);
-  });
+  test("shows every pixel as a square of whole size", () => expect([layout.pictureWidth, layout.pictureHeight]).toEqual([652, 480]));
 
   test("marks pixels at their middles and values where their colours are", () => {
     const found = marks(svg);

@@ -1,8 +1,7 @@
 import { expect, test } from "vitest";
-
+import { LAYOUTS } from "../../src/store/layout";
 import { Store } from "../../src/store/store";
 import { SHORTCUTS } from "../../src/ui/shortcuts";
-import { LAYOUTS } from "../../src/views/layout";
 
 function press(store: Store, key: string, shiftKey = false): void {
   SHORTCUTS.find(({ keys }) => keys.includes(key))?.run(store, { key, shiftKey } as KeyboardEvent);

@@ -1,8 +1,8 @@
 import { describe, expect, test } from "vitest";
 
 import type { AppliedSequence, Choice, FrameMeta, Tradeoff } from "../../src/stream/protocol";
-import { endsOf, marksOf, nearest, placeOf, sameSequence, standingOf, stepOf } from "../../src/views/sequence/place";
 import { goalWords } from "../../src/views/sequence/goals";
+import { endsOf, marksOf, nearest, placeOf, sameSequence, standingOf, stepOf } from "../../src/views/sequence/place";
 
 const choice = (capture_s: number, median: number): Choice =>
   ({ capture_s, sequence: { takes: capture_s }, predicted: { range_error_m: { median, low: 0.9 * median, high: 1.1 * median, p90: 2 * median } } }) as unknown as Choice;
@@ -14,7 +14,11 @@ const TRADEOFF = {
 describe("the plot of accuracy against time", () => {
   test("holds the front with its uncertainty and where the camera stands", () => {
     const ends = endsOf({ ...TRADEOFF, current: { capture_s: 20, meta: { accuracy: { range_error_m: 0.2 } } } } as unknown as Tradeoff);
-    for (const [capture_s, range_error_m] of [[0.05, 0.044], [5, 0.00036], [20, 0.2]]) {
+    for (const [capture_s, range_error_m] of [
+      [0.05, 0.044],
+      [5, 0.00036],
+      [20, 0.2],
+    ]) {
       const { x, y } = placeOf(ends, capture_s, range_error_m);
       expect(Math.min(x, y)).toBeGreaterThan(0);
       expect(Math.max(x, y)).toBeLessThan(1);
@@ -41,9 +45,7 @@ describe("where the camera stands", () => {
   const inUse = (sequence_id: number, takes = 3): AppliedSequence => ({ sequence_id, takes, capture_s: 0.2 }) as AppliedSequence;
   const tradeoff = { ...TRADEOFF, current: { capture_s: 0.09, meta: meta(1, 0.011) } } as Tradeoff;
 
-  test("is taken from the newest frame of the sequence in use", () => {
-    expect(standingOf(meta(2, 0.005), inUse(2), tradeoff)).toEqual({ capture_s: 0.2, range_error_m: 0.005 });
-  });
+  test("is taken from the newest frame of the sequence in use", () => expect(standingOf(meta(2, 0.005), inUse(2), tradeoff)).toEqual({ capture_s: 0.2, range_error_m: 0.005 }));
 
   test("is that of the frame of the prediction where the newest does not tell and the sequence is still the same", () => {
     for (const newest of [null, meta(1, null), meta(0, 0.005)]) expect(standingOf(newest, inUse(1), tradeoff)?.range_error_m).toBe(0.011);
@@ -70,7 +72,10 @@ test("a time stands between the points of the front by its logarithm, and not be
 });
 
 test("a click means the nearest point within reach", () => {
-  const points = [{ x: 10, y: 10 }, { x: 18, y: 10 }];
+  const points = [
+    { x: 10, y: 10 },
+    { x: 18, y: 10 },
+  ];
   expect(nearest(points, 15, 12)).toBe(points[1]);
   expect(nearest(points, 13, 41)).toBeNull();
   expect(nearest(points, 200, 10)).toBeNull();

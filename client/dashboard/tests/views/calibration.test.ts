@@ -2,9 +2,7 @@ import { expect, test } from "vitest";
 
 import { ageOf, doubtOf, driftOf } from "../../src/views/calibration/words";
 
-test("an age is said as people do", () => {
-  expect([5, 600, 7200, 864_000].map(ageOf)).toEqual(["just now", "10 min ago", "2 h ago", "10 days ago"]);
-});
+test("an age is said as people do", () => expect([5, 600, 7200, 864_000].map(ageOf)).toEqual(["just now", "10 min ago", "2 h ago", "10 days ago"]));
 
 test("drift is shown beside what it was, and called for only where it has grown", () => {
   const grown = driftOf({ invalid_share: 0.081, invalid_share_at_capture: 0.004, frame: 9 });

@@ -13,9 +13,7 @@ const SEQUENCE: SequenceDocument = {
 };
 
 describe("a sequence being typed", () => {
-  test("shows the units people use", () => {
-    expect(draftOf(SEQUENCE)).toMatchObject({ base_frequency_mhz: "23", exposure_ms: "1.92" });
-  });
+  test("shows the units people use", () => expect(draftOf(SEQUENCE)).toMatchObject({ base_frequency_mhz: "23", exposure_ms: "1.92" }));
 
   test("comes back as the document it was made from, with what is not edited", () => {
     for (const whole of [SEQUENCE, { ...SEQUENCE, take_order: "interleaved" }]) {

@@ -1,8 +1,7 @@
 import { describe, expect, test } from "vitest";
-
+import { LAYOUTS } from "../../src/store/layout";
 import { Store } from "../../src/store/store";
 import { commandsOf, matching } from "../../src/views/palette/commands";
-import { LAYOUTS } from "../../src/views/layout";
 
 describe("a search of commands", () => {
   const commands = ["Map: Range", "Map: Direct", "Layout: Six views", "Scene: mirrors", "Map: Indirect"].map((words) => ({ words }));
@@ -17,14 +16,17 @@ describe("a search of commands", () => {
 });
 
 describe("commands", () => {
-  const run = (store: Store, words: string): void => commandsOf(store).find((command) => command.words === words)?.run();
+  const run = (store: Store, words: string): void =>
+    commandsOf(store)
+      .find((command) => command.words === words)
+      ?.run();
 
   test("show maps, layouts and views", () => {
     const store = new Store({ shelf: null });
     run(store, "Map: Validity");
     run(store, "Layout: Projector");
     run(store, "Show alone: Streak");
-    expect([store.mapProduct.value, store.layout.value, store.alone.value]).toEqual(["validity", LAYOUTS["Projector"], "streak"]);
+    expect([store.mapProduct.value, store.layout.value, store.alone.value]).toEqual(["validity", LAYOUTS.Projector, "streak"]);
     run(store, "Layout: Overview");
     expect(store.alone.value).toBeNull();
   });

@@ -59,7 +59,10 @@ describe("the plane of a region", () => {
       const [right, up] = [((at % 40) - lens.cx) / lens.fx, (lens.cy - Math.floor(at / 40)) / lens.fy];
       return (2 / (1 + right * Math.tan(Math.PI / 6))) * Math.hypot(right, up, 1);
     });
-    for (const region of [{ x0: 2, y0: 3, x1: 12, y1: 9 }, { x0: 30, y0: 20, x1: 99, y1: 99 }]) {
+    for (const region of [
+      { x0: 2, y0: 3, x1: 12, y1: 9 },
+      { x0: 30, y0: 20, x1: 99, y1: 99 },
+    ]) {
       const plane = planeOf(range, 40, 30, region, lens);
       expect(Math.acos(Math.abs(plane?.normal[2] ?? 0))).toBeCloseTo(Math.PI / 6, 5);
       expect(plane?.residual).toBeLessThan(1e-6);

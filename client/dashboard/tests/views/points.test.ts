@@ -3,8 +3,8 @@ import { describe, expect, test } from "vitest";
 import { byFlags, byValue, colourCloud, fieldOfView, fillCloud, makeCloud, pinholeOf } from "../../src/views/points/cloud";
 import { distanceOf } from "../../src/views/points/lens";
 import { onScreen, pointUnder } from "../../src/views/points/picking";
-import { axesLines, floorOf, frustumLines, gridLabels, gridLines } from "../../src/views/points/room";
 import { plyOf } from "../../src/views/points/ply";
+import { axesLines, floorOf, frustumLines, gridLabels, gridLines } from "../../src/views/points/room";
 
 const WIDE_RAD = Math.PI / 2;
 

@@ -39,9 +39,7 @@ describe("a form made of parameters", () => {
     ["smoothing_px", "11", "Smoothing must be a number from 0 to 10\u202fpx."],
     ["smoothing_px", "", "Smoothing must be a number from 0 to 10\u202fpx."],
     ["rounds", "1.5", "Rounds must be an integer at least 1."],
-  ])("says what is wrong: %s = %s", (name, text, words) => {
-    expect(readingOf(PARAMETERS, { ...draftOf(PARAMETERS), [name]: text })).toEqual({ wrong: name, words });
-  });
+  ])("says what is wrong: %s = %s", (name, text, words) => expect(readingOf(PARAMETERS, { ...draftOf(PARAMETERS), [name]: text })).toEqual({ wrong: name, words }));
 
   test("names and measures what it does not know, too", () => {
     expect(labelOf("inner_radius_px")).toBe("Inner radius");

@@ -16,9 +16,7 @@ describe("limits of a recording", () => {
     { duration_s: "", size_mb: "much", frames: "" },
     { duration_s: "", size_mb: "", frames: "1.5" },
     { duration_s: "Infinity", size_mb: "", frames: "" },
-  ])("that are none are refused: %o", (typed) => {
-    expect(limitsOf(typed)).toBeNull();
-  });
+  ])("that are none are refused: %o", (typed) => expect(limitsOf(typed)).toBeNull());
 });
 
 describe("annotations as lines", () => {
@@ -28,9 +26,19 @@ describe("annotations as lines", () => {
   });
 
   test("leave out lines that say nothing, and need a name each", () => {
-    expect(annotationsOf([{ name: "a", text: "b" }, { name: "", text: " " }])).toEqual({ a: "b" });
+    expect(
+      annotationsOf([
+        { name: "a", text: "b" },
+        { name: "", text: " " },
+      ]),
+    ).toEqual({ a: "b" });
     expect(annotationsOf([{ name: "", text: "b" }])).toBeNull();
-    expect(annotationsOf([{ name: "a", text: "b" }, { name: " a ", text: "c" }])).toBeNull();
+    expect(
+      annotationsOf([
+        { name: "a", text: "b" },
+        { name: " a ", text: "c" },
+      ]),
+    ).toBeNull();
   });
 });
 

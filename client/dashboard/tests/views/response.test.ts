@@ -47,7 +47,10 @@ const at = (time_ns: number, weight = 100) => ({ time_s: time_ns * 1e-9, weight 
 
 describe("returns beside the true ones", () => {
   test("stand with the one that is the nearest to them, and the other way round", () => {
-    const [found, truth] = [[at(10.1), at(20)], [at(10), at(20.3), at(28)]];
+    const [found, truth] = [
+      [at(10.1), at(20)],
+      [at(10), at(20.3), at(28)],
+    ];
     expect(linesOf(found, truth)).toEqual([
       { found: found[0], truth: truth[0] },
       { found: found[1], truth: truth[1] },
@@ -63,9 +66,7 @@ describe("returns beside the true ones", () => {
 
   test("scatter as they did in the looks before, of the same pixel", () => {
     const history = new ReturnHistory();
-    const taken = (frame: number, time_ns: number, x = 4): void => {
-      history.take({ ...look(frame, [], x), returns: [at(time_ns, 100 + frame), at(30)] });
-    };
+    const taken = (frame: number, time_ns: number, x = 4): void => history.take({ ...look(frame, [], x), returns: [at(time_ns, 100 + frame), at(30)] });
     for (const [frame, time_ns] of [9.9, 10.1, 9.9, 10.1].entries()) taken(frame, time_ns);
     expect(history.of(at(10)).time_s).toBeNaN();
     taken(4, 10);
@@ -79,9 +80,19 @@ describe("returns beside the true ones", () => {
 });
 
 const scene = (width: number, height: number, twice: (x: number, y: number) => boolean) => {
-  const two = momentsOf([{ phase_rad: 1, weight: 500 }, { phase_rad: 3.5, weight: 400 }], 20, 4);
+  const two = momentsOf(
+    [
+      { phase_rad: 1, weight: 500 },
+      { phase_rad: 3.5, weight: 400 },
+    ],
+    20,
+    4,
+  );
   const one = momentsOf([{ phase_rad: 2, weight: 900 }], 20, 4);
-  return picture(Array.from({ length: width * height }, (_, at) => (twice(at % width, Math.floor(at / width)) ? two : one)), width);
+  return picture(
+    Array.from({ length: width * height }, (_, at) => (twice(at % width, Math.floor(at / width)) ? two : one)),
+    width,
+  );
 };
 
 describe("the pixel that is shown first", () => {
@@ -113,7 +124,5 @@ describe("stems of returns", () => {
     expect(truth).toEqual([{ time_s: 10e-9, std_s: NaN, share: 0.25 }]);
   });
 
-  test("of weak returns are left out, as in the table", () => {
-    expect(stemsOf({ returns: [at(10, 990), at(20, 10)] }, null, new ReturnHistory()).found).toHaveLength(1);
-  });
+  test("of weak returns are left out, as in the table", () => expect(stemsOf({ returns: [at(10, 990), at(20, 10)] }, null, new ReturnHistory()).found).toHaveLength(1));
 });

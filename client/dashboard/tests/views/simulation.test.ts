@@ -30,9 +30,7 @@ describe("the table of effects", () => {
     expect(sizeWords(effect("any", 0, false))).toBe("0");
   });
 
-  it("names effects for people", () => {
-    expect(effectWords("fixed-pattern-phase")).toBe("Fixed pattern phase");
-  });
+  it("names effects for people", () => expect(effectWords("fixed-pattern-phase")).toBe("Fixed pattern phase"));
 });
 
 describe("faults", () => {

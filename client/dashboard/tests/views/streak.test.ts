@@ -11,7 +11,10 @@ describe("a streak image", () => {
   test("holds all light of its row, each pixel's brightest when its light comes", () => {
     const streak = new Streak();
     streak.compute(c, 1);
-    for (const [x, phase_rad] of [[0, 3], [1, 4]] as const) {
+    for (const [x, phase_rad] of [
+      [0, 3],
+      [1, 4],
+    ] as const) {
       const column = Array.from({ length: BINS }, (_, bin) => streak.values[2 * bin + x]);
       const light = column.reduce((sum, value) => sum + value, 0) / (BINS * c.baseFrequency_hz);
       expect(light).toBeCloseTo(101, 2);

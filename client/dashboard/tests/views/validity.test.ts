@@ -3,14 +3,12 @@ import { expect, test } from "vitest";
 import { FLAGS, gravest } from "../../src/ui/flags";
 import { countFlags, paintFlags } from "../../src/views/validity/reasons";
 
-test("every bit has one flag", () => {
-  expect(FLAGS.map(({ bit }) => bit).sort((a, b) => a - b)).toEqual([1, 2, 4, 8, 16, 32, 64, 128]);
-});
+test("every bit has one flag", () => expect(FLAGS.map(({ bit }) => bit).sort((a, b) => a - b)).toEqual([1, 2, 4, 8, 16, 32, 64, 128]));
 
 test("a pixel with several flags is shown by the gravest and counted for each", () => {
   expect(gravest(1 | 4)?.name).toBe("saturated");
   const { total, valid, byFlag } = countFlags(new Uint8Array([0, 1, 5, 5]));
-  expect([total, valid, byFlag["biased"], byFlag["saturated"], byFlag["no_signal"]]).toEqual([4, 1, 3, 2, 0]);
+  expect([total, valid, byFlag.biased, byFlag.saturated, byFlag.no_signal]).toEqual([4, 1, 3, 2, 0]);
 });
 
 test("flags have their colours, and what is valid a grey for its light", () => {

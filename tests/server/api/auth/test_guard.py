@@ -15,8 +15,9 @@ from tests.server.streaming import streaming
 from tests.serving import Served, serving
 from transientcam import Camera, wire
 from transientcam.errors import ProblemError
-from transientcam_server.api.auth import Role, TokenFile
-from transientcam_server.api.auth.guard import UNAUTHENTICATED, Guard
+from transientcam_server.api import TokenFile
+from transientcam_server.api._auth import Role
+from transientcam_server.api._auth.guard import UNAUTHENTICATED, Guard
 from transientcam_server.errors import Problem
 from transientcam_server.settings import Settings
 

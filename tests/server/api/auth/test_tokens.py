@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from transientcam_server.api.auth import Role, TokenFile
-from transientcam_server.errors.exceptions import TokenFileError, UnknownToken
+from transientcam_server.api import TokenFile
+from transientcam_server.api._auth import Role
+from transientcam_server.errors import TokenFileError, UnknownToken
 
 NOW = datetime(2030, 1, 1, tzinfo=UTC)
 

@@ -12,7 +12,7 @@ from pydantic_asyncapi import AsyncAPI
 from tests.server.streaming import streaming
 from tests.serving import Served
 from transientcam import wire
-from transientcam_server.api.docs.asyncapi import asyncapi
+from transientcam_server.api._docs.asyncapi import asyncapi
 
 DOCUMENT = asyncapi(version="1.2.3", host="camera.lab:8000", secure=False)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from fastapi import FastAPI
 
-from transientcam_server.api.docs.openapi import Interface
+from transientcam_server.api._docs.openapi import Interface
 
 
 def test_it_is_made_once_for_all_callers_and_not_on_the_loop() -> None:

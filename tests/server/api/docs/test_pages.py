@@ -7,9 +7,9 @@ import pytest
 from fastapi import FastAPI
 
 from tests.server.contract import check_answer
-from transientcam_server.api import problems
-from transientcam_server.api.docs import pages
-from transientcam_server.errors.kinds import KINDS
+from transientcam_server.api import _problems as problems
+from transientcam_server.api._docs import pages
+from transientcam_server.errors._kinds import KINDS
 
 
 @pytest.mark.parametrize("slug", sorted(KINDS))

@@ -4,9 +4,8 @@ import httpx
 import pytest
 
 from tests.serving import Served
-from transientcam_server.api import problems
-from transientcam_server.api.middleware.requests import REQUEST_ID_HEADER
-from transientcam_server.api.middleware.security import SECURITY_HEADERS
+from transientcam_server.api import SECURITY_HEADERS, _problems as problems
+from transientcam_server.api._middleware.requests import REQUEST_ID_HEADER
 
 JSON = {"Content-Type": "application/json"}
 

@@ -4,11 +4,8 @@ from websockets.exceptions import InvalidStatus
 
 from tests.server.streaming import streaming
 from tests.serving import Served
-from transientcam_server.api.middleware.security import (
-    MAX_BODY_BYTES,
-    SECURITY_HEADERS,
-    OriginCheck,
-)
+from transientcam_server.api import SECURITY_HEADERS
+from transientcam_server.api._middleware.security import MAX_BODY_BYTES, OriginCheck
 from transientcam_server.settings import Settings
 
 CHANGE = ("PUT", "/api/v1/acquisition")

@@ -14,7 +14,7 @@ from tests.serving import Served, serving
 from tests.waiting import wait_until
 from transientcam import Camera, wire
 from transientcam_driver import Sequence
-from transientcam_server.api.documents.calibration import CalibrationRequest
+from transientcam_server.api._documents.calibration import CalibrationRequest
 
 CALIBRATIONS = "/api/v1/calibrations"
 QUICK = {"harmonics": 1, "zeroth": "estimated", "exposure_s": 0.0005}

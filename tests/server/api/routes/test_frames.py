@@ -12,7 +12,7 @@ from PIL import Image
 import transientcam_moments as tm
 from tests.serving import Served, serving
 from transientcam import Frame, wire
-from transientcam_server.imaging import frame as frames
+from transientcam_server.imaging._frames import frame as frames
 from transientcam_server.settings import ReconstructionSettings
 
 LATEST = "/api/v1/frames/latest"

@@ -5,7 +5,7 @@ import pytest
 
 from tests.server.contract import client_of
 from tests.serving import serving
-from transientcam_server.api import neighbours
+from transientcam_server.api import _neighbours as neighbours
 
 
 def test_a_service_lists_one_that_announces_itself_and_what_its_camera_does(

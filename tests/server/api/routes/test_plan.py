@@ -15,7 +15,7 @@ from tests.server.planning.calls import Endless, Here
 from tests.serving import Served, serving
 from transientcam import Camera
 from transientcam.wire import LEASE_HEADER
-from transientcam_server.errors.exceptions import JobCancelled, Problem
+from transientcam_server.errors import JobCancelled, Problem
 
 FIXED = {"base_frequency_hz": 23e6, "harmonics": 3}
 SCENE = {"brightness_dn_per_s": 8e5, "returns": [{"range_m": 1.5}, {"range_m": 3.0, "weight": 0.5}]}
@@ -114,7 +114,7 @@ def test_the_front_falls_and_the_current_frame_says_where_it_stands(
     noisy: httpx.Client, noisy_daemon: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(noisy_daemon.service.planning, "_process", Here())
-    families = import_module("transientcam_server.planning.families")  # not the function
+    families = import_module("transientcam_server.planning._search.families")  # not the function
     monkeypatch.setattr(families, "HARMONICS", (3,))
     monkeypatch.setattr(families, "SEARCHED", ("maximum-entropy",))
 

@@ -16,8 +16,8 @@ from tests.server.contract import client_of
 from tests.server.recording.made import record
 from tests.serving import Served, serving
 from transientcam.cli import run
-from transientcam_server.offline import job
-from transientcam_server.recording.product_stores import ProductStores
+from transientcam_server.offline import _job as job
+from transientcam_server.recording import ProductStores
 
 FRAMES = 3
 pytestmark = pytest.mark.usefixtures("zarr_clients")

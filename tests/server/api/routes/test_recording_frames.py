@@ -17,8 +17,8 @@ from tests.server.recording.made import record
 from tests.serving import Served, serving
 from tests.waiting import wait_until
 from transientcam import wire
-from transientcam_server.recording import Recording
-from transientcam_server.recording.frames import MAX_TIMES, timeline
+from transientcam_server.recording import Recording, timeline
+from transientcam_server.recording._frames import MAX_TIMES
 
 RECORDINGS = "/api/v1/recordings"
 

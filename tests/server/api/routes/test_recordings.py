@@ -16,8 +16,8 @@ from tests.server.recording.test_recovery import abandoned
 from tests.serving import Served, serving
 from transientcam import wire
 from transientcam_driver import RawFrame
-from transientcam_server.api import downloads
-from transientcam_server.camera.events import Captured
+from transientcam_server.api import _downloads as downloads
+from transientcam_server.camera import Captured
 from transientcam_server.recording import Recording
 
 RECORDINGS = "/api/v1/recordings"

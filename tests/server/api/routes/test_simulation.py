@@ -6,7 +6,7 @@ import transientcam
 from tests.serving import Served
 from transientcam import wire
 from transientcam_driver import open_camera
-from transientcam_server.camera.source import twin_of
+from transientcam_server.camera import twin_of
 
 
 def test_the_simulated_scene_is_reported(http: httpx.Client) -> None:

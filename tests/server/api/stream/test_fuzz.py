@@ -20,7 +20,7 @@ from tests.server.streaming import streaming
 from tests.serving import Served, serving
 from tests.waiting import wait_until
 from transientcam import wire
-from transientcam_server.daemon.streams import BoundedStream
+from transientcam_server.daemon._streams import BoundedStream
 
 PATIENCE_S = 30.0
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10

@@ -9,9 +9,9 @@ from typing import Any, cast
 
 from tests.server.broadcast.outboxes import run, subscribed
 from transientcam import wire
-from transientcam_server.api.stream.sender import Sender
-from transientcam_server.broadcast.outbox import Close, Outbox
-from transientcam_server.imaging.frame import Frame
+from transientcam_server.api._stream.sender import Sender
+from transientcam_server.broadcast import Close, Outbox
+from transientcam_server.imaging import Frame
 
 COMPUTED_S = 0.5
 """What a frame says that its reconstruction took: longer than these tests send for."""

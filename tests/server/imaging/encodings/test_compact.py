@@ -7,14 +7,9 @@ import pytest
 
 from transientcam import Frame, density, wire
 from transientcam.density import step_up
-from transientcam.wire.encodings import SAMPLED_PHASES, measured_error
+from transientcam.wire._encodings import SAMPLED_PHASES, measured_error
 from transientcam_driver import Sequence, open_camera
-from transientcam_server.imaging.encodings.compact import (
-    encoding_name,
-    stream_encoding,
-    travelling,
-)
-from transientcam_server.imaging.products import PRODUCTS
+from transientcam_server.imaging import PRODUCTS, encoding_name, stream_encoding, travelling
 
 _META: dict[str, Any] = {"frame": 1}
 

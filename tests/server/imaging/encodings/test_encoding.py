@@ -9,21 +9,18 @@ import pytest
 from PIL import Image
 
 from transientcam import Frame, wire
-from transientcam_server.api.negotiation import negotiate
-from transientcam_server.errors.exceptions import Problem
-from transientcam_server.imaging.encodings.encoding import (
+from transientcam_server.api._negotiation import negotiate
+from transientcam_server.errors import Problem
+from transientcam_server.imaging import (
     COLOUR_JPEG,
     COLOUR_PNG,
-    CSV,
     MSGPACK,
-    NPY,
-    NPZ,
-    PLY,
     PNG,
+    PRODUCTS,
     TIFF,
     Encoding,
 )
-from transientcam_server.imaging.products import PRODUCTS
+from transientcam_server.imaging._encodings.encoding import CSV, NPY, NPZ, PLY
 
 META = cast("wire.FrameMeta", {"frame": 7, "base_frequency_hz": 23e6})
 

@@ -6,7 +6,11 @@ export function Blocks({ verdict: { blocks, block_px } }: { verdict: VerdictDocu
   if (!blocks.some((row) => row.includes("#") || row.includes("?"))) return null;
   return (
     <svg class="blocks" viewBox={`0 0 ${columns} ${rows}`} role="img" aria-label={`Blocks of ${block_px} pixels that are unlike a diffusor`}>
-      {blocks.flatMap((row, y) => [...row].map((character, x) => character !== "." && <rect key={`${x}.${y}`} class={character === "#" ? "block-unlike" : "block-unknown"} x={x} y={y} width={1} height={1} />))}
+      {blocks.flatMap((row, y) =>
+        [...row].map(
+          (character, x) => character !== "." && <rect key={`${x}.${y}`} class={character === "#" ? "block-unlike" : "block-unknown"} x={x} y={y} width={1} height={1} />,
+        ),
+      )}
     </svg>
   );
 }

@@ -1,16 +1,16 @@
 import { useSignal } from "@preact/signals";
-
+import { engineering, fixed } from "../../scales/format";
 import { calibrationPath } from "../../store/api";
 import type { CalibrationDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
 import { ActionMenu } from "../../ui/ActionMenu";
 import { download } from "../../ui/files";
-import { engineering, fixed } from "../../ui/format";
 import { Steer } from "../../ui/Steer";
 import type { Task } from "../../ui/useTask";
 import { clock } from "../replay/words";
 import { Blocks } from "./Blocks";
 import { ageOf, doubtOf, driftOf } from "./words";
+import "../recordings/RecordingRow.css";
 
 /** What is used where no calibration is. */
 export function NominalRow({ active, task }: { active: boolean; task: Task }) {
@@ -90,14 +90,30 @@ export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
           {forcing && warned.value ? "Use anyway" : "Use"}
         </Steer>
       )}
-      <button type="button" aria-label={`Export ${called}`} title="Its file, to be taken in elsewhere" disabled={task.busy.value !== null} onClick={() => void task.run("Fetching the file…", () => download(api, `${calibrationPath(id)}/file`, `${id}.npz`))}>
+      <button
+        type="button"
+        aria-label={`Export ${called}`}
+        title="Its file, to be taken in elsewhere"
+        disabled={task.busy.value !== null}
+        onClick={() => void task.run("Fetching the file…", () => download(api, `${calibrationPath(id)}/file`, `${id}.npz`))}
+      >
         Export
       </button>
-      <ActionMenu label={`More of ${called}`} groups={[{ title: called, actions: active ? [{ text: "Use the nominal gains", run: () => void task.run("Switching…", () => calibrations.activate("nominal")) }] : [{ text: "Delete…", run: onDelete }] }]} />
+      <ActionMenu
+        label={`More of ${called}`}
+        groups={[
+          {
+            title: called,
+            actions: active
+              ? [{ text: "Use the nominal gains", run: () => void task.run("Switching…", () => calibrations.activate("nominal")) }]
+              : [{ text: "Delete…", run: onDelete }],
+          },
+        ]}
+      />
     </li>
   );
 }
 
 function sequenceOf({ sequence, exposure_s }: CalibrationDocument): string {
-  return `${engineering(Number(sequence["base_frequency_hz"]), "Hz")}, m = ${String(sequence["harmonics"])}, ${engineering(exposure_s, "s")}`;
+  return `${engineering(Number(sequence.base_frequency_hz), "Hz")}, m = ${String(sequence.harmonics)}, ${engineering(exposure_s, "s")}`;
 }

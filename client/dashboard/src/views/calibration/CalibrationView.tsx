@@ -1,14 +1,15 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
-
+import { fixed } from "../../scales/format";
 import type { CalibrationDocument, JobDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
 import { Confirm } from "../../ui/Confirm";
-import { fixed } from "../../ui/format";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
-import { useTask, type Task } from "../../ui/useTask";
+import { type Task, useTask } from "../../ui/useTask";
 import { CalibrationRow, NominalRow } from "./CalibrationRow";
+import "../recordings/RecordForm.css";
+import "./CalibrationView.css";
 
 /** As the service has it where nothing is said. */
 const DEFAULT_FRAMES = "40";
@@ -25,7 +26,7 @@ export function CalibrationView() {
   const doomed = deleting.value;
   return (
     <Panel name="calibration" title={<h2>Calibration</h2>} tools={<Import task={task} />}>
-      <div class="panel-body">
+      <div class="panel-body fades">
         {job === null ? <MeasureForm task={task} /> : <Measuring job={job} task={task} />}
         <Obstacle />
         <TaskLine task={task} field="calibration-status" />
@@ -80,11 +81,27 @@ function MeasureForm({ task }: { task: Task }) {
     >
       <label class="field record-name">
         <span>Name</span>
-        <input type="text" name="name" maxLength={200} autocomplete="off" placeholder="after warm-up" value={name.value} onInput={(event) => (name.value = event.currentTarget.value)} />
+        <input
+          type="text"
+          name="name"
+          maxLength={200}
+          autocomplete="off"
+          placeholder="after warm-up"
+          value={name.value}
+          onInput={(event) => (name.value = event.currentTarget.value)}
+        />
       </label>
       <label class="field">
         <span>Frames, with and without light</span>
-        <input type="text" inputMode="numeric" name="frames" autocomplete="off" aria-invalid={!sensible} value={frames.value} onInput={(event) => (frames.value = event.currentTarget.value)} />
+        <input
+          type="text"
+          inputMode="numeric"
+          name="frames"
+          autocomplete="off"
+          aria-invalid={!sensible}
+          value={frames.value}
+          onInput={(event) => (frames.value = event.currentTarget.value)}
+        />
       </label>
       <div class="record-actions">
         <Steer submit primary title="Measure with the present sequence; no frames come meanwhile" disabled={!sensible || task.busy.value !== null}>

@@ -1,5 +1,5 @@
+import { fixed } from "../../scales/format";
 import type { CalibrationDocument, VerdictDocument } from "../../store/documents";
-import { fixed } from "../../ui/format";
 
 /** How old something is, as people say it. */
 export function ageOf(age_s: number): string {
@@ -12,7 +12,9 @@ export function ageOf(age_s: number): string {
 /** What is said of a calibration that was not measured on a diffusor; null where it was. */
 export function doubtOf({ verdict }: VerdictDocument): { tag: string; words: string } | null {
   if (verdict === "diffusor") return null;
-  return verdict === "scene" ? { tag: "of a scene", words: "It was measured on a scene, not on a diffusor." } : { tag: "in doubt", words: "It may not have been measured on a diffusor." };
+  return verdict === "scene"
+    ? { tag: "of a scene", words: "It was measured on a scene, not on a diffusor." }
+    : { tag: "in doubt", words: "It may not have been measured on a diffusor." };
 }
 
 /** From this growth on, in shares of the pixels and as a factor, a calibration should be measured anew. */

@@ -3,6 +3,7 @@ import { useEffect } from "preact/hooks";
 
 import { useStore } from "../../store/store";
 import { openFile } from "./openFile";
+import "./FileDrop.css";
 
 const carriesFiles = (event: DragEvent): boolean => event.dataTransfer?.types.includes("Files") ?? false;
 
@@ -37,9 +38,7 @@ export function FileDrop() {
   if (!over.value) return null;
   return (
     <div class="file-drop" aria-hidden="true">
-      <p>
-        A scene (.toml) to put the camera before, a recording (.h5) of this service to show, a calibration (.npz) to take in
-      </p>
+      <p>A scene (.toml) to put the camera before, a recording (.h5) of this service to show, a calibration (.npz) to take in</p>
     </div>
   );
 }

@@ -5,8 +5,8 @@ import { chooseFile } from "./openFile";
 export function OpenButton({ kind, title }: { readonly kind: string; readonly title: string }) {
   const store = useStore();
   return (
-    <button type="button" title={title} onClick={() => { chooseFile(store, kind); }}>
+    <button type="button" title={title} onClick={() => chooseFile(store, kind)}>
       Open…
     </button>
-  ); // prettier-ignore
+  );
 }

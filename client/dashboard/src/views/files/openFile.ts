@@ -36,7 +36,10 @@ const OPENERS: Readonly<Record<string, (store: Store, file: OpenedFile) => Promi
   ".h5": async (store, file) => {
     await store.recordings.refresh();
     const found = recordingIn(store.recordings.document.peek()?.recordings ?? [], file);
-    if (found === null) throw new RequestError({ detail: `The service has no recording like ${file.name}. A page cannot bring one to it: put the file into the directory of the recordings, or open it with "transientcam replay".` });
+    if (found === null)
+      throw new RequestError({
+        detail: `The service has no recording like ${file.name}. A page cannot bring one to it: put the file into the directory of the recordings, or open it with "transientcam replay".`,
+      });
     await store.replay.open(found.id);
     store.replay.toggle();
     return `${found.name} is shown from the service's recordings.`;

@@ -3,22 +3,22 @@ import type { RefObject } from "preact";
 import { useMemo, useRef } from "preact/hooks";
 
 import type { Look } from "../../store/looks";
+import { MAP_PRODUCTS, type MapProduct } from "../../store/mapCatalogue";
 import { useStore } from "../../store/store";
+import type { ViewName } from "../../store/viewNames";
 import { ColourBar } from "../../ui/ColourBar";
 import { ColourChoice } from "../../ui/ColourChoice";
 import { Check, Tabs } from "../../ui/controls";
 import { saveNumbers, savePicture } from "../../ui/download";
+import { FirstFrame } from "../../ui/FirstFrame";
 import { captionOf } from "../../ui/figure";
 import { saveFigure } from "../../ui/figureFiles";
-import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { LimitFields } from "../../ui/LimitFields";
+import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { paint } from "../../ui/paint";
-import { Panel } from "../../ui/Panel";
 import { Stage } from "../../ui/Stage";
-import type { ViewName } from "../names";
-import { MAP_PRODUCTS, type MapProduct } from "./catalogue";
 import { Measured } from "./Measured";
 import { Readout, valueAtPixel } from "./Readout";
 
@@ -54,11 +54,11 @@ function MapPanel({ name, choice }: MapPanelProps) {
     <Panel
       name={name}
       downloads={[
-        { text: "Picture (PNG)", run: () => { savePicture(`${shown.product}-${look.frame.peek()?.meta.frame ?? 0}`, canvas.current); } },
-        { text: "Figure (PNG)", run: () => { figure("png"); } },
-        { text: "Figure (SVG)", run: () => { figure("svg"); } },
-        { text: `${shown.name} in ${shown.unit} (NPY)`, run: () => { saveNumbers(look.frame.peek()); } },
-      ]} // prettier-ignore
+        { text: "Picture (PNG)", run: () => savePicture(`${shown.product}-${look.frame.peek()?.meta.frame ?? 0}`, canvas.current) },
+        { text: "Figure (PNG)", run: () => figure("png") },
+        { text: "Figure (SVG)", run: () => figure("svg") },
+        { text: `${shown.name} in ${shown.unit} (NPY)`, run: () => saveNumbers(look.frame.peek()) },
+      ]}
       title={
         <Tabs
           label={name === "map" ? "Map" : "Second map"}
@@ -69,7 +69,7 @@ function MapPanel({ name, choice }: MapPanelProps) {
       }
       tools={<MapLookMenu key={shown.product} look={look} name={name} />}
     >
-      <Map look={look} canvas={canvas} />
+      <MapPicture look={look} canvas={canvas} />
     </Panel>
   );
 }
@@ -94,11 +94,18 @@ interface MapProps {
 }
 
 /** Nothing but the figures is keyed by the product: another map must not take the focus from the picture. */
-function Map({ look, canvas }: MapProps) {
+function MapPicture({ look, canvas }: MapProps) {
   const store = useStore();
   const { product: shown, frame } = look;
   useProducts([shown.scatterOf ?? shown.product, store.frames.amplitude.value]);
-  const { size, waiting, marked } = useMemo(() => signalsOf(look, computed(() => store.pointed.value ?? store.selected.value)), [look, store]);
+  const { size, waiting, marked } = useMemo(
+    () =>
+      signalsOf(
+        look,
+        computed(() => store.pointed.value ?? store.selected.value),
+      ),
+    [look, store],
+  );
   const [width, height] = size.value.split("x").map(Number);
 
   useDrawing(() => {
@@ -111,8 +118,8 @@ function Map({ look, canvas }: MapProps) {
     if (newest === null) {
       // What the map before showed is not this one's.
       context.clearRect(0, 0, target.width, target.height);
-      delete target.dataset["frame"];
-      delete target.dataset["product"];
+      delete target.dataset.frame;
+      delete target.dataset.product;
       return;
     }
     const [rows, columns] = newest.shape;
@@ -134,16 +141,7 @@ function Map({ look, canvas }: MapProps) {
         {waiting.value ? (
           <div class="colour-bar" />
         ) : (
-          <ColourBar
-            scale={look.scale.value}
-            colours={look.colours.value}
-            unit={shown.unit}
-            values={frame}
-            marked={marked}
-            onLimit={(limits) => {
-              store.looks.limit(look, limits);
-            }}
-          />
+          <ColourBar scale={look.scale.value} colours={look.colours.value} unit={shown.unit} values={frame} marked={marked} onLimit={(limits) => store.looks.limit(look, limits)} />
         )}
       </div>
       <footer class="panel-foot">

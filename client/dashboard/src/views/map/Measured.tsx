@@ -1,17 +1,18 @@
-import { computed, useComputed, type ReadonlySignal } from "@preact/signals";
+import { computed, type ReadonlySignal, useComputed } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 
 import { DEGREE } from "../../physics/constants";
 import { tiltOf } from "../../physics/plane";
+import { engineering, fixed, grouped } from "../../scales/format";
+import { histogram } from "../../scales/scale";
 import type { Look } from "../../store/looks";
 import { figuresOf, type RegionFigures } from "../../store/measures";
 import { useStore } from "../../store/store";
-import { engineering, fixed, grouped } from "../../ui/format";
 import { useDrawing } from "../../ui/hooks";
-import { histogram } from "../../ui/scale";
 import { lensOf } from "../points/lens";
 import { PinsRow } from "./PinsRow";
 import { planeOf } from "./plane";
+import "./Measured.css";
 
 const BINS = 64;
 const HEIGHT_PX = 24;
@@ -88,9 +89,7 @@ function RegionHistogram({ look, figures }: { look: Look; figures: ReadonlySigna
     const most = Math.max(1, ...counts);
     context.clearRect(0, 0, BINS, HEIGHT_PX);
     context.fillStyle = getComputedStyle(context.canvas).color;
-    counts.forEach((count, bin) => {
-      context.fillRect(bin, HEIGHT_PX * (1 - count / most), 1, (HEIGHT_PX * count) / most);
-    });
+    counts.forEach((count, bin) => context.fillRect(bin, HEIGHT_PX * (1 - count / most), 1, (HEIGHT_PX * count) / most));
   }, [look, figures]);
   return <canvas ref={canvas} class="measured-histogram" width={BINS} height={HEIGHT_PX} role="img" aria-label="Histogram of the region over the colour scale" />;
 }

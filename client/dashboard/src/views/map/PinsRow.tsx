@@ -1,9 +1,8 @@
 import { useMemo } from "preact/hooks";
-
+import { deviation, fixed } from "../../scales/format";
 import type { Look } from "../../store/looks";
 import { PIN_COLOURS, type Pin } from "../../store/measures";
 import { useStore } from "../../store/store";
-import { deviation, fixed } from "../../ui/format";
 import { useProducts } from "../../ui/hooks";
 import { distanceOf, lensOf, type Ranged } from "../points/lens";
 import { valueAtPixel } from "./Readout";

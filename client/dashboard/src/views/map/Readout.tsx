@@ -1,12 +1,12 @@
 import { useComputed } from "@preact/signals";
 import { useMemo } from "preact/hooks";
-
+import { deviation, fixed, NOTHING } from "../../scales/format";
 import type { Frame } from "../../store/frames";
 import type { Look } from "../../store/looks";
 import { WINDOW } from "../../store/noise";
 import type { Pixel } from "../../store/pixel";
 import { useStore } from "../../store/store";
-import { deviation, fixed, NOTHING } from "../../ui/format";
+import "./Readout.css";
 
 /** Value of a frame at a pixel; NaN without a frame, a pixel or a value. */
 export function valueAtPixel(frame: Frame | null, pixel: Pixel | null): number {
@@ -42,7 +42,10 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
       </span>
       {shown.product !== ofLight && (
         <span>
-          <span class="quiet">{ofLight}</span> <span class="readout-light" data-field="amplitude">{light}</span>{" "}
+          <span class="quiet">{ofLight}</span>{" "}
+          <span class="readout-light" data-field="amplitude">
+            {light}
+          </span>{" "}
           <span class="quiet readout-scatter" data-field="amplitude-scatter">
             {lightScatter}
           </span>

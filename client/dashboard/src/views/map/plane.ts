@@ -1,5 +1,5 @@
 /** The plane that a region of the range map is nearest to. */
-import { planeThrough, type Plane } from "../../physics/plane";
+import { type Plane, planeThrough } from "../../physics/plane";
 import { holds, type Region } from "../../store/measures";
 import { fillCloud, makeCloud, type Pinhole } from "../points/cloud";
 

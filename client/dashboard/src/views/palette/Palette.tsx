@@ -4,6 +4,7 @@ import { useEffect, useId, useRef } from "preact/hooks";
 import { useStore } from "../../store/store";
 import { SwitchedDialog } from "../../ui/Dialog";
 import { commandsOf, matching } from "./commands";
+import "./Palette.css";
 
 /** All commands of the page, by the keyboard: type, choose by arrow keys, Enter. After the WAI-ARIA pattern "combobox" with a list. */
 export function Palette() {
@@ -22,9 +23,7 @@ function Search({ onDone }: { onDone: () => void }) {
   const list = useRef<HTMLUListElement>(null);
   const found = matching(commandsOf(store), query.value);
   const at = Math.min(chosen.value, found.length - 1);
-  useEffect(() => {
-    list.current?.children[at]?.scrollIntoView({ block: "nearest" });
-  }, [at, query.value]);
+  useEffect(() => list.current?.children[at]?.scrollIntoView({ block: "nearest" }), [at, query.value]);
   const run = (place: number): void => {
     const command = found[place];
     if (command === undefined) return;
@@ -66,7 +65,11 @@ function Search({ onDone }: { onDone: () => void }) {
           </li>
         ))}
       </ul>
-      {found.length === 0 && <p class="quiet" role="status">Nothing is called that.</p>}
+      {found.length === 0 && (
+        <p class="quiet" role="status">
+          Nothing is called that.
+        </p>
+      )}
     </div>
   );
 }

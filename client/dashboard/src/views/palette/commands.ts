@@ -1,13 +1,13 @@
 /** All that the page can do at once, to be searched by words. */
 import { RequestError } from "../../store/api";
+import { LAYOUTS } from "../../store/layout";
+import { MAP_PRODUCTS } from "../../store/mapCatalogue";
 import { copyLink } from "../../store/permalink";
 import { PAST_S } from "../../store/recordings";
 import type { Store } from "../../store/store";
+import { THEMES } from "../../store/theme";
 import { SHORTCUTS } from "../../ui/shortcuts";
-import { THEMES } from "../../ui/theme";
 import { chooseFile } from "../files/openFile";
-import { LAYOUTS } from "../layout";
-import { MAP_PRODUCTS } from "../map/catalogue";
 import { VIEWS } from "../registry";
 import { PRESETS } from "../sequence/presets";
 
@@ -29,18 +29,20 @@ export function commandsOf(store: Store): Command[] {
     ...VIEWS.map(({ name, title }) => ({ words: `Show alone: ${title}`, key: "", run: () => void (store.alone.value = name) })),
     ...Object.entries({ ...LAYOUTS, ...store.layouts.named.value }).map(([name, layout]) => ({ words: `Layout: ${name}`, key: "", run: () => store.showLayout(layout) })),
     { words: "Layout: save or remove…", key: "", run: () => void (store.asksForLayout.value = true) },
-    ...(steering && applied !== null ? PRESETS.map(({ name, sequence }) => ({ words: `Sequence: ${name}`, key: "", run: () => void reported(store, () => store.sequencing.set({ ...applied, ...sequence })) })) : []),
+    ...(steering && applied !== null
+      ? PRESETS.map(({ name, sequence }) => ({ words: `Sequence: ${name}`, key: "", run: () => void reported(store, () => store.sequencing.set({ ...applied, ...sequence })) }))
+      : []),
     ...scenes.map(({ name }) => ({ words: `Scene: ${name}`, key: "", run: () => void reported(store, () => store.simulation.stage(name)) })),
     ...THEMES.map((theme) => ({ words: `Colours: ${theme === "auto" ? "as the system" : theme}`, key: "", run: () => void (store.theme.choice.value = theme) })),
     ...recordingCommands(store),
-    { words: "Open a file: scene, recording or calibration…", key: "", run: () => { chooseFile(store); } },
+    { words: "Open a file: scene, recording or calibration…", key: "", run: () => chooseFile(store) },
     { words: "Copy a link to what is shown", key: "", run: () => void copyLink(window, store) },
     ...SHORTCUTS.filter(({ shown }) => shown.length === 1 && shown !== "K").map(({ keys, shown, words, run }) => ({
       words: `Page: ${words}`,
       key: shown,
       run: () => run(store, new KeyboardEvent("keydown", { key: keys[0] })),
     })),
-  ]; // prettier-ignore
+  ];
 }
 
 /** Recordings need no control of the camera. */
@@ -64,7 +66,16 @@ async function reported(store: Store, work: () => Promise<unknown>): Promise<voi
 
 /** Those that hold every word of a query, whatever its case and order; at whose beginning one stands come first. */
 export function matching<T extends { readonly words: string }>(commands: readonly T[], query: string): T[] {
-  const sought = query.toLowerCase().split(/\s+/).filter((word) => word !== "");
-  const begun = ({ words }: T): number => sought.filter((word) => words.toLowerCase().split(/[\s:]+/).some((each) => each.startsWith(word))).length;
+  const sought = query
+    .toLowerCase()
+    .split(/\s+/)
+    .filter((word) => word !== "");
+  const begun = ({ words }: T): number =>
+    sought.filter((word) =>
+      words
+        .toLowerCase()
+        .split(/[\s:]+/)
+        .some((each) => each.startsWith(word)),
+    ).length;
   return commands.filter(({ words }) => sought.every((word) => words.toLowerCase().includes(word))).sort((a, b) => begun(b) - begun(a));
 }

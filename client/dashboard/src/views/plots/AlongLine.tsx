@@ -1,6 +1,6 @@
 import type { Signal } from "@preact/signals";
-import { useMemo } from "preact/hooks";
 import { computed } from "@preact/signals";
+import { useMemo } from "preact/hooks";
 import type uPlot from "uplot";
 
 import type { Look } from "../../store/looks";

@@ -1,16 +1,15 @@
-import { computed, signal, type Signal } from "@preact/signals";
+import { computed, type Signal, signal } from "@preact/signals";
 import { useMemo } from "preact/hooks";
 import type uPlot from "uplot";
-
+import { deviation, fixed } from "../../scales/format";
 import type { Frame } from "../../store/frames";
 import type { Look } from "../../store/looks";
 import { figuresOf, PIN_COLOURS } from "../../store/measures";
 import { type Store, useStore } from "../../store/store";
-import { deviation, fixed } from "../../ui/format";
 import { useDrawing } from "../../ui/hooks";
 import { valueAtPixel } from "../map/Readout";
 import { History, KEPT_S } from "./history";
-import { LineChart, type Line } from "./LineChart";
+import { type Line, LineChart } from "./LineChart";
 
 /** A place whose value is followed; its key says where it lies, so that another place under the same name begins anew. */
 interface Place extends Line {
@@ -36,13 +35,23 @@ export function OverTime({ look, data }: { look: Look; data: Signal<uPlot.Aligne
   void taken.value; // the figures below are of this frame
   return (
     <>
-      <LineChart label={`${name} over the last ${KEPT_S} s`} lines={places.value.map(({ name: of, colour }) => ({ name: of, colour }))} along="time (s)" across={unit} ends={[-KEPT_S, 0]} data={data} />
+      <LineChart
+        label={`${name} over the last ${KEPT_S} s`}
+        lines={places.value.map(({ name: of, colour }) => ({ name: of, colour }))}
+        along="time (s)"
+        across={unit}
+        ends={[-KEPT_S, 0]}
+        data={data}
+      />
       <p class="plots-key">
         {places.value.map(({ key, name: of, colour }) => {
           const { last, mean, std } = history.figures(key);
           return (
             <span key={key} class="plots-place" style={{ "--line": colour.startsWith("--") ? `var(${colour})` : colour }} data-place={of}>
-              {of} {fixed(last, decimals, unit)} <span class="quiet" title="Mean and standard deviation (1 σ) over the time that is shown">mean {fixed(mean, decimals)} {deviation(std, unit)}</span>
+              {of} {fixed(last, decimals, unit)}{" "}
+              <span class="quiet" title="Mean and standard deviation (1 σ) over the time that is shown">
+                mean {fixed(mean, decimals)} {deviation(std, unit)}
+              </span>
             </span>
           );
         })}
@@ -57,7 +66,16 @@ function placesOf({ selected, measures }: Store): Place[] {
   const region = measures.region.value;
   return [
     ...(pixel === null ? [] : [{ key: `pixel ${pixel.x},${pixel.y}`, name: `${pixel.x}, ${pixel.y}`, colour: "--curve", valueIn: (frame: Frame) => valueAtPixel(frame, pixel) }]),
-    ...measures.pins.value.map((pin) => ({ key: `${pin.name} ${pin.x},${pin.y}`, name: pin.name, colour: PIN_COLOURS[pin.name], valueIn: (frame: Frame) => valueAtPixel(frame, pin) })),
-    ...(region === null ? [] : [{ key: `region ${JSON.stringify(region)}`, name: "region", colour: "--light", valueIn: ({ values, shape }: Frame) => figuresOf(values, shape[1], shape[0], region).mean }]),
+    ...measures.pins.value.map((pin) => ({
+      key: `${pin.name} ${pin.x},${pin.y}`,
+      name: pin.name,
+      colour: PIN_COLOURS[pin.name],
+      valueIn: (frame: Frame) => valueAtPixel(frame, pin),
+    })),
+    ...(region === null
+      ? []
+      : [
+          { key: `region ${JSON.stringify(region)}`, name: "region", colour: "--light", valueIn: ({ values, shape }: Frame) => figuresOf(values, shape[1], shape[0], region).mean },
+        ]),
   ];
 }

@@ -3,29 +3,30 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 
 import { LightPainter } from "../../gl/paintLight";
 import type { Backdrop } from "../../gl/renderer";
+import { grouped } from "../../scales/format";
 import { LIVE, RequestError } from "../../store/api";
 import type { Frame } from "../../store/frames";
-import { aBoolean, aNumber, oneOf, remembered } from "../../store/settings";
+import type { TransientLook } from "../../store/lightLook";
+import { aBoolean, aNumber, oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { frameUrl } from "../../stream/frameUrl";
 import { ColourBar } from "../../ui/ColourBar";
 import { Choice, Toggle } from "../../ui/controls";
 import { save, savePicture } from "../../ui/download";
-import { download } from "../../ui/files";
-import { grouped } from "../../ui/format";
 import { FirstFrame } from "../../ui/FirstFrame";
+import { download } from "../../ui/files";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { PinsRow } from "../map/PinsRow";
 import { LightBar } from "../transient/LightBar";
-import type { TransientLook } from "../transient/look";
 import { byFlags, byPicture, byValue, colourCloud, fillCloud, type Painter } from "./cloud";
 import { FieldOfView } from "./FieldOfView";
 import { knownLens, lensOf } from "./lens";
 import { plyOf } from "./ply";
 import type { PointScene } from "./Scene";
 import { SceneStage } from "./SceneStage";
+import "./PointsView.css";
 
 const COLOURINGS = ["range", "light", "validity", "flight"] as const;
 type Colouring = (typeof COLOURINGS)[number];
@@ -33,13 +34,18 @@ const NAMES: Record<Exclude<Colouring, "light">, string> = { range: "range", val
 /** What the colours are made of, besides the range and the light. */
 const NEEDED: Record<Colouring, readonly string[]> = { range: [], light: [], validity: ["flags"], flight: ["coefficients"] };
 
+const COLOURING: Setting<Colouring> = { key: "points.colouring", initial: "range", ...oneOf(COLOURINGS) };
+const SIZE_PX: Setting<number> = { key: "points.size", initial: 2, ...aNumber() };
+const SHADED: Setting<boolean> = { key: "points.shaded", initial: true, ...aBoolean() };
+const SURROUNDED: Setting<boolean> = { key: "points.surrounded", initial: true, ...aBoolean() };
+
 /** The range map as points in space. */
 export function PointsView() {
   const store = useStore();
-  const colouring = useMemo(() => remembered<Colouring>(store.shelf, "points.colouring", "range", oneOf(COLOURINGS)), [store]);
-  const pointSize = useMemo(() => remembered(store.shelf, "points.size", 2, aNumber), [store]);
-  const shaded = useMemo(() => remembered(store.shelf, "points.shaded", true, aBoolean), [store]);
-  const surrounded = useMemo(() => remembered(store.shelf, "points.surrounded", true, aBoolean), [store]);
+  const colouring = store.settings.of(COLOURING);
+  const pointSize = store.settings.of(SIZE_PX);
+  const shaded = store.settings.of(SHADED);
+  const surrounded = store.settings.of(SURROUNDED);
   const { light } = store;
   const ofLight = store.frames.amplitude.value;
   const [rangeLook, lightLook] = [store.looks.of("range"), store.looks.of(ofLight)];
@@ -59,14 +65,17 @@ export function PointsView() {
 
   useEffect(() => {
     let wanted = true;
-    void import("./Scene").then(({ PointScene: Made }) => {
-      if (!wanted || canvas.current === null) return;
-      try {
-        scene.value = new Made(canvas.current);
-      } catch {
-        trouble.value = "This browser grants no WebGL, which points in space need.";
-      }
-    }, () => (trouble.value = "The part of the page that draws points could not be loaded.")); // prettier-ignore
+    void import("./Scene").then(
+      ({ PointScene: Made }) => {
+        if (!wanted || canvas.current === null) return;
+        try {
+          scene.value = new Made(canvas.current);
+        } catch {
+          trouble.value = "This browser grants no WebGL, which points in space need.";
+        }
+      },
+      () => (trouble.value = "The part of the page that draws points could not be loaded."),
+    );
     return () => {
       wanted = false;
       scene.peek()?.dispose();
@@ -108,7 +117,11 @@ export function PointsView() {
     if (flags !== null) return byFlags(flags.values);
     if (coefficients !== null && coefficients.width * coefficients.height === frame.values.length) {
       if (lit.pixels.length !== frame.values.length) lit.pixels = new Uint32Array(frame.values.length);
-      lit.painter.paint(coefficients, { phase_rad: store.player.phase_rad.value, tone: light.toneNow, colours: light.colours.value, backdrop: backdropOf(amplitude, light) }, lit.pixels);
+      lit.painter.paint(
+        coefficients,
+        { phase_rad: store.player.phase_rad.value, tone: light.toneNow, colours: light.colours.value, backdrop: backdropOf(amplitude, light) },
+        lit.pixels,
+      );
       return byPicture(lit.pixels);
     }
     if (chosen === "light" && amplitude !== null) return byValue(amplitude.values, lightLook.scale.value, lightLook.colours.value);
@@ -151,8 +164,18 @@ export function PointsView() {
       title={<h2>Points in space</h2>}
       tools={
         <PopoverButton face="Look" label="Look of the points" title="What the points are coloured by, and their size" kind="look">
-          <Choice label="Colour by" value={colouring.value} options={COLOURINGS.map((each) => ({ value: each, text: each === "light" ? ofLight : NAMES[each] }))} onChange={(each) => (colouring.value = each)} />
-          <Choice label="Size of a point" value={pointSize.value} options={[1, 2, 3, 4, 6].map((each) => ({ value: each, text: `${each} px` }))} onChange={(each) => (pointSize.value = each)} />
+          <Choice
+            label="Colour by"
+            value={colouring.value}
+            options={COLOURINGS.map((each) => ({ value: each, text: each === "light" ? ofLight : NAMES[each] }))}
+            onChange={(each) => (colouring.value = each)}
+          />
+          <Choice
+            label="Size of a point"
+            value={pointSize.value}
+            options={[1, 2, 3, 4, 6].map((each) => ({ value: each, text: `${each} px` }))}
+            onChange={(each) => (pointSize.value = each)}
+          />
         </PopoverButton>
       }
       downloads={[
@@ -195,10 +218,18 @@ export function PointsView() {
           </span>
           <FieldOfView />
           <span class="panel-tools">
-            <Toggle pressed={surrounded.value} title="Floor with a grid in metres, the camera's axes (x red, y green, z blue) and its field of view" onToggle={() => (surrounded.value = !surrounded.peek())}>
+            <Toggle
+              pressed={surrounded.value}
+              title="Floor with a grid in metres, the camera's axes (x red, y green, z blue) and its field of view"
+              onToggle={() => (surrounded.value = !surrounded.peek())}
+            >
               Grid
             </Toggle>
-            <Toggle pressed={shaded.value} title="Eye-dome lighting: what stands behind its neighbours is darker. Without it colours are exactly those of the colour bar" onToggle={() => (shaded.value = !shaded.peek())}>
+            <Toggle
+              pressed={shaded.value}
+              title="Eye-dome lighting: what stands behind its neighbours is darker. Without it colours are exactly those of the colour bar"
+              onToggle={() => (shaded.value = !shaded.peek())}
+            >
               Shading
             </Toggle>
             <button type="button" onClick={() => scene.peek()?.fromCamera()}>

@@ -18,10 +18,10 @@ import {
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { DEGREE } from "../../physics/constants";
-import { fieldOfView, makeCloud, type Cloud, type Pinhole } from "./cloud";
+import { type Cloud, fieldOfView, makeCloud, type Pinhole } from "./cloud";
 import { EyeDome } from "./eyeDome";
 import { onScreen, pointUnder } from "./picking";
-import { axesLines, floorOf, frustumLines, gridLabels, gridLines, type Floor, type Label } from "./room";
+import { axesLines, type Floor, floorOf, frustumLines, gridLabels, gridLines, type Label } from "./room";
 
 // Colours are those of the maps, byte for byte.
 ColorManagement.enabled = false;
@@ -29,7 +29,11 @@ ColorManagement.enabled = false;
 /** Of the grid, the camera's field of view, and its axes: x, y, z. */
 const GRID: readonly number[] = [112, 120, 130];
 const FRUSTUM: readonly number[] = [178, 134, 64];
-const AXES: readonly (readonly number[])[] = [[213, 94, 0], [0, 158, 115], [86, 180, 233]]; // prettier-ignore
+const AXES: readonly (readonly number[])[] = [
+  [213, 94, 0],
+  [0, 158, 115],
+  [86, 180, 233],
+];
 
 /** The picture that a cloud is made of. */
 export interface Field {
@@ -92,8 +96,8 @@ export class PointScene {
     this.#field = field;
     const { geometry } = this.#points;
     geometry.setDrawRange(0, count);
-    geometry.attributes["position"].needsUpdate = true;
-    geometry.attributes["color"].needsUpdate = true;
+    geometry.attributes.position.needsUpdate = true;
+    geometry.attributes.color.needsUpdate = true;
     this.#surround(count);
     if (!this.#placed && count > 0) {
       this.#placed = true;
@@ -138,7 +142,7 @@ export class PointScene {
   /** Colours changed, nothing else. */
   recolour(): void {
     if (this.#points === null) return;
-    this.#points.geometry.attributes["color"].needsUpdate = true;
+    this.#points.geometry.attributes.color.needsUpdate = true;
     this.#draw();
   }
 
@@ -211,9 +215,7 @@ export class PointScene {
   /** At most once a refresh of the display, and only when something changed. */
   readonly #draw = (): void => {
     if (this.#asked !== 0) return;
-    this.#asked = requestAnimationFrame(() => {
-      this.drawNow();
-    });
+    this.#asked = requestAnimationFrame(() => this.drawNow());
   };
 
   /** The camera's own field of view fits the canvas, whichever side is the longer. */

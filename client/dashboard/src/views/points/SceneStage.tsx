@@ -1,12 +1,11 @@
-import { signal, type ReadonlySignal } from "@preact/signals";
+import { type ReadonlySignal, signal } from "@preact/signals";
 import type { RefObject } from "preact";
 import { useEffect, useMemo, useRef } from "preact/hooks";
-
+import { fixed } from "../../scales/format";
 import type { Frame } from "../../store/frames";
 import { PIN_COLOURS } from "../../store/measures";
 import { type Pixel, stepped } from "../../store/pixel";
 import { useStore } from "../../store/store";
-import { fixed } from "../../ui/format";
 import { useDrawing } from "../../ui/hooks";
 import { lensOf, pointAt } from "./lens";
 import type { PointScene } from "./Scene";
@@ -46,7 +45,7 @@ export function SceneStage({ canvas, scene, range }: SceneStageProps) {
   const marks = useMemo(() => signal<readonly Mark[]>([]), []);
   const pressed = useRef<{ readonly x: number; readonly y: number } | null>(null);
   const asked = useRef(0);
-  useEffect(() => () => { cancelAnimationFrame(asked.current); }, []); // prettier-ignore
+  useEffect(() => () => cancelAnimationFrame(asked.current), []);
 
   /** Puts the marks where the scene was drawn last. */
   const place = (): void => {

@@ -1,8 +1,8 @@
 /** A range map as points in space: written into the arrays of a geometry, nothing allocated a frame. */
-import type { ColourMapName } from "../../ui/colourMaps";
+import type { ColourMapName } from "../../scales/colourMaps";
+import type { Scale } from "../../scales/scale";
 import { gravest } from "../../ui/flags";
 import { picker } from "../../ui/paint";
-import type { Scale } from "../../ui/scale";
 
 export interface Cloud {
   /** x to the right, y up, z towards the viewer, in m: the camera stands at 0 and looks along -z. */
@@ -68,16 +68,12 @@ export function colourCloud({ pixels, colours }: Cloud, count: number, paint: Pa
 /** Colours by a value, as a map on this scale has them. */
 export function byValue(values: ArrayLike<number>, scale: Scale, colours: ColourMapName): Painter {
   const pick = picker(scale, colours);
-  return (pixel, out, at) => {
-    writeRgb(pick(values[pixel]), out, at);
-  };
+  return (pixel, out, at) => writeRgb(pick(values[pixel]), out, at);
 }
 
 /** Colours as a picture of RGBA pixels has them. */
 export function byPicture(pixels: Uint32Array): Painter {
-  return (pixel, out, at) => {
-    writeRgb(pixels[pixel], out, at);
-  };
+  return (pixel, out, at) => writeRgb(pixels[pixel], out, at);
 }
 
 function writeRgb(rgba: number, out: Uint8Array, at: number): void {

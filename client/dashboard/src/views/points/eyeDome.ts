@@ -1,5 +1,18 @@
 /** Eye-dome lighting: what stands behind its neighbours on the screen is darker, so that edges and folds are seen (Boucheny 2009). */
-import { BufferAttribute, BufferGeometry, DepthTexture, Mesh, NearestFilter, NoBlending, OrthographicCamera, type PerspectiveCamera, Scene, ShaderMaterial, type WebGLRenderer, WebGLRenderTarget } from "three";
+import {
+  BufferAttribute,
+  BufferGeometry,
+  DepthTexture,
+  Mesh,
+  NearestFilter,
+  NoBlending,
+  OrthographicCamera,
+  type PerspectiveCamera,
+  Scene,
+  ShaderMaterial,
+  type WebGLRenderer,
+  WebGLRenderTarget,
+} from "three";
 
 /** How far away neighbours are, in CSS px, and how dark a step of twice the distance makes. */
 const REACH_PX = 1.5;

@@ -4,7 +4,14 @@
 const REACH_PX = 8;
 
 /** Where a point is on a screen of this size, in px from its upper left; null behind the eye. `matrix` is projection times view, by columns. */
-export function onScreen(matrix: ArrayLike<number>, x: number, y: number, z: number, width: number, height: number): { readonly x: number; readonly y: number; readonly depth: number } | null {
+export function onScreen(
+  matrix: ArrayLike<number>,
+  x: number,
+  y: number,
+  z: number,
+  width: number,
+  height: number,
+): { readonly x: number; readonly y: number; readonly depth: number } | null {
   const depth = matrix[3] * x + matrix[7] * y + matrix[11] * z + matrix[15];
   if (depth <= 0) return null;
   const across = (matrix[0] * x + matrix[4] * y + matrix[8] * z + matrix[12]) / depth;
@@ -13,7 +20,14 @@ export function onScreen(matrix: ArrayLike<number>, x: number, y: number, z: num
 }
 
 /** The foremost of the first `count` points near a place on the screen, and the nearest to it of those about as far; null for none. */
-export function pointUnder(positions: Float32Array, count: number, matrix: ArrayLike<number>, width: number, height: number, place: { readonly x: number; readonly y: number }): number | null {
+export function pointUnder(
+  positions: Float32Array,
+  count: number,
+  matrix: ArrayLike<number>,
+  width: number,
+  height: number,
+  place: { readonly x: number; readonly y: number },
+): number | null {
   let found: number | null = null;
   let least = Infinity;
   for (let n = 0; n < count; n++) {

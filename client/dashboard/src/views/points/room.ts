@@ -1,5 +1,5 @@
 /** What surrounds a cloud: a floor with a grid in metres, and the camera that sees it. Pure: lines as pairs of points, in m. */
-import { niceStep } from "../../ui/scale";
+import { niceStep } from "../../scales/scale";
 import type { Pinhole } from "./cloud";
 
 /** A floor, parallel to the camera's own horizontal plane; its edges are whole steps. */
@@ -80,6 +80,11 @@ export function axesLines({ far }: Floor): Float32Array {
 /** The camera's field of view: from its centre along the corners of the picture, and the picture's frame. */
 export function frustumLines({ far }: Floor, width: number, height: number, { fx, fy, cx, cy }: Pinhole): Float32Array {
   const depth = -FIELD * far;
-  const corners = [[-0.5, -0.5], [width - 0.5, -0.5], [width - 0.5, height - 0.5], [-0.5, height - 0.5]].map(([x, y]) => [((x - cx) / fx) * depth, ((cy - y) / fy) * depth, -depth]); // prettier-ignore
+  const corners = [
+    [-0.5, -0.5],
+    [width - 0.5, -0.5],
+    [width - 0.5, height - 0.5],
+    [-0.5, height - 0.5],
+  ].map(([x, y]) => [((x - cx) / fx) * depth, ((cy - y) / fy) * depth, -depth]);
   return Float32Array.from(corners.flatMap((corner, n) => [0, 0, 0, ...corner, ...corner, ...corners[(n + 1) % 4]]));
 }

@@ -6,7 +6,8 @@ import { useStore } from "../../store/store";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
-import { draftOf, isNumber, labelOf, readingOf, spanOf, unitOf, type Draft } from "./fields";
+import { type Draft, draftOf, isNumber, labelOf, readingOf, spanOf, unitOf } from "./fields";
+import "./ReconstructionView.css";
 
 /** How images become moments and moments become returns; changed while frames come. */
 export function ReconstructionView() {
@@ -32,13 +33,17 @@ export function ReconstructionView() {
       name="reconstruction"
       title={<h2>Reconstruction</h2>}
       tools={
-        <Steer title="Smoothing, bias and all else as the daemon has them by default" disabled={task.busy.value !== null || current === null} onClick={() => void apply({}, current?.tag ?? null)}>
+        <Steer
+          title="Smoothing, bias and all else as the daemon has them by default"
+          disabled={task.busy.value !== null || current === null}
+          onClick={() => void apply({}, current?.tag ?? null)}
+        >
           The defaults
         </Steer>
       }
     >
       <form
-        class="panel-body"
+        class="panel-body fades"
         onSubmit={(event) => {
           event.preventDefault();
           if ("settings" in reading) void apply(reading.settings, typed.peek()?.tag ?? current?.tag ?? null);
@@ -52,9 +57,7 @@ export function ReconstructionView() {
               parameter={parameter}
               text={draft[parameter.name] ?? ""}
               wrong={wrong?.wrong === parameter.name}
-              onInput={(text) => {
-                set(parameter.name, text);
-              }}
+              onInput={(text) => set(parameter.name, text)}
             />
           ))}
         </div>
@@ -98,7 +101,7 @@ function Parameter({ parameter, text, wrong, onInput }: ParameterProps) {
     <label class="field" title={description}>
       <span>{labelOf(name)}</span>
       {choices.length > 0 ? (
-        <select name={name} value={text} onChange={(event) => { onInput(event.currentTarget.value); }}>
+        <select name={name} value={text} onChange={(event) => onInput(event.currentTarget.value)}>
           {choices.map((choice) => (
             <option key={choice} value={String(choice)}>
               {String(choice).replaceAll("-", " ")}
@@ -107,7 +110,15 @@ function Parameter({ parameter, text, wrong, onInput }: ParameterProps) {
         </select>
       ) : (
         <span class="field-input">
-          <input type="text" inputMode={isNumber(parameter) ? "decimal" : "text"} autocomplete="off" name={name} value={text} aria-invalid={wrong} onInput={(event) => { onInput(event.currentTarget.value); }} />
+          <input
+            type="text"
+            inputMode={isNumber(parameter) ? "decimal" : "text"}
+            autocomplete="off"
+            name={name}
+            value={text}
+            aria-invalid={wrong}
+            onInput={(event) => onInput(event.currentTarget.value)}
+          />
           <span class="quiet">{unitOf(parameter)}</span>
         </span>
       )}
@@ -115,4 +126,4 @@ function Parameter({ parameter, text, wrong, onInput }: ParameterProps) {
       {isNumber(parameter) && <small class="quiet">{spanOf(parameter)}</small>}
     </label>
   );
-} // prettier-ignore
+}

@@ -5,7 +5,8 @@ import { useStore } from "../../store/store";
 import { Dialog } from "../../ui/Dialog";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
-import { annotationsOf, linesOf, type Line } from "./lines";
+import { annotationsOf, type Line, linesOf } from "./lines";
+import "./Annotations.css";
 
 /** What is written about a recording: names and what they say, one a line. */
 export function Annotations({ recording, onClose }: { recording: RecordingDocument; onClose: () => void }) {
@@ -22,14 +23,25 @@ export function Annotations({ recording, onClose }: { recording: RecordingDocume
         class="control"
         onSubmit={(event) => {
           event.preventDefault();
-          if (said !== null) void task.run("Writing…", () => recordings.annotate(recording.id, said)).then((done) => { if (done) onClose(); }); // prettier-ignore
+          if (said !== null)
+            void task
+              .run("Writing…", () => recordings.annotate(recording.id, said))
+              .then((done) => {
+                if (done) onClose();
+              });
         }}
       >
         <div class="lines">
           {lines.value.map(({ name, text }, at) => (
             <div key={at} class="line">
-              <input type="text" aria-label={`Name of line ${at + 1}`} placeholder="sample" value={name} onInput={(event) => { set(at, { name: event.currentTarget.value }); }} />
-              <input type="text" aria-label={`Text of line ${at + 1}`} placeholder="corner, white paint" value={text} onInput={(event) => { set(at, { text: event.currentTarget.value }); }} />
+              <input type="text" aria-label={`Name of line ${at + 1}`} placeholder="sample" value={name} onInput={(event) => set(at, { name: event.currentTarget.value })} />
+              <input
+                type="text"
+                aria-label={`Text of line ${at + 1}`}
+                placeholder="corner, white paint"
+                value={text}
+                onInput={(event) => set(at, { text: event.currentTarget.value })}
+              />
               <button type="button" aria-label={`Remove line ${at + 1}`} onClick={() => (lines.value = lines.peek().filter((_, n) => n !== at))}>
                 ×
               </button>
@@ -53,4 +65,4 @@ export function Annotations({ recording, onClose }: { recording: RecordingDocume
       </form>
     </Dialog>
   );
-} // prettier-ignore
+}

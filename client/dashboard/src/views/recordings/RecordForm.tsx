@@ -4,6 +4,7 @@ import { PAST_S } from "../../store/recordings";
 import { useStore } from "../../store/store";
 import type { Task } from "../../ui/useTask";
 import { limitsOf } from "./limits";
+import "./RecordForm.css";
 
 /** What to call a recording and when to end it; and a button that saves what just happened. */
 export function RecordForm({ task }: { task: Task }) {
@@ -26,7 +27,15 @@ export function RecordForm({ task }: { task: Task }) {
     <label class="field">
       <span>{label}</span>
       <span class="field-input">
-        <input type="text" inputMode="decimal" name={field} autocomplete="off" placeholder="none" value={text.value} onInput={(event) => (text.value = event.currentTarget.value)} />
+        <input
+          type="text"
+          inputMode="decimal"
+          name={field}
+          autocomplete="off"
+          placeholder="none"
+          value={text.value}
+          onInput={(event) => (text.value = event.currentTarget.value)}
+        />
         <span class="quiet">{unit}</span>
       </span>
     </label>
@@ -42,7 +51,15 @@ export function RecordForm({ task }: { task: Task }) {
     >
       <label class="field record-name">
         <span>Name</span>
-        <input type="text" name="name" maxLength={200} autocomplete="off" placeholder="named after the time" value={name.value} onInput={(event) => (name.value = event.currentTarget.value)} />
+        <input
+          type="text"
+          name="name"
+          maxLength={200}
+          autocomplete="off"
+          placeholder="named after the time"
+          value={name.value}
+          onInput={(event) => (name.value = event.currentTarget.value)}
+        />
       </label>
       <fieldset class="record-limits">
         <legend>Ends after</legend>

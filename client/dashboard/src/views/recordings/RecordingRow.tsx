@@ -1,13 +1,14 @@
-import { END_REASONS } from "../../store/events";
+import { grouped } from "../../scales/format";
 import { recordingPath } from "../../store/api";
 import type { RecordingDocument, RecordingState } from "../../store/documents";
+import { END_REASONS } from "../../store/events";
 import { useStore } from "../../store/store";
 import { ActionMenu } from "../../ui/ActionMenu";
 import { download } from "../../ui/files";
-import { grouped } from "../../ui/format";
 import { PlayIcon } from "../../ui/icons";
 import type { Task } from "../../ui/useTask";
 import { bytes, clock, duration } from "../replay/words";
+import "./RecordingRow.css";
 
 const STATES: Readonly<Record<RecordingState, string | null>> = {
   recording: "running",

@@ -1,18 +1,18 @@
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-
+import { grouped } from "../../scales/format";
 import type { RecordingDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
 import { Confirm } from "../../ui/Confirm";
-import { grouped } from "../../ui/format";
 import { Panel } from "../../ui/Panel";
 import { TaskLine } from "../../ui/Steer";
-import { useTask, type Task } from "../../ui/useTask";
+import { type Task, useTask } from "../../ui/useTask";
 import { OpenButton } from "../files/OpenButton";
 import { bytes, duration } from "../replay/words";
 import { Annotations } from "./Annotations";
 import { RecordForm } from "./RecordForm";
 import { RecordingRow } from "./RecordingRow";
+import "./RecordingsView.css";
 
 /** Recordings: start and stop one, look through them, play them, take them home. */
 export function RecordingsView() {
@@ -30,12 +30,16 @@ export function RecordingsView() {
       title={<h2>Recordings</h2>}
       tools={
         <>
-          {known?.free_bytes != null && <span class="quiet" title={known.directory}>{bytes(known.free_bytes)} free</span>}
+          {known?.free_bytes != null && (
+            <span class="quiet" title={known.directory}>
+              {bytes(known.free_bytes)} free
+            </span>
+          )}
           <OpenButton kind=".h5" title="Show a recording of this service by the file that was downloaded" />
         </>
       }
     >
-      <div class="panel-body">
+      <div class="panel-body fades">
         {recordings.active.value === null ? <RecordForm task={task} /> : <Running recording={recordings.active.value} task={task} />}
         <TaskLine task={task} field="recordings-status" />
         {recordings.trouble.value !== null && <p class="refusal">{recordings.trouble.value}</p>}
@@ -44,13 +48,7 @@ export function RecordingsView() {
           {known?.recordings
             .filter(({ id }) => id !== known.active)
             .map((recording) => (
-              <RecordingRow
-                key={recording.id}
-                recording={recording}
-                task={task}
-                onAnnotate={() => (annotating.value = recording)}
-                onDelete={() => (deleting.value = recording)}
-              />
+              <RecordingRow key={recording.id} recording={recording} task={task} onAnnotate={() => (annotating.value = recording)} onDelete={() => (deleting.value = recording)} />
             ))}
         </ul>
       </div>
@@ -77,7 +75,7 @@ export function RecordingsView() {
 /** The recording that runs, and the way to end it. */
 function Running({ recording, task }: { recording: RecordingDocument; task: Task }) {
   const { recordings, replay } = useStore();
-  const limit_s = recording.limits?.["duration_s"] ?? null;
+  const limit_s = recording.limits?.duration_s ?? null;
   return (
     <div class="recording-now">
       <span class="recording-sign">

@@ -1,11 +1,11 @@
 import { useEffect } from "preact/hooks";
-
+import { fixed, grouped } from "../../scales/format";
 import { REPLAY_SPEEDS, type Replay, type ReplaySettings, type Timeline } from "../../store/replay";
 import { useStore } from "../../store/store";
 import { Choice } from "../../ui/controls";
-import { fixed, grouped } from "../../ui/format";
 import { PauseIcon, PlayIcon, StepIcon } from "../../ui/icons";
 import { clock } from "./words";
+import "./ReplayBar.css";
 
 /** The timeline of the recording that the views show, and the way back to the camera. */
 export function ReplayBar() {
@@ -23,16 +23,27 @@ export function ReplayBar() {
         </span>
       </div>
       <div class="replay-controls">
-        <button type="button" class="play" aria-label="One frame back" title="One frame back ([)" onClick={() => { replay.step(-1); }}>
+        <button type="button" class="play" aria-label="One frame back" title="One frame back ([)" onClick={() => replay.step(-1)}>
           <StepIcon back />
         </button>
-        <button type="button" class="play" aria-label={playing ? "Pause the recording" : "Play the recording"} title="Play or pause the recording (P)" onClick={() => { replay.toggle(); }}>
+        <button
+          type="button"
+          class="play"
+          aria-label={playing ? "Pause the recording" : "Play the recording"}
+          title="Play or pause the recording (P)"
+          onClick={() => replay.toggle()}
+        >
           {playing ? <PauseIcon /> : <PlayIcon />}
         </button>
-        <button type="button" class="play" aria-label="One frame on" title="One frame on (])" onClick={() => { replay.step(1); }}>
+        <button type="button" class="play" aria-label="One frame on" title="One frame on (])" onClick={() => replay.step(1)}>
           <StepIcon />
         </button>
-        <Choice label="Speed of the recording" value={replay.speed.value} options={REPLAY_SPEEDS.map((speed) => ({ value: speed, text: `${speed} ×` }))} onChange={(speed) => (replay.speed.value = speed)} />
+        <Choice
+          label="Speed of the recording"
+          value={replay.speed.value}
+          options={REPLAY_SPEEDS.map((speed) => ({ value: speed, text: `${speed} ×` }))}
+          onChange={(speed) => (replay.speed.value = speed)}
+        />
         <Choice
           label="Computed with"
           value={replay.settings.value}
@@ -44,12 +55,12 @@ export function ReplayBar() {
         />
       </div>
       <Scrubber replay={replay} timeline={timeline} />
-      <button type="button" class="primary" onClick={() => { replay.leave(); }}>
+      <button type="button" class="primary" onClick={() => replay.leave()}>
         Back to live
       </button>
     </section>
   );
-} // prettier-ignore
+}
 
 /** The recording from its first frame to its last; dragged, or moved by arrow keys. */
 function Scrubber({ replay, timeline }: { replay: Replay; timeline: Timeline }) {

@@ -1,5 +1,5 @@
 /** Sizes, durations and times of recordings, for people. */
-import { engineering, fixed, NOTHING } from "../../ui/format";
+import { engineering, fixed, NOTHING } from "../../scales/format";
 
 /** A date as the reader's country writes it, and a time of 24 hours. */
 export function clock(unix_s: number | null): string {

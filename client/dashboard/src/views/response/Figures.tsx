@@ -1,9 +1,9 @@
 import { useComputed } from "@preact/signals";
 
 import { rangeOfTime_m } from "../../physics/constants";
+import { deviation, fixed } from "../../scales/format";
 import type { Pixel } from "../../store/pixel";
 import { useStore } from "../../store/store";
-import { deviation, fixed } from "../../ui/format";
 
 /** Range, time and light of the first return of a pixel, each with its standard deviation over the last frames. */
 export function PixelFigures({ pixel }: { pixel: Pixel }) {
@@ -36,7 +36,7 @@ export function PixelFigures({ pixel }: { pixel: Pixel }) {
       </caption>
       <tbody>
         {row("range", fixed(range_m, 3, "m"), deviation(range_std_m, "m"), "pixel-range")}
-        {row("time", fixed(time_ns, 2, "ns"), deviation((range_std_m / rangeOfTime_m(1)), "s"), "pixel-time")}
+        {row("time", fixed(time_ns, 2, "ns"), deviation(range_std_m / rangeOfTime_m(1), "s"), "pixel-time")}
         {row(ofLight, fixed(light, 0, unit), deviation(light_std, unit), "pixel-light")}
       </tbody>
     </table>

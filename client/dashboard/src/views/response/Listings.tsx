@@ -1,10 +1,11 @@
 import { rangeOfTime_m } from "../../physics/constants";
-import type { PixelDocument, Return } from "../../stream/protocol";
+import { deviation, engineering, fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
+import type { PixelDocument, Return } from "../../stream/protocol";
 import { FLAGS } from "../../ui/flags";
-import { deviation, engineering, fixed } from "../../ui/format";
 import type { FlagHistory } from "./flagShares";
-import { linesOf, sifted, type ReturnHistory, type ReturnLine } from "./returns";
+import { linesOf, type ReturnHistory, type ReturnLine, sifted } from "./returns";
+import "./Listings.css";
 
 /** What the service found at the pixel: returns, the truth where it is known, and flags. `held` is the number of the frame that is held. */
 export function Found({ details, held, flags, returns }: { details: PixelDocument | null; held: number | null; flags: FlagHistory; returns: ReturnHistory }) {

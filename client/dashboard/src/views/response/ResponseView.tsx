@@ -1,31 +1,34 @@
-import { computed, effect, signal, untracked, useComputed, useSignal, type ReadonlySignal, type Signal } from "@preact/signals";
+import { computed, effect, type ReadonlySignal, type Signal, signal, untracked, useComputed, useSignal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import "uplot/dist/uPlot.min.css";
 
 import { rangeOfTime_m } from "../../physics/constants";
 import { pixelOf } from "../../physics/reflection";
-import { aBoolean, remembered } from "../../store/settings";
+import { fixed, significant } from "../../scales/format";
+import { autoLimits, type Span } from "../../scales/scale";
 import type { Frame } from "../../store/frames";
 import { PIN_COLOURS } from "../../store/measures";
 import type { Pixel } from "../../store/pixel";
+import { aBoolean, type Setting } from "../../store/settings";
 import { type Store, useStore } from "../../store/store";
 import { Tabs, Toggle } from "../../ui/controls";
-import { fixed, significant } from "../../ui/format";
 import { save } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
-import { autoLimits, type Span } from "../../ui/scale";
-import { csvOf, drawnOf, type Aspect, type Subject } from "./curves";
+import { csvOf, drawnOf, type Subject } from "./curves";
 import { PixelFigures } from "./Figures";
 import { FlagHistory } from "./flagShares";
 import { richestPixel } from "./interesting";
 import { FlagWords, Found } from "./Listings";
 import { MomentsPlane } from "./MomentsPlane";
-import { responsePlot, type ResponsePlot } from "./plot";
+import { type ResponsePlot, responsePlot } from "./plot";
 import { ReturnHistory } from "./returns";
-import { ASPECTS, SIDES } from "./sides";
+import { ASPECTS, type Aspect, SIDE, SIDES } from "./sides";
 import { NO_STEMS, stemsOf } from "./stems";
+import "./ResponseView.css";
+
+const LOGARITHMIC: Setting<boolean> = { key: "response.logarithmic", initial: false, ...aBoolean() };
 
 /** Share of the height that the axis was made for which is left after a frame without such a peak. */
 const SHRINK = 0.96;
@@ -34,14 +37,14 @@ const SHRINK = 0.96;
 export function ResponseView() {
   const store = useStore();
   const { absent, amplitude } = store.frames;
-  const obstacle = absent.value["coefficients"];
+  const obstacle = absent.value.coefficients;
   useProducts(["coefficients", "range", amplitude.value]);
   const flags = useMemo(() => new FlagHistory(), []);
   const returns = useMemo(() => new ReturnHistory(), []);
   const frame = store.frames.of(obstacle === undefined ? "coefficients" : "range");
   useEffect(() => store.details.follow(store.selected, frame), [store, frame]);
   useEffect(() => selectFirst(store, frame), [store, frame]);
-  const { side } = store;
+  const side = store.settings.of(SIDE);
   const shown = useMemo(
     () =>
       computed(() => {
@@ -55,9 +58,9 @@ export function ResponseView() {
     [frame, store],
   );
   const levinson = useComputed(() => (shown.value === null ? null : pixelOf(shown.value.coefficients, shown.value.index)));
-  const logarithmic = useMemo(() => remembered(store.shelf, "response.logarithmic", false, aBoolean), [store]);
+  const logarithmic = store.settings.of(LOGARITHMIC);
   const pointed = useSignal("");
-  const pixel = useComputed(() => (absent.value["coefficients"] === undefined ? (shown.value?.pixel ?? null) : store.selected.value));
+  const pixel = useComputed(() => (absent.value.coefficients === undefined ? (shown.value?.pixel ?? null) : store.selected.value));
   const frameless = useComputed(() => frame.value === null);
   const place = useComputed(() => (pixel.value === null ? null : `${pixel.value.x}, ${pixel.value.y}`));
   const download = (aspect: Aspect) => (): void => {
@@ -95,7 +98,7 @@ export function ResponseView() {
           <Plot key={side.value} aspect={side.value} logarithmic={logarithmic} shown={shown} returns={returns} pointed={pointed} />
         )}
         {place.value !== null && (
-          <aside class="response-side" aria-label="What was found at the pixel" tabIndex={0}>
+          <aside class="response-side fades" aria-label="What was found at the pixel" tabIndex={0}>
             <Found flags={flags} returns={returns} details={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
             {pixel.value !== null && <PixelFigures key={place.value} pixel={pixel.value} />}
             <FlagWords flags={flags} looked={store.details.document.value !== null} />
@@ -151,7 +154,7 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
       aspect,
       logarithmic,
       top: () => top.current?.high ?? 1,
-      period_ns: () => store.period_s.peek() * 1e9,
+      ends_ns: () => [0, store.period_s.peek() * 1e9],
       seek: (time_ns) => {
         store.player.playing.value = false;
         store.player.seek((time_ns * 1e-9) / store.period_s.peek());
@@ -200,7 +203,11 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
     <div class="response-plot-box">
       <div class="response-plot" ref={box} data-empty={shown.value === null} data-aspect={aspect} />
       <div class="key">
-        {aspect === "bounds" && <span class="key-band" title="Any light with these moments lies within them">bounds</span>}
+        {aspect === "bounds" && (
+          <span class="key-band" title="Any light with these moments lies within them">
+            bounds
+          </span>
+        )}
         <span>estimate</span>
         {measures.pins.value.map(({ name }) => (
           <span key={name} class="key-pin" style={{ "--pin": PIN_COLOURS[name] }}>
@@ -216,7 +223,9 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
           </span>
         )}
         {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">smoothed</em>}
-        {aspect !== "cumulative" && !logarithmic && <em title="Height: linear near zero, logarithmic where it is high, so that what is dim stays in sight beside narrow and high peaks">asinh</em>}
+        {aspect !== "cumulative" && !logarithmic && (
+          <em title="Height: linear near zero, logarithmic where it is high, so that what is dim stays in sight beside narrow and high peaks">asinh</em>
+        )}
         {aspect === "density" && (
           <Toggle pressed={logarithmic} title="Logarithmic density" onToggle={() => (wanted.value = !wanted.peek())}>
             log

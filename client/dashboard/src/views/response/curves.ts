@@ -5,8 +5,8 @@ import { Poles } from "../../physics/poles";
 import { boundsAt, pixelOf, poissonKernel } from "../../physics/reflection";
 import type { Pin, PinName } from "../../store/measures";
 import type { PixelDocument } from "../../stream/protocol";
+import type { Aspect } from "./sides";
 
-export type Aspect = "density" | "bounds" | "cumulative";
 export type Truth = NonNullable<PixelDocument["truth"]>;
 
 /** Curves over the same times; their aspect says what they are. */
@@ -18,7 +18,7 @@ export interface Curves {
 }
 
 /** The lines of each aspect, in their order, as the columns of a table call them. */
-export const LINES: Readonly<Record<Aspect, readonly string[]>> = {
+const LINES: Readonly<Record<Aspect, readonly string[]>> = {
   density: ["density"],
   bounds: ["lower", "upper", "smoothed", "truth_smoothed"],
   cumulative: ["cumulative", "truth_cumulative"],
@@ -63,7 +63,11 @@ export function drawnOf(aspect: Aspect, { coefficients: c, index }: Subject, pin
 
 /** Phases that show the curves of some pixels, finer around the peaks of each. */
 function phasesOf(c: Coefficients, pixels: readonly number[]): Float64Array {
-  return phasesAround(c, SAMPLES, pixels.map((pixel) => ({ pixel, peaks: peaks(c, pixel).filter(({ share }) => share >= LEAST_SHARE) })));
+  return phasesAround(
+    c,
+    SAMPLES,
+    pixels.map((pixel) => ({ pixel, peaks: peaks(c, pixel).filter(({ share }) => share >= LEAST_SHARE) })),
+  );
 }
 
 /** The curves of one pixel. `truth` is drawn beside them where it is complete. */
@@ -107,9 +111,14 @@ function wholeOf(truth: Truth | null): Truth | null {
 export function csvOf({ curves: { aspect, time_ns, lines }, ofPins }: Drawn): string {
   const unit = aspect === "cumulative" ? "dn" : "dn_per_ns";
   const estimate = LINES[aspect][ESTIMATES[aspect]];
-  const named = [...lines.map((line, at) => ({ line, name: LINES[aspect][at] })), ...Array.from(ofPins, ([name, line]) => ({ line, name: `pin_${name.toLowerCase()}_${estimate}` }))];
+  const named = [
+    ...lines.map((line, at) => ({ line, name: LINES[aspect][at] })),
+    ...Array.from(ofPins, ([name, line]) => ({ line, name: `pin_${name.toLowerCase()}_${estimate}` })),
+  ];
   const kept = named.filter(({ line }) => line.some((value) => !Number.isNaN(value)));
   const head = ["time_ns", ...kept.map(({ name }) => `${name}_${unit}`)].join(",");
-  const rows = Array.from(time_ns, (time, n) => [time, ...kept.map(({ line }) => line[n])].map((value) => (Number.isNaN(value) ? "" : String(Number(value.toPrecision(9))))).join(","));
+  const rows = Array.from(time_ns, (time, n) =>
+    [time, ...kept.map(({ line }) => line[n])].map((value) => (Number.isNaN(value) ? "" : String(Number(value.toPrecision(9))))).join(","),
+  );
   return `${[head, ...rows].join("\n")}\n`;
 }

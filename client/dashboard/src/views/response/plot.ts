@@ -1,9 +1,10 @@
 import uPlot from "uplot";
 
 import { rangeOfTime_m } from "../../physics/constants";
+import { grouped, significant, withUnit } from "../../scales/format";
 import { PIN_COLOURS, PIN_NAMES } from "../../store/measures";
-import { grouped, significant, withUnit } from "../../ui/format";
-import { ESTIMATES, type Aspect, type Curves, type PinLines } from "./curves";
+import { type Curves, ESTIMATES, type PinLines } from "./curves";
+import type { Aspect } from "./sides";
 import { drawStems, NO_STEMS, type Stems } from "./stems";
 
 /** The plot, and the line that marks the player's time in it. */
@@ -19,8 +20,8 @@ export interface PlotOptions {
   readonly logarithmic: boolean;
   /** Upper end of the density's axis. */
   readonly top: () => number;
-  /** The time after which the flight repeats: the right end of the axis, before there is data too. */
-  readonly period_ns: () => number;
+  /** Both ends of the axis of time, before there is data too. */
+  readonly ends_ns: () => [number, number];
   /** Called with the time that was clicked. */
   readonly seek: (time_ns: number) => void;
   /** Called with the sample under the pointer; null when it leaves. */
@@ -28,7 +29,7 @@ export interface PlotOptions {
 }
 
 /** A plot of light over time of flight in ns, with the range it stands for on top. */
-export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, period_ns, seek, point }: PlotOptions): ResponsePlot {
+export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, ends_ns, seek, point }: PlotOptions): ResponsePlot {
   const style = getComputedStyle(box);
   const ink = style.getPropertyValue("--quiet");
   const hairline = style.getPropertyValue("--hairline");
@@ -64,14 +65,10 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
             point(idx == null || value == null ? null : { time_ns: data[0][idx], value });
           },
         ],
-        draw: [
-          (drawn) => {
-            drawStems(drawn, stems, { found: line, truth: truthInk });
-          },
-        ],
+        draw: [(drawn) => drawStems(drawn, stems, { found: line, truth: truthInk })],
       },
       scales: {
-        x: { time: false, range: () => [0, period_ns()] },
+        x: { time: false, range: ends_ns },
         y: logarithmic
           ? { distr: 3, range: () => [10 ** (decade(top()) - LOG_DECADES), top()] }
           : aspect !== "cumulative"
@@ -80,7 +77,17 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
       },
       axes: [
         { ...axis, size: 20, gap: 2, values: (_plot, splits) => splits.map((time_ns, at) => withUnit(String(time_ns), at === splits.length - 1 ? "ns" : "")) },
-        { ...axis, size: 52, gap: 4, label: aspect === "cumulative" ? "DN" : "DN/ns", labelSize: 16, labelGap: 0, space: 28, values: (_plot, splits) => splits.map(tickText), ...(logarithmic ? { splits: powersOfTen, filter: all } : aspect !== "cumulative" ? { splits: bentSplits(ASINH_SHARES[aspect]), filter: all } : {}) },
+        {
+          ...axis,
+          size: 52,
+          gap: 4,
+          label: aspect === "cumulative" ? "DN" : "DN/ns",
+          labelSize: 16,
+          labelGap: 0,
+          space: 28,
+          values: (_plot, splits) => splits.map(tickText),
+          ...(logarithmic ? { splits: powersOfTen, filter: all } : aspect !== "cumulative" ? { splits: bentSplits(ASINH_SHARES[aspect]), filter: all } : {}),
+        },
         {
           ...axis,
           scale: "x",
@@ -89,7 +96,7 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
           gap: 2,
           grid: { show: false },
           // Round numbers of metres, placed at the times they stand for.
-          splits: (_plot, _axis, low, high) => metres(low, high).map((range_m) => (range_m / METRES_PER_NS)),
+          splits: (_plot, _axis, low, high) => metres(low, high).map((range_m) => range_m / METRES_PER_NS),
           values: (_plot, splits) => splits.map((time_ns) => `${Number((time_ns * METRES_PER_NS).toFixed(2))}\u202fm`),
         },
       ],
@@ -112,7 +119,7 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
     show: (curves, stemsNow, pins) => {
       stems = stemsNow;
       // Where the axis bends; it follows the axis, and uPlot takes it from here.
-      Object.assign(plot.scales["y"], { asinh: top() / ASINH_SHARES[aspect] });
+      Object.assign(plot.scales.y, { asinh: top() / ASINH_SHARES[aspect] });
       if (curves === null) plot.setData(empty());
       else plot.setData([curves.time_ns, ...curves.lines, ...PIN_NAMES.map((name) => pins.get(name) ?? curves.time_ns.map(() => NaN))]);
     },

@@ -6,7 +6,7 @@ const WEAK_SHARE = 0.02;
 /** A return of a look before is the same one where it came within this time: 1 ns is 15 cm. */
 const SAME_S = 1e-9;
 /** Looks that count, and the fewest that a deviation is computed from. */
-export const LOOKS = 30;
+const LOOKS = 30;
 const FEWEST = 5;
 
 /** The returns that are worth a line, by time, and the light of the others together. */

@@ -1,6 +1,7 @@
 /** What of a pixel can be shown. */
-import type { Aspect } from "./curves";
+import { oneOf, type Setting } from "../../store/settings";
 
+export type Aspect = "density" | "bounds" | "cumulative";
 export type Side = Aspect | "moments";
 
 interface Words<T> {
@@ -16,3 +17,5 @@ export const ASPECTS: readonly Words<Aspect>[] = [
 ];
 
 export const SIDES: readonly Words<Side>[] = [...ASPECTS, { value: "moments", text: "Moments", hint: "The trigonometric moments on the complex plane" }];
+
+export const SIDE: Setting<Side> = { key: "response.side", link: "side", initial: "bounds", ...oneOf(SIDES.map(({ value }) => value)) };

@@ -1,6 +1,6 @@
+import { engineering, fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
 import type { AppliedSequence, Choice } from "../../stream/protocol";
-import { engineering, fixed } from "../../ui/format";
 import { useProducts } from "../../ui/hooks";
 import { Obstacle, Steer } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
@@ -10,8 +10,9 @@ import { FrontPlot } from "./FrontPlot";
 import { FrontSlider } from "./FrontSlider";
 import { GoalForm } from "./GoalForm";
 import { sameSequence, standingOf } from "./place";
-import { errorWords } from "./words";
 import { Summary } from "./Summary";
+import { errorWords } from "./words";
+import "./AccuracySection.css";
 
 /** What accuracy costs in time on the scene before the camera: the front, and a slider along it that sets the sequence. */
 export function AccuracySection({ applied }: { applied: AppliedSequence }) {
@@ -38,7 +39,7 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
     }
   };
   return (
-    <div class="accuracy" data-predicted={tradeoff !== null}>
+    <div class="accuracy fades" data-predicted={tradeoff !== null}>
       {tradeoff !== null && <FrontPlot tradeoff={tradeoff} now={now} chosen={looked} onChoose={look} />}
       <div class="accuracy-control">
         <p class="accuracy-figures">{looked === null ? <NowFigures applied={applied} truth_m={truth_m} /> : <LookedFigures choice={looked} />}</p>
@@ -56,7 +57,7 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
           </div>
         )}
       </div>
-      <div class="accuracy-facts">
+      <div class="accuracy-facts fades">
         {looked === null ? <Summary applied={applied} /> : <ChoiceFacts choice={looked} />}
         <details class="accuracy-goal">
           <summary>Plan for a target</summary>
@@ -70,7 +71,8 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
 function LookedFigures({ choice }: { choice: Choice }) {
   return (
     <>
-      <strong data-field="choice_range_error_m">± {engineering(choice.predicted.range_error_m.median, "m")}</strong> <span data-field="choice_capture_s">{engineering(choice.capture_s, "s")}</span>
+      <strong data-field="choice_range_error_m">± {engineering(choice.predicted.range_error_m.median, "m")}</strong>{" "}
+      <span data-field="choice_capture_s">{engineering(choice.capture_s, "s")}</span>
       <span data-field="choice_frame_rate_hz">{fixed(choice.frame_rate_hz, 1, "Hz")}</span> <span class="quiet">predicted</span>
     </>
   );

@@ -1,5 +1,5 @@
+import { engineering, fixed } from "../../scales/format";
 import type { Choice } from "../../stream/protocol";
-import { engineering, fixed } from "../../ui/format";
 import { Fact } from "./Figures";
 import { ZEROTH_NAMES } from "./words";
 

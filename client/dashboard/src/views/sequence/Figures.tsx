@@ -1,5 +1,6 @@
+import { engineering, fixed, grouped } from "../../scales/format";
 import type { AppliedSequence } from "../../stream/protocol";
-import { engineering, fixed, grouped } from "../../ui/format";
+import "./Figures.css";
 
 /** The figures that follow from a sequence; shown for the one in use and for one being edited. */
 export function Figures({ applied }: { applied: AppliedSequence }) {

@@ -1,10 +1,10 @@
 import { signal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
-
+import { engineering, significant } from "../../scales/format";
 import type { Choice, Tradeoff } from "../../stream/protocol";
-import { engineering, significant } from "../../ui/format";
 import { useSize } from "../../ui/hooks";
-import { endsOf, marksOf, nearest, placeOf, sameSequence, type Standing } from "./place";
+import { endsOf, marksOf, nearest, placeOf, type Standing, sameSequence } from "./place";
+import "./FrontPlot.css";
 
 const MARGIN = { left: 52, right: 14, top: 14, bottom: 50 };
 

@@ -1,8 +1,8 @@
 import { useRef } from "preact/hooks";
-
+import { engineering, fixed } from "../../scales/format";
 import type { Choice } from "../../stream/protocol";
-import { engineering, fixed } from "../../ui/format";
 import { sameSequence, stepOf } from "./place";
+import "./FrontSlider.css";
 
 interface FrontSliderProps {
   /** By rising time and falling error. */
@@ -68,6 +68,6 @@ export function FrontSlider({ front, now_s, looked, onLook, onRelease }: FrontSl
 }
 
 /** What a choice gives and takes: "± 4.0 mm in 94 ms, 10.6 Hz". */
-export function choiceWords(choice: Choice): string {
+function choiceWords(choice: Choice): string {
   return `± ${engineering(choice.predicted.range_error_m.median, "m", 2)} in ${engineering(choice.capture_s, "s", 2)}, ${fixed(choice.frame_rate_hz, 1, "Hz")}`;
 }

@@ -1,6 +1,7 @@
 import { useSignal } from "@preact/signals";
 
 import type { Goal } from "../../store/documents";
+import "./GoalForm.css";
 
 interface GoalFormProps {
   readonly disabled: boolean;

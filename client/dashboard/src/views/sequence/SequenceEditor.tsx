@@ -3,12 +3,13 @@ import { useEffect, useMemo } from "preact/hooks";
 
 import { RequestError } from "../../store/api";
 import { useStore } from "../../store/store";
-import { Obstacle, Steer } from "../../ui/Steer";
 import type { AppliedSequence, Problem, SequenceDocument, Zeroth } from "../../stream/protocol";
-import { fieldOf, sequenceProblem, TAKE_ORDER_NAMES, ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
-import { PRESETS } from "./presets";
-import { DRAFT_FIELD, documentOf, draftOf, type Draft } from "./draft";
+import { Obstacle, Steer } from "../../ui/Steer";
+import { DRAFT_FIELD, type Draft, documentOf, draftOf } from "./draft";
 import { Figures } from "./Figures";
+import { PRESETS } from "./presets";
+import { fieldOf, sequenceProblem, TAKE_ORDER_NAMES, ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
+import "./SequenceEditor.css";
 
 /** Pause after the last keystroke before the service is asked what the sequence would cost. */
 const TYPING_PAUSE_MS = 250;
@@ -86,7 +87,7 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
 
   return (
     <form
-      class="editor"
+      class="editor fades"
       onSubmit={(event) => {
         event.preventDefault();
         void apply();

@@ -24,7 +24,12 @@ export function SequenceView() {
                 Undo
               </Steer>
             )}
-            <button type="button" title="What accuracy costs in time on the scene before the camera, now" disabled={accuracy.job.value !== null} onClick={() => void accuracy.predict()}>
+            <button
+              type="button"
+              title="What accuracy costs in time on the scene before the camera, now"
+              disabled={accuracy.job.value !== null}
+              onClick={() => void accuracy.predict()}
+            >
               Predict
             </button>
             <Steer title="Change what the camera measures with" onClick={() => (editing.value = true)}>

@@ -1,5 +1,5 @@
+import { engineering, fixed } from "../../scales/format";
 import type { AppliedSequence } from "../../stream/protocol";
-import { engineering, fixed } from "../../ui/format";
 import { Fact, Figures } from "./Figures";
 import { TAKE_ORDER_NAMES, ZEROTH_NAMES } from "./words";
 

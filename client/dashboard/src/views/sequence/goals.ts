@@ -1,6 +1,6 @@
+import { engineering, fixed } from "../../scales/format";
 import { plainWords } from "../../store/api";
 import type { Problem } from "../../stream/protocol";
-import { engineering, fixed } from "../../ui/format";
 
 /** Goals as the service names them, as the form does, with their values. */
 const GOALS: readonly (readonly [field: string, name: string, write: (value: number) => string])[] = [

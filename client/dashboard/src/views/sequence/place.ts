@@ -1,6 +1,7 @@
 /** Where choices of sequences stand in the plot of accuracy against time, both logarithmic. */
+
+import { fraction, type Scale, ticks } from "../../scales/scale";
 import type { AppliedSequence, Choice, FrameMeta, Tradeoff } from "../../stream/protocol";
-import { fraction, ticks, type Scale } from "../../ui/scale";
 
 export interface Ends {
   readonly time: Scale;

@@ -1,7 +1,7 @@
+import { engineering } from "../../scales/format";
 import { plainWords } from "../../store/api";
+import type { RangeErrorFigure } from "../../store/rangeErrors";
 import type { Problem, Zeroth } from "../../stream/protocol";
-import type { RangeError } from "../../store/rangeErrors";
-import { engineering } from "../../ui/format";
 
 /** Names of the fields as the form has them. */
 const FIELD_NAMES: Readonly<Record<string, string>> = {
@@ -60,7 +60,7 @@ export const TAKE_ORDER_NAMES: Readonly<Record<string, string | undefined>> = {
 };
 
 /** What an error of the range holds. */
-export function errorWords(error: RangeError | null): string {
+export function errorWords(error: RangeErrorFigure | null): string {
   if (error === null) return "not known yet";
   return error.of === "noise" ? "noise alone (1 σ), as its bias is not known" : "noise (1 σ) and bias together";
 }

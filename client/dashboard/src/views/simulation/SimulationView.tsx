@@ -1,13 +1,13 @@
 import { useEffect } from "preact/hooks";
-
+import { engineering } from "../../scales/format";
 import type { EffectChoice, EffectDocument, Fault } from "../../store/documents";
 import { useStore } from "../../store/store";
-import { engineering } from "../../ui/format";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
-import { useTask, type Task } from "../../ui/useTask";
+import { type Task, useTask } from "../../ui/useTask";
 import { OpenButton } from "../files/OpenButton";
 import { effectWords, FAULTS, ordered, possible, sizeShare, sizeWords } from "./words";
+import "./SimulationView.css";
 
 /** The scene of a simulated camera, which effects it calls for, and what can be made to go wrong. */
 export function SimulationView() {
@@ -18,18 +18,26 @@ export function SimulationView() {
   const world = simulation.world.value;
   const explanation = simulation.explanation.value;
   return (
-    <Panel name="simulation" title={<h2>Simulated scene</h2>} tools={
+    <Panel
+      name="simulation"
+      title={<h2>Simulated scene</h2>}
+      tools={
         world !== null && (
           <>
             <ScenePicker task={task} />
             <OpenButton kind=".toml" title="Put the camera before a scene of your own: a TOML file" />
           </>
         )
-      }>
-      <div class="panel-body">
+      }
+    >
+      <div class="panel-body fades">
         {simulation.trouble.value !== null && <p class="quiet">{simulation.trouble.value}</p>}
         <Obstacle />
-        {world !== null && <p class="quiet scene-words">{world.scenes.find(({ name }) => name === world.scene)?.description ?? "A scene from a file"}. A scene of your own is opened here, or dropped on the page.</p>}
+        {world !== null && (
+          <p class="quiet scene-words">
+            {world.scenes.find(({ name }) => name === world.scene)?.description ?? "A scene from a file"}. A scene of your own is opened here, or dropped on the page.
+          </p>
+        )}
         {world !== null && (
           <fieldset class="faults">
             <legend>Let something go wrong</legend>

@@ -1,6 +1,7 @@
 /** The simulated world in words. */
+
+import { significant } from "../../scales/format";
 import type { EffectDocument, ExplanationDocument, Fault } from "../../store/documents";
-import { significant } from "../../ui/format";
 
 /** How faults are called on their buttons, and what they do. */
 export const FAULTS: Readonly<Record<Fault, { readonly word: string; readonly title: string }>> = {

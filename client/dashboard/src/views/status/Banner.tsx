@@ -1,9 +1,9 @@
-import { useEffect } from "preact/hooks";
 import { useComputed, useSignal } from "@preact/signals";
-
+import { useEffect } from "preact/hooks";
+import { timeOfDay } from "../../scales/format";
 import { lossReason } from "../../store/events";
 import { useStore } from "../../store/store";
-import { timeOfDay } from "../../ui/format";
+import "./Banner.css";
 
 /** Says at once what is wrong, and what is being done about it; goes away with it. */
 export function Banner({ onRetry }: { onRetry: () => void }) {
@@ -38,8 +38,7 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
     return (
       <div class="banner" role="alert" data-banner="camera">
         <p>
-          <strong>Camera lost</strong> at {timeOfDay(loss.at_s)}. The service looks for it and
-          goes on by itself; what you see is the last frame.{" "}
+          <strong>Camera lost</strong> at {timeOfDay(loss.at_s)}. The service looks for it and goes on by itself; what you see is the last frame.{" "}
           {loss.reason !== null && <span class="quiet">Reason: {lossReason(loss.reason)}</span>}
         </p>
       </div>
@@ -83,9 +82,7 @@ function Countdown({ until_s }: { until_s: number }) {
   const now_s = useSignal(Date.now() / 1000);
   useEffect(() => {
     const timer = setInterval(() => (now_s.value = Date.now() / 1000), 250);
-    return () => {
-      clearInterval(timer);
-    };
+    return () => clearInterval(timer);
   }, [now_s]);
   const left = useComputed(() => Math.max(0, Math.ceil(until_s - now_s.value)));
   return <>{left.value > 0 ? `Trying again in ${left.value} s.` : "Trying again."}</>;

@@ -1,11 +1,10 @@
-import { useMemo } from "preact/hooks";
-
-import { remembered } from "../../store/settings";
+import type { Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { SwitchedDialog } from "../../ui/Dialog";
 import { useNow } from "../../ui/hooks";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
+import "./ControlDialog.css";
 
 /** Longest name the service takes. */
 const LONGEST_NAME = 80;
@@ -22,7 +21,7 @@ export function ControlDialog() {
 function Control({ onDone }: { onDone: () => void }) {
   const store = useStore();
   const { lease } = store;
-  const name = useMemo(() => remembered(store.shelf, "lease.holder", "Dashboard", isName), [store]);
+  const name = store.settings.of(HOLDER);
   const task = useTask();
   const now_s = useNow(1);
   const control = lease.control.value;
@@ -58,16 +57,7 @@ function Control({ onDone }: { onDone: () => void }) {
       {control.kind !== "us" && (
         <label class="field">
           <span>What others should call you</span>
-          <input
-            type="text"
-            name="holder"
-            autocomplete="nickname"
-            maxLength={LONGEST_NAME}
-            value={name.value}
-            onInput={(event) => {
-              name.value = event.currentTarget.value;
-            }}
-          />
+          <input type="text" name="holder" autocomplete="nickname" maxLength={LONGEST_NAME} value={name.value} onInput={(event) => (name.value = event.currentTarget.value)} />
         </label>
       )}
       <TaskLine task={task} field="control-status" />
@@ -85,7 +75,12 @@ function Control({ onDone }: { onDone: () => void }) {
             Give back
           </button>
         ) : (
-          <button type="submit" class="primary" title={barred ?? undefined} disabled={barred !== null || task.busy.value !== null || control.kind === "unknown" || name.value.trim() === ""}>
+          <button
+            type="submit"
+            class="primary"
+            title={barred ?? undefined}
+            disabled={barred !== null || task.busy.value !== null || control.kind === "unknown" || name.value.trim() === ""}
+          >
             {control.kind === "other" ? "Take over" : "Take control"}
           </button>
         )}
@@ -99,6 +94,8 @@ function Control({ onDone }: { onDone: () => void }) {
   }
 }
 
-function isName(value: unknown): value is string {
-  return typeof value === "string" && value.length <= LONGEST_NAME;
-}
+const HOLDER: Setting<string> = {
+  key: "lease.holder",
+  initial: "Dashboard",
+  accepts: (value): value is string => typeof value === "string" && value.length <= LONGEST_NAME,
+};

@@ -1,12 +1,12 @@
 import { useComputed } from "@preact/signals";
-
+import { deviation, engineering, fixed, grouped, NOTHING } from "../../scales/format";
 import { CREDIBLE_LATENCY_S } from "../../store/status";
 import { useStore } from "../../store/store";
 import { KEPT_S, linesOf, type Trend } from "../../store/trends";
-import { deviation, engineering, fixed, grouped, NOTHING } from "../../ui/format";
 import { PulseIcon } from "../../ui/icons";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { Sparkline } from "../../ui/Sparkline";
+import "./Figures.css";
 
 /** All figures of the flow of frames, behind a button. */
 export function Figures() {

@@ -1,9 +1,9 @@
 import { useSignal } from "@preact/signals";
-
+import { LAYOUTS } from "../../store/layout";
 import { LONGEST_NAME } from "../../store/layouts";
 import { useStore } from "../../store/store";
 import { SwitchedDialog } from "../../ui/Dialog";
-import { LAYOUTS } from "../layout";
+import "./LayoutDialog.css";
 
 /** Saves the present layout under a name, and removes saved ones. */
 export function LayoutDialog() {
@@ -31,7 +31,15 @@ function Saved({ onDone }: { onDone: () => void }) {
     >
       <label class="field">
         <span>Name of the present layout</span>
-        <input type="text" name="layout" autocomplete="off" maxLength={LONGEST_NAME} value={text.value} aria-invalid={taken} onInput={(event) => (text.value = event.currentTarget.value)} />
+        <input
+          type="text"
+          name="layout"
+          autocomplete="off"
+          maxLength={LONGEST_NAME}
+          value={text.value}
+          aria-invalid={taken}
+          onInput={(event) => (text.value = event.currentTarget.value)}
+        />
       </label>
       <p class={taken ? "refusal" : "quiet"} role="status">
         {taken ? `${name} is a layout of the page's own: choose another name.` : "It is kept in this browser; a copied link shows it to others."}

@@ -1,9 +1,9 @@
+import { LAYOUTS } from "../../store/layout";
 import { copyLink } from "../../store/permalink";
 import { useStore } from "../../store/store";
+import { THEMES, type ThemeChoice } from "../../store/theme";
 import { ActionMenu } from "../../ui/ActionMenu";
-import { THEMES, type ThemeChoice } from "../../ui/theme";
 import { chooseFile } from "../files/openFile";
-import { LAYOUTS } from "../layout";
 
 /** What concerns the page and not the camera. */
 export function PageMenu() {
@@ -17,14 +17,17 @@ export function PageMenu() {
         {
           title: "Layout",
           actions: [
-            ...Object.entries({ ...LAYOUTS, ...store.layouts.named.value }).map(([text, layout]) => ({ text, run: () => { store.showLayout(layout); } })),
+            ...Object.entries({ ...LAYOUTS, ...store.layouts.named.value }).map(([text, layout]) => ({ text, run: () => store.showLayout(layout) })),
             { text: "Save or remove a layout…", run: () => (store.asksForLayout.value = true) },
-            ...(store.layouts.undoable.value ? [{ text: "Undo the last change (Z)", run: () => { store.layouts.undo(); } }] : []),
+            ...(store.layouts.undoable.value ? [{ text: "Undo the last change (Z)", run: () => store.layouts.undo() }] : []),
           ],
         },
         { title: "Colours", actions: THEMES.map((theme) => ({ text: THEME_NAMES[theme] + (theme === choice.value ? " ✓" : ""), run: () => (choice.value = theme) })) },
-        { title: "Files", actions: [{ text: "Open a scene, recording or calibration…", run: () => { chooseFile(store); } }] },
-        { title: "Stream", actions: [{ text: `Ask for less where link or browser is too slow${store.adapts.value ? " ✓" : ""}`, run: () => (store.adapts.value = !store.adapts.peek()) }] },
+        { title: "Files", actions: [{ text: "Open a scene, recording or calibration…", run: () => chooseFile(store) }] },
+        {
+          title: "Stream",
+          actions: [{ text: `Ask for less where link or browser is too slow${store.adapts.value ? " ✓" : ""}`, run: () => (store.adapts.value = !store.adapts.peek()) }],
+        },
         {
           title: "Help",
           actions: [
@@ -38,10 +41,10 @@ export function PageMenu() {
           actions: [
             { text: "Take control…", run: () => (store.asksForControl.value = true) },
             { text: "Token…", run: () => (store.asksForToken.value = true) },
-            ...(credentials.token.value === null ? [] : [{ text: "Forget the token", run: () => { credentials.use(null); } }]),
+            ...(credentials.token.value === null ? [] : [{ text: "Forget the token", run: () => credentials.use(null) }]),
           ],
         },
-      ]} // prettier-ignore
+      ]}
     />
   );
 }

@@ -1,14 +1,14 @@
 import { useComputed } from "@preact/signals";
-
+import { deviation, fixed } from "../../scales/format";
 import { flowTrouble } from "../../store/status";
 import { useStore } from "../../store/store";
-import { deviation, fixed } from "../../ui/format";
-import { errorWords } from "../sequence/words";
 import { useNow } from "../../ui/hooks";
+import { errorWords } from "../sequence/words";
 import { Figures } from "./Figures";
-import { demandWords } from "./words";
 import { Steering } from "./Steering";
 import { Toasts } from "./Toasts";
+import { demandWords } from "./words";
+import "./StatusBar.css";
 
 /** How things stand in three things: health, rate and deviation, and what one looks at; all else is behind a button. */
 export function StatusBar() {
@@ -16,7 +16,7 @@ export function StatusBar() {
     <header class="bar">
       <h1 class="brand">
         <img src="/icon.svg" alt="" width="24" height="24" />
-        <span class="brand-name">transientcam</span>
+        <span class="wide">transientcam</span>
       </h1>
       <StateChip />
       <LessAsked />
@@ -112,8 +112,8 @@ function Subject() {
   const { capabilities, simulated } = camera.value;
   const scene = simulation.world.value?.scene;
   return (
-    <span class="camera-name" title={`Serial number ${String(capabilities["serial"])}`} data-field="subject">
-      {simulated && scene !== undefined ? `simulated ${scene}` : String(capabilities["model"])}
+    <span class="camera-name" title={`Serial number ${String(capabilities.serial)}`} data-field="subject">
+      {simulated && scene !== undefined ? `simulated ${scene}` : String(capabilities.model)}
     </span>
   );
 }

@@ -1,12 +1,13 @@
+import { fixed } from "../../scales/format";
 import { captureOne } from "../../store/capture";
 import { useStore } from "../../store/store";
 import { Toggle } from "../../ui/controls";
-import { fixed } from "../../ui/format";
 import { useNow } from "../../ui/hooks";
 import { ControlIcon, HoldIcon, PauseIcon, PlayIcon, SingleIcon } from "../../ui/icons";
 import { Steer } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
 import { PageMenu } from "./PageMenu";
+import "./Steering.css";
 
 /** What can be done to the camera and to the page from anywhere. */
 export function Steering() {
@@ -68,7 +69,14 @@ function ControlButton() {
   const barred = caller.obstacle.value;
   if (barred !== null && control.kind !== "other") {
     return (
-      <button type="button" class="control-button" title={`${barred}: it can look, but not take control`} data-field="control" data-obstacle="" onClick={() => (asksForControl.value = true)}>
+      <button
+        type="button"
+        class="control-button"
+        title={`${barred}: it can look, but not take control`}
+        data-field="control"
+        data-obstacle=""
+        onClick={() => (asksForControl.value = true)}
+      >
         <ControlIcon /> <span class="wide">View only</span>
       </button>
     );

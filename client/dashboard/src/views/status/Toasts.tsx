@@ -3,6 +3,7 @@ import { useEffect } from "preact/hooks";
 
 import type { Happening } from "../../store/events";
 import { useStore } from "../../store/store";
+import "./Toasts.css";
 
 /** How long a notice stays, one that something can be done about longer; and how many are seen together. */
 const STAYS_S = 6;
@@ -22,9 +23,7 @@ export function Toasts() {
   useEffect(() => {
     if (soonest_s === null) return undefined;
     const timer = setTimeout(() => (now_s.value = Date.now() / 1000), 1000 * Math.max(0.1, soonest_s - Date.now() / 1000));
-    return () => {
-      clearTimeout(timer);
-    };
+    return () => clearTimeout(timer);
   }, [soonest_s, now_s]);
   return (
     <div class="toasts" role="log" aria-label="What just happened">

@@ -1,6 +1,7 @@
 /** Words of the header. */
+
+import { fixed } from "../../scales/format";
 import type { Decision } from "../../stream/connection";
-import { fixed } from "../../ui/format";
 
 /** What less is asked for, as a sign and as sentences; `zoomed` where only a part of the picture is in sight. */
 export function demandWords({ demand: { maxRate_hz, coded, part }, carried_bytes_s, pictures_hz }: Decision, zoomed: boolean): { readonly short: string; readonly long: string } {

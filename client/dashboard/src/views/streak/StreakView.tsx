@@ -1,29 +1,32 @@
 import { computed, useComputed, useSignal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
-
-import { scaleOf, TONES, type ToneKind } from "../../gl/tone";
 import { rangeOfTime_m } from "../../physics/constants";
-import { oneOf, remembered } from "../../store/settings";
+import { COLOUR_MAPS, type ColourMapName } from "../../scales/colourMaps";
+import { fixed, significant } from "../../scales/format";
+import { ticks } from "../../scales/scale";
+import { scaleOf, TONES, type ToneKind } from "../../scales/tone";
+import { oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
 import { ColourChoice } from "../../ui/ColourChoice";
-import { COLOUR_MAPS, type ColourMapName } from "../../ui/colourMaps";
 import { npy, save, savePicture } from "../../ui/download";
-import { fixed, significant } from "../../ui/format";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
-import { ticks } from "../../ui/scale";
 import { ToneChoice } from "../../ui/ToneChoice";
 import { BINS, paintStreak, Streak, whiteOf } from "./streak";
+import "./StreakView.css";
+
+const TONE: Setting<ToneKind> = { key: "streak.tone", initial: "root", ...oneOf(TONES) };
+const COLOURS: Setting<ColourMapName> = { key: "streak.colours", initial: "inferno", ...oneOf(COLOUR_MAPS) };
 
 /** One row of the picture over time of flight: columns across, time downwards. */
 export function StreakView() {
   const store = useStore();
   useProducts(["coefficients"]);
   const frame = store.frames.of("coefficients");
-  const tone = useMemo(() => remembered<ToneKind>(store.shelf, "streak.tone", "root", oneOf(TONES)), [store]);
-  const colours = useMemo(() => remembered<ColourMapName>(store.shelf, "streak.colours", "inferno", oneOf(COLOUR_MAPS)), [store]);
+  const tone = store.settings.of(TONE);
+  const colours = store.settings.of(COLOURS);
   const streak = useMemo(() => new Streak(), []);
   const canvas = useRef<HTMLCanvasElement>(null);
   const bright = useSignal(NaN);
@@ -75,9 +78,9 @@ export function StreakView() {
         </PopoverButton>
       }
       downloads={[
-        { text: "Picture (PNG)", run: () => { savePicture(name(), canvas.current); } },
-        { text: "Density in DN/s (NPY)", run: () => { save(`${name()}.npy`, new Blob([npy(streak.values, [BINS, streak.width])])); } },
-      ]} // prettier-ignore
+        { text: "Picture (PNG)", run: () => savePicture(name(), canvas.current) },
+        { text: "Density in DN/s (NPY)", run: () => save(`${name()}.npy`, new Blob([npy(streak.values, [BINS, streak.width])])) },
+      ]}
     >
       <div class="streak">
         <div class="streak-axis" aria-hidden="true">

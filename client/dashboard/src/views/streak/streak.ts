@@ -1,8 +1,8 @@
 /** A streak image: one row of the picture over time (Fig. 15). */
 import type { Coefficients } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
-import { toned, type ToneKind } from "../../gl/tone";
-import { colourTable, levelOf, type ColourMapName } from "../../ui/colourMaps";
+import { type ColourMapName, colourTable, levelOf } from "../../scales/colourMaps";
+import { type ToneKind, toned } from "../../scales/tone";
 
 /** Times of a streak image over one period. */
 export const BINS = 256;

@@ -1,9 +1,9 @@
-import { signal, type Signal } from "@preact/signals";
+import { type Signal, signal } from "@preact/signals";
 
 import type { Store } from "../../store/store";
-import { save } from "../../ui/download";
-import type { Progress, FilmKind } from "../../ui/film";
 import type { Action } from "../../ui/ActionMenu";
+import { save } from "../../ui/download";
+import type { FilmKind, Progress } from "../../ui/film";
 import { filmFrames, filmPass, type Subject } from "./film";
 
 /** The film that is being made, if one is, and why the last one was not. */
@@ -22,7 +22,10 @@ export class Filming {
     const run = (make: typeof filmPass, name: string, kind: FilmKind) => (): void => {
       void this.#make(() => make(subject, store, kind, this.#progress()), `${name}-${store.frames.of("coefficients").peek()?.meta.frame ?? 0}.${kind}`);
     };
-    const kinds: readonly (readonly [FilmKind, string])[] = [["webm", "WebM"], ["gif", "GIF"]]; // prettier-ignore
+    const kinds: readonly (readonly [FilmKind, string])[] = [
+      ["webm", "WebM"],
+      ["gif", "GIF"],
+    ];
     return kinds.flatMap(([kind, text]) => [
       { text: `Film of one pass (${text})`, run: run(filmPass, "pass", kind) },
       { text: `Film of 30 frames (${text})`, run: run(filmFrames, "frames", kind) },
@@ -70,9 +73,9 @@ export function FilmProgress({ filming }: { filming: Filming }) {
     <div class="panel-row filming" role="status">
       <span>Filming {Math.round(100 * filming.share.value)} %</span>
       <progress value={filming.share.value} aria-label="Film" />
-      <button type="button" onClick={() => { filming.cancel(); }}>
+      <button type="button" onClick={() => filming.cancel()}>
         Cancel
       </button>
     </div>
-  ); // prettier-ignore
+  );
 }

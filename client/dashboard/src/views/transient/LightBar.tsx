@@ -1,11 +1,10 @@
 import { useComputed } from "@preact/signals";
-
-import { scaleOf } from "../../gl/tone";
-import { useStore, type Store } from "../../store/store";
+import type { Scale } from "../../scales/scale";
+import { scaleOf } from "../../scales/tone";
+import type { Play, TransientLook } from "../../store/lightLook";
+import { AMPLITUDE } from "../../store/mapCatalogue";
+import { type Store, useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
-import type { Scale } from "../../ui/scale";
-import { AMPLITUDE } from "../map/catalogue";
-import type { Play, TransientLook } from "./look";
 
 /** What the colours of the light mean: their scale and its unit. */
 export function lightScale(look: TransientLook, store: Store, play: Play): { readonly scale: Scale; readonly unit: string } {

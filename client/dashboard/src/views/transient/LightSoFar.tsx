@@ -1,16 +1,15 @@
 import { useComputed } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
-
-import { toned } from "../../gl/tone";
 import type { Coefficients } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
+import { colourTable, levelOf } from "../../scales/colourMaps";
+import { toned } from "../../scales/tone";
+import { gateStart_rad, NAMES, type TransientLook } from "../../store/lightLook";
+import { AMPLITUDE } from "../../store/mapCatalogue";
 import { useStore } from "../../store/store";
-import { colourTable, levelOf } from "../../ui/colourMaps";
 import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing } from "../../ui/hooks";
 import { Stage } from "../../ui/Stage";
-import { AMPLITUDE } from "../map/catalogue";
-import { gateStart_rad, NAMES, type TransientLook } from "./look";
 
 /** Finding poles takes microseconds a pixel: larger pictures are thinned to about this many. */
 const MOST_PIXELS = 40_000;

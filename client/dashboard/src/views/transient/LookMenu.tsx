@@ -1,8 +1,8 @@
+import type { TransientLook } from "../../store/lightLook";
 import { ColourChoice } from "../../ui/ColourChoice";
 import { Check, Choice } from "../../ui/controls";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { ToneChoice } from "../../ui/ToneChoice";
-import type { TransientLook } from "./look";
 
 const STOPS = [-4, -3, -2, -1, 0, 1, 2, 3, 4, 6, 8];
 
@@ -11,7 +11,12 @@ export function LookMenu({ look }: { look: TransientLook }) {
   return (
     <PopoverButton face="Look" label="Look of the light" title="Tone, exposure and colours" kind="look">
       <ToneChoice tone={look.tone} />
-      <Choice label="Exposure" value={look.stops.value} options={STOPS.map((stops) => ({ value: stops, text: stopsText(stops) }))} onChange={(stops) => (look.stops.value = stops)} />
+      <Choice
+        label="Exposure"
+        value={look.stops.value}
+        options={STOPS.map((stops) => ({ value: stops, text: stopsText(stops) }))}
+        onChange={(stops) => (look.stops.value = stops)}
+      />
       <ColourChoice colours={look.colours} />
       {look.play.value === "density" && (
         <Check title="Show the still scene behind the light" checked={look.backdrop.value} onChange={(shown) => (look.backdrop.value = shown)}>

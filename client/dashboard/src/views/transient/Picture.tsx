@@ -3,12 +3,12 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 
 import { createRenderer, hasGraphics } from "../../gl/createRenderer";
 import type { DensityRenderer } from "../../gl/renderer";
+import type { TransientLook } from "../../store/lightLook";
+import { AMPLITUDE } from "../../store/mapCatalogue";
 import { useStore } from "../../store/store";
-import { useDrawing } from "../../ui/hooks";
 import { FirstFrame } from "../../ui/FirstFrame";
+import { useDrawing } from "../../ui/hooks";
 import { Stage } from "../../ui/Stage";
-import { AMPLITUDE } from "../map/catalogue";
-import type { TransientLook } from "./look";
 
 /** Tries of WebGL2 before the page is content with typed arrays. */
 const GRAPHICS_TRIES = 2;
@@ -40,7 +40,7 @@ export function Picture({ look }: { look: TransientLook }) {
     }
     made.onLost(tryAgain);
     renderer.value = made;
-    canvas.current.dataset["renderer"] = made.kind;
+    canvas.current.dataset.renderer = made.kind;
     return () => {
       renderer.value = null;
       made.dispose();
@@ -57,12 +57,9 @@ export function Picture({ look }: { look: TransientLook }) {
     if (renderer.value === null || coefficients === null) return;
     const fits = brightness?.values.length === coefficients.width * coefficients.height;
     const white = brightness?.map?.high ?? NaN;
-    const backdrop =
-      wanted && fits && white > 0 && brightness?.values instanceof Float32Array
-        ? { values: brightness.values, white }
-        : null;
+    const backdrop = wanted && fits && white > 0 && brightness?.values instanceof Float32Array ? { values: brightness.values, white } : null;
     renderer.value.draw(coefficients, { phase_rad, tone, colours, backdrop });
-    if (canvas.current !== null) canvas.current.dataset["frame"] = String(frame.peek()?.meta.frame);
+    if (canvas.current !== null) canvas.current.dataset.frame = String(frame.peek()?.meta.frame);
     look.snapshot = () => {
       draw();
       return canvas.current;

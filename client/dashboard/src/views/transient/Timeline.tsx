@@ -1,10 +1,11 @@
 import { useEffect, useRef } from "preact/hooks";
-
+import { rangeOfTime_m } from "../../physics/constants";
+import { fixed } from "../../scales/format";
+import { ticks } from "../../scales/scale";
 import { useStore } from "../../store/store";
 import { useDrawing } from "../../ui/hooks";
-import { fixed } from "../../ui/format";
-import { rangeOfTime_m } from "../../physics/constants";
-import { ticks } from "../../ui/scale";
+import "../map/Readout.css";
+import "./Timeline.css";
 
 /** Finest step of the slider, in shares of the period. */
 const STEP = 1 / 2048;
@@ -64,9 +65,7 @@ export function Timeline() {
         step={STEP}
         aria-label="Time of flight"
         onPointerDown={() => ([player.playing.value, player.scrubbed.value] = [false, true])}
-        onInput={(event) => {
-          player.seek(event.currentTarget.valueAsNumber);
-        }}
+        onInput={(event) => player.seek(event.currentTarget.valueAsNumber)}
       />
       <div class="timeline-metres" aria-hidden="true">
         {ticks({ low: 0, high: period_m, kind: "linear" }, 6).map((range_m) => (

@@ -4,26 +4,27 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import { rangeOfTime_m } from "../../physics/constants";
 import { densityAt } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
-import { SPEEDS_NS, type Lit } from "../../store/player";
+import { fixed, significant, superscript } from "../../scales/format";
+import { gateStart_rad, NAMES, type Play, type TransientLook } from "../../store/lightLook";
+import { AMPLITUDE } from "../../store/mapCatalogue";
+import { SPEEDS_NS } from "../../store/player";
 import { type Store, useStore } from "../../store/store";
 import { Choice, Tabs } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
-import { fixed, significant, superscript } from "../../ui/format";
-import { useDrawing, useProducts } from "../../ui/hooks";
 import { captionOf, timeWords } from "../../ui/figure";
-import { saveFigure, type FigureParts } from "../../ui/figureFiles";
+import { type FigureParts, saveFigure } from "../../ui/figureFiles";
+import { useDrawing, useProducts } from "../../ui/hooks";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
-import { AMPLITUDE } from "../map/catalogue";
-import { litOf, peaksOf, turnsOf } from "./arrivals";
-import { FilmProgress } from "./Filming";
+import { litOf, peaksOf, steady, turnsOf } from "./arrivals";
+import { Filming, FilmProgress } from "./Filming";
 import { LightBar, lightScale } from "./LightBar";
-import { gateStart_rad, NAMES, type Play, type TransientLook } from "./look";
 import { LightSoFar } from "./LightSoFar";
 import { LookMenu } from "./LookMenu";
 import { Picture } from "./Picture";
-import { stripOf, PICTURES } from "./strip";
+import { PICTURES, stripOf } from "./strip";
 import { Timeline, TimeReadout } from "./Timeline";
+import "./TransientView.css";
 
 const PLAY_TABS: readonly { readonly value: Play; readonly text: string; readonly hint: string }[] = [
   { value: "density", text: "In flight", hint: "The light that arrives at one time" },
@@ -37,13 +38,14 @@ export function TransientView() {
   useProducts(["coefficients", AMPLITUDE]);
   const frame = store.frames.of("coefficients");
   const { player, light: look } = store;
+  const filming = useMemo(() => new Filming(), []);
   // A film ends with the picture that it is taken of.
   useEffect(
     () => () => {
-      look.filming.cancel();
+      filming.cancel();
       look.snapshot = () => null;
     },
-    [look],
+    [look, filming],
   );
   useDrawing(() => {
     const arrivals = frame.value?.light?.arrivals;
@@ -58,20 +60,9 @@ export function TransientView() {
       name="transient"
       title={<h2>Light</h2>}
       downloads={[
-        {
-          text: "Picture (PNG)",
-          run: () => {
-            savePicture(figureName(), look.snapshot());
-          },
-        },
-        {
-          text: "Figure (PNG)",
-          run: () => void saveFigure(figureName(), look.snapshot(), subject.parts(), "png"),
-        },
-        {
-          text: "Figure (SVG)",
-          run: () => void saveFigure(figureName(), look.snapshot(), subject.parts(), "svg"),
-        },
+        { text: "Picture (PNG)", run: () => savePicture(figureName(), look.snapshot()) },
+        { text: "Figure (PNG)", run: () => void saveFigure(figureName(), look.snapshot(), subject.parts(), "png") },
+        { text: "Figure (SVG)", run: () => void saveFigure(figureName(), look.snapshot(), subject.parts(), "svg") },
         {
           text: "Strip of 8 times (PNG)",
           run: () => {
@@ -86,7 +77,7 @@ export function TransientView() {
             savePicture(`${look.play.peek()}-strip-${frame.peek()?.meta.frame ?? 0}`, strip);
           },
         },
-        ...look.filming.actions(subject, store),
+        ...filming.actions(subject, store),
       ]}
       tools={
         <>
@@ -100,7 +91,7 @@ export function TransientView() {
         <LightBar look={look} play={play} />
       </div>
       <footer class="panel-foot">
-        <FilmProgress filming={look.filming} />
+        <FilmProgress filming={filming} />
         <Timeline />
         <div class="panel-row">
           <button
@@ -108,9 +99,7 @@ export function TransientView() {
             class="play"
             aria-label={player.playing.value ? "Pause" : "Play"}
             title={player.playing.value ? "Pause (space)" : "Play (space)"}
-            onClick={() => {
-              player.toggle();
-            }}
+            onClick={() => player.toggle()}
           >
             {player.playing.value ? <PauseIcon /> : <PlayIcon />}
           </button>
@@ -131,12 +120,6 @@ export function TransientView() {
       </footer>
     </Panel>
   );
-}
-
-/** Ends that noise alone moves stay where they are. */
-function steady(before: Lit | null, now: Lit | null): Lit | null {
-  const near = before !== null && now !== null && Math.abs(before.first - now.first) + Math.abs(before.last - now.last) < 0.03;
-  return near ? before : now;
 }
 
 /** What is written around a figure or a film of the light. */

@@ -5,8 +5,8 @@ import { rangeOfTime_m } from "../../physics/constants";
 import type { Frame } from "../../store/frames";
 import type { Store } from "../../store/store";
 import { figureLayout, figureSvg, timeWords } from "../../ui/figure";
-import { imageOf, type FigureParts } from "../../ui/figureFiles";
-import { recorderOf, type FilmKind, type Progress } from "../../ui/film";
+import { type FigureParts, imageOf } from "../../ui/figureFiles";
+import { type FilmKind, type Progress, recorderOf } from "../../ui/film";
 
 /** Width of the picture in a film, in px. */
 const PICTURE_PX = 490;

@@ -1,5 +1,5 @@
 /** A strip of pictures: light at several times, side by side. */
-import { fixed } from "../../ui/format";
+import { fixed } from "../../scales/format";
 
 const COLUMNS = 4;
 export const PICTURES = 8;

@@ -1,16 +1,17 @@
-import { useComputed, type ReadonlySignal } from "@preact/signals";
+import { type ReadonlySignal, useComputed } from "@preact/signals";
 import { useRef } from "preact/hooks";
-
+import { fixed, grouped } from "../../scales/format";
 import type { Frame } from "../../store/frames";
 import { useStore } from "../../store/store";
 import { saveNumbers, savePicture } from "../../ui/download";
-import { FLAGS } from "../../ui/flags";
 import { FirstFrame } from "../../ui/FirstFrame";
-import { fixed, grouped } from "../../ui/format";
+import { FLAGS } from "../../ui/flags";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { Stage } from "../../ui/Stage";
 import { countFlags, paintFlags } from "./reasons";
+import "../response/Listings.css";
+import "./ValidityView.css";
 
 /** Which pixels something is wrong with, and what. */
 export function ValidityView() {
@@ -32,7 +33,7 @@ export function ValidityView() {
     const fits = brightness?.values.length === newest.values.length;
     paintFlags(newest.values, fits ? brightness.values : null, brightness?.map?.high ?? 1, image.data);
     context.putImageData(image, 0, 0);
-    canvas.current.dataset["frame"] = String(newest.meta.frame);
+    canvas.current.dataset.frame = String(newest.meta.frame);
   }, [frame, scene]);
   const empty = useComputed(() => frame.value === null);
   return (
@@ -40,9 +41,9 @@ export function ValidityView() {
       name="validity"
       title={<h2>Validity</h2>}
       downloads={[
-        { text: "Picture (PNG)", run: () => { savePicture(`validity-${frame.peek()?.meta.frame ?? 0}`, canvas.current); } },
-        { text: "Flags (NPY)", run: () => { saveNumbers(frame.peek()); } },
-      ]} // prettier-ignore
+        { text: "Picture (PNG)", run: () => savePicture(`validity-${frame.peek()?.meta.frame ?? 0}`, canvas.current) },
+        { text: "Flags (NPY)", run: () => saveNumbers(frame.peek()) },
+      ]}
     >
       <Stage width={width} height={height} label="Validity map">
         <canvas ref={canvas} data-product="flags" />

@@ -1,0 +1,347 @@
+/** Between the worker and the store: takes what arrives into the store once an animation frame. */
+import { effect } from "@preact/signals";
+import { Fluency } from "../stream/fluency";
+import type { AppliedSequence, CameraDocument, ErrorMessage, Hello, Notice, Problem } from "../stream/protocol";
+import type { FrameReport } from "../stream/summary";
+import type { Command, Report } from "../stream/worker";
+import type { AnimationLoop } from "./animation";
+import { kindOf, LIVE, RequestError } from "./api";
+import { inWords, lossWords, sequenceKey } from "./events";
+import { frameOf } from "./frames";
+import type { Store } from "./store";
+
+/** What of a Worker is used. */
+export interface WorkerPort {
+  onmessage: ((event: MessageEvent<Report>) => void) | null;
+  postMessage(command: Command): void;
+}
+
+/** The page's clock in s of unix time. */
+type Clock = () => number;
+
+export class StreamClient {
+  readonly #store: Store;
+  readonly #worker: WorkerPort;
+  readonly #loop: AnimationLoop;
+  readonly #now_s: Clock;
+  /** Newest frame a product that is not drawn yet: what comes faster than the display replaces it. */
+  readonly #pending = new Map<string, FrameReport>();
+  /** Frames of recordings that are asked for, by their tickets. */
+  readonly #errands = new Map<number, Errand>();
+  readonly #brought: (() => void)[] = [];
+  #tickets = 0;
+  #filling: ReturnType<typeof setTimeout> | undefined;
+  #asking = false;
+  #looking: ReturnType<typeof setTimeout> | undefined;
+  #session = "";
+  readonly #fluency = new Fluency();
+
+  constructor(store: Store, worker: WorkerPort, loop: AnimationLoop, now_s: Clock = () => Date.now() / 1000) {
+    this.#store = store;
+    this.#worker = worker;
+    this.#loop = loop;
+    this.#now_s = now_s;
+    worker.onmessage = ({ data }) => this.#receive(data);
+    loop.add(() => {
+      this.#draw();
+      for (const take of this.#brought.splice(0)) take();
+      return this.#count();
+    });
+    store.replay.loader = store.rangeErrors.loader = (path, products) => this.#bring(path, products);
+  }
+
+  /** Connects, and keeps streaming what the store's views need. */
+  open(url: string): void {
+    const { token } = this.#store.api.credentials;
+    let known = this.#store.frames.wanted.peek();
+    let shown = token.peek();
+    this.#send({ type: "open", url, products: known, token: shown });
+    effect(() => {
+      if (token.value === shown) return;
+      shown = token.value;
+      this.#send({ type: "authenticate", token: shown });
+    });
+    effect(() => {
+      const wanted = this.#store.frames.wanted.value;
+      if (wanted === known) return;
+      known = wanted;
+      this.#send({ type: "want", products: wanted });
+    });
+    effect(() => this.#send({ type: "adapt", adapts: this.#store.adapts.value }));
+    effect(() => {
+      const sight = this.#store.sight.value;
+      clearTimeout(this.#looking);
+      this.#looking = setTimeout(() => this.#send({ type: "look", sight }), 1000 * SETTLED_S);
+    });
+    effect(() => {
+      if (!this.#store.held.value) this.#loop.wake();
+    });
+    let replayed = false;
+    effect(() => {
+      const active = this.#store.replay.active.value;
+      // Frames that waited meanwhile are old: ask for new ones.
+      if (replayed && !active) this.#send({ type: "want", products: known });
+      replayed = active;
+      this.#loop.wake();
+    });
+  }
+
+  /** The page was hidden, or is seen again. */
+  hid(): void {
+    this.#fluency.restart();
+  }
+
+  retryNow(): void {
+    this.#send({ type: "retry" });
+  }
+
+  #send(command: Command): void {
+    this.#worker.postMessage(command);
+  }
+
+  #receive(report: Report): void {
+    const { status } = this.#store;
+    switch (report.type) {
+      case "connecting":
+        status.connection.value = { kind: "connecting" };
+        break;
+      case "open":
+        status.connection.value = { kind: "open" };
+        break;
+      case "refused":
+        status.connection.value = { kind: "refused" };
+        this.#store.asksForToken.value = true;
+        break;
+      case "waiting":
+        status.connectionLost(report.reason, this.#now_s() + report.retry_s);
+        break;
+      case "camera":
+        this.#takeCamera(report.document);
+        break;
+      case "demand":
+        status.demanded.value = report.demand.maxRate_hz === null ? null : report;
+        this.#fluency.restart();
+        break;
+      case "unreadable":
+        status.unreadable.value = report.reason;
+        break;
+      case "frame":
+        this.#pending.set(report.message.product, report);
+        this.#loop.wake();
+        break;
+      case "brought":
+        this.#deliver(report.ticket, report.reports, report.problem);
+        break;
+      case "message":
+        if (report.message.type === "hello") this.#greet(report.message);
+        else if (report.message.type === "notice") this.#notice(report.message);
+        else if (report.message.type === "error") this.#complain(report.message);
+        break;
+    }
+  }
+
+  #greet(hello: Hello): void {
+    const { status } = this.#store;
+    this.#takeSequence(hello.sequence);
+    if (hello.session === this.#session) {
+      status.subscribedAnew();
+      status.cameraIs(hello.camera.state, this.#now_s());
+    } else {
+      this.#session = hello.session;
+      status.sessionOpened(hello.camera.state, this.#now_s());
+      void this.#readCamera();
+      void this.learnAbsent();
+      void this.#store.caller.look();
+      void this.#store.lease.look();
+      void this.#store.recordings.refresh();
+    }
+    clearTimeout(this.#filling);
+    const soon = hello.camera.state === "streaming" && (hello.sequence?.capture_s ?? 0) < SOON_S;
+    this.#filling = setTimeout(() => void this.#fillIn(), soon ? 1000 * SOON_S : 0);
+  }
+
+  /** A camera that stands still, or takes seconds for a frame, is shown by the newest frame there is. */
+  async #fillIn(): Promise<void> {
+    const { api, frames, replay, status } = this.#store;
+    const missing = (): string[] => frames.wanted.peek().filter((product) => frames.of(product).peek()?.origin !== LIVE);
+    if (replay.active.peek() || missing().length === 0) return;
+    try {
+      if ((await api.newestFrame()) === null) return;
+      const reports = await this.#bring(LIVE, missing());
+      if (replay.active.peek()) return;
+      for (const report of reports) {
+        if (!missing().includes(report.message.product)) continue; // the stream was quicker
+        frames.put(frameOf(report));
+        status.frameDrawn(report.message.meta, this.#now_s());
+      }
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error; // the stream says what is wrong
+    }
+  }
+
+  #complain({ problem }: ErrorMessage): void {
+    // A refused user is asked for a token; an error beside that would say nothing more.
+    if (TOKEN_PROBLEMS.includes(kindOf(problem))) this.#store.api.credentials.refused.value = problem;
+    else if (kindOf(problem) === UNKNOWN_PRODUCT) void this.learnAbsent();
+    else this.#store.status.unreadable.value = problem.detail ?? problem.title ?? null;
+  }
+
+  #notice(notice: Notice): void {
+    const { status } = this.#store;
+    const shown = inWords(notice);
+    // A calibration sets the sequence anew although it stays as it is.
+    const unchanged = notice.kind === "sequence-changed" && sameSequence(notice.sequence, this.#store.sequence.peek());
+    const key = notice.kind === "sequence-changed" ? { key: sequenceKey(notice.sequence) } : {};
+    if (shown !== null && !unchanged) this.#store.events.tell(shown.words, shown.tone, key);
+    switch (notice.kind) {
+      case "dropped":
+        status.dropNotice(notice.channel, notice.total);
+        break;
+      case "lost-images":
+        status.lostImages.value += notice.count;
+        this.#store.events.tally("lost-images", notice.count, lossWords, "plain");
+        break;
+      case "camera-lost":
+        status.cameraIs("lost", this.#now_s(), notice.reason);
+        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
+        break;
+      case "camera-back":
+        status.cameraIs("streaming", this.#now_s());
+        void this.#readCamera();
+        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
+        break;
+      case "sequence-changed":
+        this.#takeSequence(notice.sequence);
+        // A calibration is good for some sequences only.
+        if (this.#store.calibrations.document.peek() !== null) void this.#store.calibrations.refresh();
+        break;
+      case "lease-changed":
+        void this.#store.lease.look();
+        break;
+      case "reconstruction-changed":
+        this.#store.replay.recompute();
+        if (this.#store.reconstruction.current.peek() !== null) void this.#store.reconstruction.refresh();
+        break;
+      case "calibration-changed":
+        if (this.#store.calibrations.document.peek() !== null) void this.#store.calibrations.refresh();
+        break;
+      case "simulation-changed":
+        this.#store.frames.sceneSince_s = status.serviceTime_s(this.#now_s());
+        this.#store.accuracy.sceneChanged();
+        this.#store.rangeErrors.sceneChanged();
+        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
+        break;
+      case "recording-started":
+      case "recording-stopped":
+        void this.#store.recordings.refresh();
+        break;
+    }
+  }
+
+  #takeSequence(sequence: AppliedSequence | null): void {
+    if (sequence !== null) this.#store.sequence.value = sequence;
+  }
+
+  /** What the stream does not say: what the camera is and can do. */
+  async #readCamera(): Promise<void> {
+    if (this.#asking) return;
+    this.#asking = true;
+    try {
+      this.#takeCamera(await this.#store.api.camera());
+    } catch {
+      // Asked again when there is a connection again; the stream itself says that there is none.
+    } finally {
+      this.#asking = false;
+    }
+  }
+
+  /** Reads which products the camera does not have: before the first subscription, which asks for no other. */
+  async learnAbsent(): Promise<void> {
+    const { api, frames } = this.#store;
+    try {
+      const absent = await api.absentProducts();
+      if (JSON.stringify(absent) !== JSON.stringify(frames.absent.peek())) frames.absent.value = absent;
+    } catch (error) {
+      if (!(error instanceof RequestError)) throw error; // the stream says what is wrong
+    }
+  }
+
+  #takeCamera(document: CameraDocument): void {
+    this.#store.camera.value = document;
+    if (document.simulated && this.#store.simulation.world.peek() === null) void this.#store.simulation.follow();
+    this.#store.status.cameraIs(document.state, this.#now_s(), document.reason);
+  }
+
+  #draw(): void {
+    if (this.#store.held.peek() || this.#store.replay.active.peek() || this.#pending.size === 0) return;
+    let newest = 0;
+    let encode_s = 0;
+    for (const report of this.#pending.values()) {
+      this.#store.frames.put(frameOf(report));
+      const { meta } = report.message;
+      newest = Math.max(newest, meta.frame);
+      encode_s += report.message.encode_s;
+      this.#store.status.frameDrawn(meta, this.#now_s());
+    }
+    this.#store.status.encode_s.value = encode_s;
+    this.#pending.clear();
+    this.#fluency.frameTaken(newest);
+    // Another client may have started the camera; or this frame was on its way when it stopped: read the state.
+    if (this.#store.status.cameraState.peek() !== "streaming") void this.#readCamera();
+    this.#send({ type: "acknowledge", frame: newest });
+  }
+
+  /** Counts how fluently the light of the stream moves; true while each refresh of the screen is to be counted. */
+  #count(): boolean {
+    const { player, frames, held, replay } = this.#store;
+    const moves = (player.playing.peek() || player.scrubbed.peek()) && frames.of("coefficients").peek() !== null;
+    if (!moves || held.peek() || replay.active.peek()) {
+      this.#fluency.restart();
+      return false;
+    }
+    const report = this.#fluency.refreshed(this.#now_s());
+    if (report !== null) this.#send({ type: "moved", ...report });
+    return true;
+  }
+
+  /** Has the worker bring products of a frame; they come before a refresh of the display, like all frames. */
+  #bring(path: string, products: readonly string[]): Promise<readonly FrameReport[]> {
+    const ticket = ++this.#tickets;
+    return new Promise((resolve, reject) => {
+      this.#errands.set(ticket, { resolve, reject });
+      this.#send({ type: "bring", ticket, path: `/api/v1${path}`, products });
+    });
+  }
+
+  #deliver(ticket: number, reports: readonly FrameReport[], problem: Problem | null): void {
+    const errand = this.#errands.get(ticket);
+    this.#errands.delete(ticket);
+    if (errand === undefined) return;
+    if (problem !== null && reports.length === 0) {
+      errand.reject(new RequestError(problem));
+      return;
+    }
+    this.#brought.push(() => errand.resolve(reports));
+    this.#loop.wake();
+  }
+}
+
+/** Whether two sequences measure with the same; each time one is set it gets another number. */
+function sameSequence(one: AppliedSequence, other: AppliedSequence | null): boolean {
+  return other !== null && JSON.stringify({ ...one, sequence_id: 0 }) === JSON.stringify({ ...other, sequence_id: 0 });
+}
+
+interface Errand {
+  readonly resolve: (reports: readonly FrameReport[]) => void;
+  readonly reject: (error: Error) => void;
+}
+
+/** How long the picture stays where it is before only the part in sight is asked for. */
+const SETTLED_S = 0.3;
+
+/** How long the stream's next frame is waited for before the newest there is will do. */
+const SOON_S = 0.4;
+
+const UNKNOWN_PRODUCT = "unknown-product";
+
+const TOKEN_PROBLEMS: readonly string[] = ["token-required", "token-refused"];

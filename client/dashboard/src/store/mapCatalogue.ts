@@ -1,0 +1,57 @@
+import type { ColourMapName } from "../scales/colourMaps";
+import type { ScaleKind } from "../scales/scale";
+
+/** A map of one number a pixel, and how it is shown unless the user chose otherwise. */
+export interface MapProduct {
+  readonly product: string;
+  readonly name: string;
+  readonly hint: string;
+  readonly unit: string;
+  readonly colours: ColourMapName;
+  readonly scale: ScaleKind;
+  readonly decimals: number;
+  /** Zero means something: limits lie evenly around it. */
+  readonly signed?: boolean;
+  /** The product whose scatter over frames this page measures; absent for what the service computes. */
+  readonly scatterOf?: string;
+}
+
+/** The maps on offer, in the order of their tabs. */
+export const MAP_PRODUCTS: readonly MapProduct[] = [
+  { product: "range", name: "Range", hint: "Distance to what the first light came from", unit: "m", colours: "viridis", scale: "linear", decimals: 3 },
+  { product: "direct", name: "Direct", hint: "Light of the first return", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
+  { product: "indirect", name: "Indirect", hint: "Light that took a longer way", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
+  { product: "brightness", name: "Brightness", hint: "All light: the zeroth moment", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
+  {
+    product: "validity",
+    name: "Validity",
+    hint: "Smallest eigenvalue of the moments over b₀; below zero no light could have made them",
+    unit: "1",
+    colours: "coolwarm",
+    scale: "linear",
+    decimals: 4,
+    signed: true,
+  },
+  {
+    product: "range_std",
+    name: "Deviation",
+    hint: "Standard deviation of the range that the noise of the sensor predicts, by the likelihood estimate",
+    unit: "m",
+    colours: "cividis",
+    scale: "logarithmic",
+    decimals: 4,
+  },
+  {
+    product: "range_scatter",
+    name: "Scatter",
+    hint: "Standard deviation of the range over the last 30 frames, as measured here",
+    unit: "m",
+    colours: "cividis",
+    scale: "logarithmic",
+    decimals: 4,
+    scatterOf: "range",
+  },
+];
+
+/** What the hover line says beside the map's own value. */
+export const AMPLITUDE = "brightness";

@@ -1,0 +1,177 @@
+"""A camera's frames, live or into a file, for the viewer Rerun."""
+
+from collections.abc import Callable, Sequence
+from math import inf
+from typing import Final
+
+import rerun as rr
+
+from transientcam.camera import Camera
+from transientcam.errors import ParameterError
+from transientcam.frame import Frame
+from transientcam.robotics._messages import (
+    Calibration,
+    Pinhole,
+    Transform,
+    messages_of,
+    viewable,
+)
+from transientcam.robotics._reports import Report
+from transientcam.robotics._rerun_messages import (
+    MEASURED,
+    PREDICTED,
+    log_message,
+    log_report,
+    log_transient,
+)
+from transientcam.robotics._scatter import Scatter
+from transientcam.robotics._source import Source
+from transientcam.wire import PRODUCTS, Subscription
+
+LOGGED: Final = ("range", "direct", "indirect", "brightness", "pointcloud", "transient")
+"""What is sent, if nothing else is said."""
+BINS: Final = 64
+FLUSH_EVERY_S: Final = 1.0
+"""After so much time of the camera, what was logged has to have arrived."""
+FLUSH_S: Final = 2.0
+"""How long that may take."""
+
+
+class RerunBridge:
+    """Sends a camera's frames to a recording of Rerun.
+
+    ``run`` belongs to one thread; ``close`` may be called from any. Who made the recording closes
+    it.
+
+    Parameters
+    ----------
+    camera
+        Whose frames.
+    recording
+        Where to, with its sinks set.
+    products
+        Products that are images; ``pointcloud`` (points and depth image), and ``transient``.
+    max_rate_hz
+        No more frames a second than this.
+    transient_rate_hz
+        No more tensors a second than this; they are the largest by far.
+    bins
+        How many times of flight a tensor has.
+    on_report
+        Called with what is in the recording, too: losses and lost connections.
+
+    Raises
+    ------
+    ParameterError
+        If a product cannot be shown.
+    ServerUnreachable, ProblemError
+        If the camera does not state its lens.
+    """
+
+    def __init__(
+        self,
+        camera: Camera,
+        recording: rr.RecordingStream,
+        *,
+        products: Sequence[str] = LOGGED,
+        max_rate_hz: float = 10.0,
+        transient_rate_hz: float = 1.0,
+        bins: int = BINS,
+        on_report: Callable[[Report], object] = lambda report: None,
+    ) -> None:
+        known = [name for name in PRODUCTS if viewable(name) and name != "raw"]
+        for name in products:
+            if name not in (*known, "transient"):
+                limit = f"some of {', '.join((*known, 'transient'))}"
+                raise ParameterError("products", name, limit)
+        self._recording = recording
+        self._bins = bins
+        self._on_report = on_report
+        rates = {"transient": min(transient_rate_hz, max_rate_hz)}
+        # the tensor is computed here: its coefficients are a tenth of its bytes
+        streamed = {"transient": "coefficients"}
+        self._subscriptions = [
+            Subscription(streamed.get(name, name), rates.get(name, max_rate_hz))
+            for name in sorted(dict.fromkeys(products), key=lambda name: name == "pointcloud")
+        ]
+        self._source = Source(camera, on_report=self._report)
+        self._scatter = Scatter()
+        self._direct: Frame | None = None
+        self._lens: Pinhole | None = None
+        self._left = inf
+        self._flushed_s = -inf
+        self._unsent = 0
+
+    def run(self, count: int | None = None) -> None:
+        """Send frames until it is closed, or until there were ``count`` of the first product."""
+        self._left = inf if count is None else count
+        while self._left > 0 and not self._source.closed:
+            self._source.attempt(self._follow, None)
+
+    def close(self) -> None:
+        """Disconnect from the camera; ``run`` returns."""
+        self._source.close()
+
+    def __enter__(self) -> "RerunBridge":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _follow(self) -> None:
+        with self._source.stream(*self._subscriptions) as stream:
+            while self._left > 0:
+                frame = stream.receive()
+                self._left -= frame.product == self._subscriptions[0].product
+                if self._is_taken(frame.meta["host_time_s"]):
+                    self._send(frame)
+                else:
+                    self._unsent += 1
+
+    def _is_taken(self, now_s: float) -> bool:
+        """Return whether what was logged arrives; so no more than a second of it waits here."""
+        if self._unsent == 0 and abs(now_s - self._flushed_s) < FLUSH_EVERY_S:
+            return True
+        try:
+            self._recording.flush(timeout_sec=FLUSH_S)
+        except (RuntimeError, TimeoutError) as error:
+            if self._unsent == 0:
+                self._on_report(Report("error", "connection", f"frames are not taken: {error}"))
+            return False
+        self._flushed_s = now_s
+        if self._unsent:
+            self._lens = None  # who takes them again may be another viewer
+            text = f"frames are taken again; {self._unsent} were not sent"
+            self._unsent = 0
+            self._report(Report("warning", "connection", text))
+        return True
+
+    def _send(self, frame: Frame) -> None:
+        lens = self._source.lens_of(frame)
+        self._recording.set_time("frame", sequence=frame.frame)
+        self._recording.set_time("capture", timestamp=frame.meta["host_time_s"])
+        if frame.product == "coefficients":
+            log_transient(self._recording, frame, self._bins)
+            return
+        if frame.product == "direct":
+            self._direct = frame
+        of_frame = self._direct if self._direct and self._direct.frame == frame.frame else None
+        intensity = None if of_frame is None else of_frame.array
+        for message in messages_of({frame.product: frame.array}, lens, intensity=intensity):
+            if lens != self._lens or not isinstance(message, Calibration | Transform):
+                log_message(self._recording, message)
+        self._lens = lens
+        if frame.product == "range":
+            self._send_deviation(frame)
+
+    def _send_deviation(self, frame: Frame) -> None:
+        predicted = frame.meta["predicted_range_std_m"]
+        if predicted is not None:
+            self._recording.log(PREDICTED, rr.Scalars(predicted["median"]))
+        measured = self._scatter.add(frame)
+        if measured is not None:
+            self._recording.log(MEASURED, rr.Scalars(measured))
+
+    def _report(self, report: Report) -> None:
+        self._on_report(report)
+        log_report(self._recording, report.level, report.text)

@@ -1,0 +1,92 @@
+"""The options of httpx and websockets, for the synchronous and the asynchronous client."""
+
+from collections.abc import Callable
+from importlib.metadata import version
+from typing import Any, Final
+
+import httpx
+from websockets.typing import Subprotocol
+
+from transientcam.requests import Answer, Request
+from transientcam.transport._errors import media_type
+from transientcam.transport._tls import shared_context
+from transientcam.wire import LEASE_HEADER, MAX_SERVER_MESSAGE_BYTES, SUBPROTOCOL
+
+USER_AGENT: Final = f"transientcam/{version('transientcam')}"
+_CLOSE_WITHIN_S = 1.0
+_QUEUED_MESSAGES = 256
+
+
+def http_options(*, token: str | None, timeout_s: float) -> dict[str, Any]:
+    """Return the options of an httpx client."""
+    headers = {"user-agent": USER_AGENT}
+    if token is not None:
+        headers["authorization"] = f"Bearer {token}"
+    return {"headers": headers, "timeout": timeout_s}
+
+
+def request_options(request: Request[Any], *, timeout_s: float) -> dict[str, Any]:
+    """Return the options of one request, besides its method and address."""
+    return {
+        "params": list(request.params),
+        "content": request.body,
+        "headers": request.headers,
+        "timeout": timeout_s + request.extra_timeout_s,
+    }
+
+
+def answer_of(response: httpx.Response) -> Answer:
+    """Return the answer in a response that was read to its end."""
+    return Answer(
+        response.status_code,
+        media_type(response.headers.get("content-type", "")),
+        response.content,
+        response.reason_phrase,
+    )
+
+
+def set_lease(headers: httpx.Headers, lease_id: str | None) -> None:
+    """Send this lease with every request from now on; None sends none."""
+    if lease_id is None:
+        headers.pop(LEASE_HEADER, None)
+    else:
+        headers[LEASE_HEADER] = lease_id
+
+
+Progress = Callable[[int, int | None], object]
+"""Takes the bytes received so far and their total; None where the total is unknown."""
+
+
+class DownloadProgress:
+    """Counts the bytes of a download and reports them to ``progress``."""
+
+    def __init__(self, response: httpx.Response, progress: Progress | None) -> None:
+        length = response.headers.get("content-length", "")
+        # a compressed body has another length once it is decoded
+        plain = length.isdecimal() and "content-encoding" not in response.headers
+        self._total = int(length) if plain else None
+        self._progress = progress
+        self._done = 0
+
+    def add(self, count: int) -> None:
+        """Count ``count`` more bytes, and report."""
+        self._done += count
+        if self._progress is not None:
+            self._progress(self._done, self._total)
+
+
+def stream_options(url: str, *, timeout_s: float, threaded: bool = False) -> dict[str, Any]:
+    """Return the options of a websockets client; ``threaded`` for one that reads on a thread."""
+    options: dict[str, Any] = {
+        "subprotocols": [Subprotocol(SUBPROTOCOL)],
+        "user_agent_header": USER_AGENT,
+        "open_timeout": timeout_s,
+        "close_timeout": _CLOSE_WITHIN_S,
+        "max_size": MAX_SERVER_MESSAGE_BYTES,  # the default of 1 MiB is less than many a frame
+        # Deflating a frame takes longer than sending it, and floats hardly shrink.
+        "compression": None,
+        # Credits bound the frames on their way, so this bounds only notices. A full queue stops
+        # the reading of pongs, which would cut the connection of a slow reader.
+        "max_queue": _QUEUED_MESSAGES,
+    }
+    return options | {"ssl": shared_context()} if threaded and url.startswith("wss:") else options

@@ -1,0 +1,128 @@
+"""The table of products: what a frame can be asked for, and what travels of it."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from transientcam.wire._contract import F32
+from transientcam.wire._encodings import ENCODINGS
+
+_IMAGE: Final = ("y", "x")
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """One kind of array that a frame offers.
+
+    Attributes
+    ----------
+    unit
+        Of the values: ``m``, ``DN`` (digital numbers of the sensor), ``DN/s`` or ``1``.
+    axes
+        Names of the axes, slowest first.
+    dtype
+        As numpy writes it, byte order included.
+    """
+
+    name: str
+    unit: str
+    axes: tuple[str, ...]
+    dtype: str
+    summary: str
+
+    @property
+    def encodings(self) -> tuple[str, ...]:
+        """Names of the encodings that it can be sent in."""
+        fitting = (each.name for each in ENCODINGS.values() if each.fits(self.axes, self.dtype))
+        return F32, *fitting
+
+
+PRODUCTS: Final[dict[str, Product]] = {
+    product.name: product
+    for product in (
+        Product("range", "m", _IMAGE, "<f4", "range of the first return; NaN without one"),
+        Product("direct", "DN", _IMAGE, "<f4", "weight of the first return"),
+        Product("indirect", "DN", _IMAGE, "<f4", "weight of all later returns"),
+        Product("uniform", "DN", _IMAGE, "<f4", "weight spread evenly over all times"),
+        Product("brightness", "DN", _IMAGE, "<f4", "zeroth moment: all light"),
+        Product("validity", "1", _IMAGE, "<f4", "smallest eigenvalue of the moments, over b_0"),
+        Product(
+            "range_std",
+            "m",
+            _IMAGE,
+            "<f4",
+            "standard deviation that the noise of the sensor gives the range; NaN without one",
+        ),
+        Product(
+            "range_bias",
+            "m",
+            _IMAGE,
+            "<f4",
+            "bias of the range, as far as the frame shows it; NaN if m = 1",
+        ),
+        Product(
+            "range_error",
+            "m",
+            _IMAGE,
+            "<f4",
+            "noise and bias of the range together: root sum of squares; NaN if m = 1",
+        ),
+        Product(
+            "reduced_chi_square",
+            "1",
+            _IMAGE,
+            "<f4",
+            "misfit over noise, about 1 where the moments are explained: of two-returns or "
+            "unwrapped-phase where that is the estimator, of the likelihood else",
+        ),
+        Product("flags", "1", _IMAGE, "|u1", "what was wrong with a pixel; 0 for nothing"),
+        Product(
+            "coefficients",
+            "DN,1",
+            ("coefficient", *_IMAGE),
+            "<f4",
+            "E in DN, then Re and Im of a_1 to a_m (Eq. 2; a_0 is 1)",
+        ),
+        Product("moments", "DN", ("moment", *_IMAGE), "<c8", "calibrated moments b_0 to b_m"),
+        Product(
+            "measured_moments",
+            "DN",
+            ("moment", *_IMAGE),
+            "<c8",
+            "calibrated moments b_0 to b_m before smoothing and biasing",
+        ),
+        Product("raw", "DN", ("image", *_IMAGE), "<u2", "images of the sensor, each labelled"),
+        Product("transient", "DN/s", ("time", *_IMAGE), "<f4", "density over time of flight"),
+        Product(
+            "density_std",
+            "DN/s",
+            ("time", *_IMAGE),
+            "<f4",
+            "standard deviation of transient that the sensor's noise predicts, to first order",
+        ),
+        Product("cumulative", "DN", ("time", *_IMAGE), "<f4", "light up to a time of flight"),
+        Product("streak", "DN/s", ("time", "x"), "<f4", "density over time of flight of one row"),
+        Product(
+            "bounds",
+            "DN/s",
+            ("bound", "time", *_IMAGE),
+            "<f4",
+            "least and greatest density, smoothed, that the moments allow",
+        ),
+        Product(
+            "returns",
+            "s,DN",
+            ("return", *_IMAGE),
+            "<f4",
+            "time of flight and weight of each return, the strongest first; NaN and 0 for none",
+        ),
+        Product(
+            "pointcloud",
+            "m",
+            ("coordinate", *_IMAGE),
+            "<f4",
+            "x (right), y (down), z (forward) of the first return; NaN without one",
+        ),
+        Product("truth", "m", _IMAGE, "<f4", "the simulated scene's range; NaN without light"),
+    )
+}
+"""Every product by name: an entry here and one of the server's registry make a product."""

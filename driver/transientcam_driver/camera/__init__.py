@@ -1,0 +1,58 @@
+"""What a camera is: its interface, its values, its limits, and the plug-ins that open one.
+
+Programs use a `Camera`. `Status`, `RawFrame` and `Counters` are plain values of any device.
+`HostCamera` is the base of cameras whose state is kept on this machine. A package offers a
+`CameraPlugin`; `open_camera` opens a camera by its name.
+"""
+
+from transientcam_driver.camera._camera import Camera, CameraState
+from transientcam_driver.camera._capabilities import (
+    IMAGE_HEADER_BYTES,
+    AppliedSequence,
+    Capabilities,
+)
+from transientcam_driver.camera._factory import FactoryCalibration, Lens
+from transientcam_driver.camera._frame import Counters, RawFrame
+from transientcam_driver.camera._hop import Hop
+from transientcam_driver.camera._host_camera import HostCamera
+from transientcam_driver.camera._opening import check_camera, kinds, open_camera, plugin_of
+from transientcam_driver.camera._plugin import CameraName, CameraPlugin, FoundCamera
+from transientcam_driver.camera._sensor import Sensor
+from transientcam_driver.camera._simulation import (
+    ExplainedEffect,
+    Explanation,
+    Response,
+    Simulation,
+    Truth,
+)
+from transientcam_driver.camera._status import DeviceState, Status, StatusFlag
+
+__all__ = [
+    "IMAGE_HEADER_BYTES",
+    "AppliedSequence",
+    "Camera",
+    "CameraName",
+    "CameraPlugin",
+    "CameraState",
+    "Capabilities",
+    "Counters",
+    "DeviceState",
+    "ExplainedEffect",
+    "Explanation",
+    "FactoryCalibration",
+    "FoundCamera",
+    "Hop",
+    "HostCamera",
+    "Lens",
+    "RawFrame",
+    "Response",
+    "Sensor",
+    "Simulation",
+    "Status",
+    "StatusFlag",
+    "Truth",
+    "check_camera",
+    "kinds",
+    "open_camera",
+    "plugin_of",
+]

@@ -1,0 +1,1 @@
+"""The cameras there are drivers for, one package each."""

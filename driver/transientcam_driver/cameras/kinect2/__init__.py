@@ -1,0 +1,130 @@
+"""Microsoft Kinect v2: three fixed frequencies over USB 3 (docs/cameras.md, docs/kinect2.md).
+
+``packets`` finds sub-images in the packets of the isochronous endpoint, ``codes`` decodes them,
+``measurement`` puts them in the order of a frame, ``tables`` and ``parameters`` read what the
+camera knows about itself; ``encoder`` goes the other way. All of these are pure. The bytes are
+those that OpenKinect/libfreenect2 accepts.
+"""
+
+from transientcam_driver.cameras.kinect2 import (
+    _codes as codes,
+    _encoder as encoder,
+    _measurement as measurement,
+)
+from transientcam_driver.cameras.kinect2._abilities import (
+    EXPOSURE_S,
+    FRAME_RATE_HZ,
+    IMAGE_PERIOD_S,
+    capabilities_of,
+)
+from transientcam_driver.cameras.kinect2._camera import Kinect2Camera
+from transientcam_driver.cameras.kinect2._codes import BITS, ZERO_DN
+from transientcam_driver.cameras.kinect2._commands import (
+    COLOR_PARAMETERS_BYTES,
+    COMPLETION_MAGIC,
+    INITIALISE_STREAMS,
+    MODE_OFF,
+    MODE_ON,
+    MODE_ON_PLAIN,
+    READ_COLOR_PARAMETERS,
+    READ_FIRMWARE_VERSIONS,
+    READ_HARDWARE,
+    READ_P0,
+    READ_PARAMETERS,
+    READ_SERIAL,
+    READ_STATUS,
+    REQUEST_MAGIC,
+    STOP,
+    STREAMING_OFF,
+    STREAMING_ON,
+    Request,
+)
+from transientcam_driver.cameras.kinect2._device import Identity, Kinect2
+from transientcam_driver.cameras.kinect2._finding import PRODUCT, facts, list_kinects, open_kinect2
+from transientcam_driver.cameras.kinect2._layout import (
+    BASE_FREQUENCY_HZ,
+    HEIGHT,
+    IN_ORDER,
+    MEASURED,
+    PHASES,
+    SAMPLING,
+    STREAM_MULTIPLES,
+    SUB_IMAGE_BYTES,
+    SUB_IMAGES,
+    WIDTH,
+)
+from transientcam_driver.cameras.kinect2._link import (
+    PRODUCT_IDS,
+    VENDOR_ID,
+    FailureTaker,
+    PacketTaker,
+)
+from transientcam_driver.cameras.kinect2._packets import TICK_S, Assembler
+from transientcam_driver.cameras.kinect2._parameters import ROWS, DepthParameters, Rows
+from transientcam_driver.cameras.kinect2._tables import RESPONSE_BYTES, P0Tables
+from transientcam_driver.cameras.kinect2._usb_link import LEAST_TRANSFERS, PACKETS, TRANSFERS
+from transientcam_driver.cameras.kinect2._usb_port import PACKET_BYTES, UDEV_RULES, libusb
+
+__all__ = [
+    "BASE_FREQUENCY_HZ",
+    "BITS",
+    "COLOR_PARAMETERS_BYTES",
+    "COMPLETION_MAGIC",
+    "EXPOSURE_S",
+    "FRAME_RATE_HZ",
+    "HEIGHT",
+    "IMAGE_PERIOD_S",
+    "INITIALISE_STREAMS",
+    "IN_ORDER",
+    "LEAST_TRANSFERS",
+    "MEASURED",
+    "MODE_OFF",
+    "MODE_ON",
+    "MODE_ON_PLAIN",
+    "PACKETS",
+    "PACKET_BYTES",
+    "PHASES",
+    "PRODUCT",
+    "PRODUCT_IDS",
+    "READ_COLOR_PARAMETERS",
+    "READ_FIRMWARE_VERSIONS",
+    "READ_HARDWARE",
+    "READ_P0",
+    "READ_PARAMETERS",
+    "READ_SERIAL",
+    "READ_STATUS",
+    "REQUEST_MAGIC",
+    "RESPONSE_BYTES",
+    "ROWS",
+    "SAMPLING",
+    "STOP",
+    "STREAMING_OFF",
+    "STREAMING_ON",
+    "STREAM_MULTIPLES",
+    "SUB_IMAGES",
+    "SUB_IMAGE_BYTES",
+    "TICK_S",
+    "TRANSFERS",
+    "UDEV_RULES",
+    "VENDOR_ID",
+    "WIDTH",
+    "ZERO_DN",
+    "Assembler",
+    "DepthParameters",
+    "FailureTaker",
+    "Identity",
+    "Kinect2",
+    "Kinect2Camera",
+    "P0Tables",
+    "PacketTaker",
+    "Request",
+    "Rows",
+    "capabilities_of",
+    "codes",
+    "encoder",
+    "facts",
+    "libusb",
+    "list_kinects",
+    "measurement",
+    "open_kinect2",
+]

@@ -1,0 +1,435 @@
+"""A camera behind docs/usb-protocol.md: configure it, start it, take its frames."""
+
+import math
+import threading
+import warnings
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+from transientcam_driver.camera import (
+    IMAGE_HEADER_BYTES,
+    AppliedSequence,
+    CameraState,
+    Capabilities,
+    Counters,
+    DeviceState,
+    RawFrame,
+    Simulation,
+    Status,
+)
+from transientcam_driver.cameras.open_usb._receiving import Receiver
+from transientcam_driver.cameras.open_usb._transport import Transport
+from transientcam_driver.cameras.open_usb.protocol import (
+    CAPS_ROOM_BYTES,
+    LAST_ERROR_BYTES,
+    STATUS_BYTES,
+    TIME_BYTES,
+    Commitment,
+    Request,
+    SequenceWords,
+    unpack_capabilities,
+    unpack_last_error,
+    unpack_status,
+    unpack_time,
+)
+from transientcam_driver.clock import Clock, RealClock
+from transientcam_driver.errors import (
+    CameraClosed,
+    CameraError,
+    CameraFault,
+    CameraLost,
+    DeviceRefused,
+    FrameTimeout,
+    NotStreaming,
+    ProtocolError,
+    TransferOverflow,
+    TransferStalled,
+)
+from transientcam_driver.sequence import Sequence
+
+READ_S = 0.1
+"""Longest single read: how long a stop or an interrupt may have to wait for a reader."""
+_BEATS_PER_TIMEOUT = 4
+_PERIOD_RTOL = 0.01  # of the time from image to image, which capabilities give to the nanosecond
+
+
+class UsbCamera:
+    """An AMCW lidar on USB, real or simulated, owned by this process: a `Camera`.
+
+    Methods may be called from any thread, ``read_frame`` from one at a time. Images are read on
+    the thread that calls ``read_frame``, which also sends the heartbeat: the light is on only
+    while frames are read. When none is read for longer than the device's heartbeat, the device
+    switches itself off, and the next ``read_frame`` starts it again.
+
+    The light goes off with ``stop``, ``safe_off`` and ``close``, when the object is collected or
+    the interpreter ends, and by the device's own watchdog when the process dies.
+
+    Parameters
+    ----------
+    connect
+        Finds and claims the device with a serial number, or any when it is None.
+    clock
+        Real time by default.
+    simulation
+        The handle on a simulated camera; None for a real one.
+    sequence
+        What to configure first; by default the nearest that the camera can do to ``Sequence()``.
+    """
+
+    factory: None = None
+
+    def __init__(
+        self,
+        connect: Callable[[str | None], Transport],
+        *,
+        clock: Clock | None = None,
+        simulation: Simulation | None = None,
+        sequence: Sequence | None = None,
+    ) -> None:
+        self._connect = connect
+        self._clock = clock or RealClock()
+        self.simulation = simulation
+        self.counters = Counters()
+        self._control = threading.RLock()  # requests and the state
+        self._reading = threading.Lock()  # held by the reader
+        self._requested = sequence
+        self._resume = False
+        self._closed = False
+        self._heartbeat_s = -math.inf
+        self._stalled = False
+        self._state = CameraState.CONNECTING
+        self._applied: AppliedSequence | None = None
+        self._open(None)
+
+    # --- state and methods -------------------------------------------------------------------
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What the camera can do, by its own answer."""
+        return self._capabilities
+
+    @property
+    def state(self) -> CameraState:
+        """Where the camera stands."""
+        return self._state
+
+    @property
+    def applied(self) -> AppliedSequence:
+        """What is really set."""
+        assert self._applied is not None  # noqa: S101  (set before the constructor returns)
+        return self._applied
+
+    def validate(self, sequence: Sequence) -> AppliedSequence:
+        """Return what would be set, without a request to the device; the epoch is 0.
+
+        Raises
+        ------
+        SequenceError
+            Naming the field, its value and the limit of this camera.
+        """
+        return self._capabilities.apply(sequence)
+
+    def configure(self, sequence: Sequence) -> AppliedSequence:
+        """Set a sequence; while streaming, the next frame is the new sequence's.
+
+        Frames of the sequence before are not delivered any more once this returns.
+
+        Raises
+        ------
+        SequenceError
+            The sequence is not possible; nothing was changed.
+        CameraLost
+            The camera is gone; the sequence is not remembered.
+        """
+        self._capabilities.validate(sequence)
+        with self._control:
+            applied = self._configure(sequence)
+            self._requested = sequence
+            return applied
+
+    def start(self) -> None:
+        """Switch the light on and capture frames back to back."""
+        with self._control:
+            self._start()
+            self._resume = True
+
+    def stop(self) -> None:
+        """Switch the light off; a ``read_frame`` that is waiting raises NotStreaming."""
+        self._off(Request.STOP)
+
+    def safe_off(self) -> None:
+        """Switch the light off by the request that a device always honours."""
+        self._off(Request.SAFE_OFF)
+
+    def status(self) -> Status:
+        """Read the device's status."""
+        with self._control:
+            return unpack_status(self._request_in(Request.GET_STATUS, length=STATUS_BYTES))
+
+    def device_time_s(self) -> float:
+        """Read the device's clock: seconds since power-up."""
+        with self._control:
+            return unpack_time(self._request_in(Request.GET_TIME, length=TIME_BYTES))
+
+    def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
+        """Wait for the next complete frame.
+
+        Raises
+        ------
+        FrameTimeout
+            None was complete in time; the camera goes on capturing.
+        ProtocolError
+            None was complete in time, because images have another size than the capabilities say.
+        NotStreaming
+            The camera was not started, or was stopped meanwhile.
+        CameraLost
+            It was unplugged or does not answer; see ``reconnect``.
+        CameraFault
+            The device switched itself off.
+        """
+        with self._reading:
+            end_s = self._clock.now_s() + timeout_s
+            while True:
+                self._keep_alive()
+                if (frame := self._receiver.take()) is not None:
+                    return frame
+                left_s = end_s - self._clock.now_s()
+                if left_s <= 0:
+                    self._receiver.require_images_of_the_size_announced()
+                    raise FrameTimeout(timeout_s)
+                if not self._read(min(left_s, READ_S)):
+                    self._check_silence()
+
+    def reconnect(self) -> None:
+        """After CameraLost: find the same device again, restore the sequence, resume streaming.
+
+        Does nothing unless the camera is disconnected.
+
+        Raises
+        ------
+        CameraNotFound
+            It is still absent; try again later.
+        CameraError
+            It is there but cannot be opened: not yet (a node without its permissions, a second
+            unplugging), or because another program has claimed it.
+        """
+        with self._reading, self._control:
+            self._require_open()
+            if self._state is not CameraState.DISCONNECTED:
+                return
+            self._close_transport()
+            self._open(self._capabilities.serial)
+            if self._resume:
+                self._start()
+
+    def close(self) -> None:
+        """Switch the light off and give the device back; may be called twice."""
+        with self._control:
+            if self._closed:
+                return
+            self._closed = True
+            self._resume = False
+            with suppress(CameraError):  # the light of a lost camera is the watchdog's
+                self._transport.control_out(Request.SAFE_OFF)
+            self._state = CameraState.DISCONNECTED
+        with self._reading:  # the device must not be closed while a thread reads
+            self._close_transport()
+
+    def __enter__(self) -> "UsbCamera":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # --- connection ------------------------------------------------------------------------
+
+    def _open(self, serial: str | None) -> None:
+        self._state = CameraState.CONNECTING
+        try:
+            self._transport = self._connect(serial)
+        except CameraError:
+            self._state = CameraState.DISCONNECTED
+            raise
+        self._release = weakref.finalize(self, _release, self._transport)
+        try:
+            # usb-protocol 9: also where the last owner left the light on
+            self._transport.control_out(Request.SAFE_OFF)
+            self._capabilities = unpack_capabilities(
+                self._request_in(Request.GET_CAPS, length=CAPS_ROOM_BYTES)
+            )
+            self._transport.expect_transfers(IMAGE_HEADER_BYTES + self._capabilities.image_bytes)
+            self._receiver = Receiver(self._capabilities, self.counters)
+            self._configure(self._requested or self._capabilities.nearest(Sequence()))
+        except BaseException:
+            self._close_transport()
+            self._state = CameraState.DISCONNECTED
+            raise
+        self._stalled = False
+        self._state = CameraState.IDLE
+
+    def _lose(self) -> None:
+        """Mark the device as gone; a reading thread may still use its transport."""
+        self._state = CameraState.DISCONNECTED
+
+    def _close_transport(self) -> None:
+        """Give the device back; no thread may be reading."""
+        self._release.detach()
+        self._transport.close()
+
+    def _require_open(self) -> None:
+        if self._closed:
+            raise CameraClosed
+
+    # --- requests (under _control) ---------------------------------------------------------
+
+    def _request_in(self, request: Request, *, value: int = 0, length: int) -> bytes:
+        with self._translated(request):
+            return self._transport.control_in(request, value=value, length=length)
+
+    def _request_out(self, request: Request, data: bytes = b"") -> None:
+        with self._translated(request):
+            self._transport.control_out(request, data)
+
+    @contextmanager
+    def _translated(self, request: Request) -> Iterator[None]:
+        """Around a request: a stall becomes DeviceRefused, a loss disconnects the camera."""
+        self._require_open()
+        if self._state is CameraState.DISCONNECTED:
+            raise CameraLost("it is disconnected")
+        try:
+            try:
+                yield
+            except TransferStalled as stall:
+                raise self._refusal(request) from stall
+        except CameraLost:
+            self._lose()
+            raise
+
+    def _refusal(self, request: Request) -> DeviceRefused:
+        """Read why the device stalled a request (usb-protocol 7, 10.5)."""
+        try:
+            answer = self._transport.control_in(Request.GET_LAST_ERROR, length=LAST_ERROR_BYTES)
+        except TransferStalled:  # usb-protocol 10.5
+            return DeviceRefused(request.name, "NONE", "it does not say why")
+        refused, code, detail = unpack_last_error(answer)
+        if refused != request.name:  # usb-protocol 10.5: the reason of an earlier request
+            return DeviceRefused(request.name, "NONE", "it does not say why")
+        return DeviceRefused(refused, code, detail)
+
+    def _configure(self, sequence: Sequence) -> AppliedSequence:
+        words = SequenceWords.of(sequence, self._capabilities)
+        self._request_out(Request.SET_SEQUENCE, words.pack())  # usb-protocol 5.1: staged
+        with self._receiver.lock:
+            # usb-protocol 3.1: the new epoch is above this one, also after a power cycle
+            above = 0 if self._applied is None else self._applied.epoch
+            answer = Commitment.unpack(
+                self._request_in(Request.COMMIT, value=above, length=Commitment.MOST_BYTES)
+            )
+            really_set = answer.words.sequence(self._capabilities)
+            # usb-protocol 8.4, 10.12
+            period_s = really_set.exposure_s + self._capabilities.streaming_readout_s
+            if (
+                answer.images != really_set.images
+                or answer.epoch <= above
+                or not math.isclose(answer.image_period_ns / 1e9, period_s, rel_tol=_PERIOD_RTOL)
+            ):
+                raise ProtocolError(f"COMMIT answered with {answer}")
+            self._applied = self._capabilities.describe(really_set, epoch=answer.epoch)
+            self._receiver.switch(self._applied, first_image=answer.first_image)
+        return self._applied
+
+    def _start(self) -> None:
+        self._require_open()
+        with self._receiver.lock:
+            self._request_out(Request.STOP)  # usb-protocol 3: no image is exposed until START
+            self._receiver.restart(first_image=self.status().next_image)
+            self._request_out(Request.START)
+            self._heartbeat_s = self._clock.now_s()
+            self._state = CameraState.STREAMING
+
+    def _off(self, request: Request) -> None:
+        with self._control:
+            self._resume = False
+            try:
+                self._request_out(request)
+            except DeviceRefused:
+                self._request_out(Request.SAFE_OFF)  # usb-protocol 9, 10.6: never refused
+            self._state = CameraState.IDLE
+
+    # --- images (under _reading) -----------------------------------------------------------
+
+    def _keep_alive(self) -> None:
+        """Send the heartbeat when it is due; start again when it was missed (usb-protocol 3.2)."""
+        with self._control:
+            self._require_open()
+            if self._state is not CameraState.STREAMING:
+                if self._state is CameraState.DISCONNECTED:
+                    raise CameraLost("it is disconnected")
+                raise NotStreaming(self._state)
+            silent_s = self._clock.now_s() - self._heartbeat_s
+            if silent_s >= self._capabilities.heartbeat_s:
+                self._start()  # the light is off by now, and images in the FIFO are old
+            elif silent_s >= self._capabilities.heartbeat_s / _BEATS_PER_TIMEOUT:
+                self._request_out(Request.HEARTBEAT)
+                self._heartbeat_s = self._clock.now_s()
+
+    def _read(self, timeout_s: float) -> bool:
+        """Take one transfer; return whether anything came."""
+        try:
+            data = self._transport.read(timeout_s=timeout_s)
+        except TransferStalled:
+            self._clear_stall()
+            return True
+        except TransferOverflow:  # usb-protocol 10.3
+            self._receiver.resynchronise()
+            return True
+        except CameraLost:
+            with self._control:
+                self._require_open()  # closed by another thread: no loss
+                self._lose()
+            raise
+        if not data:
+            return False
+        self._stalled = False
+        self._receiver.feed(data, host_time_s=self._clock.unix_s())
+        return True
+
+    def _clear_stall(self) -> None:
+        """Clear the halt once; a second one in a row resets the device (usb-protocol 10.2)."""
+        with self._control:
+            try:
+                if not self._stalled:
+                    self._stalled = True
+                    self._transport.clear_halt()
+                    return
+                self._transport.reset()
+            except CameraLost:
+                self._lose()
+                raise
+            self._lose()
+            raise CameraLost("the image endpoint stalled twice; the device was reset")
+
+    def _check_silence(self) -> None:
+        """Read the status after a read without an image (usb-protocol 10.1)."""
+        with self._control:
+            if self._state is not CameraState.STREAMING:
+                return  # stopped meanwhile: _keep_alive raises
+            status = self.status()
+            if status.state is DeviceState.STREAMING:
+                return
+            if status.watchdog_tripped:
+                self._start()
+                return
+            self._state = CameraState.FAULTED
+            raise CameraFault(
+                "it stopped by itself" if status.interlock_closed else "the interlock was opened"
+            )
+
+
+def _release(transport: Transport) -> None:
+    """Light off when a camera is collected, or the interpreter ends, without close()."""
+    warnings.warn("a camera was left open; use close() or `with`", ResourceWarning, stacklevel=2)
+    with suppress(CameraError):
+        transport.control_out(Request.SAFE_OFF)
+    transport.close()

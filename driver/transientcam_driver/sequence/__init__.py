@@ -1,0 +1,31 @@
+"""What is captured: the sequence of frequencies and phases, and how the sensor samples it."""
+
+from transientcam_driver.sequence._sampling import FOUR_PHASES_RAD, MAX_HARMONICS, Sampling
+from transientcam_driver.sequence._sequence import (
+    DERIVED_FIELDS,
+    LOW_FREQUENCY_HZ,
+    READ_ONLY_FIELDS,
+    SPEED_OF_LIGHT_M_S,
+    ImageLabel,
+    Scheme,
+    Sequence,
+    SubPhases,
+    TakeOrder,
+    Zeroth,
+)
+
+__all__ = [
+    "DERIVED_FIELDS",
+    "FOUR_PHASES_RAD",
+    "LOW_FREQUENCY_HZ",
+    "MAX_HARMONICS",
+    "READ_ONLY_FIELDS",
+    "SPEED_OF_LIGHT_M_S",
+    "ImageLabel",
+    "Sampling",
+    "Scheme",
+    "Sequence",
+    "SubPhases",
+    "TakeOrder",
+    "Zeroth",
+]

@@ -1,0 +1,52 @@
+"""Values of the whole simulation: impulse responses, imperfections, normal numbers."""
+
+from transientcam_simulation.base._imperfections import (
+    IDEAL,
+    PINHOLE,
+    PROFILES,
+    TYPICAL,
+    TYPICAL_LENS,
+    DarkCurrent,
+    DeviceProfile,
+    Drift,
+    Lens,
+    LensScatter,
+    Outliers,
+    Pattern,
+    RollOff,
+    Waveform,
+)
+from transientcam_simulation.base._normal import drawn_bins, drawn_tails, quantiles, standard_normal
+from transientcam_simulation.base._responses import (
+    BIN_S,
+    Moments,
+    Responses,
+    Scatter,
+    SparseResponses,
+)
+
+__all__ = [
+    "BIN_S",
+    "IDEAL",
+    "PINHOLE",
+    "PROFILES",
+    "TYPICAL",
+    "TYPICAL_LENS",
+    "DarkCurrent",
+    "DeviceProfile",
+    "Drift",
+    "Lens",
+    "LensScatter",
+    "Moments",
+    "Outliers",
+    "Pattern",
+    "Responses",
+    "RollOff",
+    "Scatter",
+    "SparseResponses",
+    "Waveform",
+    "drawn_bins",
+    "drawn_tails",
+    "quantiles",
+    "standard_normal",
+]

@@ -1,0 +1,82 @@
+"""Compiled lanes beside this folder's arithmetic: the same bytes, used once they are ready.
+
+A lane stands beside a statement in NumPy, which serves until the lane is made ready in the
+background: no image waits for a compiler. Importing this module imports none. The driver does not
+depend on numba; without it NumPy goes on serving.
+"""
+
+import os
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from typing import Any, Final
+
+from transientcam_compiled import Cache, Kernels
+
+OF_IMAGES: Final = ("imaging._compiled_images",)
+"""Modules of the lanes that images of any scene use."""
+COMPILED: Final = (
+    *OF_IMAGES,
+    "light._compiled_chunks",
+    "light._compiled_edges",
+    "light._compiled_light",
+    "light._compiled_tiles",
+)
+"""Modules of all lanes."""
+WORTH_PIXELS: Final = 100_000_000
+"""Of images in NumPy, after which their lanes are asked for.
+
+They save some 2 ns a pixel, and loading them takes 0.2 to 0.7 s of processor time.
+"""
+CHUNK: Final = 64
+"""Points or pixels that lanes take at a time, which are mostly beside each other in a row."""
+FUNCTIONS: Final[dict[str, dict[str, Callable[..., Any]]]] = {}
+"""Those that each module has compiled, by their names."""
+_PACKAGE: Final = "transientcam_simulation"
+CACHE: Final = Cache(f"{_PACKAGE}.compiled._lanes", f"{_PACKAGE}.compiled._compiling")
+"""numba itself notices changes of each file of lanes, which use no functions of another."""
+
+
+def _load(name: str) -> dict[str, Callable[..., Any]]:
+    return FUNCTIONS[import_module(f"{_PACKAGE}.{name}").__name__]
+
+
+class Lanes:
+    """The compiled lanes of a process; ``TRANSIENTCAM_KERNELS`` as `Kernels` reads it.
+
+    Attributes
+    ----------
+    kernels : Kernels
+        The lanes of each module: they become ready together.
+    """
+
+    def __init__(self, environ: Mapping[str, str]) -> None:
+        self.kernels = Kernels[str](environ, CACHE, _load, added=self._add)
+        self._ready: dict[str, Callable[..., Any]] = {}
+        self._pixels = 0
+
+    def find(self, name: str) -> Callable[..., Any] | None:
+        """Return a lane, or None where NumPy is to be used."""
+        return self._ready.get(name)
+
+    def want(self, modules: tuple[str, ...] = COMPILED) -> None:
+        """Have lanes made ready in the background, once; returns at once."""
+        for name in modules:
+            self.kernels.want(name)
+
+    def want_for_images(self, pixels: int) -> None:
+        """Want lanes of images once NumPy has computed many; it has one more of so many pixels."""
+        self._pixels += pixels
+        if self._pixels >= WORTH_PIXELS:
+            self.want(OF_IMAGES)
+
+    def compile_now(self) -> None:
+        """Make all lanes ready before returning."""
+        for name in COMPILED:
+            self.kernels.make_ready(name)
+
+    def _add(self, _module: str, functions: dict[str, Callable[..., Any]]) -> None:
+        self._ready = {**self._ready, **functions}
+
+
+# The one place that reads the environment; a process has one set of machine code.
+LANES: Final = Lanes(os.environ)

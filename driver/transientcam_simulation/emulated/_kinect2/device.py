@@ -1,0 +1,100 @@
+"""The cable of an emulated Kinect v2: a link at a time, its packets, faults, and a plug."""
+
+from collections.abc import Callable, Iterator
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.cameras.kinect2 import FRAME_RATE_HZ, MEASURED, TICK_S, encoder
+from transientcam_driver.clock import Clock
+from transientcam_simulation.emulated._kinect2.firmware import EmulatedFirmware
+from transientcam_simulation.emulated._kinect2.link import EmulatedLink
+from transientcam_simulation.emulated._open_usb import Fault
+from transientcam_simulation.emulated._plugged_camera import PluggedCamera
+
+PERIOD_S: Final = 1 / FRAME_RATE_HZ
+_NUMBERS: Final = 1 << 32
+_SPOILT_PACKET: Final = 3  # of a sub-image
+
+
+class Pixels(Protocol):
+    """What the sensor sees."""
+
+    def sub_images(self, number: int, *, device_time_s: float) -> NDArray[np.uint8]:
+        """Return the sub-images (9 or 10, bytes) of a frame, numbered from 0."""
+        ...
+
+
+class EmulatedKinect2(PluggedCamera[EmulatedLink]):
+    """An emulated camera, and its cable; a fault loses or shortens a packet of an image.
+
+    Parameters
+    ----------
+    power_on
+        Makes the firmware, at the start and when the cable is plugged in again.
+    pixels
+        What its frames show.
+    clock
+        Paces its frames. Where they take longer to make than 1/30 s, they come later.
+    """
+
+    def __init__(
+        self, power_on: Callable[[], EmulatedFirmware], pixels: Pixels, *, clock: Clock
+    ) -> None:
+        super().__init__("kinect2:emulated", "Kinect v2")
+        self._firmware_of_power_on = power_on
+        self._pixels = pixels
+        self._clock = clock
+        self._since_s = clock.now_s()
+        self._frame = 0
+        self._power_on()
+
+    def _power_on(self) -> None:
+        self.firmware = self._firmware_of_power_on()
+
+    def _new_link(self) -> EmulatedLink:
+        return EmulatedLink(self)
+
+    @property
+    def lit(self) -> bool:
+        """Whether the light is on."""
+        return self.plugged and self.firmware.lit
+
+    # --- images ------------------------------------------------------------------------------
+
+    def wait_for_frame(self, due_s: float | None, wanted: Callable[[], bool]) -> float | None:
+        """Wait until a frame is due, now without a time; return when the next one is.
+
+        None if none is wanted any more.
+        """
+        with self.changed:
+            while wanted():
+                now_s = self._clock.now_s()
+                begin_s = now_s if due_s is None else due_s
+                if now_s >= begin_s:
+                    late = now_s - begin_s > PERIOD_S / 2
+                    return PERIOD_S + (now_s if late else begin_s)
+                self._clock.wait(self.changed, begin_s - now_s)
+            return None
+
+    def frame(self) -> Iterator[bytes]:
+        """Return the packets of the next frame, some of them lost or shortened."""
+        with self.changed:
+            number, self._frame = self._frame, self._frame + 1
+        time_s = self._clock.now_s() - self._since_s
+        sub_images = self._pixels.sub_images(number, device_time_s=time_s)
+        timestamp = round(time_s / TICK_S) % _NUMBERS
+        packets = encoder.packets(sub_images, sequence=number % _NUMBERS, timestamp=timestamp)
+        image = place = 0
+        for packet in packets:
+            spoilt = place == _SPOILT_PACKET and image < MEASURED
+            if spoilt and self._takes(Fault.CORRUPT_PIXELS):
+                yield packet[: len(packet) // 2]
+            elif not (spoilt and self._takes(Fault.DROP)):
+                yield packet
+            image, place = (image, place + 1) if packet else (image + 1, 0)
+
+    def _takes(self, fault: Fault) -> bool:
+        with self.changed:
+            return self._faults.take(fault)

@@ -1,0 +1,9 @@
+"""From light to raw images: exposure, the sensor, its noise and its converter."""
+
+from transientcam_simulation.imaging._switchable_world import SwitchableWorld
+from transientcam_simulation.imaging._world import World
+
+__all__ = [
+    "SwitchableWorld",
+    "World",
+]

@@ -1,0 +1,260 @@
+"""The light on points, and moments: compiled arithmetic without edges.
+
+Bytes are those of the statements in NumPy, as in `compiled_edges`.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from transientcam_simulation.compiled import (
+    CHUNK,
+    DOUBLES,
+    INDICES,
+    LINE,
+    NUMBERS,
+    PIXELS,
+    PLACES,
+    REGION,
+    STACK,
+    TILES,
+    WHOLE,
+    float32,
+    float64,
+    inner,
+    int64,
+    lane,
+)
+
+Plane = Any
+"""A float32 array as numba compiles it."""
+_ZERO, _ONE = np.float32(0), np.float32(1)
+
+
+@inner
+def _receive(lamp: Any, axis: Any, point: Any, normal: Any, put: Any) -> None:
+    """Put lengths of the ways to a lamp, irradiance, and cosines to its axis, of points."""
+    x, y, z = point
+    across, along, up = normal
+    length_m, irradiance, cosine = put
+    for i in range(len(x)):
+        a, b, c = lamp[0] - x[i], lamp[1] - y[i], lamp[2] - z[i]
+        length = np.sqrt(a * a + b * b + c * c)
+        facing = a * across[i] + b * along[i] + c * up[i]
+        length_m[i] = length
+        irradiance[i] = max(facing, _ZERO) / (length * length * length)
+        cosine[i] = -(a * axis[0] + b * axis[1] + c * axis[2]) / length
+
+
+@lane(LINE, LINE, LINE, LINE, LINE, LINE, LINE, LINE, PLACES)
+def received(
+    lamp: Any, axis: Any, x: Any, y: Any, z: Any, across: Any, along: Any, up: Any, on: Any
+) -> Any:
+    """Return lengths of the ways to a lamp, irradiance, and cosines to its axis, of some points."""
+    count = len(on)
+    length_m, irradiance = np.empty(count, float32), np.empty(count, float32)
+    cosine = np.empty(count, float32)
+    of = (lamp[0], lamp[1], lamp[2]), (axis[0], axis[1], axis[2])
+    put = length_m, irradiance, cosine
+    if count == len(x):
+        _receive(*of, (x, y, z), (across, along, up), put)
+    else:
+        _receive(*of, (x[on], y[on], z[on]), (across[on], along[on], up[on]), put)
+    return length_m, irradiance, cosine
+
+
+@inner
+def _darken(moments: Any, each: Any, light: Any) -> None:
+    """Do it for a chunk of pixels with one number, or two, each."""
+    if len(moments) == len(light):
+        for i in range(len(light)):
+            moments[i] -= (_ONE - light[i]) * each[i]
+        return
+    for i in range(len(light)):
+        dark = _ONE - light[i]
+        moments[2 * i] -= dark * each[2 * i]
+        moments[2 * i + 1] -= dark * each[2 * i + 1]
+
+
+@inner
+def _copy(values: Any, copied: Any) -> None:
+    """Copy a row in a loop that a compiler makes vectors of, unlike an assignment to a slice."""
+    for i in range(len(copied)):
+        copied[i] = values[i]
+
+
+@inner
+def _leave(moments: Any, rest: Any) -> None:
+    """Leave a share of the moments in a row of pixels."""
+    if len(moments) == len(rest):
+        for c in range(len(rest)):
+            moments[c] *= rest[c]
+        return
+    for c in range(len(rest)):
+        moments[2 * c] *= rest[c]
+        moments[2 * c + 1] *= rest[c]
+
+
+@lane(WHOLE, STACK, PLACES, NUMBERS, STACK, TILES, WHOLE, REGION)
+def remaining(
+    total: Plane, each: Any, chains: Any, regions: Any, light: Any, marks: Any, uncovered: Plane,
+    of: Any,
+) -> Any:  # fmt: skip
+    """Return moments of a region, without what shadows take of each chain's, and what is covered.
+
+    A moment is a real number, or a real and an imaginary one. See `layers` for the shadows.
+    """
+    top, start, height, width = of
+    parts = total.shape[1] // uncovered.shape[1]
+    moments = np.empty((height, parts * width), float32)
+    for row in range(height):
+        r, line = top + row, moments[row]
+        _copy(total[r, parts * start : parts * (start + width)], line)
+        for k in range(len(chains)):
+            first, after = regions[k, 1], regions[k, 1] + regions[k, 3]
+            for c in range((regions[k, 3] + CHUNK - 1) // CHUNK):
+                if marks[k, r, c]:
+                    a, b = first + c * CHUNK, min(first + (c + 1) * CHUNK, after)
+                    _darken(
+                        line[parts * (a - start) : parts * (b - start)],
+                        each[chains[k], r, parts * a : parts * b],
+                        light[k, r, a:b],
+                    )
+        _leave(line, uncovered[r, start : start + width])
+    return moments
+
+
+@lane(DOUBLES, float64)
+def phases(delay_s: Any, angular_hz: Any) -> Any:
+    """Return phases of light with some times of flight."""
+    phase_rad = np.empty(len(delay_s), float32)
+    for i in range(len(delay_s)):
+        phase_rad[i] = angular_hz * delay_s[i]
+    return phase_rad
+
+
+@lane(WHOLE, PLACES, DOUBLES, LINE, LINE)
+def turned(of_rays: Any, on: Any, weight: Any, cosine: Any, sine: Any) -> None:
+    """Add phasors to moments of some points, real and imaginary parts in turn."""
+    if len(on) == len(of_rays):
+        for i in range(len(of_rays)):
+            of_rays[i, 0] = of_rays[i, 0] + weight[i] * cosine[i]
+            of_rays[i, 1] = of_rays[i, 1] + weight[i] * sine[i]
+        return
+    for k in range(len(on)):
+        i = on[k]
+        of_rays[i, 0] = of_rays[i, 0] + weight[k] * cosine[k]
+        of_rays[i, 1] = of_rays[i, 1] + weight[k] * sine[k]
+
+
+@inner
+def _upright(x: Any, y: Any, z: Any, ball: Any, normal: Any) -> None:
+    """Put unit normals of one ellipsoid."""
+    across, along, up = normal
+    for i in range(len(x)):
+        a, b, c = (x[i] - ball[0]) / ball[3], (y[i] - ball[1]) / ball[4], (z[i] - ball[2]) / ball[5]
+        length = np.sqrt(a * a + b * b + c * c)
+        across[i], along[i], up[i] = a / length, b / length, c / length
+
+
+@lane(LINE, LINE, LINE, WHOLE, PLACES)
+def upright(x: Any, y: Any, z: Any, balls: Any, ends: Any) -> Any:
+    """Return unit normals of ellipsoids, each with some of the points."""
+    normal = np.empty((3, len(x)), float32)
+    for n in range(len(balls)):
+        ball = balls[n, 0], balls[n, 1], balls[n, 2], balls[n, 3], balls[n, 4], balls[n, 5]
+        a, b = ends[n], ends[n + 1]
+        _upright(
+            x[a:b], y[a:b], z[a:b], ball, (normal[0, a:b], normal[1, a:b], normal[2, a:b])
+        )  # fmt: skip
+    return normal
+
+
+@lane(LINE, LINE, LINE, LINE, LINE, LINE, DOUBLES, DOUBLES, INDICES)
+def returned(
+    across: Any, along: Any, up: Any, x: Any, y: Any, z: Any, throughput: Any, albedos: Any,
+    index: Any,
+) -> Any:  # fmt: skip
+    """Return throughput and reflectance of points that are seen from in front, of others 0."""
+    facing, reflectance = np.empty(len(x), float64), np.empty(len(x), float64)
+    for i in range(len(x)):
+        towards = _ZERO + across[i] * x[i] + along[i] * y[i] + up[i] * z[i]
+        facing[i] = throughput[i] if towards < _ZERO else 0.0
+    for i in range(len(x)):
+        reflectance[i] = albedos[index[i]] * facing[i]
+    return facing, reflectance
+
+
+@lane(LINE, LINE, LINE, PLACES, DOUBLES, float64)
+def arrived(
+    length_m: Any, distance_m: Any, irradiance: Any, on: Any, sent: Any, metres_per_s: Any
+) -> Any:
+    """Return times of flight and weights of the light on some points."""
+    count = len(on)
+    delay_s, weight = np.empty(count, float64), np.empty(count, float64)
+    if count == len(sent):
+        for i in range(count):
+            delay_s[i] = (float64(length_m[i]) + float64(distance_m[i])) / metres_per_s
+            weight[i] = sent[i] * float64(irradiance[i])
+        return delay_s, weight
+    for k in range(count):
+        i = on[k]
+        delay_s[k] = (float64(length_m[k]) + float64(distance_m[i])) / metres_per_s
+        weight[k] = sent[i] * float64(irradiance[k])
+    return delay_s, weight
+
+
+@lane(WHOLE, PIXELS, WHOLE, LINE, int64, int64)
+def layered(moments: Plane, places: Any, of_rays: Any, share: Any, top: int, left: int) -> None:
+    """Add moments of what covers pixels, by its share."""
+    rows, columns = places[0], places[1]
+    if of_rays.shape[1] == 1:
+        for k in range(len(rows)):
+            moments[rows[k] - top, columns[k] - left] += of_rays[k, 0] * share[k]
+        return
+    for k in range(len(rows)):
+        row, column = rows[k] - top, 2 * (columns[k] - left)
+        moments[row, column] += of_rays[k, 0] * share[k]
+        moments[row, column + 1] += of_rays[k, 1] * share[k]
+
+
+@lane(WHOLE, PIXELS, LINE)
+def uncover(uncovered: Plane, places: Any, share: Any) -> None:
+    """Take from pixels what layers cover of them, one after the other; at most all is covered."""
+    rows, columns = places[0], places[1]
+    for k in range(len(rows)):
+        uncovered[rows[k], columns[k]] -= share[k]
+    for k in range(len(rows)):
+        left = uncovered[rows[k], columns[k]]
+        uncovered[rows[k], columns[k]] = max(left, _ZERO)
+
+
+@lane(WHOLE, int64, REGION, float32, WHOLE, REGION, float32, WHOLE, REGION)
+def blended(
+    total: Plane, parts: int, of: Any, one: Any, first: Plane, of_first: Any, other: Any,
+    second: Plane, of_second: Any,
+) -> Any:  # fmt: skip
+    """Return moments of a region between two times, from those of the regions that differ then.
+
+    A moment has so many parts.
+    """
+    top, left, height, width = of
+    mixed = np.empty((height, parts * width), float32)
+    then, later = np.empty(parts * width, float32), np.empty(parts * width, float32)
+    for row in range(height):
+        r = top + row
+        still = total[r, parts * left : parts * (left + width)]
+        _copy(still, then)
+        _copy(still, later)
+        place = r - of_first[0]
+        if 0 <= place < of_first[2]:
+            shift = parts * (of_first[1] - left)
+            _copy(first[place], then[shift : shift + parts * of_first[3]])
+        place = r - of_second[0]
+        if 0 <= place < of_second[2]:
+            shift = parts * (of_second[1] - left)
+            _copy(second[place], later[shift : shift + parts * of_second[3]])
+        line = mixed[row]
+        for c in range(len(line)):
+            line[c] = one * then[c] + other * later[c]
+    return mixed

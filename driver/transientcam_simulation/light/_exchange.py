@@ -1,0 +1,185 @@
+"""Light that patches of surfaces give each other, with its times of flight."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
+from transientcam_simulation.base import BIN_S, Scatter
+from transientcam_simulation.light._patches import Patches, form_factors
+from transientcam_simulation.light._paths import image_lights, light_on, normals_at, scatter_of
+from transientcam_simulation.scene import Points, Scene
+
+_MOST_BOUNCES = 200  # in a room of white walls light is followed no further
+_HISTORY_BOUNCES = 4
+_HISTORY_LEFT = 0.02  # of the highest radiosity
+_SAMPLES = 3  # a side, of the direct light on a patch: its edge may cross the patch
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """Light between the patches of a scene.
+
+    Attributes
+    ----------
+    factors, distance_m
+        (N, N) form factors, receivers first, and distances.
+    delay_s, radiosity
+        (K, N, S) direct light on S samples of each patch by each chain of mirrors, and what it
+        gives on.
+    """
+
+    scene: Scene
+    patches: Patches
+    factors: NDArray[np.float32]
+    distance_m: NDArray[np.float32]
+    delay_s: NDArray[np.float64]
+    radiosity: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, scene: Scene, per_side: int) -> "Exchange":
+        """Compute form factors and distances between patches, and the direct light on each."""
+        patches = Patches.of(scene, per_side)
+        factors = form_factors(scene, patches, patches.centre, patches.normal)
+        squared = np.maximum(
+            np.sum(patches.centre**2, 1)[:, None]
+            + np.sum(patches.centre**2, 1)
+            - 2 * patches.centre @ patches.centre.T,
+            0,
+        )
+        delay_s, radiosity = _direct(scene, patches)
+        return cls(
+            scene,
+            patches,
+            factors.astype(np.float32),
+            np.sqrt(squared).astype(np.float32),
+            delay_s,
+            radiosity,
+        )
+
+    def bounces(self, tolerance: float) -> int:
+        """Return how often light is followed from patch to patch.
+
+        As the scene says; or until all that is left, at the rate at which it falls from bounce to
+        bounce, gives no patch more than ``tolerance`` of radiosity. The bound holds at every
+        frequency, as no moment exceeds the zeroth.
+        """
+        if self.scene.transport.diffuse_bounces is not None:
+            return self.scene.transport.diffuse_bounces
+        light = self.radiosity.sum(axis=(0, 2))
+        highest = [float(light.max(initial=0.0))]
+        for bounce in range(_MOST_BOUNCES):
+            light = self.patches.albedo * (self.factors @ light)
+            highest.append(float(light.max(initial=0.0)))
+            share = min(highest[-1] / highest[-2], 0.999) if highest[-2] else 0.0
+            if highest[-1] / (1 - share) <= tolerance:
+                return bounce
+        return _MOST_BOUNCES
+
+    def irradiance(self, frequency_hz: float, bounces: int) -> NDArray[np.complex128]:
+        """Moments (N) of the light that patches get from each other, over some bounces."""
+        omega = 2 * np.pi * frequency_hz
+        scatter = scatter_of(self.scene, self.patches.surface)
+        transfer = 1.0 if scatter is None else scatter.transfer(frequency_hz)
+        light = np.einsum("kns,kns->n", self.radiosity, np.exp(1j * omega * self.delay_s))
+        phase = np.float32(omega / SPEED_OF_LIGHT_M_S) * self.distance_m
+        in_phase, quadrature = self.factors * np.cos(phase), self.factors * np.sin(phase)
+        total = np.zeros(len(self.patches), dtype=np.complex128)
+        for _bounce in range(bounces):
+            given = (light * transfer).astype(np.complex64)
+            of_real, of_imag = given.real.copy(), given.imag.copy()
+            got = (in_phase @ of_real - quadrature @ of_imag) + 1j * (
+                in_phase @ of_imag + quadrature @ of_real
+            )
+            total += got
+            light = self.patches.albedo * got
+        return total
+
+    @cached_property
+    def history(self) -> tuple[float, NDArray[np.float64]]:
+        """Irradiance (N, T) over time in bins of ``BIN_S``, and the time of the first bin's start.
+
+        Of the first bounces only; the caller scales it to the light of all. Light is moved by
+        whole bins, so that each bounce is off by half a bin at most.
+        """
+        shift = np.rint(self.distance_m / (SPEED_OF_LIGHT_M_S * BIN_S)).astype(np.intp)
+        scatter = scatter_of(self.scene, self.patches.surface)
+        first_s = float(self.delay_s[self.radiosity > 0].min(initial=1.0))
+        placed = np.rint((self.delay_s - first_s) / BIN_S).astype(np.intp)
+        placed[self.radiosity <= 0] = 0
+        bounces = min(
+            _HISTORY_BOUNCES,
+            self.bounces(_HISTORY_LEFT * float(self.radiosity.sum(axis=2).max(initial=0.0))),
+        )
+        tail = 0
+        if scatter is not None:
+            tail = int((8 * scatter.width_s.max() + 12 * scatter.decay_s.max()) / BIN_S) + 1
+        count = int(placed.max()) + bounces * (int(shift.max()) + tail) + 1
+        patches = len(self.patches)
+        light = np.zeros((patches, count))
+        index = np.broadcast_to(np.arange(patches)[None, :, None], placed.shape)
+        np.add.at(light, (index.ravel(), placed.ravel()), self.radiosity.ravel())
+        total = np.zeros_like(light)
+        for _bounce in range(bounces):
+            got = np.zeros_like(light)
+            last = np.flatnonzero(light.any(axis=0)).max(initial=0) + 1
+            for q in range(patches):
+                given = light[q, :last]
+                if not given.any():
+                    continue
+                if scatter is not None:
+                    given = _spread(given, scatter.width_s[q], scatter.decay_s[q], tail)
+                for p in np.flatnonzero(self.factors[:, q]):
+                    at = shift[p, q]
+                    got[p, at : at + len(given)] += (self.factors[p, q] * given)[: count - at]
+            total += got
+            light = self.patches.albedo[:, None] * got
+        return first_s - BIN_S / 2, total
+
+
+def _spread(
+    given: NDArray[np.float64], width_s: float, decay_s: float, tail: int
+) -> NDArray[np.float64]:
+    if not width_s and not decay_s:
+        return given
+    edges_s = BIN_S * (np.arange(tail + 1) - 0.5)
+    return np.convolve(given, np.diff(Scatter(width_s, decay_s).cumulated(edges_s)))
+
+
+def _direct(scene: Scene, patches: Patches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Direct light on samples of each patch, as the share of the patch's radiosity it makes."""
+    middles = (2 * np.arange(_SAMPLES) + 1) / (2 * _SAMPLES)
+    u, w = (grid.ravel() for grid in np.meshgrid(middles, middles))
+    c = patches.corners
+    points = (
+        np.einsum("s,nc->nsc", (1 - u) * (1 - w), c[:, 0])
+        + np.einsum("s,nc->nsc", u * (1 - w), c[:, 1])
+        + np.einsum("s,nc->nsc", u * w, c[:, 2])
+        + np.einsum("s,nc->nsc", (1 - u) * w, c[:, 3])
+    ).reshape(-1, 3)
+    surface = np.repeat(patches.surface, _SAMPLES**2)
+    points = _onto(scene, points, surface)
+    normal = normals_at(scene, points, surface)
+    lights = tuple(image_lights(scene))
+    shape = (len(lights), len(patches), _SAMPLES**2)
+    delay_s, radiosity = np.zeros(shape), np.zeros(shape)
+    for k, light in enumerate(lights):
+        length_m, irradiance = light_on(scene, light, points, normal)
+        delay_s[k] = length_m.reshape(shape[1:]) / SPEED_OF_LIGHT_M_S
+        radiosity[k] = irradiance.reshape(shape[1:]) * patches.albedo[:, None] / _SAMPLES**2
+    return delay_s, radiosity
+
+
+def _onto(scene: Scene, points: Points, surface: NDArray[np.intp]) -> Points:
+    """Move points of flat patches out to the curved surface they stand for."""
+    points = points.copy()
+    for index in np.unique(surface):
+        shape = scene.surfaces[index].shape
+        if hasattr(shape, "radii"):
+            mine = surface == index
+            on_unit = (points[mine] - shape.centre) / shape.radii
+            on_unit /= np.linalg.norm(on_unit, axis=-1, keepdims=True)
+            points[mine] = shape.centre + on_unit * shape.radii
+    return points

@@ -1,0 +1,279 @@
+"""How far each effect moves the light of a scene, still or over its life: by leaving it out."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_simulation.base import PINHOLE
+from transientcam_simulation.effects import Glimpse, Values
+from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._paths import Lit, light_rays
+from transientcam_simulation.light._radiosity import Interreflection
+from transientcam_simulation.light._rays import places_within, rays_through
+from transientcam_simulation.light._recent import Recent
+from transientcam_simulation.light._subpixel import PIXELS, may_be_thin
+from transientcam_simulation.light._variants import without_gloss, without_mirrors
+from transientcam_simulation.scene import Points, Rectangle, Scene, Surface, Viewpoint
+
+_PIXELS = 20_000  # judged of a still scene, about; of larger images every second pixel a side, ...
+_PIXELS_MOVING = 1_500  # the same at each time
+_TIMES = 8  # of the longest period, at which a moving scene is judged
+_WITHIN = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))  # of a pixel
+_WITHIN_AT_THIN = 16  # places, where something may be so thin that these four miss it
+_FREQUENCIES = 8  # judged at most; the highest one always
+_ROUNDING = 1e-9
+_KEPT = 32  # changes by effects, for the last few sequences
+_ROUGH_PATCHES = 6  # a side, to estimate interreflection
+_ROUGH_ERROR = 1.5  # by which that may be too low
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Rays into pixels at one time, one or several a pixel, and the light that they see.
+
+    ``sharp``: as if no surface let light in.
+    """
+
+    scene: Scene
+    lits: tuple[Lit, ...]
+    sharp: bool = False
+
+    def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
+        """Means over the rays of each pixel."""
+        total = np.zeros(len(self.lits[0].surface), dtype=np.complex128)
+        for lit in self.lits:
+            total += lit.moments(frequency_hz, None if self.sharp else lit.scatter(self.scene))
+        mean: NDArray[np.complex128] = total / len(self.lits)
+        return mean
+
+
+class SceneFacts:
+    """Of a scene of surfaces before a camera of so many pixels."""
+
+    def __init__(self, scene: Scene, *, width: int, height: int) -> None:
+        assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
+        self._camera = scene.camera
+        self._scene = scene
+        self._size = width, height
+        pixels = _PIXELS_MOVING if scene.moves else _PIXELS
+        self._stride = stride = max(1, math.floor(math.sqrt(width * height / pixels)))
+        columns, rows = np.meshgrid(
+            np.arange(stride // 2, width, stride), np.arange(stride // 2, height, stride)
+        )
+        self._shape = rows.shape
+        self._rows, self._columns = rows.ravel(), columns.ravel()
+        self._times_s: tuple[float, ...] = (0.0,)
+        motions = [each for surface in scene.surfaces for each in surface.motions]
+        self._period_s = max((each.period_s for each in motions), default=0.0)
+        if scene.moves:
+            self._times_s = tuple((k + 0.5) / _TIMES * self._period_s for k in range(_TIMES))
+        self._found: Recent[tuple[str, tuple[float, ...], float], tuple[Values, ...]]
+        self._found = Recent(_KEPT)
+        self._left_out: dict[str, list[list[_Seen]]] = {}
+
+    @property
+    def glimpses(self) -> tuple[Glimpse, ...]:
+        """Direct light and mirrors on the pixels judged."""
+        return self._glimpses
+
+    @cached_property
+    def _glimpses(self) -> tuple[Glimpse, ...]:
+        cosine = cosine_to_axis(self._camera, self._rays(self._camera))
+        return tuple(
+            Glimpse(each.lits[0].weight.sum(axis=0), each.lits[0].reflectance, cosine, self._shape)
+            for each in self._seen
+        )
+
+    def changes(
+        self, effect: str, frequencies_hz: tuple[float, ...], *, during_s: float = 0.0
+    ) -> tuple[Values, ...]:
+        """Return how far leaving out an effect moves each pixel's moments, at most, by time."""
+        key = effect, _some(frequencies_hz), during_s if effect == "motion" else 0.0
+        return self._found.get(key, lambda: self._changes(*key))
+
+    def further_bounces(self, tolerance: float) -> int:
+        """Return how often light goes from surface to surface until less than this is left."""
+        return Exchange.of(self._rough(self._scene.at(self._times_s[0])), _ROUGH_PATCHES).bounces(
+            tolerance
+        )
+
+    def _changes(
+        self, effect: str, frequencies_hz: tuple[float, ...], during_s: float
+    ) -> tuple[Values, ...]:
+        if effect == "interreflection":
+            return self._further_light()
+        surfaces, camera, there = self._scene.surfaces, self._camera, self._seen
+        variants: dict[str, tuple[bool, Callable[[], list[list[_Seen]]]]] = {
+            "mirror-paths": (
+                any(each.kind == "mirror" for each in surfaces),
+                lambda: [[self._look(without_mirrors(each.scene), camera) for each in there]],
+            ),
+            "gloss": (
+                any(each.gloss for each in surfaces),
+                lambda: [[self._look(without_gloss(each.scene), camera) for each in there]],
+            ),
+            "scattering": (
+                any(each.scatter for each in surfaces),
+                lambda: [[replace(each, sharp=True) for each in there]],
+            ),
+            "mixed-pixels": (
+                True,
+                lambda: [[self._look(each.scene, camera, self._within) for each in there]],
+            ),
+            "distortion": (
+                camera.lens.bends,
+                lambda: [[self._look(each.scene, replace(camera, lens=PINHOLE)) for each in there]],
+            ),
+        }
+        if effect == "motion":  # which depends on the sequence
+            return self._moved(frequencies_hz, during_s) if self._scene.moves else ()
+        happens, others = variants[effect]
+        if not happens:
+            return ()
+        if effect not in self._left_out:
+            self._left_out[effect] = others()
+        return self._apart(self._left_out[effect], frequencies_hz)
+
+    def _moved(self, frequencies_hz: tuple[float, ...], during_s: float) -> tuple[Values, ...]:
+        """Return how far moments of each pixel change within a time, at most.
+
+        An edge that moves by less than judged pixels are apart may pass none of their centres. Its
+        contrast is then found over a longer time, and counts by the part of a pixel that it moves.
+        """
+        apart = self._apart([self._later(part * during_s) for part in (0.5, 1.0)], frequencies_hz)
+        moved = self._fastest_pixels_per_s * during_s
+        if not 0 < moved < self._stride:
+            return apart
+        longer_s = min(during_s * self._stride / moved, self._period_s / _TIMES)
+        swept = self._apart([self._later(longer_s)], frequencies_hz)
+        return tuple(
+            np.maximum(one, min(1.0, moved) * other)
+            for one, other in zip(apart, swept, strict=True)
+        )
+
+    def _later(self, by_s: float) -> list[_Seen]:
+        return [self._look(self._scene.at(t + by_s), self._camera) for t in self._times_s]
+
+    @property
+    def too_thin(self) -> tuple[str, ...]:
+        """Names of surfaces that move and may be thinner than a pixel."""
+        return tuple(each.name for each in self._thin(1.0) if each.motions)
+
+    @cached_property
+    def _within(self) -> tuple[tuple[float, float], ...]:
+        """Places in a pixel at which light is looked for that differs."""
+        if not self._thin(PIXELS):
+            return _WITHIN
+        right, down = places_within(_WITHIN_AT_THIN)
+        return tuple(zip(right.tolist(), down.tolist(), strict=True))
+
+    def _thin(self, pixels: float) -> list[Surface]:
+        """Surfaces that may be thinner than so many pixels, seen by camera or light."""
+        apexes = self._camera.position_m, self._scene.light.position_m
+        return [
+            each
+            for k, each in enumerate(self._scene.surfaces)
+            if each.opaque is None
+            and any(
+                may_be_thin(
+                    there.surfaces[k].shape, apex, self._pixel_rad, pixels=pixels, aslant=False
+                )
+                for there in map(self._scene.at, self._times_s)
+                for apex in apexes
+            )
+        ]
+
+    @property
+    def _pixel_rad(self) -> float:
+        return math.radians(self._camera.field_of_view_deg) / self._size[0]
+
+    @cached_property
+    def _fastest_pixels_per_s(self) -> float:
+        """Highest speed of any surface, at the place where it stands, in pixels."""
+        speeds = [0.0]
+        for each in self._scene.surfaces:
+            away_m = np.linalg.norm(each.shape.extent() - self._camera.position_m, axis=-1).min()
+            speed_m_s = sum(motion.speed_m_s for motion in each.motions)
+            speeds.append(speed_m_s / (self._pixel_rad * max(float(away_m), 1e-3)))
+        return max(speeds)
+
+    @cached_property
+    def _seen(self) -> list[_Seen]:
+        return [self._look(self._scene.at(time_s), self._camera) for time_s in self._times_s]
+
+    def _look(
+        self,
+        scene: Scene,
+        camera: Viewpoint,
+        places: tuple[tuple[float, float], ...] = ((0.0, 0.0),),
+    ) -> _Seen:
+        """Follow rays through places in the pixels judged, from their centres."""
+        rays = np.concatenate([self._rays(camera, at) for at in places])
+        lit, count = light_rays(scene, rays), len(self._rows)
+        return _Seen(
+            scene, tuple(lit.part(slice(k, k + count)) for k in range(0, len(rays), count))
+        )
+
+    def _rays(self, camera: Viewpoint, at: tuple[float, float] = (0.0, 0.0)) -> Points:
+        width, height = self._size
+        return rays_through(
+            camera, self._columns + at[0], self._rows + at[1], width=width, height=height
+        )
+
+    def _apart(
+        self, others: list[list[_Seen]], frequencies_hz: tuple[float, ...]
+    ) -> tuple[Values, ...]:
+        """Return the largest difference of moments from those of several variants."""
+        apart = tuple(np.zeros(len(self._rows)) for _ in self._seen)
+        for frequency_hz in frequencies_hz:
+            for k, one in enumerate(self._seen):
+                moments = one.moments(frequency_hz)
+                for other in others:
+                    change = np.abs(moments - other[k].moments(frequency_hz))
+                    # what rounding alone makes is no change
+                    change[change < _ROUNDING * np.abs(moments)] = 0
+                    np.maximum(apart[k], change, out=apart[k])
+        return apart
+
+    def _further_light(self) -> tuple[Values, ...]:
+        """Estimate the brightness of light over several surfaces, which bounds its moments."""
+        transport = self._scene.transport
+        scattering = [each for each in self._scene.surfaces if each.scatters]
+        flat = len(scattering) == 1 and isinstance(scattering[0].shape, Rectangle)
+        if flat or not scattering or transport.diffuse_bounces == 0:
+            return ()
+        height, width = self._shape
+        found = []
+        for each in self._seen:
+            further = Interreflection(
+                self._rough(each.scene), each.lits[0], width=width, height=height
+            )
+            found.append(_ROUGH_ERROR * further.moments(0.0).real.ravel())
+        return tuple(found)
+
+    def _rough(self, scene: Scene) -> Scene:
+        patches = min(_ROUGH_PATCHES, scene.transport.patches)
+        return replace(scene, transport=replace(scene.transport, patches=patches))
+
+
+def _some(frequencies_hz: tuple[float, ...]) -> tuple[float, ...]:
+    """Choose a few of many frequencies, evenly, up to the highest."""
+    step = math.ceil(len(frequencies_hz) / _FREQUENCIES)
+    return tuple(sorted(frequencies_hz)[::-1][::step])
+
+
+def cosine_to_axis(camera: Viewpoint, rays: Points) -> Values:
+    """Return the cosine of each ray's angle to the axis of the lens."""
+    half_width = math.tan(math.radians(camera.field_of_view_deg) / 2)
+    x, y = camera.lens.centre
+    axis = camera.look_at_m - camera.position_m
+    axis = axis / np.linalg.norm(axis)
+    right = np.cross(axis, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    axis = axis + 2 * half_width * (x * right - y * np.cross(right, axis))
+    cosine: Values = rays @ (axis / np.linalg.norm(axis))
+    return cosine

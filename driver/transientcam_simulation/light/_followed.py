@@ -1,0 +1,119 @@
+"""Rays of a camera into a scene that stands still, each followed once whatever sequence asks."""
+
+import threading
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._paths import Lit, light_rays
+from transientcam_simulation.light._rays import RAYS, camera_rays, rays_within
+from transientcam_simulation.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Within:
+    """The light of several rays in each of some pixels.
+
+    Attributes
+    ----------
+    pixel
+        (P) by index, rising.
+    rays
+        For each place in a pixel, all pixels.
+    """
+
+    pixel: NDArray[np.intp]
+    rays: Lit
+
+    def of_pixels(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return what belongs to the rays (..., R P) by place and pixel (..., R, P)."""
+        return values.reshape((*values.shape[:-1], -1, self.pixel.size))
+
+    def part(self, place: NDArray[np.intp]) -> "Within":
+        """Return the rays in some of the pixels, by their places among these."""
+        rays = np.arange(0, len(self.rays.surface), self.pixel.size)[:, None] + place
+        return Within(self.pixel[place], self.rays.part(rays.ravel()))
+
+
+class FollowedRays:
+    """Light that rays through pixels see, as far as it was asked for; for any thread.
+
+    Which pixels need several rays depends on the noise and the frequencies of a sequence; what one
+    of these rays sees does not.
+
+    Parameters
+    ----------
+    scene
+        Standing still, with a camera.
+    """
+
+    def __init__(self, scene: Scene, *, width: int, height: int) -> None:
+        assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
+        self.scene = scene
+        self.width, self.height = width, height
+        self._camera = scene.camera
+        self.centres = camera_rays(self._camera, width=width, height=height)
+        self._adding = threading.Lock()
+        self._kept: dict[int, Within] = {}
+
+    @cached_property
+    def lit(self) -> Lit:
+        """Light of one ray a pixel, (H W)."""
+        return light_rays(self.scene, self.centres)
+
+    @cached_property
+    def exchange(self) -> Exchange:
+        """Light that surfaces give each other."""
+        return Exchange.of(self.scene, self.scene.transport.patches)
+
+    def within(self, pixel: NDArray[np.intp], count: int = RAYS) -> Within:
+        """Return the light of several rays in each pixel.
+
+        Parameters
+        ----------
+        pixel
+            (P) by index, rising, none twice; at least one.
+        count
+            Of rays in each pixel.
+        """
+        with self._adding:
+            kept = self._kept.get(count)
+            more = pixel
+            if kept is not None:
+                more = np.setdiff1d(pixel, kept.pixel, assume_unique=True)
+            if more.size:
+                size = {"width": self.width, "height": self.height}
+                rays = rays_within(self._camera, more, count, **size)
+                added = Within(more, light_rays(self.scene, rays))
+                kept = self._kept[count] = added if kept is None else _both(kept, added)
+            assert kept is not None  # noqa: S101  (what was missing was added)
+            if pixel.size == kept.pixel.size:
+                return kept
+            return kept.part(np.searchsorted(kept.pixel, pixel))
+
+
+def _both(one: Within, other: Within) -> Within:
+    """Join the rays in some pixels and those in others, by rising index."""
+    pixel = np.concatenate([one.pixel, other.pixel])
+    joined = _side_by_side(one.rays, one.pixel.size, other.rays, other.pixel.size)
+    return Within(pixel, joined).part(np.argsort(pixel, kind="stable"))
+
+
+def _side_by_side(one: Lit, pixels: int, other: Lit, more: int) -> Lit:
+    """Join the rays in some pixels and those in others, place by place."""
+    merged = {}
+    for name in Lit.__slots__:
+        first, second = getattr(one, name), getattr(other, name)
+        axis = 1 if name in ("delay_s", "weight") else 0  # of the rays
+        shape, inner = first.shape[:axis], first.shape[axis + 1 :]
+        parts = (
+            first.reshape(*shape, -1, pixels, *inner),
+            second.reshape(*shape, -1, more, *inner),
+        )
+        joined = np.concatenate(parts, axis=axis + 1)
+        merged[name] = joined.reshape(*shape, -1, *inner)
+    return Lit(**merged)

@@ -1,0 +1,121 @@
+"""Surfaces cut into patches, and the share of its light that each patch gives to each other one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_simulation.light._paths import blocked
+from transientcam_simulation.scene import Cells, Points, Scene
+
+_LEAST = 4  # patches along the longest side of a surface
+_BLOCK = 1 << 18  # segments at a time
+
+
+@dataclass(frozen=True, slots=True)
+class Patches:
+    """All patches of the scattering surfaces of a scene, flat.
+
+    Attributes
+    ----------
+    surface
+        (N) index of the surface a patch is cut from.
+    cells
+        By the surface's index, its grid; ``first`` is where its patches begin.
+    """
+
+    surface: NDArray[np.intp]
+    centre: Points
+    normal: Points
+    area: NDArray[np.float64]
+    corners: Points
+    albedo: NDArray[np.float64]
+    cells: dict[int, Cells]
+    first: dict[int, int]
+
+    def __len__(self) -> int:
+        """Patches in all."""
+        return len(self.area)
+
+    @classmethod
+    def of(cls, scene: Scene, per_side: int) -> "Patches":
+        """Cut the longest side of all surfaces into so many patches, the others as finely.
+
+        The longest side of a small one is cut into a few all the same.
+        """
+        scattering = {k: each for k, each in enumerate(scene.surfaces) if each.scatters}
+        longest_m = max(np.ptp(s.shape.extent(), axis=0).max() for s in scattering.values())
+        edge_m = float(longest_m) / per_side
+        cells = {
+            index: each.shape.cells(
+                min(edge_m, float(np.ptp(each.shape.extent(), axis=0).max()) / _LEAST)
+            )
+            for index, each in scattering.items()
+        }
+        counts = {index: len(grid.area) for index, grid in cells.items()}
+        first = dict(zip(counts, np.cumsum([0, *counts.values()]).tolist(), strict=False))
+        grids = list(cells.values())
+        return cls(
+            np.repeat(list(counts), list(counts.values())),
+            np.concatenate([grid.centre for grid in grids]),
+            np.concatenate([grid.normal for grid in grids]),
+            np.concatenate([grid.area for grid in grids]),
+            np.concatenate([grid.corners for grid in grids]),
+            np.repeat([s.reflectivity for s in scattering.values()], list(counts.values())),
+            cells,
+            first,
+        )
+
+
+def form_factors(scene: Scene, patches: Patches, at: Points, normal: Points) -> NDArray[np.float64]:
+    """Irradiance (P, N) at points by each patch of radiosity 1: Lambert's contour integral.
+
+    Patches that face away, stand behind the point's surface, or are hidden, give nothing. A patch
+    that the point's horizon cuts counts by its centre.
+    """
+    factors = np.zeros((len(at), len(patches)))
+    rows = max(1, _BLOCK // max(1, len(patches)))
+    hides = len(scene.surfaces) > 0
+    for first in range(0, len(at), rows):
+        block = slice(first, first + rows)
+        way = patches.centre[None, :, :] - at[block, None, :]
+        towards = np.einsum("pnc,pc->pn", way, normal[block]) > 1e-9
+        back = np.einsum("pnc,nc->pn", way, patches.normal) < -1e-9
+        p, n = np.nonzero(towards & back)
+        if hides:
+            clear = ~_blocked(scene, patches, at[block][p], n)
+            p, n = p[clear], n[clear]
+        factors[block][p, n] = _contour(
+            patches.corners[n] - at[block][p][:, None, :], normal[block][p]
+        )
+    return factors
+
+
+def _blocked(
+    scene: Scene, patches: Patches, at: Points, patch: NDArray[np.intp]
+) -> NDArray[np.bool_]:
+    """Whether anything hides a patch's centre from a point."""
+    if len(patches.cells) == 2 and len(scene.surfaces) == 2 and _convex(scene):
+        return np.zeros(len(at), dtype=bool)
+    return blocked(scene, at, patches.centre[patch])
+
+
+def _convex(scene: Scene) -> bool:
+    """Whether both of two surfaces are flat, so that neither hides parts of itself or the other."""
+    return all(hasattr(surface.shape, "right") for surface in scene.surfaces)
+
+
+def _contour(corners: Points, normal: Points) -> NDArray[np.float64]:
+    """Form factor of polygons (P, 4, 3), relative to points with normals (P, 3)."""
+    unit = corners / np.linalg.norm(corners, axis=-1, keepdims=True)
+    following = np.roll(unit, -1, axis=1)
+    cross = np.cross(unit, following)
+    sine = np.linalg.norm(cross, axis=-1)
+    cosine = np.einsum("pkc,pkc->pk", unit, following)
+    angle = np.arctan2(sine, cosine)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        edge = np.where(sine > 0, angle / sine, 0.0)
+    # counter-clockwise from the patch's front is clockwise around the normal at the point
+    total = -np.einsum("pk,pkc,pc->p", edge, cross, normal) / (2 * np.pi)
+    clipped: NDArray[np.float64] = np.clip(total, 0.0, 1.0)
+    return clipped

@@ -1,0 +1,195 @@
+"""Diffuse interreflection: light that goes from surface to surface before the camera sees it.
+
+Radiosity with times of flight. Surfaces are cut into patches; at each frequency a patch's
+irradiance is a complex moment, and light on its way from patch to patch turns it by its time of
+flight. Moments are therefore sums over all paths between patches, at exactly the frequencies
+requested; nothing is binned.
+"""
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
+from transientcam_simulation.base import BIN_S, Responses
+from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._followed import Within
+from transientcam_simulation.light._patches import Patches
+from transientcam_simulation.light._paths import Lit
+from transientcam_simulation.scene import Bilinear, Scene
+
+_CENTROID_HZ = 1e5  # low enough that a phase is proportional to the mean delay
+_HISTOGRAM_PATCHES = 12  # a side, for the impulse response of a pixel
+
+
+class Interreflection:
+    """The light that reaches pixels over more than one scattering surface.
+
+    Parameters
+    ----------
+    scene, lit
+        A scene, and the light that the camera's rays see of it.
+    fine
+        The light of several rays in each of the pixels that are the mean over these.
+    tolerance
+        Brightness that light may lack, where the scene does not say how far it is followed.
+    exchange
+        Light between the scene's patches, where that is known.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        lit: Lit,
+        *,
+        width: int,
+        height: int,
+        fine: tuple[Within, ...] = (),
+        tolerance: float = 1e-4,
+        exchange: Exchange | None = None,
+    ) -> None:
+        self._scene = scene
+        self._lit = lit
+        self._shape = (height, width)
+        self._fine = fine
+        self._exchange = exchange or Exchange.of(scene, scene.transport.patches)
+        self._bounces = self._exchange.bounces(tolerance)
+        self._places = self._between(self._exchange.patches, lit)
+        self._places_of_fine = [self._between(self._exchange.patches, each.rays) for each in fine]
+
+    @property
+    def patches(self) -> int:
+        """Number of patches of the scene."""
+        return len(self._exchange.patches)
+
+    def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
+        """``int g(tau) exp(2 pi i f tau) dtau`` of this light, (H, W)."""
+        return self._moments(frequency_hz) if frequency_hz else self._zeroth
+
+    @cached_property
+    def _zeroth(self) -> NDArray[np.complex128]:
+        """Moments at the frequency 0, which those at any other are asked for with."""
+        return self._moments(0.0)
+
+    def _moments(self, frequency_hz: float) -> NDArray[np.complex128]:
+        irradiance = self._exchange.irradiance(frequency_hz, self._bounces)
+        moments = self._gathered(irradiance, frequency_hz, self._lit, self._places)
+        for each, places in zip(self._fine, self._places_of_fine, strict=True):
+            of_rays = self._gathered(irradiance, frequency_hz, each.rays, places)
+            moments[each.pixel] = each.of_pixels(of_rays).mean(axis=0)
+        return moments.reshape(self._shape)
+
+    def error(self, frequency_hz: float) -> float:
+        """Estimate the error of the moments by their change when patches are twice as large.
+
+        Relative, root mean square over the pixels. The rule is of second order: of the change by
+        a factor of two, a third is left.
+        """
+        fine = self.moments(frequency_hz)
+        transport = self._scene.transport
+        halved = replace(transport, patches=max(2, transport.patches // 2))
+        height, width = self._shape
+        scene = replace(self._scene, transport=halved)
+        coarse = Interreflection(scene, self._lit, width=width, height=height)
+        change = np.sqrt(np.mean(np.abs(fine - coarse.moments(frequency_hz)) ** 2))
+        return float(change / np.sqrt(np.mean(np.abs(fine) ** 2)) / 3)
+
+    @cached_property
+    def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Mean delay and weight of this light, (H, W)."""
+        weight = self.moments(0.0).real
+        phase_rad = np.angle(self.moments(_CENTROID_HZ))
+        return phase_rad / (2 * np.pi * _CENTROID_HZ), weight
+
+    def of_pixel(self, x: int, y: int, *, weight: float) -> tuple[float, NDArray[np.float64]]:
+        """Time of the first bin's start, and mass in bins of ``BIN_S`` that sum up to a weight."""
+        ray = y * self._shape[1] + x
+        start_s, history = self._histogram.history
+        cells, weights = self._between_few
+        mass = np.maximum(weights[ray] @ history[cells[ray]], 0)
+        if weight <= 0 or not mass.any():
+            return start_s, np.zeros(0)
+        start_s += float(self._lit.distance_m[ray]) / SPEED_OF_LIGHT_M_S
+        return start_s, mass * (weight / mass.sum())
+
+    def _gathered(
+        self, irradiance: NDArray[np.complex128], frequency_hz: float, lit: Lit, places: Bilinear
+    ) -> NDArray[np.complex128]:
+        on_pixel = np.einsum("pk,pk->p", places[1], irradiance[places[0]])
+        way = np.exp(2j * np.pi * frequency_hz / SPEED_OF_LIGHT_M_S * lit.distance_m)
+        moments = lit.reflectance * on_pixel * way
+        scatter = lit.scatter(self._scene)
+        if scatter is not None:
+            moments *= scatter.transfer(frequency_hz)
+        result: NDArray[np.complex128] = moments
+        return result
+
+    def _between(self, patches: Patches, lit: Lit) -> Bilinear:
+        """Patches around the end of each ray, and weights of the interpolation."""
+        count = len(lit.surface)
+        index, weights = np.zeros((count, 4), dtype=np.intp), np.zeros((count, 4))
+        for surface, cells in patches.cells.items():
+            mine = lit.surface == surface
+            if mine.any():
+                index[mine], weights[mine] = self._scene.surfaces[surface].shape.between_cells(
+                    lit.point[mine], cells.rows, cells.columns
+                )
+                index[mine] += patches.first[surface]
+        return index, weights
+
+    @cached_property
+    def _histogram(self) -> Exchange:
+        few = min(_HISTOGRAM_PATCHES, self._scene.transport.patches)
+        return Exchange.of(self._scene, few)
+
+    @cached_property
+    def _between_few(self) -> Bilinear:
+        return self._between(self._histogram.patches, self._lit)
+
+
+class WithInterreflection:
+    """Returns by direct light and mirrors, and the light that surfaces give each other."""
+
+    kind: Literal["sparse", "dense"] = "dense"
+
+    def __init__(self, direct: Responses, further: Interreflection) -> None:
+        self._direct = direct
+        self._further = further
+
+    def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
+        """Sum of both."""
+        return self._direct.moments(frequency_hz) + self._further.moments(frequency_hz)
+
+    def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Direct returns, and one for all the rest at its mean delay."""
+        delay_s, weight = self._direct.returns()
+        mean_s, rest = self._further.returns
+        mean_s = np.where(rest > 0, mean_s, np.nan)
+        delay_s, weight = (
+            np.concatenate([delay_s, mean_s[None]]),
+            np.concatenate([weight, rest[None]]),
+        )
+        order = np.argsort(delay_s, axis=0)  # NaN goes last
+        return np.take_along_axis(delay_s, order, 0), np.take_along_axis(weight, order, 0)
+
+    def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Density per s over equal bins; a sharp return fills one bin."""
+        _, rest = self._further.returns
+        start_s, mass = self._further.of_pixel(x, y, weight=float(rest[y, x]))
+        time_s, value = self._direct.of_pixel(x, y)
+        if self._direct.kind == "dense":
+            value = value * BIN_S
+        if not time_s.size and not mass.any():
+            return start_s + BIN_S * np.array([0.5]), np.zeros(1)
+        first_s = min([start_s] if mass.any() else [], default=np.inf)
+        first_s = min(first_s, float(time_s.min()) - BIN_S / 2 if time_s.size else np.inf)
+        into = np.rint((time_s - first_s) / BIN_S - 0.5).astype(int)
+        shift = round((start_s - first_s) / BIN_S) if mass.any() else 0
+        bins = np.zeros(max(int(into.max(initial=0)) + 1, shift + len(mass)))
+        bins[shift : shift + len(mass)] += mass
+        np.add.at(bins, into, value)
+        time_s = np.float64(first_s) + BIN_S * (np.arange(len(bins), dtype=np.float64) + 0.5)
+        return np.asarray(time_s, dtype=np.float64), bins / BIN_S

@@ -1,0 +1,304 @@
+"""What is in front of the camera as light, still or moving, with the effects called for."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_simulation.base import PINHOLE, Lens, Moments, Responses
+from transientcam_simulation.effects import (
+    CALLED_ABOVE,
+    DiffuseInterreflection,
+    Distortion,
+    Facts,
+    Glimpse,
+    Gloss,
+    MirrorPaths,
+    MixedPixels,
+    Noise,
+    Scattering,
+)
+from transientcam_simulation.light._bundle import Region
+from transientcam_simulation.light._facts import SceneFacts, cosine_to_axis
+from transientcam_simulation.light._followed import FollowedRays
+from transientcam_simulation.light._layers import MovingResponses
+from transientcam_simulation.light._moving import MovingLight, still_scene
+from transientcam_simulation.light._radiosity import Interreflection, WithInterreflection
+from transientcam_simulation.light._rays import camera_rays
+from transientcam_simulation.light._recent import Recent
+from transientcam_simulation.light._still import StillLight
+from transientcam_simulation.light._time_interpolation import Between, Steps
+from transientcam_simulation.light._variants import (
+    without_gloss,
+    without_mirrors,
+    without_scattering,
+)
+from transientcam_simulation.scene import Scene
+
+Values = NDArray[np.float64]
+KEPT_PIXELS: Final = 40_000
+"""Of sensors for which more is kept of a scene than what is shown: 1 KiB a pixel and view."""
+_STILL_VIEWS: Final = 3  # for sequences that alternate
+_FOLLOWED: Final = 2  # for effects that do
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a sequence asks of the light: effects by name, and how exactly.
+
+    ``noise`` is that of a moment, ``highest_hz`` the highest frequency that is measured, ``lens``
+    the one before the sensor, and ``image_period_s`` the time from image to image.
+    """
+
+    effects: frozenset[str] = frozenset()
+    noise: Noise = field(default_factory=lambda: Noise(1e6, 0.0, 900.0, 1))
+    highest_hz: float = 0.0
+    lens: Lens = PINHOLE
+    image_period_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What the camera sees: impulse responses, and the reflectance of the pixels' surfaces (H, W).
+
+    ``region``: rows and columns of the pixels that differ from the background; None: all may.
+    """
+
+    responses: Responses
+    reflectance: Callable[[], NDArray[np.float32] | np.float32]
+    region: Region | None = None
+
+    def moments(
+        self, frequency_hz: float, region: Region | None
+    ) -> NDArray[np.complexfloating] | Moments:
+        """Moments of all pixels, or of a region that holds all that differs."""
+        if region is None:
+            return self.responses.moments(frequency_hz)
+        if isinstance(self.responses, MovingResponses | Between):
+            return self.responses.moments_in(region, frequency_hz)
+        return self.responses.moments(frequency_hz)[region]
+
+
+@dataclass(frozen=True, slots=True)
+class Views:
+    """The view at a time of the device; the same object as long as nothing changes.
+
+    ``exact`` takes no account of the time it takes. ``background`` is the view without what moves,
+    of which views are regions.
+    """
+
+    at: Callable[[float], View]
+    exact: Callable[[float], View]
+    background: View | None = None
+
+
+class Latest:
+    """A view as a function of time that remembers the last one."""
+
+    def __init__(self, of: Callable[[float], View]) -> None:
+        self._of = of
+        self._last: tuple[float, View] | None = None
+
+    def __call__(self, time_s: float) -> View:
+        """Return the view at a time."""
+        if self._last is None or self._last[0] != time_s:
+            self._last = time_s, self._of(time_s)
+        return self._last[1]
+
+
+def _view_of(now: MovingResponses | Between) -> View:
+    return View(now, lambda: now.reflectance, now.region)
+
+
+class Scenery(Protocol):
+    """Something in front of the camera."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether it changes with time."""
+        ...
+
+    @property
+    def glimpses(self) -> tuple[Glimpse, ...]:
+        """What effects are judged by."""
+        ...
+
+    @property
+    def facts(self) -> Facts | None:
+        """How effects of light change it; None if there is no geometry."""
+        ...
+
+    @property
+    def lens(self) -> Lens:
+        """What the light comes through."""
+        ...
+
+    @property
+    def cosine(self) -> Values:
+        """(H, W): of the angle between the pixels' rays and the lens's axis."""
+        ...
+
+    def view(self, wanted: Wanted) -> Views:
+        """Prepare its views."""
+        ...
+
+
+class GivenScenery:
+    """Given impulse responses that do not change."""
+
+    moves = False
+    facts = None
+    lens = PINHOLE
+
+    def __init__(self, responses: Responses) -> None:
+        self._view = View(responses, lambda: np.float32(1))
+
+    @property
+    def glimpses(self) -> tuple[Glimpse, ...]:
+        """All pixels, once."""
+        return self._glimpses
+
+    @cached_property
+    def _glimpses(self) -> tuple[Glimpse]:
+        brightness = self._view.responses.moments(0.0).real
+        ones = np.ones(brightness.size)
+        shape = brightness.shape[0], brightness.shape[1]
+        return (Glimpse(brightness.ravel(), ones, ones, shape),)
+
+    @property
+    def cosine(self) -> Values:
+        """One, as nothing is known of angles."""
+        return np.ones(self.glimpses[0].shape)
+
+    def view(self, wanted: Wanted) -> Views:
+        """Return the given view."""
+        return Views(lambda _time_s: self._view, lambda _time_s: self._view)
+
+
+class SurfaceScenery:
+    """Surfaces, a light source and a camera."""
+
+    def __init__(self, scene: Scene, *, width: int, height: int) -> None:
+        assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
+        self._scene = scene
+        self._camera = scene.camera
+        self._size = {"width": width, "height": height}
+        small = width * height <= KEPT_PIXELS
+        self._still_views: Recent[Wanted, Views] = Recent(_STILL_VIEWS if small else 1)
+        self._followed: Recent[tuple[frozenset[str], Lens], FollowedRays]
+        self._followed = Recent(_FOLLOWED if small else 0)
+
+    @property
+    def moves(self) -> bool:
+        """Whether anything moves."""
+        return self._scene.moves
+
+    @property
+    def lens(self) -> Lens:
+        """The camera's."""
+        return self._camera.lens
+
+    @property
+    def glimpses(self) -> tuple[Glimpse, ...]:
+        """Pixels, over the scene's life."""
+        return self.facts.glimpses
+
+    @property
+    def facts(self) -> SceneFacts:
+        """How effects change the scene, over its life."""
+        return self._facts
+
+    @cached_property
+    def _facts(self) -> SceneFacts:
+        return SceneFacts(self._scene, **self._size)
+
+    @property
+    def cosine(self) -> Values:
+        """Of the pixels' rays to the lens's axis."""
+        return self._cosine
+
+    @cached_property
+    def _cosine(self) -> Values:
+        shape = self._size["height"], self._size["width"]
+        return cosine_to_axis(self._camera, camera_rays(self._camera, **self._size)).reshape(shape)
+
+    def view(self, wanted: Wanted) -> Views:
+        """Trace a still scene once; of a moving one what moves, for each time."""
+        # what moves is remembered by its views, which belong to one camera
+        if self.moves:
+            return self._traced(wanted)
+        return self._still_views.get(wanted, lambda: self._traced(wanted))
+
+    def _traced(self, wanted: Wanted) -> Views:
+        scene = self._with(wanted)
+        effects = wanted.effects
+        # effects within a pixel change which rays are followed, and not what they see
+        followed = self._followed.get(
+            (effects - {MixedPixels.name}, wanted.lens),
+            lambda: FollowedRays(still_scene(scene), **self._size),
+        )
+        still = StillLight(
+            followed.scene,
+            **self._size,
+            noise=wanted.noise if MixedPixels.name in effects else None,
+            highest_hz=wanted.highest_hz,
+            followed=followed,
+        )
+        tolerance = CALLED_ABOVE * float(wanted.noise.deviation(0.0, 0.0))
+        further = DiffuseInterreflection.name in effects
+        if not self.moves:
+            view = self._still_view(still, followed, tolerance if further else None)
+            return Views(lambda _time_s: view, lambda _time_s: view)
+        moving = MovingLight(scene, still, soft=MixedPixels.name in effects)
+        if further:
+            at = Latest(lambda time_s: self._lit_view(moving.at(time_s), tolerance))
+            return Views(at, at)
+        exact = Latest(lambda time_s: _view_of(moving.at(time_s)))
+        steps = Steps(scene, moving.at, pixel_rad=still.pixel_rad, every_s=wanted.image_period_s)
+        between = Latest(lambda time_s: _view_of(steps.at(time_s)))
+        return Views(between, exact, self._still_view(still, followed, None))
+
+    def _lit_view(self, now: MovingResponses, tolerance: float) -> View:
+        """View of a moving scene with light over several surfaces, computed anew."""
+        width, height = self._size["width"], self._size["height"]
+        light = Interreflection(now.scene, now.lit, width=width, height=height, tolerance=tolerance)
+        return View(WithInterreflection(now, light), lambda: now.reflectance)
+
+    def _still_view(
+        self, still: StillLight, followed: FollowedRays, tolerance: float | None
+    ) -> View:
+        """View what stands still, with light over several surfaces up to a tolerance."""
+        shape = self._size["height"], self._size["width"]
+        responses: Responses = still.responses()
+        if tolerance is not None:
+            light = Interreflection(
+                still.scene,
+                still.lit,
+                width=still.width,
+                height=still.height,
+                fine=still.fine,
+                tolerance=tolerance,
+                exchange=followed.exchange,
+            )
+            responses = WithInterreflection(responses, light)
+        reflectance = still.reflectance.reshape(shape)
+        return View(responses, lambda: reflectance)
+
+    def _with(self, wanted: Wanted) -> Scene:
+        """Return the scene with the effects of light that are wanted, and no others."""
+        effects, scene = wanted.effects, self._scene
+        lens = wanted.lens if Distortion.name in effects else PINHOLE
+        scene = replace(scene, camera=replace(self._camera, lens=lens))
+        if MirrorPaths.name not in effects:
+            scene = without_mirrors(scene)
+        if Gloss.name not in effects:
+            scene = without_gloss(scene)
+        if Scattering.name not in effects:
+            scene = without_scattering(scene)
+        if DiffuseInterreflection.name in effects and scene.transport.diffuse_bounces == 0:
+            # on, although the scene has none
+            scene = replace(scene, transport=replace(scene.transport, diffuse_bounces=1))
+        return scene

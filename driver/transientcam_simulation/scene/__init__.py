@@ -1,0 +1,53 @@
+"""What is in front of the simulated camera: surfaces, light, motions, and the files of scenes."""
+
+from transientcam_simulation.scene._file import (
+    BUILT_IN,
+    SceneInfo,
+    list_scenes,
+    load_scene,
+    parse_scene,
+)
+from transientcam_simulation.scene._geometry import (
+    Bilinear,
+    Cells,
+    Ellipsoid,
+    Points,
+    Rectangle,
+    Shape,
+    blocked_by_mask,
+)
+from transientcam_simulation.scene._motion import Motion
+from transientcam_simulation.scene._scene import (
+    Background,
+    Diffusor,
+    Light,
+    ResponseFile,
+    Scene,
+    Surface,
+    TimeZero,
+    Viewpoint,
+)
+
+__all__ = [
+    "BUILT_IN",
+    "Background",
+    "Bilinear",
+    "Cells",
+    "Diffusor",
+    "Ellipsoid",
+    "Light",
+    "Motion",
+    "Points",
+    "Rectangle",
+    "ResponseFile",
+    "Scene",
+    "SceneInfo",
+    "Shape",
+    "Surface",
+    "TimeZero",
+    "Viewpoint",
+    "blocked_by_mask",
+    "list_scenes",
+    "load_scene",
+    "parse_scene",
+]

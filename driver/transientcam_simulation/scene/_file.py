@@ -1,0 +1,407 @@
+"""Read scene files: TOML tables into a scene. Reading computes nothing."""
+
+import tomllib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.camera import Sensor
+from transientcam_driver.errors import SceneError
+from transientcam_simulation.base import (
+    PROFILES,
+    DarkCurrent,
+    DeviceProfile,
+    Drift,
+    Lens,
+    LensScatter,
+    Outliers,
+    Pattern,
+    Scatter,
+    Waveform,
+)
+from transientcam_simulation.effects import CHOICES, EFFECTS
+from transientcam_simulation.scene._geometry import Ellipsoid, Rectangle, Shape
+from transientcam_simulation.scene._limits import require_modest
+from transientcam_simulation.scene._motion import Motion, Repeat
+from transientcam_simulation.scene._scene import (
+    Background,
+    Diffusor,
+    Kind,
+    Light,
+    ResponseFile,
+    Scene,
+    Surface,
+    TimeZero,
+    Transport,
+    Viewpoint,
+)
+from transientcam_simulation.scene._table import Table
+
+BUILT_IN = Path(__file__).parents[1] / "scenes"
+MOST_BOUNCES = 8
+_SHAPES = ("rectangle", "sphere", "ellipsoid")
+
+
+@dataclass(frozen=True, slots=True)
+class SceneInfo:
+    """A built-in scene."""
+
+    name: str
+    description: str
+    path: Path
+
+
+def list_scenes() -> tuple[SceneInfo, ...]:
+    """List the scenes that come with the driver."""
+    infos = []
+    for path in sorted(BUILT_IN.glob("*.toml"), key=lambda path: path.stem):
+        table = _open(path)
+        infos.append(SceneInfo(path.stem, table.text("description", ""), path))
+    return tuple(infos)
+
+
+def load_scene(path: Path) -> Scene:
+    """Read a scene file.
+
+    Raises
+    ------
+    SceneError
+        Naming the file, the key, its value and what is allowed.
+    """
+    return _scene(_open(path), name=path.stem, file=path)
+
+
+def parse_scene(text: str) -> Scene:
+    """Read the text of a scene file that comes from elsewhere; it may name no other file.
+
+    Raises
+    ------
+    SceneError
+        As `load_scene`; and if it would take much memory or time to prepare.
+    """
+    try:
+        content = tomllib.loads(text)
+        scene = _scene(Table("the scene", "", content), name="own scene", file=None)
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError; a number of too many digits
+        raise SceneError("the scene", "the text", str(error), "valid TOML") from error
+    built_in = [each.name for each in list_scenes()]
+    if scene.name in built_in:
+        allowed = f"another name than those of built-in scenes: {', '.join(built_in)}"
+        raise SceneError("the scene", "name", scene.name, allowed)
+    require_modest(scene)
+    return scene
+
+
+def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
+    folder = None if file is None else file.parent
+    name, description = top.text("name", name), top.text("description", "")
+    responses = tuple(_response(table, folder) for table in top.tables("response"))
+    motions = _motions(top.tables("motion"))
+    surfaces = tuple(_surface(table, motions) for table in top.tables("surface"))
+    diffusor = _diffusor(top.table("diffusor")) if "diffusor" in top else None
+    if sum(map(bool, (responses, surfaces, diffusor))) != 1:
+        allowed = "given, or [[response]] or [diffusor] instead, but only one of them"
+        raise top.error("surface", len(surfaces), allowed)
+    scene = Scene(
+        name=name,
+        description=description,
+        file=file,
+        light=_light(top.table("light"), somewhere=bool(surfaces)),
+        sensor=_sensor(top.table("sensor")),
+        device=_device(top.table("device"), folder),
+        camera=_viewpoint(top.table("camera")) if surfaces else None,
+        surfaces=surfaces,
+        transport=_transport(top.table("transport")),
+        responses=responses,
+        diffusor=diffusor,
+        ambient_electrons_per_s=_ambient(top.table("ambient")),
+        effects=_effects(top.table("effects")),
+        seed=top.integer("seed", 1, least=0, most=2**63 - 1),
+    )
+    top.done()
+    return scene
+
+
+def _open(path: Path) -> Table:
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SceneError(path, "the file", error.strerror, "readable") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SceneError(path, "the file", str(error), "valid TOML") from error
+    return Table(path, "", content)
+
+
+def _light(table: Table, *, somewhere: bool) -> Light:
+    electrons_per_s = table.number("electrons_per_s", above=0)
+    if not somewhere:
+        table.done()
+        return Light(electrons_per_s, np.zeros(3), np.zeros(3), 0.0)
+    light = Light(
+        electrons_per_s=electrons_per_s,
+        position_m=table.vector("position_m"),
+        aim_at_m=table.vector("aim_at_m"),
+        beam_exponent=table.number("beam_exponent", 0.0, least=0),
+    )
+    if np.array_equal(light.aim_at_m, light.position_m):
+        raise table.error("aim_at_m", light.aim_at_m.tolist(), "away from position_m")
+    table.done()
+    return light
+
+
+def _viewpoint(table: Table) -> Viewpoint:
+    view = Viewpoint(
+        position_m=table.vector("position_m", (0.0, 0.0, 0.0)),
+        look_at_m=table.vector("look_at_m", (0.0, 1.0, 0.0)),
+        field_of_view_deg=table.number("field_of_view_deg", 45.0, above=0, most=170),
+        lens=_lens(table.table("lens")),
+    )
+    if not np.any((view.look_at_m - view.position_m)[:2]):
+        allowed = "away from position_m, and not straight above or below it"
+        raise table.error("look_at_m", view.look_at_m.tolist(), allowed)
+    table.done()
+    return view
+
+
+def _lens(table: Table) -> Lens:
+    k1, k2, p1, p2 = (
+        table.number(name, 0.0, least=-most, most=most)
+        for name, most in (("k1", 1.0), ("k2", 1.0), ("p1", 0.1), ("p2", 0.1))
+    )
+    x, y = (table.number(name, 0.0, least=-0.5, most=0.5) for name in ("centre_x", "centre_y"))
+    lens = Lens((k1, k2, p1, p2), (x, y), table.number("vignetting", 0.0, least=0, most=16))
+    table.done()
+    return lens
+
+
+def _sensor(table: Table) -> Sensor:
+    default = Sensor()
+    sensor = Sensor(
+        full_well_e=table.number("full_well_e", default.full_well_e, above=0),
+        gain_e_per_dn=table.number("gain_e_per_dn", default.gain_e_per_dn, above=0),
+        read_noise_e=table.number("read_noise_e", default.read_noise_e, least=0),
+        bits=table.integer("bits", default.bits, least=1, most=16),
+        dark_dn=table.number("dark_dn", default.dark_dn, least=0),
+    )
+    if sensor.dark_dn > sensor.highest_dn:
+        allowed = f"a number of at most {sensor.highest_dn}, the highest code of the converter"
+        raise table.error("dark_dn", sensor.dark_dn, allowed)
+    table.done()
+    return sensor
+
+
+def _device(table: Table, folder: Path | None) -> DeviceProfile:
+    profile = PROFILES[table.choice("profile", tuple(PROFILES), "ideal")]
+    profile = replace(profile, seed=table.integer("seed", 0, least=0, most=2**63 - 1))
+    if "waveform_file" in table:
+        profile = replace(profile, waveform=Waveform(file=_file(table, "waveform_file", folder)))
+    if "pattern" in table:
+        profile = replace(profile, pattern=_pattern(table.table("pattern"), folder))
+    if "drift" in table:
+        profile = replace(profile, drift=_drift(table.table("drift")))
+    if "lens_scatter" in table:
+        profile = replace(profile, lens_scatter=_lens_scatter(table.table("lens_scatter")))
+    if "dark_current_e_per_s" in table:
+        current = DarkCurrent(table.number("dark_current_e_per_s", least=0))
+        profile = replace(profile, dark_current=current)
+    if "outlier_share" in table:
+        share = table.number("outlier_share", least=0, most=1)
+        profile = replace(profile, outliers=Outliers(share))
+    table.done()
+    return profile
+
+
+def _pattern(table: Table, folder: Path | None) -> Pattern:
+    pattern = Pattern(
+        delay_s=table.number("delay_s", 0.0, least=0),
+        gain=table.number("gain", 0.0, least=0, most=0.3),
+        file=_file(table, "file", folder) if "file" in table else None,
+        file_frequency_hz=table.number("file_frequency_hz", 23e6, above=0),
+    )
+    if pattern.file is not None and pattern.delay_s:
+        raise table.error("delay_s", pattern.delay_s, "absent beside file, which has the delays")
+    table.done()
+    return pattern
+
+
+def _file(table: Table, key: str, folder: Path | None) -> Path:
+    """Read the name of a file beside the scene's own."""
+    name = table.text(key)
+    if folder is None:
+        raise table.error(key, name, "absent: a scene that is sent cannot name files")
+    return folder / name
+
+
+def _drift(table: Table) -> Drift:
+    drift = Drift(
+        rise_c=table.number("rise_c"),
+        time_constant_s=table.number("time_constant_s", above=0),
+        delay_s_per_c=table.number("delay_s_per_c"),
+    )
+    table.done()
+    return drift
+
+
+def _lens_scatter(table: Table) -> LensScatter:
+    scatter = LensScatter(
+        share=table.number("share", least=0, most=0.5), width=table.number("width", 0.15, above=0)
+    )
+    table.done()
+    return scatter
+
+
+def _transport(table: Table) -> Transport:
+    default = Transport()
+    transport = Transport(
+        mirror_bounces=table.integer(
+            "mirror_bounces", default.mirror_bounces, least=0, most=MOST_BOUNCES
+        ),
+        diffuse_bounces=(
+            table.integer("diffuse_bounces", least=0, most=MOST_BOUNCES)
+            if "diffuse_bounces" in table
+            else None
+        ),
+        patches=table.integer("patches", default.patches, least=2, most=64),
+    )
+    table.done()
+    return transport
+
+
+def _ambient(table: Table) -> float:
+    electrons_per_s = table.number("electrons_per_s", 0.0, least=0)
+    table.done()
+    return electrons_per_s
+
+
+def _diffusor(table: Table) -> Diffusor:
+    diffusor = Diffusor(
+        brightness=table.number("brightness", 1.0, above=0),
+        delay_s=table.number("delay_s", 0.0, least=0),
+        fall_off=table.number("fall_off", 0.0, least=0, most=0.9),
+    )
+    table.done()
+    return diffusor
+
+
+def _effects(table: Table) -> dict[str, str]:
+    effects = {
+        effect.name: table.choice(effect.name, CHOICES, "auto")
+        for effect in EFFECTS
+        if effect.optional
+    }
+    table.done()
+    return effects
+
+
+def _motions(tables: list[Table]) -> dict[str, Motion]:
+    motions: dict[str, Motion] = {}
+    for table in tables:
+        name = table.text("name")
+        if name in motions:
+            raise table.error("name", name, "a name that no other motion has")
+        motions[name] = Motion(
+            path_m=table.vectors("path_m", least=2),
+            period_s=table.number("period_s", above=0),
+            repeat=table.choice("repeat", get_args(Repeat), "restart"),
+        )
+        table.done()
+    return motions
+
+
+def _surface(table: Table, motions: dict[str, Motion]) -> Surface:
+    kind: Kind = table.choice("kind", get_args(Kind))
+    name = table.text("name", kind)
+    shape = _shape(table, kind)
+    share = "reflectivity" if kind == "mirror" else "albedo"
+    gloss, exponent = _gloss(table) if kind in ("diffuse", "translucent") else (0.0, 50.0)
+    surface = Surface(
+        name,
+        kind,
+        shape,
+        0.0 if kind == "stencil" else table.number(share, least=0, most=1),
+        _mask(table) if kind == "stencil" else None,
+        _scatter(table) if kind == "translucent" else None,
+        _moves(table, kind, motions) if "motion" in table else (),
+        gloss,
+        exponent,
+    )
+    if surface.reflectivity + gloss > 1 and surface.scatters:
+        limit = f"at most {1 - surface.reflectivity:g}, what albedo leaves of the light"
+        raise table.error("gloss", gloss, limit)
+    table.done()
+    return surface
+
+
+def _shape(table: Table, kind: Kind) -> Shape:
+    allowed = _SHAPES if kind in ("diffuse", "translucent") else _SHAPES[:1]
+    shape = table.choice("shape", allowed, "rectangle")
+    centre_m = table.vector("centre_m")
+    if shape == "sphere":
+        return Ellipsoid(centre_m, np.full(3, table.number("radius_m", above=0)))
+    if shape == "ellipsoid":
+        radii_m = table.vector("radii_m")
+        if radii_m.min() <= 0:
+            raise table.error("radii_m", radii_m.tolist(), "three numbers above 0")
+        return Ellipsoid(centre_m, radii_m)
+    normal = table.vector("normal")
+    if not np.any(normal):
+        raise table.error("normal", normal.tolist(), "other than zero")
+    return Rectangle.facing(centre_m, normal, size=table.size("size_m"))
+
+
+def _gloss(table: Table) -> tuple[float, float]:
+    return (
+        table.number("gloss", 0.0, least=0, most=1),
+        table.number("gloss_exponent", 50.0, least=1, most=10_000),
+    )
+
+
+def _scatter(table: Table) -> Scatter:
+    return Scatter(
+        width_s=table.number("scatter_width_s", 0.0, least=0, most=1e-6),
+        decay_s=table.number("scatter_decay_s", above=0, most=1e-6),
+    )
+
+
+def _moves(table: Table, kind: Kind, motions: dict[str, Motion]) -> tuple[Motion, ...]:
+    if kind not in ("diffuse", "translucent"):
+        raise table.error("motion", table.words("motion"), f"absent; a {kind} stays in its place")
+    names = table.words("motion")
+    for name in names:
+        if name not in motions:
+            known = ", ".join(motions) or "none in this file"
+            raise table.error("motion", name, f"the name of a [[motion]]: {known}")
+    return tuple(motions[name] for name in names)
+
+
+def _mask(table: Table) -> NDArray[np.bool_]:
+    text = table.text("mask")
+    rows = [line.strip() for line in text.strip().splitlines()]
+    if not rows or len({len(row) for row in rows}) != 1 or set("".join(rows)) - {"#", "."}:
+        allowed = "rows of equal length made of '#' (opaque) and '.' (open)"
+        raise table.error("mask", text, allowed)
+    return np.array([[cell == "#" for cell in row] for row in rows])
+
+
+def _response(table: Table, folder: Path | None) -> ResponseFile:
+    time_zero_s = table.number("time_zero_s") if "time_zero_s" in table else None
+    has_zero_file = "time_zero_file" in table
+    zero_file = _file(table, "time_zero_file", folder) if has_zero_file else None
+    if time_zero_s is not None and zero_file is not None:
+        raise table.error("time_zero_s", time_zero_s, "absent beside time_zero_file")
+    response = ResponseFile(
+        path=_file(table, "file", folder),
+        weight=table.number("weight", 1.0, above=0),
+        delay_s=table.number("delay_s", 0.0),
+        normalise=table.switch("normalise", True),
+        background=table.choice("background", get_args(Background), "none"),
+        time_zero=table.choice("time_zero", get_args(TimeZero), "start"),
+        time_zero_s=time_zero_s,
+        time_zero_file=zero_file,
+        bin_s=table.number("bin_s", above=0) if "bin_s" in table else None,
+    )
+    table.done()
+    return response

@@ -1,0 +1,167 @@
+"""What is in front of the simulated camera, and the camera itself.
+
+The schema is described in docs/scenes.md; ``file`` reads it.
+"""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.camera import Sensor
+from transientcam_simulation.base import IDEAL, PINHOLE, DeviceProfile, Lens, Scatter
+from transientcam_simulation.scene._geometry import Points, Rectangle, Shape
+from transientcam_simulation.scene._motion import Motion
+
+Background = Literal["none", "median"]
+TimeZero = Literal["start", "peak"]
+Kind = Literal["diffuse", "translucent", "mirror", "stencil"]
+
+
+@dataclass(frozen=True, slots=True)
+class Viewpoint:
+    """Where the camera stands and looks; ``field_of_view_deg`` is horizontal, of a pinhole."""
+
+    position_m: Points
+    look_at_m: Points
+    field_of_view_deg: float
+    lens: Lens = PINHOLE
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """A small light source.
+
+    Its intensity falls off with the ``beam_exponent``-th power of the cosine to the direction it
+    is aimed in. ``electrons_per_s`` is what a white surface that faces it on its axis at 1 m
+    gives a pixel.
+    """
+
+    electrons_per_s: float
+    position_m: Points
+    aim_at_m: Points
+    beam_exponent: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """Something that scatters, reflects or blocks light.
+
+    ``reflectivity`` is the albedo of a diffuse or translucent surface. ``opaque`` is the mask of
+    a stencil, rows from top to bottom as seen from its front; the other kinds have none. ``gloss``
+    is the share of light that a scattering surface reflects as a dull mirror, in a lobe of Blinn's
+    model with the exponent ``gloss_exponent``.
+    """
+
+    name: str
+    kind: Kind
+    shape: Shape
+    reflectivity: float
+    opaque: NDArray[np.bool_] | None = None
+    scatter: Scatter | None = None
+    motions: tuple[Motion, ...] = ()
+    gloss: float = 0.0
+    gloss_exponent: float = 50.0
+
+    @property
+    def mirror(self) -> Rectangle:
+        """The plane of a mirror."""
+        assert isinstance(self.shape, Rectangle)  # noqa: S101  (scene files make no others)
+        return self.shape
+
+    @property
+    def scatters(self) -> bool:
+        """Whether light that falls on it goes in all directions."""
+        return self.kind in ("diffuse", "translucent")
+
+    def at(self, time_s: float) -> "Surface":
+        """Return it at its place at a time."""
+        if not self.motions:
+            return self
+        by = sum((motion.offset_m(time_s) for motion in self.motions), np.zeros(3))
+        return replace(self, shape=self.shape.moved(by), motions=())
+
+
+@dataclass(frozen=True, slots=True)
+class Transport:
+    """How far light is followed.
+
+    Attributes
+    ----------
+    mirror_bounces
+        Most mirrors on the way of light to a surface, and on a ray of the camera.
+    diffuse_bounces
+        How often light goes from surface to surface before the camera sees it; None: until what is
+        left is below the noise.
+    patches
+        Into how many patches the longest side of a surface is cut to compute that.
+    """
+
+    mirror_bounces: int = 2
+    diffuse_bounces: int | None = None
+    patches: int = 24
+
+
+@dataclass(frozen=True, slots=True)
+class ResponseFile:
+    """Impulse responses from a file (see ``measured.py``)."""
+
+    path: Path
+    weight: float = 1.0
+    delay_s: float = 0.0
+    normalise: bool = True
+    background: Background = "none"
+    time_zero: TimeZero = "start"
+    time_zero_s: float | None = None
+    time_zero_file: Path | None = None
+    bin_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Diffusor:
+    """The light shines at the sensor through a filter and a diffusor (Fig. 4).
+
+    Every pixel gets one return of the same brightness and delay; ``fall_off`` is the share of the
+    brightness that is missing in the corners of the image.
+    """
+
+    brightness: float = 1.0
+    delay_s: float = 0.0
+    fall_off: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Everything in front of the camera, and the camera."""
+
+    name: str
+    description: str
+    file: Path | None
+    light: Light
+    sensor: Sensor = field(default_factory=Sensor)
+    device: DeviceProfile = IDEAL
+    camera: Viewpoint | None = None
+    surfaces: tuple[Surface, ...] = ()
+    transport: Transport = field(default_factory=Transport)
+    responses: tuple[ResponseFile, ...] = ()
+    diffusor: Diffusor | None = None
+    ambient_electrons_per_s: float = 0.0
+    effects: dict[str, str] = field(default_factory=dict)
+    seed: int = 1
+
+    @property
+    def mirror_bounces(self) -> int:
+        """Mirrors that light may pass."""
+        return self.transport.mirror_bounces
+
+    @property
+    def moves(self) -> bool:
+        """Whether anything in it moves."""
+        return any(surface.motions for surface in self.surfaces)
+
+    def at(self, time_s: float) -> "Scene":
+        """Return the scene as it is at a time of the device."""
+        surfaces = tuple(surface.at(time_s) for surface in self.surfaces)
+        return replace(self, surfaces=surfaces) if self.moves else self

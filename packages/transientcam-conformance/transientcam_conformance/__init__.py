@@ -1,0 +1,22 @@
+"""Checks of a running camera against the documentation: each tries one promise of it.
+
+``transientcam conformance URL`` runs them. They use nothing but the documented interface, and
+leave the camera as they found it.
+"""
+
+from transientcam_conformance._check import Check
+from transientcam_conformance._device import Device
+from transientcam_conformance._report import Report, Result
+from transientcam_conformance._running import CHECKS, GROUPS, SLOW, chosen, run
+
+__all__ = [
+    "CHECKS",
+    "GROUPS",
+    "SLOW",
+    "Check",
+    "Device",
+    "Report",
+    "Result",
+    "chosen",
+    "run",
+]

@@ -1,0 +1,85 @@
+"""The plug-in ``opt8241``: a Texas Instruments OPT8241-CDK on USB, or its emulation."""
+
+from collections.abc import Callable, Iterator
+from contextlib import closing, suppress
+from typing import Final
+
+from transientcam_driver.camera import Camera, CameraName, CameraPlugin, FoundCamera
+from transientcam_driver.cameras.triggered import TriggeredCamera
+from transientcam_driver.clock import Clock
+from transientcam_driver.errors import CameraError
+from transientcam_opt8241 import PRODUCT, QUADS, Opt8241, list_cameras, open_link
+from transientcam_opt8241.emulated import build_opt8241
+from transientcam_simulation.entries.emulated import (
+    EMULATED,
+    OF_EMULATION,
+    require_no_emulation,
+    simulated_scene,
+)
+
+
+def _quads(name: CameraName) -> int:
+    return int(name.choice("phases", map(str, QUADS)))
+
+
+def _open(name: CameraName, clock: Clock) -> Camera:
+    quads = _quads(name)
+    if name.address != EMULATED:
+        require_no_emulation(name)
+        return TriggeredCamera(_one_at_a_time(lambda: _real(name)), clock=clock)
+    scene = simulated_scene(name)
+    emulated, simulation = build_opt8241(scene.load(), seed=scene.seed, clock=clock, quads=quads)
+    connect = _one_at_a_time(lambda: Opt8241(emulated.connect(), quads=quads))
+    return TriggeredCamera(connect, clock=clock, simulation=simulation)
+
+
+def _one_at_a_time(connect: Callable[[], Opt8241]) -> Callable[[], Opt8241]:
+    """Return what gives a camera back before it claims it again."""
+    opened: list[Opt8241] = []
+
+    def again() -> Opt8241:
+        while opened:
+            opened.pop().close()
+        opened.append(connect())
+        return opened[0]
+
+    return again
+
+
+def _real(name: CameraName) -> Opt8241:
+    return Opt8241(open_link(name.address or None), quads=_quads(name))
+
+
+def _check(name: CameraName) -> None:
+    _quads(name)
+    if name.address == EMULATED:
+        simulated_scene(name).load()
+    else:
+        require_no_emulation(name)
+
+
+def _find() -> Iterator[FoundCamera]:
+    yield FoundCamera(f"opt8241:{EMULATED}", product=PRODUCT, simulated=True)
+    with suppress(CameraError):  # without libusb there are none; doctor says so
+        yield from list_cameras()
+
+
+def _facts(name: CameraName) -> Iterator[tuple[str, str]]:
+    """Read what the maintainer of this driver needs to know of a real camera."""
+    if name.address != EMULATED:
+        with closing(_real(name)) as device:
+            yield from device.facts()
+
+
+PLUGIN: Final = CameraPlugin(
+    summary="a Texas Instruments OPT8241-CDK on USB, or its emulation (docs/opt8241.md)",
+    usage=f"opt8241[:SERIAL] or opt8241:{EMULATED}",
+    open=_open,
+    find=_find,
+    check=_check,
+    facts=_facts,
+    options={
+        "phases": "4 or 6 of each frequency; 4 without it",
+        **OF_EMULATION,
+    },
+)

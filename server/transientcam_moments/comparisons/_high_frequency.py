@@ -1,0 +1,57 @@
+"""One return from the phase at high frequencies, where smooth indirect light cancels itself."""
+
+import numpy as np
+
+from transientcam_moments.arrays import Array
+from transientcam_moments.comparisons._estimate import SparseEstimate
+from transientcam_moments.comparisons._pixels import pixels_of
+from transientcam_moments.comparisons._technique import Technique
+
+_LEAST = 2
+
+
+def high_frequency(b: Array) -> SparseEstimate:
+    """Estimate one return from the two highest frequencies.
+
+    Parameters
+    ----------
+    b : array, shape (m + 1, ...)
+        Moments, m >= 2; only b_{m-1} and b_m are looked at.
+
+    Returns
+    -------
+    SparseEstimate
+        A return of weight |b_m|.
+
+    Raises
+    ------
+    ParameterError
+        When m < 2.
+
+    Notes
+    -----
+    The beat of the two, arg(b_m conj(b_{m-1})), has no ambiguity within the turn and chooses among
+    the m phases that b_m alone allows; it may be off by pi / m. The frequencies are high where
+    m f is above the bandwidth of the indirect light.
+    """
+    pixels = pixels_of(b, least=_LEAST, name="high-frequency", first=-2)
+    m, low, high = pixels.m, pixels.b[-2], pixels.b[-1]
+    beat = np.angle(high * low.conj())
+    turns = np.round((m * beat - np.angle(high)) / (2 * np.pi))
+    phase = (np.angle(high) + 2 * np.pi * turns) / m
+    return pixels.sparse(phase[None], np.abs(high)[None])
+
+
+TECHNIQUE = Technique(
+    name="high-frequency",
+    label="after Gupta et al. 2015 (high-frequency phase)",
+    returns="1",
+    frequencies="(m - 1) f, m f",
+    harmonics=lambda m: (m - 1, m),
+    least_harmonics=_LEAST,
+    assumptions="Indirect light is smooth over time, so that it has nothing at these frequencies.",
+    cost="Two arctangents.",
+    failure="A mirror's return does not cancel: it pulls the phase by up to its share, and where "
+    "it is strong the wrong period is chosen.",
+    estimate=high_frequency,
+)

@@ -1,0 +1,403 @@
+"""The likelihood estimate of every pixel, with what it is worth."""
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from transientcam_compiled import Spread
+from transientcam_moments._dispatch import accelerated, on_threads
+from transientcam_moments.arrays import (
+    MAX_HARMONICS,
+    Array,
+    as_array,
+    by_blocks,
+    in_range,
+    in_turn,
+    moment_planes,
+    namespace,
+    summary,
+)
+from transientcam_moments.errors import ParameterError, ShapeError
+from transientcam_moments.likelihood import _choice as choice
+from transientcam_moments.likelihood._arithmetic import logarithm
+from transientcam_moments.likelihood._chi_square import (
+    SIGNIFICANCE,
+    ambiguous,
+    explained,
+    reduced,
+)
+from transientcam_moments.likelihood._choice import MARGIN, MOST_RETURNS, TAIL_SHAPE
+from transientcam_moments.likelihood._planar import Data, fit
+from transientcam_moments.moment_problem import DIRECT_THRESHOLD, Returns, Separation, separate
+from transientcam_moments.noise import MomentNoise
+
+ASSUMED_NOISE: Final = 0.01
+"""Standard deviation over the largest moment, where none is given."""
+MODEL_ERROR: Final = 4e-3
+"""What calibration, and light of no model, leave in the moments of a camera, over the largest: as
+large as the bias of Sec. 4.3. docs/likelihood.md has the evidence."""
+
+
+class Likelihood(NamedTuple):
+    """Sharp returns, or a return and a tail that begins with it, by weighted least squares.
+
+    Attributes
+    ----------
+    phase_rad : array, shape (K, ...)
+        Of each return, in [0, 2 pi), ascending; NaN in unused slots, which come last. With a tail
+        there is one.
+    weight : array, shape (K, ...)
+        Light of each return, >= 0, in the unit of the moments; 0 in unused slots.
+    phase_std_rad, weight_std : array, shape (K, ...)
+        Their standard deviations, from the information matrix of the model that was chosen; NaN
+        in unused slots.
+    tail, tail_std : array, shape (...)
+        Light of the tail and its standard deviation; 0 and NaN where there is none.
+    delay_rad, delay_std_rad : array, shape (...)
+        Mean phase by which that light comes after the return; NaN without a tail. The prior is
+        part of its standard deviation.
+    chi_square : array, shape (...)
+        Sum of squares of what is left of the moments, over their variances; NaN where there is
+        no light or a measured moment is not finite.
+    degrees_of_freedom : integer array, shape (...)
+        How many more real numbers were measured than the model has unknowns.
+    count : integer array, shape (...)
+        Number of returns; 0 where there is no light or a measured moment is not finite.
+    lead : array, shape (...)
+        Of two returns by `two_returns`: by how much chi-square is larger with the best other pair
+        that was found and has another direct return. Infinite where there is none, or none was
+        looked for.
+    tail_shape : int
+        Shape p of the tail's gamma distribution, the same in all pixels.
+    """
+
+    phase_rad: Array
+    weight: Array
+    phase_std_rad: Array
+    weight_std: Array
+    tail: Array
+    tail_std: Array
+    delay_rad: Array
+    delay_std_rad: Array
+    chi_square: Array
+    degrees_of_freedom: Array
+    count: Array
+    lead: Array
+    tail_shape: int
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
+
+    @property
+    def has_tail(self) -> Array:
+        """Where the model with a tail was chosen, and there is light in it."""
+        return self.tail > 0
+
+    @property
+    def reduced_chi_square(self) -> Array:
+        """Chi-square over its degrees of freedom; NaN where there are none."""
+        return reduced(self.chi_square, self.degrees_of_freedom)
+
+    def ambiguous(self, significance: float = SIGNIFICANCE) -> Array:
+        """Say where another pair of returns may be the right one; as `Unwrapped.ambiguous`."""
+        return ambiguous(self.lead, significance)
+
+    def explained(self, significance: float = SIGNIFICANCE) -> Array:
+        """Say where the model explains the moments.
+
+        Parameters
+        ----------
+        significance : float
+            Share of the pixels of which it is wrongly denied, 0 < significance < 1.
+
+        Returns
+        -------
+        boolean array, shape (...)
+            False where chi-square is above what noise alone exceeds with that probability, and
+            where there is no light. Without degrees of freedom nothing can contradict the model.
+
+        Raises
+        ------
+        ParameterError
+            For a significance outside of 0 to 1.
+        """
+        return explained(self.chi_square, self.degrees_of_freedom, significance)
+
+    def separate(self, threshold: float = DIRECT_THRESHOLD) -> Separation:
+        """Separate direct from indirect light.
+
+        Parameters
+        ----------
+        threshold : float
+            The direct return is the first whose weight is at least this share of the strongest
+            one's, 0 to 1. The tail is indirect, however strong it is.
+
+        Raises
+        ------
+        ParameterError
+            For a threshold outside of 0 to 1.
+        """
+        xp = namespace(self.weight)
+        returns = Returns(self.phase_rad, self.weight, self.tail, self.count)
+        direct, indirect, phase = separate(returns, threshold)
+        # a tail begins at its return, which may be too faint to be seen itself
+        phase = xp.where(self.has_tail, self.phase_rad[0], phase)
+        return Separation(direct, indirect + self.tail, phase)
+
+    def direct_phase_std_rad(self, threshold: float = DIRECT_THRESHOLD) -> Array:
+        """Return the standard deviation (...) of the phase of the direct return; NaN without."""
+        xp = namespace(self.weight)
+        phase = self.separate(threshold).phase_rad
+        direct = self.phase_rad == phase
+        std = xp.where(direct, self.phase_std_rad, 0).sum(axis=0)
+        return xp.where(direct.any(axis=0), std, np.nan).astype(self.weight.dtype)
+
+
+def likelihood(
+    b: Array,
+    noise: MomentNoise | None = None,
+    *,
+    harmonics: Sequence[int] | None = None,
+    returns: int = MOST_RETURNS,
+    tail_shape: int = TAIL_SHAPE,
+    model_error: float = 0.0,
+    threads: int | None = None,
+) -> Likelihood:
+    """Estimate the returns of every pixel from moments whose noise is known.
+
+    Parameters
+    ----------
+    b : array, shape (N, ...)
+        Moments, calibrated, not biased.
+    noise : MomentNoise, optional
+        Of shape (N, ...) or (N,). Moments with a variance that is 0, infinite or NaN count as not
+        measured, and may be anything: as b_0 of ``zeroth="estimated"``. When left out, every part
+        of a moment has the standard deviation `ASSUMED_NOISE` times the pixel's largest one, and
+        all that is said of deviations and chi-square is relative to that.
+    harmonics : sequence of int, optional
+        Which multiples of the base frequency they are, N different ones of 0 to 32 in any order;
+        0 to N - 1 when left out.
+    returns : int
+        Most sharp returns, 1 to 3.
+    tail_shape : int
+        Shape p of the tail's gamma distribution, 1 (exponential) to 6; 0 for no tail.
+    model_error : float
+        What is wrong with every part of a moment beside its noise, as calibration and the models
+        leave it: a standard deviation over the pixel's largest moment, 0 to 1. It is part of all
+        that is said of deviations and chi-square. `MODEL_ERROR` is a camera's.
+    threads : int, optional
+        How many the compiled lane uses; all cores, when left out.
+
+    Returns
+    -------
+    Likelihood
+        With `returns` slots, or as many as the highest harmonic if that is less. Pixels without
+        light or with a measured moment that is not finite have no return.
+
+    Raises
+    ------
+    ShapeError
+        When `b` is not 2 to 33 planes of numbers, or noise or harmonics don't fit it.
+    ParameterError
+        For other numbers of returns, shapes of tails, harmonics or model errors, and for less
+        than one thread.
+
+    Notes
+    -----
+    Two models are fitted by weighted least squares, with all weights >= 0:
+    b_j = sum_k w_k exp(i j phi_k) with K = 1 to 3 returns, and
+    b_j = exp(i j phi) (w + v / (1 - i j d)^p), a return w with a tail v whose density is that of a
+    gamma distribution, of mean delay p d; log(p d) has a normal prior with mean log 0.75 and
+    standard deviation 1. The one with the least chi^2 + n_unknowns (log n_numbers + 6) is taken:
+    the Bayesian information criterion with a margin (see `MARGIN`).
+
+    A fit begins with the returns of the one before and the best of 4 m + 6 phases for one more,
+    the tail with two returns; it takes at most 4, 8, 10 and 10 of Levenberg and Marquardt's steps,
+    none of which raises chi^2, with the weights eliminated (Golub and Pereyra 1973, Kaufman 1975),
+    and no more where one changes chi^2 by too little to matter (`sharp.judge`). Noise
+    smaller than the rounding of the moments' precision counts as that large.
+
+    With b_0 measured, all light comes from returns and tail: a uniform part is not in the model.
+    """
+    return fitted(b, noise, on_threads(threads), harmonics, returns, tail_shape, model_error)
+
+
+def fitted(
+    b: Array,
+    noise: MomentNoise | None,
+    spread: Spread,
+    harmonics: Sequence[int] | None = None,
+    returns: int = MOST_RETURNS,
+    tail_shape: int = TAIL_SHAPE,
+    model_error: float = 0.0,
+) -> Likelihood:
+    """Do what `likelihood` does, with the threads of a caller."""
+    planes, trailing = moment_planes(b)
+    if not 1 <= returns <= MOST_RETURNS:
+        raise ParameterError("returns", returns, f"1 to {MOST_RETURNS}")
+    if not 0 <= tail_shape <= 6:
+        raise ParameterError("tail_shape", tail_shape, "0 to 6")
+    in_range("model_error", model_error, 0.0, 1.0, "0 to 1")
+    planes, variance = dense(planes, noise, harmonics, trailing)
+    found = _estimated(planes, variance, returns, tail_shape, float(model_error), spread=spread)
+    shaped = [part.reshape((*part.shape[:-1], *trailing)) for part in found]
+    xp = namespace(planes)
+    lead = xp.broadcast_to(xp.asarray(np.inf, dtype=shaped[0].dtype), trailing)
+    return Likelihood._make([*shaped, lead, tail_shape])
+
+
+def dense(
+    planes: Array,
+    noise: MomentNoise | None,
+    harmonics: Sequence[int] | None,
+    trailing: tuple[int, ...],
+) -> tuple[Array, Array]:
+    """Return moments and variance (m + 1, P) with planes of zeros for what was not measured."""
+    places = places_of(harmonics, planes.shape[0])
+    variance = variance_of(noise, planes, trailing)
+    xp = namespace(planes)
+    order = max(places)
+    if places != tuple(range(order + 1)):
+        empty = xp.zeros_like(planes[0])
+        by_place = dict(zip(places, range(len(places)), strict=True))
+        place_of = [by_place.get(j) for j in range(order + 1)]
+        planes = xp.stack([empty if at is None else planes[at] for at in place_of])
+        variance = xp.stack(
+            [xp.zeros_like(variance[0]) if at is None else variance[at] for at in place_of]
+        )
+    return planes, variance
+
+
+def places_of(harmonics: Sequence[int] | None, count: int) -> tuple[int, ...]:
+    """Return the multiple of each of `count` moments; raises as `likelihood`."""
+    places = tuple(range(count)) if harmonics is None else tuple(int(each) for each in harmonics)
+    if len(places) != count:
+        raise ShapeError("harmonics", f"{len(places)} numbers", f"one for each of {count} moments")
+    if len(set(places)) != count or not 0 <= min(places) <= max(places) <= MAX_HARMONICS:
+        raise ParameterError("harmonics", places, f"different ones of 0 to {MAX_HARMONICS}")
+    return places
+
+
+def variance_of(noise: MomentNoise | None, planes: Array, trailing: tuple[int, ...]) -> Array:
+    """Return the variance (N, P) of each part of the moments; raises as `likelihood`."""
+    xp = namespace(planes)
+    real = planes.real.dtype
+    if noise is None:
+        return as_array(assumed_noise(planes).variance)
+    variance = as_array(noise.variance)
+    shape = tuple(variance.shape)
+    if shape not in ((planes.shape[0],), (planes.shape[0], *trailing)):
+        expected = f"({planes.shape[0]},) or {(planes.shape[0], *trailing)}"
+        raise ShapeError("noise", f"of shape {shape}", expected)
+    flat = variance.reshape((planes.shape[0], -1))
+    return xp.broadcast_to(xp.asarray(flat).astype(real), planes.shape)
+
+
+def assumed_noise(b: Array) -> MomentNoise:
+    """Return the noise of moments (m + 1, ...) where none is known: `ASSUMED_NOISE`."""
+    xp = namespace(b)
+    size = xp.maximum(abs(b.real), abs(b.imag)).max(axis=0)
+    return MomentNoise(xp.broadcast_to((ASSUMED_NOISE * size) ** 2, b.shape).astype(b.real.dtype))
+
+
+@accelerated("likelihood")
+def _estimated(
+    planes: Array, variance: Array, returns: int, tail_shape: int, error: float
+) -> tuple[Array, ...]:
+    """Return the attributes of `Likelihood` of flat planes."""
+    return by_blocks(
+        lambda b, variance: _estimate(b, variance, returns, tail_shape, error), planes, variance
+    )
+
+
+def _estimate(
+    b: Array, variance: Array, returns: int, tail_shape: int, error: float
+) -> tuple[Array, ...]:
+    """Planar statement of `likelihood`: all harmonics from 0 on, (m + 1, P)."""
+    with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
+        data, scale, usable = prepared(b, variance, error)
+        found = fit(data, returns, tail_shape)
+        return results(found, data, scale, usable, min(returns, b.shape[0] - 1), tail_shape)
+
+
+def prepared(b: Array, variance: Array, error: float) -> tuple[Data, Array, Array]:
+    """Return data with the largest moment 1, what they were divided by, and where there is light.
+
+    A pixel that cannot be used is fitted to one return, which comes to nothing.
+    """
+    xp = namespace(b)
+    seen = (variance > 0) & (variance < np.inf)
+    first = xp.zeros(b.shape, dtype=bool)
+    first = first | (xp.arange(b.shape[0]) == 0)[:, None]
+    re = xp.where(seen, b.real, 0)
+    im = xp.where(seen & ~first, b.imag, 0)
+    size = xp.maximum(abs(re), abs(im)).max(axis=0)
+    # the squares of deviations over it must neither over- nor underflow
+    limits = np.finfo(size.dtype)
+    usable = (
+        xp.isfinite(size)
+        & (size > float(limits.tiny) * 16)
+        & (size < float(limits.max * limits.eps))
+    )
+    usable = usable & (seen & ~first).any(axis=0)
+    usable = usable & ~(seen[0] & ~(re[0] > 0))
+    scale = xp.where(usable, size, 1).astype(size.dtype)
+    inverse = xp.where(usable, 1 / scale, 0).astype(size.dtype)
+    re, im = xp.where(usable, re * inverse, 1), xp.where(usable, im * inverse, 0)
+    std = xp.sqrt(xp.where(seen, variance, 1)) * inverse
+    rounding = 4 * float(limits.eps)
+    std = xp.minimum(xp.maximum(std, rounding), 1 / rounding)
+    weight = xp.where(usable, xp.where(seen, 1 / (std * std + error**2), 0), 1)
+    numbers = xp.where(usable, (2 * seen).sum(axis=0) - seen[0], 1).astype(size.dtype)
+    penalty = (logarithm(numbers) + MARGIN).astype(size.dtype)
+    re, im, weight = (part.astype(size.dtype) for part in (re, im, weight))
+    data = Data(re, im, weight, penalty, numbers)
+    return data, scale, usable
+
+
+def results(
+    found: Array, data: Data, scale: Array, usable: Array, slots: int, tail_shape: int
+) -> tuple[Array, ...]:
+    """Return the attributes of `Likelihood` of what was found."""
+    xp = namespace(found)
+
+    def three(first: int) -> Array:
+        return found[first : first + slots]
+
+    weight = three(choice.WEIGHT)
+    count = found[choice.COUNT]
+    has_tail = found[choice.LENGTH] > 0
+    slot = xp.arange(slots)[:, None]
+    # a return that was driven to 0 is none; that of a tail stays, its phase is the tail's
+    used = usable & (slot < count) & ((weight > 0) | has_tail)
+    phase = in_turn(xp.arctan2(three(choice.Y), three(choice.X)))
+    phase = xp.where(used, phase, np.nan).astype(scale.dtype)
+    order = xp.argsort(phase, axis=0)
+
+    def sorted_planes(planes: Array, unused: float) -> Array:
+        planes = xp.where(used, planes, unused).astype(scale.dtype)
+        return xp.take_along_axis(planes, order, axis=0)
+
+    tailed = usable & has_tail & (found[choice.TAIL] > 0)
+
+    def where_tail(plane: Array, otherwise: float) -> Array:
+        return xp.where(tailed, plane, otherwise).astype(scale.dtype)
+
+    delay = tail_shape * found[choice.LENGTH]
+    unknowns = xp.where(has_tail, 4, 2 * count)
+    free = xp.where(usable, data.numbers - unknowns, 0)
+    return (
+        sorted_planes(phase, np.nan),
+        sorted_planes(weight * scale, 0.0),
+        sorted_planes(xp.sqrt(three(choice.PHASE_VARIANCE)), np.nan),
+        sorted_planes(xp.sqrt(three(choice.WEIGHT_VARIANCE)) * scale, np.nan),
+        where_tail(found[choice.TAIL] * scale, 0.0),
+        where_tail(xp.sqrt(found[choice.TAIL_VARIANCE]) * scale, np.nan),
+        where_tail(delay, np.nan),
+        where_tail(delay * xp.sqrt(found[choice.LENGTH_VARIANCE]), np.nan),
+        xp.where(usable, found[choice.CHI_SQUARE], np.nan).astype(scale.dtype),
+        free.astype(np.int32),
+        used.sum(axis=0).astype(np.int32),
+    )

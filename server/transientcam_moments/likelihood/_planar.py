@@ -1,0 +1,281 @@
+"""The fits of all pixels: each model where the simpler ones leave something to explain."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from transientcam_moments.arrays import Array, namespace
+from transientcam_moments.likelihood import _sharp as sharp, _tail as tail
+from transientcam_moments.likelihood._choice import (
+    DELAY_RAD,
+    MOST_RETURNS,
+    PLANES,
+    PRIOR,
+    SCORE,
+    STEPS,
+    TAIL_STEPS,
+    chosen,
+    has_tail,
+    nothing,
+    offer_returns,
+    offer_tail,
+    start_of_tail,
+    turns_of,
+    vary_returns,
+    vary_tail,
+)
+
+
+class Data(NamedTuple):
+    """What is fitted: planes of pixels, the moments over `scale`.
+
+    Attributes
+    ----------
+    re, im : array, shape (m + 1, P)
+        0 where not measured.
+    weight : array, shape (m + 1, P)
+        Inverse variance of each part; 0 where not measured.
+    penalty : array, shape (P)
+        What an unknown has to lower chi-square by.
+    numbers : array, shape (P)
+        How many real numbers were measured.
+    """
+
+    re: Array
+    im: Array
+    weight: Array
+    penalty: Array
+    numbers: Array
+
+
+def fit(data: Data, most: int, shape: int) -> Array:
+    """Return what is found of every pixel (PLANES, P), as `choice` lays it out.
+
+    `most` is the largest number of sharp returns, 1 to 3; `shape` that of the tail, 0 for none.
+    """
+    xp = namespace(data.re)
+    m = data.re.shape[0] - 1
+    most = min(most, m)
+    found = [data.re[0]] * PLANES
+    far = np.inf + 0 * data.penalty
+    nothing(data.penalty, far, found)
+    one = SharpFit.start(data, 1, None, far)
+    one.offer(found, data.numbers >= 0)
+    planes = xp.stack(found)
+    if most < 2 and not (shape and m >= 2):
+        return varied(data, planes, 1, 0)
+
+    def more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+        found = list(planes)
+        two = SharpFit.start(data, 2, before, np.inf + 0 * data.penalty)
+        if most >= 2:
+            two.offer(found, data.numbers >= 4)
+        if shape:
+            _offer_tail(data, two, shape, found)
+        done = xp.stack(found)
+        if most < MOST_RETURNS:
+            return done
+
+        def most_of_all(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+            found = list(planes)
+            bar = found[SCORE] - 6 * data.penalty
+            SharpFit.start(data, 3, before, bar).offer(found, data.numbers >= 6)
+            return namespace(planes).stack(found)
+
+        still = done[SCORE] > 6 * data.penalty
+        return where(still, most_of_all, data, two.state(), done)
+
+    # chi-square cannot become less than 0: no model with more unknowns is better below
+    planes = where(planes[SCORE] > 4 * data.penalty, more, data, one.state(), planes)
+    return varied(data, planes, most, shape)
+
+
+def varied(data: Data, planes: Array, most: int, shape: int) -> Array:
+    """Return what was found with the variances of what was chosen."""
+    order = (0,) * (len(data.re) - 1)
+
+    def of_returns(count: int, data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+        found = list(planes)
+        vary_returns(order, (0,) * count, (0,) * (2 * count), data.weight, found)
+        return namespace(planes).stack(found)
+
+    def of_tail(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+        found = list(planes)
+        vary_tail(order, (0,) * shape, (0,) * 4, data.weight, PRIOR, found)
+        return namespace(planes).stack(found)
+
+    for count in range(1, most + 1):
+        here = chosen((0,) * count, planes)
+        planes = where(here, partial(of_returns, count), data, (), planes)
+    return where(has_tail(planes), of_tail, data, (), planes) if shape else planes
+
+
+def where(
+    mask: Array,
+    function: Callable[[Data, tuple[Array, ...], Array], Array],
+    data: Data,
+    before: tuple[Array, ...],
+    planes: Array,
+) -> Array:
+    """Apply a function of pixels to those of a mask; to all where arrays cannot be cut."""
+    if namespace(mask) is not np:
+        return namespace(mask).where(mask, function(data, before, planes), planes)
+    at = np.flatnonzero(mask)
+    if at.size:
+        planes[:, at] = function(
+            Data(*(part[..., at] for part in data)),
+            tuple(part[..., at] for part in before),
+            planes[:, at],
+        )
+    return planes
+
+
+class SharpFit:
+    """A fit of K sharp returns: banks, as `sharp` takes them."""
+
+    cost: Array
+
+    def __init__(
+        self, data: Data, x: Sequence[Array], y: Sequence[Array], w: Sequence[Array]
+    ) -> None:
+        m, count = data.re.shape[0] - 1, len(x)
+        self.data = data
+        self.order, self.returns = (0,) * m, (0,) * count
+        self.unknowns = (0,) * (2 * count)
+        self.x, self.y, self.w = list(x), list(y), list(w)
+        self._pr, self._pi = ([data.re[0]] * (m * count) for _ in range(2))
+        self._rr, self._ri = ([data.re[0]] * (m + 1) for _ in range(2))
+        for k in range(count):
+            sharp.powers(self.order, x[k], y[k], k, self._pr, self._pi)
+
+    @classmethod
+    def start(
+        cls, data: Data, count: int, before: tuple[Array, ...] | None, bar: Array
+    ) -> "SharpFit":
+        """Add a return to those of another fit, and fit all of them; `bar` as in `sharp.judge`."""
+        x, y, w = before or ((), (), ())
+        point = cls(data, x, y, w).new_return()
+        fit = cls(data, *([*old, new] for old, new in zip((x, y, w), point, strict=True)))
+        fit._look()
+        fit.improve(STEPS[count - 1], bar)
+        return fit
+
+    @classmethod
+    def at(cls, data: Data, x: Sequence[Array], y: Sequence[Array]) -> "SharpFit":
+        """Begin with returns at points x + i y of the unit circle, and the best weights there."""
+        fit = cls(data, x, y, x)
+        given = (data.re, data.im, data.weight, fit._pr, fit._pi, fit.w)
+        sharp.weigh(fit.order, fit.returns, *given)
+        fit._look()
+        return fit
+
+    def improve(self, steps: int, bar: Array) -> None:
+        """Take at most so many steps to a lower chi-square."""
+        data = self.data
+
+        def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
+            pr, pi, w, rr, ri = (list(part) for part in state[:5])
+            cost, damping = sharp.step(
+                self.order, self.returns, self.unknowns, data.re, data.im, data.weight,
+                pr, pi, w, rr, ri, state[5], state[6], bar,
+            )  # fmt: skip
+            return tuple(pr), tuple(pi), tuple(w), tuple(rr), tuple(ri), cost, damping
+
+        banks = (tuple(part) for part in (self._pr, self._pi, self.w, self._rr, self._ri))
+        damping = sharp.FIRST_DAMPING + 0 * self.cost
+        state = _times(steps, step, (*banks, self.cost, damping), _moving)
+        self._pr, self._pi, self.w, self._rr, self._ri = (list(part) for part in state[:5])
+        self.x, self.y = (part[:: len(self.order)] for part in (self._pr, self._pi))
+        self.cost = state[5]
+
+    def _look(self) -> None:
+        """Find what the returns leave."""
+        data, given = self.data, (self._pr, self._pi, self.w, self._rr, self._ri)
+        sharp.remains(self.order, self.returns, data.re, data.im, *given)
+        self.cost = sharp.chi_square(self.order, data.weight, self._rr, self._ri)
+
+    def new_return(self) -> tuple[Array, Array, Array]:
+        """Return point and weight of the best return for what these leave."""
+        self._look()
+        order, weight, xp = self.order, self.data.weight, namespace(self.cost)
+        returns = (0,) * (len(self.returns) + 1)
+        re, im = list(self._rr), list(self._ri)
+        total = sharp.weigh_what_is_left(order, weight, self._rr, self._ri, re, im)
+        kr, ki = ([total] * ((len(order) + 1) * len(returns)) for _ in range(2))
+        sharp.overlaps(order, returns, weight, total, self._pr, self._pi, kr, ki)
+        turns = xp.asarray(turns_of(len(order)).astype(total.dtype))
+
+        def attempt(state: tuple[Array, ...]) -> tuple[Array, ...]:
+            row = state[0]
+            best = sharp.try_phases(order, returns, turns, row, re, im, kr, ki, *state[1:])
+            return row + 1, *best
+
+        zero = 0 * total
+        state = _times(len(turns), attempt, (0, zero, 1 + zero, 1 + zero, zero))
+        _, along, apart, x, y = state
+        return x, y, along / (apart * total)
+
+    def state(self) -> tuple[Array, ...]:
+        """Return what a fit of one more return begins with."""
+        xp = namespace(self.cost)
+        return tuple(xp.stack(part) for part in (self.x, self.y, self.w))
+
+    def offer(self, found: list[Array], allowed: Array) -> None:
+        """Put the returns where they are the better model."""
+        penalty = self.data.penalty
+        offer_returns(self.returns, self.x, self.y, self.w, self.cost, penalty, allowed, found)
+
+
+def _offer_tail(data: Data, two: SharpFit, shape: int, found: list[Array]) -> None:
+    """Fit a return with a tail, from two returns on, and put it where it is the better model."""
+    order, powers, unknowns = two.order, (0,) * shape, (0,) * 4
+    mean = DELAY_RAD / shape
+    x, y, w, v, ratio, t = start_of_tail(two.x, two.y, two.w, DELAY_RAD)
+    d = ratio * mean
+    ur, ui, lag, qr, qi, rr, ri = ([d] * len(data.re) for _ in range(7))
+    tail.shape(order, powers, d, lag, qr, qi)
+    tail.turn_back(order, data.re, data.im, x, y, ur, ui)
+    tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
+    cost = sharp.chi_square(order, data.weight, rr, ri) + PRIOR * t * t
+
+    def step(state: Any) -> Any:
+        lag, qr, qi, rr, ri = (list(part) for part in state[:5])
+        x, y, w, v, d, t, cost, damping = state[5:]
+        new = tail.step(
+            order, powers, unknowns, data.re, data.im, data.weight, PRIOR,
+            x, y, w, v, d, t, lag, qr, qi, rr, ri, cost, damping, bar,
+        )  # fmt: skip
+        return tuple(lag), tuple(qr), tuple(qi), tuple(rr), tuple(ri), *new
+
+    banks = (tuple(part) for part in (lag, qr, qi, rr, ri))
+    damping = sharp.FIRST_DAMPING + 0 * cost
+    bar = found[SCORE] - 4 * data.penalty
+    state = _times(TAIL_STEPS, step, (*banks, x, y, w, v, d, t, cost, damping), _moving)
+    x, y, w, v, d, t, cost, _ = state[5:]
+    allowed = data.numbers >= 4
+    offer_tail(PRIOR, x, y, w, v, d, t, cost, data.penalty, allowed, found)
+
+
+def _moving(state: Any) -> bool:
+    """Say whether any pixel takes a further step."""
+    return bool((state[-1] < sharp.SETTLED).any())
+
+
+def _times(
+    times: int,
+    step: Callable[[Any], Any],
+    state: Any,
+    going_on: Callable[[Any], bool] = lambda state: True,
+) -> Any:
+    """Apply a step so many times, or until nothing goes on; JAX compiles all of them once."""
+    if namespace(state[-1]).__name__ == "jax.numpy":
+        from jax import lax
+
+        return lax.fori_loop(0, times, lambda _, inner: step(inner), state)
+    for _ in range(times):
+        if not going_on(state):
+            break
+        state = step(state)
+    return state

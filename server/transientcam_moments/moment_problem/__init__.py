@@ -1,0 +1,63 @@
+"""From moments to light: the trigonometric moment problem and its two solutions.
+
+Levinson's recursion, biasing, maximum entropy and Pisarenko's estimate (sections 3 and 4 of the
+paper), with the bounds on what moments leave open.
+"""
+
+from transientcam_moments.moment_problem._biasing import (
+    EPSILON,
+    Biased,
+    bias,
+    estimate_zeroth,
+    smallest_eigenvalue,
+)
+from transientcam_moments.moment_problem._bounds import bounds, smoothed_density
+from transientcam_moments.moment_problem._cumulative import cumulative
+from transientcam_moments.moment_problem._levinson import (
+    Coefficients,
+    extend,
+    from_reflection,
+    levinson,
+    moments_of,
+    predicted,
+)
+from transientcam_moments.moment_problem._maximum_entropy import density
+from transientcam_moments.moment_problem._peaks import Peaks, peaks
+from transientcam_moments.moment_problem._pisarenko import (
+    DIRECT_THRESHOLD,
+    Returns,
+    Separation,
+    first_returns,
+    improved_returns,
+    pisarenko,
+    separate,
+)
+from transientcam_moments.moment_problem._polishing import polish
+
+__all__ = [
+    "DIRECT_THRESHOLD",
+    "EPSILON",
+    "Biased",
+    "Coefficients",
+    "Peaks",
+    "Returns",
+    "Separation",
+    "bias",
+    "bounds",
+    "cumulative",
+    "density",
+    "estimate_zeroth",
+    "extend",
+    "first_returns",
+    "from_reflection",
+    "improved_returns",
+    "levinson",
+    "moments_of",
+    "peaks",
+    "pisarenko",
+    "polish",
+    "predicted",
+    "separate",
+    "smallest_eigenvalue",
+    "smoothed_density",
+]

@@ -1,0 +1,296 @@
+"""Pisarenko's estimate: a uniform part and at most m sharp returns (Sec. 5.1, Theorem 2)."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from transientcam_moments._dispatch import accelerated, on_threads
+from transientcam_moments.arrays import (
+    Array,
+    by_blocks,
+    in_range,
+    in_turn,
+    moment_planes,
+    namespace,
+    squared,
+    summary,
+)
+from transientcam_moments.moment_problem._biasing import search
+from transientcam_moments.moment_problem._levinson import (
+    Recursion,
+    normalised,
+    onto_circle,
+    recursion,
+)
+from transientcam_moments.moment_problem._polishing import polish, residual, size
+from transientcam_moments.moment_problem._roots import circle_roots
+
+DIRECT_THRESHOLD = 0.1
+"""A return is the direct one when it is the first with this share of the strongest."""
+
+
+class Returns(NamedTuple):
+    """Sharp returns and a uniform part with the moments of the measurement.
+
+    Attributes
+    ----------
+    phase_rad : array, shape (m, ...)
+        In [0, 2 pi), ascending; NaN in unused slots, which come last.
+    weight : array, shape (m, ...)
+        Brightness of each return, >= 0; 0 in unused slots.
+    uniform : array, shape (...)
+        The smallest eigenvalue, brightness of the uniform part; negative where the moments
+        contradict each other. The weights and it add up to b_0.
+    count : integer array, shape (...)
+        Number of returns.
+    """
+
+    phase_rad: Array
+    weight: Array
+    uniform: Array
+    count: Array
+
+    def __repr__(self) -> str:
+        """State order, pixels and how many returns they have."""
+        count = np.asarray(self.count)
+        pixels = " x ".join(map(str, count.shape)) or "1"
+        numbers, pixels_of = np.unique(count, return_counts=True)
+        shares = (
+            f"{number} in {share:.1%}"
+            for number, share in zip(numbers, pixels_of / max(count.size, 1), strict=True)
+        )
+        return f"<Returns m = {len(self.weight)}, pixels {pixels}; returns: {', '.join(shares)}>"
+
+
+class Separation(NamedTuple):
+    """Direct and indirect light of each pixel (Sec. 5.1).
+
+    Attributes
+    ----------
+    direct : array, shape (...)
+        Weight of the direct return; 0 where there is none.
+    indirect : array, shape (...)
+        Sum of the other weights.
+    phase_rad : array, shape (...)
+        Phase of the direct return; NaN where there is none.
+    """
+
+    direct: Array
+    indirect: Array
+    phase_rad: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
+
+
+def pisarenko(b: Array, *, eigenvalue: Array | None = None, threads: int | None = None) -> Returns:
+    """Explain moments by a uniform part and as few returns as there have to be.
+
+    Parameters
+    ----------
+    b : array, shape (m + 1, ...)
+        Trigonometric moments; with b_0 = 0 where it was not measured, the returns are those of
+        least total brightness.
+    eigenvalue : array, shape (...), optional
+        Smallest eigenvalue of `b`, where it is at hand already.
+    threads : int, optional
+        How many threads a compiled lane uses; all cores when left out.
+
+    Returns
+    -------
+    result : `Returns`
+        Fewer than m returns where the smallest eigenvalue is multiple; none where there is no
+        light or a moment is NaN or infinite.
+
+    Raises
+    ------
+    ShapeError
+        When `b` is not 2 to 33 planes of numbers.
+    ParameterError
+        For less than one thread.
+
+    Notes
+    -----
+    Theorem 2. At the smallest eigenvalue lambda Levinson's recursion on B - lambda I ends with an
+    error of zero at the order of the smallest singular leading block, which is the number of
+    returns; its polynomial is the eigenvector. The weights are 1 / sum_k |Phi_k(z)|^2 / E_k with
+    the recursion's polynomials Phi_k, and so never negative.
+    """
+    planes, trailing = moment_planes(b)
+    spread = on_threads(threads)
+    phase, weight, uniform, count = _explained(planes, eigenvalue, spread=spread)
+    return Returns(
+        phase.reshape((phase.shape[0], *trailing)),
+        weight.reshape((weight.shape[0], *trailing)),
+        uniform.reshape(trailing),
+        count.reshape(trailing),
+    )
+
+
+def separate(returns: Returns, threshold: float = DIRECT_THRESHOLD) -> Separation:
+    """Separate direct from indirect light.
+
+    Parameters
+    ----------
+    returns : Returns
+        From `pisarenko`.
+    threshold : float
+        The direct return is the first whose weight is at least this share of the strongest one's,
+        0 to 1.
+
+    Returns
+    -------
+    Separation
+
+    Raises
+    ------
+    ParameterError
+        For a threshold outside of 0 to 1.
+
+    Notes
+    -----
+    Sec. 5.1: "the first return with a weight above a relative threshold".
+    """
+    in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
+    return Separation(*_separate(returns.weight, returns.phase_rad, threshold))
+
+
+@accelerated("separate", order=lambda weights, *_: len(weights), of="f")
+def _separate(weights: Array, phases_rad: Array, threshold: float) -> tuple[Array, ...]:
+    """Planar statement of `separate`: direct, indirect and phase of the direct return."""
+    xp = namespace(weights)
+    enough = threshold * weights.max(axis=0)
+    direct = xp.zeros_like(weights[0])
+    phase = xp.full(weights[0].shape, np.nan, dtype=weights.dtype)
+    for weight, angle in zip(weights[::-1], phases_rad[::-1], strict=True):
+        first = (weight >= enough) & (weight > 0)
+        direct = xp.where(first, weight, direct)
+        phase = xp.where(first, angle, phase)
+    return direct, xp.maximum(weights.sum(axis=0) - direct, 0), phase
+
+
+@accelerated("pisarenko")
+def _explained(b: Array, eigenvalue: Array | None) -> tuple[Array, ...]:
+    """Return phase, weight, uniform and count of flat planes, improved where they are ill."""
+    known = () if eigenvalue is None else (eigenvalue.reshape(-1),)
+    found = by_blocks(first_returns, b, *known)
+    return improved_returns(b, found) if namespace(b) is np else found
+
+
+def first_returns(
+    b: Array, uniform: Array | None = None, *, noise: float | None = None
+) -> tuple[Array, Array, Array, Array]:
+    """Planar statement of `pisarenko`: b (m + 1, P) to phase, weight, uniform, count.
+
+    `uniform` is the smallest eigenvalue where it is known, `noise` the precision of the data where
+    it isn't that of their type.
+    """
+    with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
+        planes, scale = normalised(b)
+        if uniform is None:
+            uniform = search(planes)
+        else:
+            uniform = namespace(b).where(scale > 0, uniform / scale, 0 * scale)
+        floor = 4 * len(planes[1:]) * (noise or float(np.finfo(scale.dtype).eps))
+        phase, weight, count = _returns(planes, uniform, scale, floor)
+        return phase, weight, uniform * scale, count
+
+
+def improved_returns(b: Array, found: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Redo in double precision, or polish, the pixels that don't reproduce their moments.
+
+    That is where single precision, or the closed form in double precision, isn't enough; by more
+    than rounding the result to `b`'s type explains.
+    """
+    eps = float(np.finfo(found[1].dtype).eps)
+    tolerance = 16 * b.shape[0] * eps
+    with np.errstate(all="ignore"):
+        (error,) = by_blocks(lambda b, *found: (size(residual(b, *found), b),), b, *found[:3])
+    ill = np.flatnonzero(error > tolerance)  # NaN stays
+    if not ill.size:
+        return found
+    with np.errstate(all="ignore"):
+        wide = b[:, ill].astype(np.complex128)
+        better = tuple(part[..., ill].astype(np.float64) for part in found[:3])
+        if b.dtype == np.complex64:
+            _take_if_better(wide, better, eps, tolerance)
+        better = polish(wide, *better, tolerance=tolerance)
+        for coarser in (1e2, 1e4, 1e6):
+            _take_if_better(wide, better, coarser * eps, tolerance)
+        better = polish(wide, *better, tolerance=tolerance)
+        order = np.argsort(better[0], axis=0)
+        phase = np.take_along_axis(better[0], order, axis=0).astype(found[0].dtype)
+        phase = in_turn(phase)
+        weight = np.take_along_axis(better[1], order, axis=0).astype(found[1].dtype)
+        phase = np.where(weight > 0, phase, np.nan)  # rounding may take the faintest away
+    count = np.count_nonzero(weight, axis=0)
+    result = tuple(np.array(part) for part in found)
+    for part, new in zip(result, (phase, weight, better[2], count), strict=True):
+        part[..., ill] = new
+    return result
+
+
+def _take_if_better(b: Array, found: tuple[Array, ...], noise: float, tolerance: float) -> None:
+    """Solve again, taking returns for one that are one to the precision `noise`; keep what fits."""
+    error = size(residual(b, *found), b)
+    at = np.flatnonzero(error > tolerance)
+    if not at.size:
+        return
+    tried = by_blocks(lambda part: first_returns(part, noise=noise)[:3], b[:, at])
+    fits = size(residual(b[:, at], *tried), b[:, at]) < error[at]
+    for part, new in zip(found, tried, strict=True):
+        part[..., at[fits]] = new[..., fits]
+
+
+def _returns(
+    b: list[Array], uniform: Array, scale: Array, floor: float
+) -> tuple[Array, Array, Array]:
+    """Find the returns of planes whose largest moment is 1, with a singular B - uniform I.
+
+    Prediction errors and weights below `floor`, relative to the brightness, are rounding. Weights
+    are multiplied with `scale`.
+    """
+    xp = namespace(b[1])
+    total = b[0] - uniform  # "using b_0 - lambda_m in place of b_0" (Sec. 5.1)
+    inverse = xp.where(total > 0, 1 / total, 0 * total)
+    block = [xp.where(total > 0, 1, 0).astype(total.dtype)] + [part * inverse for part in b[1:]]
+    # the recursion ends at order m wherever it has not before: B - lambda I is singular
+    floors = [floor] * (len(b) - 2) + [np.inf]
+    singular = recursion(block, floors, onto_circle)
+    last = singular.reflection[0]
+    for k, g in enumerate(singular.reflection[1:], start=2):
+        last = xp.where(singular.order == k, g, last)
+    phases, weights = [], []
+    # roots of c* s(phi) (Theorem 2), c = a; weights of Eq. (4) without its linear system
+    for index, u in enumerate(circle_roots(singular.polynomial, singular.order, last)):
+        share = 1 / _christoffel(singular, u)
+        weight = share * total * scale
+        used = (singular.order > index) & (share > floor) & (weight > 0)
+        angle = xp.arctan2(-u.imag, u.real)  # z = 1 / u
+        phases.append(xp.where(used, in_turn(angle), np.nan).astype(total.dtype))
+        weights.append(xp.where(used, weight, 0).astype(total.dtype))
+    phase, weight = xp.stack(phases), xp.stack(weights)
+    order = xp.argsort(phase, axis=0)  # NaN comes last
+    return (
+        xp.take_along_axis(phase, order, axis=0),
+        xp.take_along_axis(weight, order, axis=0),
+        (weight > 0).sum(axis=0).astype(np.int32),
+    )
+
+
+def _christoffel(singular: Recursion, u: Array) -> Array:
+    """Return s* T^-1 s = sum_{k < order} |Phi_k(z)|^2 / E_k at z = 1 / u on the unit circle.
+
+    On the circle |Phi_k(z)| = |A_k(u)| for the predictor polynomial A_k, which goes up with its
+    reversed B_k(u) = u^k conj(A_k): A_k = A_{k-1} + g_k u B_{k-1}, u B_k = u (u B_{k-1} +
+    conj(g_k) A_{k-1}).
+    """
+    xp = namespace(u)
+    forward = xp.ones_like(u)
+    backward = u
+    total = squared(forward)
+    for k, g in enumerate(singular.reflection[:-1], start=1):
+        forward, backward = forward + g * backward, u * (backward + g.conj() * forward)
+        total = total + xp.where(singular.order > k, squared(forward) / singular.errors[k], 0)
+    return total

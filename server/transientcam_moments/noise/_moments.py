@@ -1,0 +1,353 @@
+"""From a sensor to the covariance of calibrated moments."""
+
+import math
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from transientcam_moments.arrays import (
+    MAX_HARMONICS,
+    Array,
+    as_array,
+    chosen,
+    in_range,
+    namespace,
+    squared,
+    summary,
+)
+from transientcam_moments.errors import ParameterError, ShapeError
+from transientcam_moments.images import (
+    FOUR_PHASES_RAD,
+    SIGMA_PX,
+    ZEROTH_IMAGES,
+    gaussian_taps,
+    phase_noise,
+    smooth,
+)
+from transientcam_moments.noise._sensor import Sensor
+
+
+class MomentNoise(NamedTuple):
+    """Noise of moments: independent between planes, and between real and imaginary part.
+
+    Attributes
+    ----------
+    variance : array, shape (m + 1, ...)
+        Of b_0 (0 where it is not measured), and of Re b_j and of Im b_j, each, j = 1 .. m.
+    """
+
+    variance: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
+
+    def covariance(self) -> Array:
+        """Return the covariance (2m + 1, 2m + 1, ...) of b_0, Re b_1, Im b_1, ..., Im b_m."""
+        xp = namespace(self.variance)
+        each = xp.concatenate([self.variance[:1], xp.repeat(self.variance[1:], 2, axis=0)])
+        identity = xp.eye(each.shape[0], dtype=each.dtype)
+        return identity.reshape(identity.shape + (1,) * (each.ndim - 1)) * each[None]
+
+    def deviation(self, gradient: Array) -> Array:
+        """Return the standard deviation (...) of a quantity q with dq = Re sum conj(gradient) db.
+
+        Parameters
+        ----------
+        gradient : array, shape (m + 1, ...)
+            Of q with respect to the moments.
+        """
+        xp = namespace(self.variance)
+        return xp.sqrt((squared(gradient) * self.variance).sum(axis=0))
+
+
+def moment_noise(
+    brightness: Array,
+    sensor: Sensor,
+    *,
+    calibration: Array,
+    zeroth: str,
+    takes: int = 1,
+    ambient: Array | float = 0.0,
+    phases_rad: Sequence[float] = FOUR_PHASES_RAD,
+) -> MomentNoise:
+    """Return the noise of the calibrated moments of a capture.
+
+    Parameters
+    ----------
+    brightness : array, shape (...)
+        b_0 in DN at the exposure of one image; values below 0 count as 0.
+    sensor : Sensor
+        What turns light into numbers.
+    calibration : array, shape (m + 1,) or (m + 1, ...)
+        The gains that the measured moments are divided by: of the sub-phases
+        (`nominal_calibration`), or measured ones.
+    zeroth : {"low-frequency", "on-off", "estimated"}
+        How b_0 was measured.
+    takes : int
+        Captures that are averaged.
+    ambient : array, shape (...), or float
+        Light that is not modulated, in DN an image.
+    phases_rad : sequence of float
+        Of the images of each frequency.
+
+    Returns
+    -------
+    MomentNoise
+
+    Raises
+    ------
+    ParameterError
+        For another `zeroth` or takes < 1.
+    ShapeError
+        When the calibration has not 2 to 33 planes.
+
+    Notes
+    -----
+    An image at phase theta holds dark + ambient + 1/2 (b_0 + Re(b_j G exp(-i theta))). Two images
+    at opposite phases hold b_0 + 2 ambient together, whatever the phase of the signal: real and
+    imaginary part of the four-bucket phasor have the same variance and no correlation, and it is
+    the same for all frequencies. Divided by G it grows by 1 / |G|^2. The modulus that stands for
+    b_0 at the low frequency varies like one component; 2 (on - off) is twice a difference of an
+    image with b_0 / 2 and one without. At other phases than the four the same holds of the mean
+    of both parts and over all phases of the signal.
+    """
+    chosen("zeroth", zeroth, tuple(ZEROTH_IMAGES))
+    if takes < 1:
+        raise ParameterError("takes", takes, ">= 1")
+    gain = as_array(calibration)
+    if gain.ndim < 1 or not 2 <= gain.shape[0] <= MAX_HARMONICS + 1:
+        raise ShapeError("calibration", f"of shape {tuple(gain.shape)}", "2 to 33 planes")
+    brightness = as_array(brightness)
+    xp = namespace(brightness)
+    light = xp.maximum(brightness, 0) + 0.0  # whole numbers become real ones
+    size = squared(xp.asarray(gain) + 0j).real
+    if gain.ndim == 1:
+        size = size.reshape((-1,) + (1,) * light.ndim)
+    # signal(theta) + signal(theta + 180 degrees) = b_0 + 2 ambient
+    mean = sensor.image_variance((light + 2 * ambient) / 2)
+    phasor = phase_noise(phases_rad) * mean + xp.zeros_like(light)
+    planes = [phasor / size[j] for j in range(gain.shape[0])]
+    if zeroth == "on-off":
+        on, off = sensor.image_variance(light / 2 + ambient), sensor.image_variance(ambient)
+        planes[0] = 4 * (on + off) / size[0]
+    elif zeroth == "estimated":
+        planes[0] = xp.zeros_like(light)
+    return MomentNoise((xp.stack(planes) / takes).astype(light.dtype))
+
+
+def smoothing_factor(sigma_px: float = SIGMA_PX) -> float:
+    """Return what `smooth` leaves of the variance of independent pixels far from the border.
+
+    Parameters
+    ----------
+    sigma_px : float
+        Standard deviation of the Gaussian, 0 to 100.
+
+    Notes
+    -----
+    The sum of its squared weights.
+    """
+    in_range("sigma_px", sigma_px, 0.0, 100.0, "0 to 100 pixels")
+    if sigma_px == 0:
+        return 1.0
+    taps = _taps(sigma_px)
+    return float((taps**2).sum() / taps.sum() ** 2) ** 2
+
+
+def own_share(sigma_px: float = SIGMA_PX) -> float:
+    """Return what `smooth` leaves of the variance of a pixel at least, whatever is around it.
+
+    Parameters
+    ----------
+    sigma_px : float
+        Standard deviation of the Gaussian, 0 to 100.
+
+    Notes
+    -----
+    The square of the pixel's own weight, which is larger at the border and beside missing pixels.
+    """
+    in_range("sigma_px", sigma_px, 0.0, 100.0, "0 to 100 pixels")
+    return float(gaussian_taps(sigma_px).max()) ** 4
+
+
+def smoothed(noise: MomentNoise, sigma_px: float = SIGMA_PX) -> MomentNoise:
+    """Return the noise that is left after `smooth`.
+
+    Parameters
+    ----------
+    noise : MomentNoise
+        Of shape (m + 1, H, W), independent between pixels.
+    sigma_px : float
+        Standard deviation of the Gaussian, 0 to 100.
+
+    Returns
+    -------
+    MomentNoise
+        Of each pixel by itself; neighbours are correlated after smoothing.
+
+    Raises
+    ------
+    ShapeError
+        When there are no image axes.
+
+    Notes
+    -----
+    The variance is the one before, averaged with the squared weights. Squaring makes a Gaussian of
+    sigma / sqrt(2), times the sum of the squares over the square of the sum, of what lies inside.
+    """
+    in_range("sigma_px", sigma_px, 0.0, 100.0, "0 to 100 pixels")
+    variance = noise.variance
+    if variance.ndim != 3:
+        raise ShapeError("noise", f"of shape {tuple(variance.shape)}", "(m + 1, H, W)")
+    if sigma_px == 0:
+        return noise
+    rows, columns = (_factors(sigma_px, length) for length in variance.shape[-2:])
+    left = namespace(variance).asarray(np.outer(rows, columns)).astype(variance.dtype)
+    return MomentNoise(smooth(variance, sigma_px / math.sqrt(2)) * left)
+
+
+def smoothed_of(
+    noise_of: Callable[..., MomentNoise],
+    brightness: Array,
+    sigma_px: float = SIGMA_PX,
+    *,
+    ambient: Array | None = None,
+) -> MomentNoise:
+    """Return what `smoothed` gives of an image, by smoothing its brightness alone.
+
+    Parameters
+    ----------
+    noise_of : callable
+        Returns the noise (m + 1, H, W) of each pixel by itself, of its brightness, as
+        `moment_noise` does: its variance must be affine in a brightness above 0. Gains of single
+        pixels are taken for those of their neighbours. Called with ``ambient=`` where that is
+        given, to which the variance must be affine, too.
+    brightness : array, shape (H, W)
+        In DN.
+    sigma_px : float
+        Standard deviation of the Gaussian, 0 to 100.
+    ambient : array, shape (H, W), optional
+        Light that is not modulated, in DN an image.
+
+    Returns
+    -------
+    MomentNoise
+        Of shape (m + 1, H, W).
+
+    Raises
+    ------
+    ShapeError
+        When the brightness is no image.
+    """
+    in_range("sigma_px", sigma_px, 0.0, 100.0, "0 to 100 pixels")
+    if brightness.ndim != 2:
+        raise ShapeError("brightness", f"of shape {tuple(brightness.shape)}", "(H, W)")
+    if sigma_px == 0:
+        return _of_light(noise_of, brightness, ambient)
+
+    def around(light: Array) -> Array:
+        """Return the mean of a pixel and its neighbours."""
+        return smooth(namespace(light).maximum(light, 0)[None], sigma_px / math.sqrt(2))[0]
+
+    other = None if ambient is None else around(ambient)
+    variance = _of_light(noise_of, around(brightness), other).variance
+    xp = namespace(variance)
+    rows, columns = (_factors(sigma_px, length) for length in brightness.shape)
+    left = xp.asarray(np.outer(rows, columns)).astype(variance.dtype)
+    return MomentNoise(variance * left)
+
+
+def smoothed_at(
+    noise_of: Callable[..., MomentNoise],
+    brightness: Array,
+    pixels: Array,
+    sigma_px: float = SIGMA_PX,
+    *,
+    ambient: Array | None = None,
+) -> MomentNoise:
+    """Return what `smoothed` gives at some pixels, computed for their neighbours alone.
+
+    Parameters
+    ----------
+    noise_of : callable
+        Returns the noise of each pixel by itself, of a brightness of any shape, as `moment_noise`
+        with scalar gains: its variance must be affine in a brightness above 0. Called with
+        ``ambient=`` as by `smoothed_of`.
+    brightness : array, shape (H, W)
+        In DN; NaN where there is none.
+    pixels : array of int, shape (S,)
+        Places in the flattened image.
+    sigma_px : float
+        Standard deviation of the Gaussian, 0 to 100.
+    ambient : array, shape (H, W), optional
+        Light that is not modulated, in DN an image.
+
+    Returns
+    -------
+    MomentNoise
+        Of shape (m + 1, S).
+
+    Raises
+    ------
+    ShapeError
+        When the brightness is no image.
+    """
+    in_range("sigma_px", sigma_px, 0.0, 100.0, "0 to 100 pixels")
+    brightness = np.asarray(brightness)
+    if brightness.ndim != 2:
+        raise ShapeError("brightness", f"of shape {brightness.shape}", "(H, W)")
+    if sigma_px == 0:
+        there = np.maximum(brightness.reshape(-1)[pixels], 0)
+        other = None if ambient is None else np.asarray(ambient).reshape(-1)[pixels]
+        return _of_light(noise_of, there, other)
+    height, width = brightness.shape
+    row, column = np.divmod(pixels, width)
+    taps = gaussian_taps(sigma_px / math.sqrt(2))
+    radius = len(taps) // 2
+    shift = np.arange(-radius, radius + 1)
+    rows, columns = row[:, None] + shift, column[:, None] + shift
+    inside = ((rows >= 0) & (rows < height))[:, :, None]
+    inside = inside & ((columns >= 0) & (columns < width))[:, None, :]
+    places = rows.clip(0, height - 1)[:, :, None], columns.clip(0, width - 1)[:, None, :]
+    weight = np.outer(taps, taps).reshape(-1)
+    near = brightness[places]
+    present = inside & np.isfinite(near)
+    share = present.reshape((-1, weight.size)) @ weight
+
+    def around(near: Array) -> Array:
+        """Return the mean of a pixel and its neighbours (S, 2 R + 1, 2 R + 1)."""
+        light = np.where(present, np.maximum(near, 0), 0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = light.reshape((-1, weight.size)) @ weight / share
+        # a pixel that is not finite stays as it is
+        return np.where(present[:, radius, radius], mean, np.nan)
+
+    other = None if ambient is None else around(np.asarray(ambient)[places])
+    variance = _of_light(noise_of, around(near), other).variance
+    left = _factors(sigma_px, height)[row] * _factors(sigma_px, width)[column]
+    return MomentNoise((variance * left).astype(variance.dtype))
+
+
+def _of_light(
+    noise_of: Callable[..., MomentNoise], brightness: Array, ambient: Array | None
+) -> MomentNoise:
+    return noise_of(brightness) if ambient is None else noise_of(brightness, ambient=ambient)
+
+
+def _taps(sigma_px: float) -> Array:
+    radius = int(np.ceil(4 * sigma_px))
+    return np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma_px) ** 2)
+
+
+@lru_cache(maxsize=64)
+def _factors(sigma_px: float, length: int) -> Array:
+    """Sum of squares over square of the sum of the weights inside an axis, for each place on it."""
+    taps, inside = _taps(sigma_px), np.ones(length)
+    sums = (np.convolve(inside, each)[len(taps) // 2 :][:length] for each in (taps**2, taps))
+    squares, total = sums
+    factors = squares / total**2
+    factors.flags.writeable = False  # shared by all calls
+    return factors

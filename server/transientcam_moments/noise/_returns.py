@@ -1,0 +1,206 @@
+"""First-order noise of Pisarenko's returns, and of what is derived from them."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from transientcam_moments._dispatch import lookup
+from transientcam_moments.arrays import Array, in_range, namespace, summary
+from transientcam_moments.moment_problem import DIRECT_THRESHOLD, Returns
+from transientcam_moments.noise._cramer_rao import COINCIDE_RAD, CramerRao, cramer_rao
+from transientcam_moments.noise._moments import MomentNoise
+
+CLEAR = 8.0
+"""Standard deviations that returns must keep from vanishing, from each other, from the ends of the
+turn and from the threshold for first order to hold."""
+
+
+class ReturnNoise(NamedTuple):
+    """Standard deviations of returns; shapes as of `Returns` and `Separation`.
+
+    Attributes
+    ----------
+    phase_std_rad, weight_std : array, shape (m, ...)
+        Of every return; NaN in unused slots.
+    uniform_std : array, shape (...)
+        Of the uniform part.
+    direct_phase_std_rad, direct_std, indirect_std : array, shape (...)
+        Of the direct return's phase and weight and of all other weights together; NaN where there
+        is no return.
+    holds : boolean array, shape (...)
+        Where first order holds.
+    """
+
+    phase_std_rad: Array
+    weight_std: Array
+    uniform_std: Array
+    direct_phase_std_rad: Array
+    direct_std: Array
+    indirect_std: Array
+    holds: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
+
+
+def return_noise(
+    returns: Returns, noise: MomentNoise, *, threshold: float = DIRECT_THRESHOLD
+) -> ReturnNoise:
+    """Propagate the noise of moments to the returns that Pisarenko's estimate finds in them.
+
+    Parameters
+    ----------
+    returns : Returns
+        From `pisarenko`, of moments without noise if those are known, else of the measured ones.
+    noise : MomentNoise
+        Of shape (m + 1, ...).
+    threshold : float
+        As for `separate`, 0 to 1.
+
+    Returns
+    -------
+    ReturnNoise
+
+    Raises
+    ------
+    ParameterError
+        For a threshold outside of 0 to 1.
+
+    Notes
+    -----
+    Implicit differentiation of b_j = sum_k w_k exp(i j phi_k), j = 1 .. m. With m returns these
+    are as many real equations as unknowns: the inverse of their Jacobian is all there is, and the
+    estimate reaches the Cramer-Rao bound. b_0, however it was measured or biased, is in none of
+    them; it only moves the uniform part.
+
+    First order fails, and `holds` is false, with fewer than m returns (the rest of the estimate is
+    made of noise, splits the true returns and gives their phases heavy tails, so that what is
+    stated is no more than the bound), where a return is no more than `CLEAR` standard deviations
+    strong, where two are no further apart, and where the direct return might be another one.
+    """
+    in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
+    bound = cramer_rao(returns.phase_rad, returns.weight, noise)
+    xp = namespace(bound.weight_std)
+    used = returns.weight > 0
+    first = _first(returns, used, threshold)
+    any_there = used.any(axis=0)
+    with np.errstate(all="ignore"):
+        total = _of_sum(bound, used)
+        indirect = _of_sum(bound, used & ~first)
+        return ReturnNoise(
+            phase_std_rad=bound.phase_std_rad,
+            weight_std=bound.weight_std,
+            uniform_std=xp.sqrt(noise.variance[0] + total),
+            direct_phase_std_rad=_of_first(bound.phase_std_rad, first, any_there),
+            direct_std=_of_first(bound.weight_std, first, any_there),
+            indirect_std=xp.where(any_there, xp.sqrt(indirect), np.nan),
+            holds=_holds(returns, bound, used, first, threshold),
+        )
+
+
+def direct_phase_noise(
+    returns: Returns, noise: MomentNoise, *, threshold: float = DIRECT_THRESHOLD
+) -> tuple[Array, Array]:
+    """Return `direct_phase_std_rad` and `holds` of `return_noise` alone, in less time."""
+    in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
+    count, pixels = returns.phase_rad.shape[0], returns.phase_rad.shape[1:]
+    lane = None
+    if isinstance(returns.phase_rad, np.ndarray) and count == noise.variance.shape[0] - 1:
+        lane = lookup("direct_noise", count, math.prod(pixels), "d")
+    if lane is None:
+        return _planar_direct_phase_noise(returns, noise, threshold)
+    phase, weight, variance = (
+        np.asarray(planes, float).reshape((count, -1))
+        for planes in (returns.phase_rad, returns.weight, noise.variance[1:])
+    )
+    std_rad, holds, whole = lane(phase, weight, variance, threshold, CLEAR, COINCIDE_RAD)
+    if not whole.all():
+        others = ~whole
+        some = Returns(
+            phase[:, others],
+            weight[:, others],
+            np.asarray(returns.uniform).reshape(-1)[others],
+            np.asarray(returns.count).reshape(-1)[others],
+        )
+        of_some = MomentNoise(noise.variance.reshape((count + 1, -1))[:, others])
+        std_rad[others], holds[others] = _planar_direct_phase_noise(some, of_some, threshold)
+    return std_rad.reshape(pixels), holds.reshape(pixels)
+
+
+def _planar_direct_phase_noise(
+    returns: Returns, noise: MomentNoise, threshold: float
+) -> tuple[Array, Array]:
+    bound = cramer_rao(returns.phase_rad, returns.weight, noise)
+    used = returns.weight > 0
+    first = _first(returns, used, threshold)
+    with np.errstate(all="ignore"):
+        return (
+            _of_first(bound.phase_std_rad, first, used.any(axis=0)),
+            _holds(returns, bound, used, first, threshold),
+        )
+
+
+def _first(returns: Returns, used: Array, threshold: float) -> Array:
+    """Where the direct return is: the first one over the threshold."""
+    direct = used & (returns.weight >= threshold * returns.weight.max(axis=0))
+    return direct & (namespace(used).cumsum(direct, axis=0) == 1)
+
+
+def _of_first(values: Array, first: Array, any_there: Array) -> Array:
+    xp = namespace(values)
+    return xp.where(any_there, xp.where(first, values, 0).sum(axis=0), np.nan)
+
+
+def _holds(
+    returns: Returns, bound: CramerRao, used: Array, first: Array, threshold: float
+) -> Array:
+    """Whether first order holds, see `return_noise`."""
+    return (
+        used.all(axis=0)
+        & _strong(returns, bound)
+        & _apart(returns, bound)
+        & _decided(returns, bound, first, threshold)
+    )
+
+
+def _of_sum(bound: CramerRao, chosen: Array) -> Array:
+    """Variance of the sum of the chosen weights."""
+    xp = namespace(bound.covariance)
+    count = chosen.shape[0]
+    both = chosen[:, None] & chosen[None]
+    return xp.where(both, bound.covariance[:count, :count], 0).sum(axis=(0, 1))
+
+
+def _strong(returns: Returns, bound: CramerRao) -> Array:
+    """Whether every return is clearly there."""
+    return (returns.weight > CLEAR * bound.weight_std).all(axis=0)
+
+
+def _apart(returns: Returns, bound: CramerRao) -> Array:
+    """Whether neighbours on the turn keep their order, and none crosses its ends."""
+    xp = namespace(bound.covariance)
+    phase, weight = returns.phase_rad, returns.weight
+    count = weight.shape[0]
+    clear = (phase > CLEAR * bound.phase_std_rad) & (
+        2 * np.pi - phase > CLEAR * bound.phase_std_rad
+    )
+    clear = clear.all(axis=0)
+    for k in range(count - 1):
+        mixed = bound.covariance[count + k, count + k + 1] / (weight[k] * weight[k + 1])
+        variance = bound.phase_std_rad[k] ** 2 + bound.phase_std_rad[k + 1] ** 2 - 2 * mixed
+        clear = clear & (phase[k + 1] - phase[k] > CLEAR * xp.sqrt(xp.maximum(variance, 0)))
+    return clear
+
+
+def _decided(returns: Returns, bound: CramerRao, first: Array, threshold: float) -> Array:
+    """Whether noise cannot lift an earlier return over the threshold or the direct one under it."""
+    xp = namespace(bound.covariance)
+    strongest = returns.weight.max(axis=0)
+    is_strongest = returns.weight == strongest
+    of_strongest = xp.where(is_strongest, bound.weight_std, 0).max(axis=0)
+    spread = bound.weight_std + threshold * of_strongest
+    margin = abs(returns.weight - threshold * strongest) > CLEAR * spread
+    until = xp.cumsum(first[::-1], axis=0)[::-1] > 0  # the direct one and all before it
+    return (margin | is_strongest | ~until).all(axis=0)

@@ -1,0 +1,97 @@
+"""A reconstruction most of which one compiled pass has computed."""
+
+from collections.abc import Callable
+from functools import cached_property
+
+from transientcam_compiled import Spread, at_once
+from transientcam_moments._kernels.one_pass import Planes
+from transientcam_moments.arrays import Array
+from transientcam_moments.images import Repair
+from transientcam_moments.moment_problem import Coefficients, Returns, levinson
+from transientcam_moments.reconstruction._flags import Flags
+from transientcam_moments.reconstruction._lazy import Reconstruction
+from transientcam_moments.reconstruction._settings import Settings
+
+
+class PassedReconstruction(Reconstruction):
+    """A reconstruction most of which one compiled pass has computed.
+
+    Parameters
+    ----------
+    planes : Planes
+        Of the pass.
+    settings : Settings
+        Those it was made with.
+    measure : callable
+        Returns the calibrated moments that are not smoothed; called when they are first read.
+    kept : boolean array, shape (takes, N), optional
+        Which images went into the moments; all, when left out.
+    repaired : Repair, optional
+        What was done to the images before.
+    calibration : array, optional
+        As of `Reconstruction`.
+    corrected : boolean array, shape (...), optional
+        Where known harmonics were taken out; none are known, when left out.
+    spread : callable, optional
+        As of `Reconstruction`.
+    other_light : callable, optional
+        As of `Reconstruction`.
+    """
+
+    def __init__(
+        self,
+        planes: Planes,
+        settings: Settings,
+        measure: Callable[[], Array],
+        kept: Array | None = None,
+        repaired: Repair | None = None,
+        calibration: Array | None = None,
+        corrected: Array | None = None,
+        spread: Spread = at_once,
+        other_light: Callable[[Array], Array | None] | None = None,
+    ) -> None:
+        super().__init__(
+            None,
+            settings,
+            kept=kept,
+            repaired=repaired,
+            calibration=calibration,
+            spread=spread,
+            other_light=other_light,
+        )
+        self._measure = measure
+        self.smoothed = planes.smoothed
+        self._corrected = planes.smoothed, corrected
+        self.validity = planes.validity
+        self._flags_of_moments = planes.flags
+        self.returns = Returns(planes.phase_rad, planes.weight, planes.uniform, planes.count)
+        self.brightness = planes.brightness
+        if settings.estimator == "pisarenko":  # else they follow from another estimate
+            self.uniform = planes.uniform
+            self.direct = planes.direct
+            self.indirect = planes.indirect
+            if settings.base_frequency_hz is not None:
+                self.range_m = planes.range_m
+
+    @cached_property
+    def measured(self) -> Array:
+        """Calibrated moments (m + 1, ...), not smoothed; read from the data once more."""
+        return self._measure()
+
+    @cached_property
+    def coefficients(self) -> Coefficients:
+        """Coefficients of the maximum entropy density; no biased moments are made for them."""
+        return levinson(self.smoothed, brightness=self.brightness)
+
+    @property
+    def _shape(self) -> tuple[int, tuple[int, ...]]:
+        return self.smoothed.shape[0] - 1, tuple(self.smoothed.shape[1:])
+
+    @cached_property
+    def _biased(self) -> tuple[Array, Array]:
+        biased = (self._flags_of_moments & int(Flags.BIASED)) > 0
+        if self.settings.zeroth == "estimated":
+            return self.smoothed, biased
+        moments = self.smoothed.copy()
+        moments[0] = self.brightness
+        return moments, biased

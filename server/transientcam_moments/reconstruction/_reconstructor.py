@@ -1,0 +1,495 @@
+"""From raw images or moments to a reconstruction: in one compiled pass, or stage by stage."""
+
+import math
+import threading
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from transientcam_compiled import Spread, at_once
+from transientcam_moments._dispatch import lookup, on_threads
+from transientcam_moments._kernels.one_pass import Constants, OnePass
+from transientcam_moments._kernels.padding import LEAST_WIDTH
+from transientcam_moments.arrays import Array, as_array
+from transientcam_moments.errors import ParameterError, UnlabelledImages
+from transientcam_moments.images import (
+    ZEROTH_IMAGES,
+    HarmonicCorrection,
+    Repair,
+    Replacement,
+    average_takes,
+    calibrate,
+    checked_mask,
+    checked_waveform,
+    fill_bad_pixels,
+    gaussian_taps,
+    harmonics_of,
+    inverse_gains,
+    is_four_bucket,
+    matters,
+    measure,
+    repair,
+    saturated,
+    smooth,
+    takes_first,
+)
+from transientcam_moments.noise import ambient_light
+from transientcam_moments.reconstruction._labels import Labels
+from transientcam_moments.reconstruction._lazy import Reconstruction
+from transientcam_moments.reconstruction._one_pass import PassedReconstruction
+from transientcam_moments.reconstruction._ranging import range_m
+from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, Settings
+from transientcam_moments.reconstruction._sparse_frequencies import GappedReconstruction
+
+_BY_THE_PASS = ("pisarenko", "pisarenko-merged", *OF_ANY_MULTIPLES)
+"""Estimators that follow from the pass's returns or moments."""
+_WHOLE = 1e-6  # sum of the phasors of phases that are spread evenly over a period, at most
+_SHAPES = 4  # of images that a reconstructor keeps prepared
+
+
+class Reconstructor:
+    """Reconstructs the frames of a camera.
+
+    What does not change from frame to frame is prepared once; several threads may call it at the
+    same time, and no result changes with a later call.
+
+    Parameters
+    ----------
+    settings : Settings, optional
+        The paper's, when left out. Raw images need ``zeroth`` and ``takes`` in them, and a range
+        ``base_frequency_hz``: these have no default.
+    calibration : array, shape (m + 1,) or (m + 1, ...), optional
+        Gains to divide by, as `calibrate` takes them. Raw images need them; moments without are
+        taken to be calibrated.
+    bad_pixels : boolean array, shape (H, W), optional
+        Pixels that show the mean of their neighbours instead, and are flagged.
+    waveform : array, shape (m, K), optional
+        Odd harmonics of the modulation, from `waveform_of`, that are taken out of the moments; none
+        are known, when left out. Needs the calibration.
+    """
+
+    def __init__(
+        self,
+        settings: Settings | None = None,
+        *,
+        calibration: Array | None = None,
+        bad_pixels: Array | None = None,
+        waveform: Array | None = None,
+    ) -> None:
+        self.settings = Settings() if settings is None else settings
+        self._calibration = calibration
+        self._bad = bad_pixels
+        if waveform is not None:
+            waveform = checked_waveform(waveform)
+            if calibration is None:
+                raise ParameterError("calibration", None, "given, for the phases of the waveform")
+            if not self.settings.consecutive:
+                limit = "1 to m, for a waveform to be taken out"
+                raise ParameterError("multiples", self.settings.multiples, limit)
+        self._waveform = waveform if waveform is not None and matters(waveform) else None
+        self._lock = threading.Lock()
+        self._prepared: dict[tuple[Any, ...], OnePass] = {}
+        self._corrections: dict[tuple[int, ...], HarmonicCorrection] = {}
+
+    def __call__(
+        self,
+        data: Array | Sequence[Array],
+        *,
+        saturated_pixels: Array | None = None,
+        previous: Array | None = None,
+        spread: Spread = at_once,
+    ) -> Reconstruction:
+        """Reconstruct one frame.
+
+        Parameters
+        ----------
+        data : array
+            Real images (N, ...) in capture order, as `measure` takes them, or complex moments
+            (m + 1, ...). They must stay as they are if ``measured`` is to be read later.
+        saturated_pixels : boolean array, shape (...), optional
+            Pixels to be flagged; found in images by themselves.
+        previous : array, optional
+            Images of the frame before, like `data`, for ``spoilt_images="fill"``.
+        spread : callable
+            How the compiled pass, and the likelihood, use several threads, as `kernels.over`
+            returns it.
+
+        Returns
+        -------
+        Reconstruction
+            Where the compiled pass serves, with range, returns, light, flags and validity
+            computed; else with moments measured and nothing else computed yet.
+
+        Raises
+        ------
+        ShapeError
+            When the data have no shape that belongs to images or moments, or calibration or bad
+            pixels have another one.
+        UnlabelledImages
+            When the data are raw images, and settings or gains leave open what they show.
+        """
+        data = data if isinstance(data, Sequence) else as_array(data)
+        if not isinstance(data, Sequence) and np.dtype(data.dtype).kind == "c":
+            moments = data if self._bad is None else fill_bad_pixels(data, self._bad)
+            return self._of_moments(self._calibrated(moments), saturated_pixels, None, spread)
+        zeroth, count = self._require_labels()
+        takes = takes_first(data, count, len(self.settings.sampled_rad))
+        repaired = self._repaired(takes, previous)
+        if repaired is not None:
+            takes = repaired.images
+        # behind the smoothing, where a waveform is known: harmonics are taken out there
+        one_pass = None if self._waveform is not None else self._pass_of_images(takes, zeroth)
+        if one_pass is not None:
+            planes = one_pass.images(takes[0], saturated_pixels, spread)
+            return PassedReconstruction(
+                planes,
+                self.settings,
+                lambda: self._measured(takes)[0],
+                repaired=repaired,
+                calibration=self._calibration,
+                spread=spread,
+                other_light=self._other_light(takes, zeroth),
+            )
+        moments, kept = self._measured(takes, None if repaired is None else repaired.left_out)
+        if saturated_pixels is None:
+            stack = takes.reshape((-1, *moments.shape[1:]))
+            saturated_pixels = saturated(stack, full_scale=self.settings.full_scale)
+            if self._bad is not None:  # their own values are not used
+                saturated_pixels = saturated_pixels & ~self._bad
+        other_light = self._other_light(takes, zeroth)
+        return self._of_moments(moments, saturated_pixels, kept, spread, repaired, other_light)
+
+    def of_measured(
+        self,
+        moments: Array,
+        *,
+        saturated_pixels: Array | None = None,
+        ambient_dn: float = 0.0,
+        spread: Spread = at_once,
+    ) -> Reconstruction:
+        """Go on from the moments that another reconstruction began with.
+
+        Where that one had several takes and the same settings, calibration and bad pixels, all
+        that follows is equal to the bit; with one take the compiled pass may round in another way.
+
+        Parameters
+        ----------
+        moments : array, shape (m + 1, ...)
+            `Reconstruction.measured`: calibrated, and bad pixels replaced already.
+        saturated_pixels : boolean array, shape (...), optional
+            Pixels to be flagged; none, when left out.
+        ambient_dn : float
+            Light in DN an image that was not the camera's, the same for all pixels.
+        spread : callable
+            As of a call.
+        """
+        found = self._of_moments(moments, saturated_pixels, None, spread)
+        if ambient_dn > 0:
+            found.ambient = np.full(moments.shape[1:], ambient_dn, moments.real.dtype)
+        return found
+
+    def _require_labels(self) -> tuple[str, int]:
+        """Return how b_0 was measured and the number of takes, where raw images can be read."""
+        settings, calibration = self.settings, self._calibration
+        stated = {"zeroth": settings.zeroth, "takes": settings.takes, "calibration": calibration}
+        if settings.zeroth is None or settings.takes is None or calibration is None:
+            raise UnlabelledImages(tuple(name for name, each in stated.items() if each is None))
+        return settings.zeroth, settings.takes
+
+    def _of_moments(
+        self,
+        moments: Array,
+        saturated_pixels: Array | None,
+        kept: Array | None,
+        spread: Spread,
+        repaired: Repair | None = None,
+        other_light: Callable[[Array], Array | None] | None = None,
+    ) -> Reconstruction:
+        """Go on from calibrated moments."""
+        if not self.settings.consecutive:
+            return GappedReconstruction(
+                moments,
+                self.settings,
+                saturated_pixels,
+                bad_pixels=self._bad,
+                kept=kept,
+                calibration=self._calibration,
+                spread=spread,
+                other_light=other_light,
+            )
+        one_pass = self._pass_of_moments(moments)
+        correction = self._correction(moments)
+        if one_pass is None:
+            return Reconstruction(
+                moments,
+                self.settings,
+                saturated_pixels,
+                bad_pixels=self._bad,
+                kept=kept,
+                repaired=repaired,
+                calibration=self._calibration,
+                correction=correction,
+                spread=spread,
+                other_light=other_light,
+            )
+        smoothed = moments
+        if moments.ndim == 3:
+            smoothed = smooth(moments, self.settings.smoothing_sigma_px)
+        corrected = None
+        if correction is not None:
+            smoothed, corrected = correction(smoothed, spread=spread)
+        planes = one_pass.moments(smoothed, saturated_pixels, spread)
+        return PassedReconstruction(
+            planes,
+            self.settings,
+            lambda: moments,
+            kept=kept,
+            repaired=repaired,
+            calibration=self._calibration,
+            corrected=corrected,
+            spread=spread,
+            other_light=other_light,
+        )
+
+    def _correction(self, moments: Array) -> HarmonicCorrection | None:
+        """Return what takes the harmonics of the waveform out of these moments, if any is known."""
+        if self._waveform is None:
+            return None
+        shape = tuple(moments.shape[1:])
+        with self._lock:
+            if shape not in self._corrections:
+                self._corrections[shape] = HarmonicCorrection(
+                    self._waveform,
+                    self._calibration,
+                    shape,
+                    smoothing_sigma_px=self.settings.smoothing_sigma_px,
+                    estimated=self.settings.zeroth == "estimated",
+                )
+                while len(self._corrections) > _SHAPES:
+                    self._corrections.pop(next(iter(self._corrections)))
+            return self._corrections[shape]
+
+    def _repaired(self, takes: Array, previous: Array | None) -> Repair | None:
+        """Return the images after repair; None for other arrays than NumPy's, or by the settings.
+
+        What to do depends on the values, which are not known yet where JAX traces a function.
+        Without opposite phases there are no sums to find spoilt images by.
+        """
+        if self.settings.spoilt_images == "keep" or not isinstance(takes, np.ndarray):
+            return None
+        if not is_four_bucket(self.settings.sampled_rad):
+            return None
+        zeroth, count = self._require_labels()
+        before = None
+        if previous is not None and self.settings.spoilt_images == "fill":
+            before = np.asarray(takes_first(previous, count))
+        return repair(
+            takes,
+            zeroth=zeroth,
+            calibration=self._calibration,
+            full_scale=self.settings.full_scale,
+            previous=before,
+        )
+
+    def _other_light(self, takes: Array, zeroth: str) -> Callable[[Array], Array | None] | None:
+        """Return what tells light that is not the camera's, of the first take's first frequency.
+
+        It depends on values, which are not known yet where JAX traces a function.
+        """
+        sensor, phases_rad = self.settings.sensor, self.settings.sampled_rad
+        whole = abs(np.exp(1j * np.asarray(phases_rad)).sum()) < _WHOLE
+        if sensor is None or not whole or not isinstance(takes, np.ndarray):
+            return None
+        first = ZEROTH_IMAGES[zeroth] if zeroth == "on-off" else 0
+        return partial(
+            ambient_light,
+            takes[0, first : first + len(phases_rad)],
+            sensor=sensor,
+            sigma_px=self.settings.smoothing_sigma_px,
+            bad_pixels=self._bad,
+        )
+
+    def _measured(self, takes: Array, left_out: Array | None = None) -> tuple[Array, Array]:
+        """Return calibrated moments of raw images, and which images went into them."""
+        average, kept = average_takes(takes, left_out=left_out)
+        if self._bad is not None:
+            average = fill_bad_pixels(average, self._bad)
+        zeroth, _ = self._require_labels()
+        moments = measure(average, zeroth=zeroth, phases_rad=self.settings.sampled_rad)
+        return self._calibrated(moments), kept
+
+    def _calibrated(self, moments: Array) -> Array:
+        return moments if self._calibration is None else calibrate(moments, self._calibration)
+
+    # -- which way -----------------------------------------------------------------------------
+    # The compiled pass serves NumPy arrays in single precision, of 64 pixels or more and an order
+    # whose kernel "reconstruct" is compiled, where moments keep their harmonics and the range is
+    # Pisarenko's, or of OF_ANY_MULTIPLES, which follow from the pass's moments. It begins with
+    # the raw images of one take of uint16 at four phases, as wide as its smoothing needs, or else
+    # (several takes, other images, moments) behind the smoothing. All else goes stage by stage,
+    # each computed when it is first read.
+
+    def _pass_of_images(self, takes: Array, zeroth: str) -> OnePass | None:
+        if not is_four_bucket(self.settings.sampled_rad):
+            return None
+        m = harmonics_of(takes.shape[1], zeroth)
+        shape = tuple(takes.shape[2:])
+        raw = isinstance(takes, np.ndarray) and takes.dtype == np.uint16 and takes.shape[0] == 1
+        wide = self._taps(shape) is None or shape[1] >= LEAST_WIDTH
+        return self._pass(m, shape) if raw and wide else None
+
+    def _pass_of_moments(self, moments: Array) -> OnePass | None:
+        if not isinstance(moments, np.ndarray) or moments.dtype != np.complex64 or not moments.ndim:
+            return None
+        return self._pass(moments.shape[0] - 1, moments.shape[1:])
+
+    def _pass(self, m: int, shape: tuple[int, ...]) -> OnePass | None:
+        usual = self.settings.keep == "harmonics" and self.settings.consecutive
+        usual = usual and self.settings.estimator in _BY_THE_PASS
+        prepare = lookup("reconstruct", m, math.prod(shape))
+        masked = self._bad is None or np.shape(self._bad) == shape
+        if not usual or prepare is None or not masked:
+            return None
+        with self._lock:
+            found = self._prepared.get((prepare, shape))
+            if found is None:
+                found = prepare(shape, self._constants(m, shape))
+                while len(self._prepared) >= _SHAPES:
+                    self._prepared.pop(next(iter(self._prepared)))
+                self._prepared[prepare, shape] = found
+            return found
+
+    # -- preparing -----------------------------------------------------------------------------
+
+    def _taps(self, shape: tuple[int, ...]) -> Array | None:
+        sigma_px = self.settings.smoothing_sigma_px
+        return gaussian_taps(sigma_px) if sigma_px > 0 and len(shape) == 2 else None
+
+    def _constants(self, m: int, shape: tuple[int, ...]) -> Constants:
+        calibration = np.ones(m + 1) if self._calibration is None else self._calibration
+        bad, replaced = self._replacement(shape)
+        frequency_hz = self.settings.base_frequency_hz
+        return Constants(
+            self.settings,
+            inverse_gains(calibration, (m + 1, *shape)),
+            self._taps(shape),
+            math.nan if frequency_hz is None else float(range_m(np.float64(1.0), frequency_hz)),
+            bad,
+            replaced,
+        )
+
+    def _replacement(
+        self, shape: tuple[int, ...]
+    ) -> tuple[Array | None, Callable[[Array], Array] | None]:
+        """Return the flat places of bad pixels, and how to get moments for them from images."""
+        if self._bad is None:
+            return None, None
+        mask = checked_mask(self._bad, shape)
+        if not mask.any() or mask.all():
+            return np.flatnonzero(mask), None
+        replacement = Replacement(mask)
+        zeroth, phases_rad = self.settings.zeroth, self.settings.sampled_rad
+        if zeroth is None:  # moments, whose bad pixels are replaced already
+            return replacement.places, None
+        return replacement.places, lambda raw: measure(
+            replacement.values(raw), zeroth=zeroth, phases_rad=phases_rad
+        )
+
+
+def reconstruct(
+    data: Array | Sequence[Array],
+    settings: Settings | None = None,
+    *,
+    harmonic: Array | None = None,
+    phase_rad: Array | None = None,
+    frequency_hz: Array | None = None,
+    illumination: Array | None = None,
+    take: Array | None = None,
+    calibration: Array | None = None,
+    saturated_pixels: Array | None = None,
+    bad_pixels: Array | None = None,
+    previous: Array | None = None,
+    waveform: Array | None = None,
+    threads: int | None = None,
+) -> Reconstruction:
+    """Reconstruct one frame of labelled raw images, or of moments.
+
+    ::
+
+        with h5py.File("corner.h5") as file:
+            names = ("harmonic", "phase_rad", "frequency_hz", "illumination", "take")
+            labels = {name: file[name][()] for name in names}
+            found = tm.reconstruct(file["raw"][0], **labels, calibration=file["gain"][()])
+
+    With labels as ``Reconstructor(settings, calibration=..., bad_pixels=...)`` of the images in the
+    order that `measure` takes, and of settings with what the labels say; for many frames keep a
+    `Reconstructor`.
+
+    Parameters
+    ----------
+    data : array
+        Real images (N, ...) in any order, or complex moments (m + 1, ...).
+    settings : Settings, optional
+        Of smoothing, biasing and estimator: the paper's, when left out.
+    harmonic, phase_rad, frequency_hz, illumination, take : array, shape (N,), optional
+        What each image shows, see `Labels`. Raw images need them, or else ``zeroth``, ``takes`` and
+        ``base_frequency_hz`` in the settings and the order of `measure`.
+    calibration : array, shape (m + 1,) or (m + 1, ...), optional
+        Gains, as `calibrate` takes them; `nominal_calibration` where none were measured. Raw images
+        need them.
+    saturated_pixels : boolean array, shape (...), optional
+        Pixels to be flagged; found in images by themselves.
+    bad_pixels : boolean array, shape (H, W), optional
+        Pixels that show the mean of their neighbours instead, and are flagged.
+    previous : array, optional
+        Images of the frame before, like `data`, for ``spoilt_images="fill"``.
+    waveform : array, shape (m, K), optional
+        Odd harmonics that are taken out of the moments, as `Reconstructor` takes them.
+    threads : int, optional
+        How many the compiled pass uses; all cores, when left out.
+
+    Raises
+    ------
+    UnlabelledImages
+        When raw images do not say what they show: nothing is assumed for it.
+    ParameterError
+        When the labels are of no capture there is, or contradict the settings; for a waveform
+        without a calibration.
+    ShapeError
+        When shapes do not fit each other.
+    """
+    chosen = Settings() if settings is None else settings
+    given = {"harmonic": harmonic, "phase_rad": phase_rad}
+    if not isinstance(data, Sequence):
+        data = as_array(data)
+    raw = isinstance(data, Sequence) or np.dtype(data.dtype).kind != "c"
+    if harmonic is not None and phase_rad is not None:
+        labels = Labels(harmonic, phase_rad, frequency_hz, illumination, take)
+        chosen = labels.settings(chosen)
+        data = labels.in_order(data) if raw else data
+        previous = None if previous is None else labels.in_order(previous)
+    elif raw:
+        _require_stated(chosen, given, calibration)
+    if raw and (chosen.base_frequency_hz is None or calibration is None):
+        needed = {"frequency_hz": chosen.base_frequency_hz, "calibration": calibration}
+        raise UnlabelledImages(tuple(name for name, value in needed.items() if value is None))
+    reconstructor = Reconstructor(
+        chosen, calibration=calibration, bad_pixels=bad_pixels, waveform=waveform
+    )
+    spread = on_threads(threads)
+    return reconstructor(data, saturated_pixels=saturated_pixels, previous=previous, spread=spread)
+
+
+def _require_stated(
+    settings: Settings, labels: dict[str, Array | None], calibration: Array | None
+) -> None:
+    """Refuse images without labels, unless the settings state all that labels would say."""
+    physics = (settings.base_frequency_hz, settings.zeroth, settings.takes)
+    if None not in physics:
+        return
+    missing = [name for name, value in labels.items() if value is None]
+    if settings.base_frequency_hz is None:
+        missing.append("frequency_hz")
+    raise UnlabelledImages((*missing, *(["calibration"] if calibration is None else [])))

@@ -1,0 +1,148 @@
+"""How moments become range, and what the range may be taken from."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from transientcam_moments.arrays import MAX_HARMONICS, chosen, in_range
+from transientcam_moments.comparisons import TECHNIQUES
+from transientcam_moments.errors import ParameterError
+from transientcam_moments.images import FOUR_PHASES_RAD, SIGMA_PX, ZEROTH_IMAGES, phase_weights
+from transientcam_moments.moment_problem import DIRECT_THRESHOLD, EPSILON
+from transientcam_moments.noise import Sensor
+
+SPOILT_IMAGES = ("keep", "repair", "fill")
+"""What becomes of images that lost their synchronisation; see `Settings`."""
+
+OF_ANY_MULTIPLES = ("likelihood", "two-returns", "unwrapped-phase")
+"""Estimators that serve moments of any multiples of the base frequency."""
+OWN = (
+    "pisarenko",
+    "maximum-entropy",
+    "likelihood",
+    "single-frequency",
+    "pisarenko-merged",
+    "two-returns",
+    "unwrapped-phase",
+)
+"""Estimators that `Reconstruction` implements itself."""
+ESTIMATORS = (
+    *OWN,
+    *(
+        each.name
+        for each in TECHNIQUES.values()
+        if each.measures == "moments" and each.name not in OWN
+    ),
+)
+"""What the range may be taken from; see `transientcam_moments.comparisons`."""
+
+
+def least_harmonics(estimator: str) -> int:
+    """Return the smallest m that an estimator gives a range of."""
+    return TECHNIQUES[estimator].least_harmonics if estimator in TECHNIQUES else 1
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How moments become range.
+
+    Attributes
+    ----------
+    base_frequency_hz : float, optional
+        f, of the first harmonic. Ranges and times of flight need it.
+    zeroth : {"low-frequency", "on-off", "estimated"}, optional
+        How b_0 was measured (Sec. 4.3). Raw images need it; moments whose b_0 is 0 since it was
+        not measured are "estimated".
+    takes : int, optional
+        Captures in the images, averaged without outliers. Raw images need it.
+    multiples : tuple of int, optional
+        Which multiples of the base frequency were measured, ascending; 1 to m, when left out. Only
+        `OF_ANY_MULTIPLES` serve others.
+    phases_rad : tuple of float, optional
+        Of the raw images of each frequency, in their order, three or more: 0, 90, 180 and 270
+        degrees, when left out.
+    epsilon : float
+        Least uniform part relative to b_0 (Sec. 4.3), 0 <= epsilon < 1.
+    keep : {"harmonics", "brightness"}
+        What biasing leaves as it is.
+    smoothing_sigma_px : float
+        Of the Gaussian over neighbouring pixels; 0 for none, and none without two image axes.
+    threshold : float
+        The range is that of the first return, or peak, with this share of the strongest one's
+        weight, or density.
+    estimator : str
+        What the range is taken from: "pisarenko" as the paper has it, "pisarenko-merged" (see
+        `merge_returns`), "maximum-entropy", "likelihood", "two-returns" (see `two_returns`),
+        "unwrapped-phase" (see `unwrap`), "single-frequency", which is the usual arg b_1, or another
+        of the `comparisons` of moments.
+    minimum_brightness : float
+        Pixels with b_0 at or below it have no signal, in the unit of the moments.
+    full_scale : float
+        Largest value of a raw image; pixels that reach it are saturated.
+    spoilt_images : {"repair", "fill", "keep"}
+        What becomes of raw images that lost their synchronisation (Sec. 6): rebuilt where sums of
+        opposite images find them (`repair`), and where those don't, also filled in from the
+        frame before, or kept as they are.
+    sensor : noise.Sensor, optional
+        Whose noise the images have; "likelihood", "two-returns" and "unwrapped-phase" weigh the
+        moments by it, and "pisarenko-merged" merges by it; all assume some without one, see
+        `likelihood`.
+    """
+
+    base_frequency_hz: float | None = None
+    zeroth: str | None = None
+    takes: int | None = None
+    multiples: tuple[int, ...] | None = None
+    phases_rad: tuple[float, ...] | None = None
+    epsilon: float = EPSILON
+    keep: str = "harmonics"
+    smoothing_sigma_px: float = SIGMA_PX
+    threshold: float = DIRECT_THRESHOLD
+    estimator: str = "pisarenko"
+    minimum_brightness: float = 0.0
+    full_scale: float = 4095.0
+    spoilt_images: str = "repair"
+    sensor: Sensor | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what no stage could work with (ParameterError)."""
+        if self.base_frequency_hz is not None and not 0 < self.base_frequency_hz < float("inf"):
+            raise ParameterError("base_frequency_hz", self.base_frequency_hz, "> 0 and finite")
+        if self.zeroth is not None:
+            chosen("zeroth", self.zeroth, tuple(ZEROTH_IMAGES))
+        if self.takes is not None and self.takes < 1:
+            raise ParameterError("takes", self.takes, ">= 1")
+        if self.sensor is not None:
+            for field in ("zeroth", "takes"):
+                if getattr(self, field) is None:
+                    raise ParameterError(field, None, "stated, for the noise of a sensor")
+        phase_weights(self.sampled_rad)
+        if self.multiples is not None and not _ascending(self.multiples):
+            raise ParameterError("multiples", self.multiples, "ascending, from 1 to 32")
+        in_range("epsilon", self.epsilon, 0.0, float(np.nextafter(1.0, 0.0)), "0 <= epsilon < 1")
+        chosen("keep", self.keep, ("harmonics", "brightness"))
+        in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
+        in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
+        chosen("estimator", self.estimator, ESTIMATORS)
+        chosen("spoilt_images", self.spoilt_images, SPOILT_IMAGES)
+
+    @property
+    def least_harmonics(self) -> int:
+        """The smallest m that the estimator gives a range of."""
+        return least_harmonics(self.estimator)
+
+    @property
+    def sampled_rad(self) -> tuple[float, ...]:
+        """Phases of the raw images of each frequency."""
+        return FOUR_PHASES_RAD if self.phases_rad is None else self.phases_rad
+
+    @property
+    def consecutive(self) -> bool:
+        """Whether the multiples are 1 to m, as the trigonometric moment problem needs."""
+        return self.multiples is None or self.multiples[-1] == len(self.multiples)
+
+
+def _ascending(multiples: tuple[int, ...]) -> bool:
+    """Return whether there are multiples, each larger than the one before."""
+    inside = bool(multiples) and multiples[0] >= 1 and multiples[-1] <= MAX_HARMONICS
+    return inside and list(multiples) == sorted(set(multiples))

@@ -1,0 +1,106 @@
+"""The JSON documents about the camera, and whether it captures."""
+
+from typing import Any, Literal
+
+from pydantic import ConfigDict
+
+from transientcam_server.api._documents.document import Document
+
+
+class CameraDocument(Document):
+    """The camera: what it can do, and how it is."""
+
+    class IntrinsicsDocument(Document):
+        """A pinhole camera, in pixels; whole numbers are the centres of pixels."""
+
+        fx: float
+        fy: float
+        cx: float
+        cy: float
+        width: int
+        height: int
+        distortion: tuple[float, ...]
+        """k1, k2, p1, p2, k3 of Brown and Conrady, which OpenCV has in this order; or none."""
+        light_x_m: float
+        """How far to the right of the lens the light is."""
+        source: Literal["settings", "camera", "scene", "recording", "origin", "assumed"]
+        """Its origin: the settings `[lens]`, the camera itself, the simulated scene, the recording,
+        the origin of a relay, or none."""
+
+    class SensorDocument(Document):
+        """The sensor, which predictions of noise rest on."""
+
+        gain_e_per_dn: float
+        """Electrons a digital number stands for."""
+        full_well_e: float
+        """Electrons that a pixel holds."""
+        read_noise_e: float
+        """Standard deviation of a read-out, in electrons."""
+        dark_dn: float
+        """What the converter gives for an empty pixel."""
+        bits: int
+
+    class OriginDocument(Document):
+        """The service that this one relays, and what was missed on the way from there."""
+
+        url: str
+        service_id: str
+        version: str
+        role: Literal["viewer", "operator", "admin"]
+        """What this relay may do there; a viewer's token changes nothing."""
+        product: Literal["raw", "measured_moments"]
+        """What comes from there: images, or their moments alone."""
+        missed_frames: int
+        """Frames that the origin captured and this relay never got, since it began; those across a
+        restart of the origin are not known."""
+        dropped_frames: int
+        """Those of them that the origin dropped because relay or network were too slow."""
+        reconnects: int
+        """How often the origin was found again."""
+        restarts: int
+        """How often it was started anew meanwhile."""
+
+    state: Literal["starting", "streaming", "stopped", "calibrating", "lost", "held"]
+    reason: str | None = None
+    """Why it is lost, or its light is held off."""
+    simulated: bool
+    capabilities: dict[str, Any]
+    """As the camera itself states them; units are in the names."""
+    intrinsics: IntrinsicsDocument
+    """Where the pixels look: (column, row) along ((c - cx) / fx, (r - cy) / fy, 1), but for the
+    distortion."""
+    sensor: SensorDocument
+    origin: OriginDocument | None = None
+    """Of a relay (docs/relay.md); null where the camera is at this service."""
+    status: dict[str, Any] | None = None
+    """As the camera itself states it now; null while it is lost."""
+    counters: dict[str, int]
+    """What was received since the service started."""
+
+
+class AcquisitionDocument(Document):
+    """Whether frames are captured, and how fast."""
+
+    running: bool
+    state: Literal["starting", "streaming", "stopped", "calibrating", "lost", "held"]
+    reason: str | None = None
+    """Why the camera is lost, or its light is held off."""
+    rate_hz: float | None = None
+    """Measured over the last frames; null before there are two."""
+    frames: int
+    """Captured since the service started."""
+    frame_age_s: float
+    """Since the last frame arrived."""
+    stalled: bool
+    """Whether no frame arrived for much longer than one takes."""
+
+
+class AcquisitionRequest(Document):
+    """What the acquisition should do."""
+
+    model_config = ConfigDict(
+        extra="forbid", strict=True, json_schema_extra={"examples": [{"running": False}]}
+    )
+
+    running: bool
+    """Whether frames are captured; the light is off while they are not."""

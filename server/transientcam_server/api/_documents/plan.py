@@ -1,0 +1,255 @@
+"""The JSON documents of planning."""
+
+from typing import Any, Literal
+
+from pydantic import ConfigDict, Field
+
+from transientcam_server.api._documents.document import Document
+from transientcam_server.api._documents.frame import FrameDocument
+from transientcam_server.api._documents.sequence import SequenceDocument
+
+
+class _Asked(Document):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class TargetDocument(_Asked):
+    """What has to be reached; all that is given."""
+
+    range_error_m: float | None = Field(default=None, gt=0)
+    """Noise and bias of the range together, of the median lit pixel, at most."""
+    range_std_m: float | None = Field(default=None, gt=0)
+    """Standard deviation of the range of a typical pixel, at most."""
+    separation_m: float | None = Field(default=None, gt=0)
+    """Distance at which two equal returns are both found."""
+    separation_share: float = Field(default=0.9, gt=0, lt=1)
+    """In what share of all captures they are."""
+    bound_width: float | None = Field(default=None, gt=0)
+    """Width of the bounds on the density over the mean density, at most."""
+
+
+class BudgetDocument(_Asked):
+    """What may be spent; all that is given."""
+
+    capture_s: float | None = Field(default=None, gt=0)
+    """Time of one capture, at most."""
+    frame_rate_hz: float | None = Field(default=None, gt=0)
+    """Frames a second back to back, at least."""
+    computing_share: float | None = Field(default=None, gt=0)
+    """Share of the time between two frames that reconstruction may take, at most."""
+
+
+class GivenReturnDocument(_Asked):
+    """Light that comes back from one range."""
+
+    range_m: float = Field(gt=0, le=1e6)
+    weight: float = Field(default=1.0, gt=0, le=1e6)
+    """Relative to the others."""
+
+
+class SceneDocument(_Asked):
+    """A scene of equal pixels."""
+
+    brightness_dn_per_s: float = Field(gt=0, le=1e12)
+    """Zeroth moment in DN for each second of exposure."""
+    ambient_dn_per_s: float = Field(default=0.0, ge=0, le=1e12)
+    """Light that is not the camera's, in DN an image for each second of exposure."""
+    returns: list[GivenReturnDocument] = Field(
+        default_factory=lambda: [GivenReturnDocument(range_m=2.0)], min_length=1, max_length=32
+    )
+
+
+class PlanRequest(_Asked):
+    """What a sequence is wanted for."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {"target": {"range_error_m": 0.005}},
+                {"budget": {"frame_rate_hz": 15.0}, "fixed": {"zeroth": "low-frequency"}},
+            ]
+        },
+    )
+
+    target: TargetDocument = TargetDocument()
+    budget: BudgetDocument = BudgetDocument()
+    fixed: dict[str, Any] = Field(default_factory=dict)
+    """Fields of the sequence that must stay as given here."""
+    estimator: Literal["single-frequency", "maximum-entropy", "likelihood", "pisarenko"] | None = (
+        None
+    )
+    """The only estimator to plan with; null considers all of these."""
+    scene: SceneDocument | None = None
+    """Null looks at the scene: by a simulated camera of its own in virtual time, or else by the
+    current frame."""
+    ambient_dn_per_s: float | None = Field(default=None, ge=0)
+    """Light on that scene that is not the camera's; null measures it."""
+
+
+class FigureDocument(Document):
+    """A predicted error of the range in m."""
+
+    median: float
+    """Of the median lit pixel."""
+    low: float
+    """What is measured lies above this with 95 %."""
+    high: float
+    """And below this."""
+    p90: float
+    """90 % of the pixels are predicted to be better; fewer are where much light comes back close
+    behind the direct one, as near the edge of a corner, and no frequency resolves it."""
+
+
+class PredictedDocument(Document):
+    """Predicted accuracy."""
+
+    range_error_m: FigureDocument
+    """Noise and bias together: root sum of squares, pixel by pixel."""
+    range_std_m: FigureDocument
+    """Noise: standard deviation between captures."""
+    range_bias_m: float
+    """How far the mean range of the median pixel is off; more captures do not reduce it."""
+    range_bias_most_m: float
+    """How far it is off where light begins as early, or as late, as the moments of the look only
+    just allow."""
+    bias_known: bool
+    """Whether the look tells the bias. It does not where shapes of light that explain its moments
+    alike put the range elsewhere, nor where its two estimators disagree about the direct range,
+    nor where many pixels may be lit by other surfaces alone: then `range_bias_m` holds only for
+    the simplest light, and `summary` says why."""
+    outlier_share: float
+    """Share of the ranges that are off by more than five times `range_error_m`; pixels whose bias
+    none of the frequencies looked at shows are not in it."""
+    beyond_scene: bool
+    """Whether it sees more of the scene than the look that the scene was judged by, so that the
+    prediction is a bound on how good it can be."""
+    bound_width: float | None = None
+    separation_share: float | None = None
+
+
+class ChoiceDocument(Document):
+    """A sequence and what is predicted of it."""
+
+    sequence: SequenceDocument
+    """The body for `PUT /sequence`."""
+    estimator: str
+    """What the range is to be taken from, as in `PUT /reconstruction`."""
+    applied: dict[str, Any]
+    """What the camera would make of it."""
+    capture_s: float
+    frame_rate_hz: float
+    reconstruct_s: float | None
+    """Processor time of one frame on this machine; null as long as the kernels that it needs are
+    not compiled. With a budget `computing_share` they are, before the answer."""
+    computing_share: float | None
+    """That over the time between two frames: what a core is busy with."""
+    predicted: PredictedDocument
+
+
+class NeighbourDocument(ChoiceDocument):
+    """Another choice on the front, beside the recommended one."""
+
+    time_factor: float
+    """Its capture time over the recommended one's."""
+    error_factor: float | None = None
+    """Its error over the recommended one's."""
+
+
+class SeenDocument(Document):
+    """The scene that was planned for, by its median lit pixel."""
+
+    range_m: float
+    brightness_dn_per_s: float
+    """Zeroth moment for each second of exposure."""
+    ambient_dn_per_s: float
+    """Light that is not the camera's, in DN an image for each second of exposure."""
+    lit_share: float
+    """Share of all pixels whose light stands clear of the noise; no others count."""
+    dim_share: float
+    """Share of those that are so dim, at their range, that other surfaces may light them alone."""
+    moving_share: float
+    """Share of the lit pixels that changed while the scene was looked at: what moves is not
+    predicted."""
+    ambiguity_checked: bool
+    """Whether a second base frequency showed that no range is short by a period."""
+
+
+class PlanDocument(ChoiceDocument):
+    """A recommendation and its neighbours."""
+
+    compared_by: str
+    """The target that neighbours are compared by."""
+    summary: str
+    """Noise and bias in a sentence, what half the error costs, and why a bias is not known."""
+    scene: SeenDocument
+    half_time: NeighbourDocument | None = None
+    """What half the time gives; null where nothing is that quick."""
+    twice_accuracy: NeighbourDocument | None = None
+    """What half the error costs; null where nothing is that accurate."""
+
+
+class RangeErrorDocument(Document):
+    """Error of the range against the simulated truth, in m."""
+
+    median: float
+    rms: float
+
+
+class CurrentDocument(Document):
+    """Where the current frame stands."""
+
+    meta: FrameDocument
+    sequence: SequenceDocument
+    capture_s: float
+    frame_rate_hz: float
+    range_error_m: RangeErrorDocument | None = None
+    """Null for a real camera."""
+
+
+class PointDocument(Document):
+    """Predicted errors of the range of the median pixel, in m."""
+
+    capture_s: float
+    range_std_m: float
+    range_bias_m: float
+    range_error_m: float
+
+
+class LineDocument(Document):
+    """How the error of the same frequencies falls with capture time."""
+
+    estimator: str
+    harmonics: int
+    base_frequency_hz: float
+    points: list[PointDocument]
+
+
+AccuracyName = Literal["range_error_m", "range_std_m", "bound_width"]
+"""Which accuracy capture time is held against."""
+
+
+class TradeoffRequest(_Asked):
+    """What the front is wanted for."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"by": "range_error_m"}]}
+    )
+
+    by: AccuracyName = "range_error_m"
+    """The accuracy that capture time is held against."""
+
+
+class TradeoffDocument(Document):
+    """What accuracy costs on the scene before the camera."""
+
+    compared_by: str
+    scene_of_frame: int
+    """Number of the frame that the scene was judged by."""
+    current: CurrentDocument
+    front: list[ChoiceDocument]
+    """By rising capture time and falling error."""
+    lines: list[LineDocument]
+    """Of every estimator and set of frequencies on the front: noise falls onto the bias."""
+    summary: str
+    """From where on bias rules and time buys little, and the best there is, in a sentence."""

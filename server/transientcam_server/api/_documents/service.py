@@ -1,0 +1,94 @@
+"""The JSON documents about the service itself."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from transientcam_server.api._documents.document import Document
+from transientcam_server.api._documents.frame import HistoryDocument
+
+
+class InfoDocument(Document):
+    """What answers here."""
+
+    class CallerDocument(Document):
+        """The client that sent this request, as the service authenticated it."""
+
+        name: str = Field(description="of the token; `anybody` where none is required")
+        role: Literal["viewer", "operator", "admin"]
+
+    class ProductDocument(Document):
+        """An array that can be requested of a frame."""
+
+        name: str
+        unit: str
+        axes: list[str]
+        dtype: str
+        summary: str
+        formats: list[str]
+        """Suffixes it can be had in."""
+        over_time: bool
+        """Whether it takes `time_s` or `bins`."""
+        streamed: bool
+        """Whether the stream offers it."""
+
+    class AbsentDocument(Document):
+        """A product that frames of this camera do not have."""
+
+        name: str
+        reason: str
+
+    class StreamDocument(Document):
+        """Where the stream is."""
+
+        path: str
+        subprotocol: str
+        asyncapi: str = Field(description="where its messages are described, as AsyncAPI 3")
+        encodings: list[str] = Field(description="which a subscription may request")
+
+    name: str
+    version: str
+    service_id: str
+    """Another one with each start of the service."""
+    path: list[str]
+    """The `service_id` of this service and of all that it relays; the camera's own is the last."""
+    api: str
+    stream: StreamDocument
+    products: list[ProductDocument]
+    absent_products: list[AbsentDocument]
+    """What other cameras have, and why this one does not."""
+    caller: CallerDocument
+    history: HistoryDocument
+    """Which frames can be had, as in `GET /frames`."""
+    clients: int
+    """Streams open now."""
+    kernels: dict[str, Any]
+    """Which compiled kernels are ready; the others are computed with NumPy meanwhile."""
+    reconstruction: dict[str, float | str]
+    """Settings of the reconstruction."""
+
+
+class LivenessDocument(Document):
+    """The process answers."""
+
+    status: Literal["alive"] = "alive"
+
+
+class ReadinessDocument(Document):
+    """Frames can be had."""
+
+    status: Literal["ready"] = "ready"
+
+
+class VersionsDocument(Document):
+    """Which interfaces are served."""
+
+    class ApiDocument(Document):
+        """One version of the interface."""
+
+        name: str
+        path: str
+
+    name: str
+    version: str
+    api: list[ApiDocument]

@@ -1,0 +1,61 @@
+"""JSON documents about the simulated world."""
+
+from typing import Annotated, Final, Literal
+
+from pydantic import ConfigDict, Field
+
+from transientcam_server.api._documents.document import Document
+
+MAX_DEFINITION: Final = 65_536
+"""Characters of a scene that a client sends."""
+Choice = Literal["auto", "on", "off"]
+
+
+class SceneDocument(Document):
+    """A scene that comes along."""
+
+    name: str
+    description: str
+
+
+class SimulationDocument(Document):
+    """The simulated world before the camera."""
+
+    scene: str
+    effects: dict[str, Choice]
+    """What was chosen for effects by name, in place of the scene's own choice."""
+    scenes: list[SceneDocument]
+    """What the camera can be put before."""
+    diffusor: bool
+    """Whether filter and diffusor are before the lens, and hide the scene."""
+    plugged: bool
+    """Whether the simulated cable is in."""
+    faults: list[str]
+    """What can be made to go wrong."""
+
+
+class SimulationRequest(Document):
+    """What the camera should be put before; what is absent stays."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"scene": "corner", "effects": {"ambient": "on"}}]},
+    )
+
+    scene: Annotated[str, Field(max_length=64)] | None = None
+    definition: Annotated[str, Field(max_length=MAX_DEFINITION)] | None = None
+    """In its place the text of a scene's file (TOML); it may name no other file."""
+    effects: Annotated[dict[str, Choice], Field(max_length=64)] | None = None
+    """By name, in place of all earlier choices; of the others the scene decides."""
+    diffusor: bool | None = None
+    """Put filter and diffusor before the lens, to measure a calibration, or take them away."""
+
+
+class FaultRequest(Document):
+    """What should go wrong."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"fault": "corrupt-image"}]}
+    )
+
+    fault: Literal["unplug", "replug", "corrupt-image", "drop-image"]

@@ -1,0 +1,312 @@
+"""What Prometheus reads of a service: few series, whatever the number of clients.
+
+What the service counts anyway is read at each scrape; only distributions are observed as
+they happen. Each service has a registry of its own.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+import prometheus_client as prometheus
+from prometheus_client import Histogram
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, InfoMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+import transientcam_moments as tm
+from transientcam_server.api._relay_metrics import RelayCollector
+from transientcam_server.camera import Back, Captured, Event, Lost
+from transientcam_server.imaging import NOMINAL_ID
+from transientcam_server.recording import Library
+from transientcam_server.service import Service
+
+CONTENT_TYPE: Final = prometheus.CONTENT_TYPE_LATEST
+_FLAGS: Final = [str(flag.name).lower() for flag in tm.Flags if flag]
+_INTERVALS_S: Final = (0.01, 0.02, 0.04, 0.06, 0.08, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0)
+_LATENCIES_S: Final = (0.002, 0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.1, 0.2, 0.5, 1.0, 5.0)
+_COMPUTING_S: Final = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 5.0)
+
+
+class Metrics:
+    """The metrics of one service."""
+
+    def __init__(self, service: Service) -> None:
+        self.registry = prometheus.CollectorRegistry()
+        self._frame_interval = Histogram(
+            "transientcam_frame_interval_seconds",
+            "From one frame to the next, by the camera's clock.",
+            buckets=_INTERVALS_S,
+            registry=self.registry,
+        )
+        self._latency = Histogram(
+            "transientcam_frame_latency_seconds",
+            "From the arrival of a frame's last image until a product of it left for a client.",
+            buckets=_LATENCIES_S,
+            registry=self.registry,
+        )
+        self._reconstruction = Histogram(
+            "transientcam_reconstruction_duration_seconds",
+            "Computing time of a frame of which anything was computed.",
+            buckets=_COMPUTING_S,
+            registry=self.registry,
+        )
+        self._requests = prometheus.Counter(
+            "transientcam_http_requests",
+            "Requests that were answered, by the class of the answer's status.",
+            ("status",),
+            registry=self.registry,
+        )
+        for each in ("2xx", "3xx", "4xx", "5xx"):
+            self._requests.labels(each)
+        self._last: Captured | None = None
+        # every series from the start, so that its rate can be queried
+        self.pixels: Mapping[str, int] = {"total": 1} | dict.fromkeys(_FLAGS, 0)
+        self.spoilt = dict.fromkeys(("rejected", "repaired", "filled", "unrepaired"), 0)
+        self.losses = 0
+        self.reconnects = 0
+        self.registry.register(_ServiceCollector(service, self))
+        self.registry.register(RecordingCollector(service.recordings))
+        self.registry.register(RelayCollector(service))
+        prometheus.ProcessCollector(registry=self.registry)
+        prometheus.PlatformCollector(registry=self.registry)
+        prometheus.GCCollector(registry=self.registry)
+
+    def happened(self, event: Event) -> None:
+        """Count an event of the acquisition."""
+        match event:
+            case Captured(raw):
+                if self._last is not None and self._last.raw.epoch == raw.epoch:
+                    interval_s = raw.device_time_s - self._last.raw.device_time_s
+                    self._frame_interval.observe(interval_s)
+                self._last = event
+            case Lost():
+                self.losses += 1
+                self._last = None
+            case Back():
+                self.reconnects += 1
+
+    def sent(self, latency_s: float) -> None:
+        """Observe how old a frame was when it left for a client."""
+        self._latency.observe(latency_s)
+
+    def superseded(self, meta: Mapping[str, Any]) -> None:
+        """Count a frame that is no longer the newest by what became of it."""
+        if meta["reconstruct_s"] is not None:
+            self._reconstruction.observe(meta["reconstruct_s"])
+        self.pixels = meta["pixels"] or self.pixels
+        for result in self.spoilt:
+            images = meta[f"{result}_images"] or 0
+            self.spoilt[result] += len(images) if isinstance(images, list) else images
+
+    def answered(self, status: int) -> None:
+        """Count an answer."""
+        self._requests.labels(f"{status // 100}xx").inc()
+
+    def exposition(self) -> bytes:
+        """Return everything in the text format of Prometheus."""
+        return prometheus.generate_latest(self.registry)
+
+
+class _ServiceCollector(Collector):
+    """Collects what the service counts anyway."""
+
+    def __init__(self, service: Service, metrics: Metrics) -> None:
+        self._service = service
+        self._metrics = metrics
+
+    def describe(self) -> Iterator[Metric]:
+        """Describe no metrics in advance: a registry has one such collector."""
+        return iter(())
+
+    def collect(self) -> Iterator[Metric]:
+        """Return the values of this moment."""
+        yield from self._build()
+        yield from self._device()
+        yield from self._frames()
+        yield from self._history()
+        yield from self._calibration()
+        yield from self._clients()
+
+    def _build(self) -> Iterator[Metric]:
+        service = self._service
+        capabilities = service.camera.capabilities
+        yield InfoMetricFamily(
+            "transientcam_build",
+            "Versions of what runs here.",
+            value={
+                "version": service.identity["version"],
+                "api": "v1",
+                "model": capabilities.model,
+                "firmware": capabilities.firmware,
+            },
+        )
+
+    def _device(self) -> Iterator[Metric]:
+        state = self._service.acquisition.status().state
+        yield GaugeMetricFamily(
+            "transientcam_device_connected", "Whether the camera answers.", state != "lost"
+        )
+        yield GaugeMetricFamily(
+            "transientcam_acquisition_running",
+            "Whether frames are being captured.",
+            state == "streaming",
+        )
+        yield CounterMetricFamily(
+            "transientcam_device_losses", "How often the camera was lost.", self._metrics.losses
+        )
+        yield CounterMetricFamily(
+            "transientcam_device_reconnects",
+            "How often a lost camera came back.",
+            self._metrics.reconnects,
+        )
+        counters = self._service.camera.counters
+        images = CounterMetricFamily(
+            "transientcam_images",
+            "Images from the camera, by what became of them.",
+            labels=("result",),
+        )
+        for result, count in (
+            ("received", counters.images),
+            ("lost", counters.lost),
+            ("corrupt", counters.corrupt),
+        ):
+            images.add_metric((result,), count)
+        yield images
+        spoilt = CounterMetricFamily(
+            "transientcam_spoilt_images",
+            "Images unlike the others, of frames that were computed, by what became of them.",
+            labels=("result",),
+        )
+        for result, count in self._metrics.spoilt.items():
+            spoilt.add_metric((result,), count)
+        yield spoilt
+        yield CounterMetricFamily(
+            "transientcam_usb_resynchronisations",
+            "How often the beginning of an image had to be searched for.",
+            counters.resyncs,
+        )
+
+    def _frames(self) -> Iterator[Metric]:
+        status = self._service.acquisition.status()
+        yield CounterMetricFamily(
+            "transientcam_frames_captured", "Frames since the service started.", status.frames
+        )
+        yield GaugeMetricFamily(
+            "transientcam_frame_age_seconds", "Since the last frame arrived.", status.frame_age_s
+        )
+        latest = self._service.hub.latest
+        if latest is None:
+            return
+        yield GaugeMetricFamily(
+            "transientcam_sensor_temperature_celsius",
+            "Of the camera, with its last frame.",
+            latest.raw.temperature_c,
+        )
+        shares = GaugeMetricFamily(
+            "transientcam_pixels_flagged_ratio",
+            "Share of the pixels of the last frame that was looked at that carry a flag.",
+            labels=("flag",),
+        )
+        pixels = self._metrics.pixels
+        for flag, count in pixels.items():
+            if flag not in ("total", "valid"):
+                shares.add_metric((flag,), count / pixels["total"])
+        yield shares
+
+    def _history(self) -> Iterator[Metric]:
+        history = self._service.history
+        yield GaugeMetricFamily(
+            "transientcam_history_frames", "Former frames that can still be had.", history.count
+        )
+        yield GaugeMetricFamily(
+            "transientcam_history_bytes", "Memory of their raw images.", history.size_bytes
+        )
+        yield GaugeMetricFamily(
+            "transientcam_history_limit_bytes",
+            "What it may be at most.",
+            history.settings.max_bytes,
+        )
+
+    def _calibration(self) -> Iterator[Metric]:
+        calibrations = self._service.calibrations
+        yield GaugeMetricFamily(
+            "transientcam_calibration_active",
+            "Whether a measurement calibrates frames, where it fits the sequence.",
+            calibrations.active_id != NOMINAL_ID,
+        )
+        captured_unix_s = calibrations.active_since_s
+        if captured_unix_s is not None:
+            yield GaugeMetricFamily(
+                "transientcam_calibration_timestamp_seconds",
+                "When the active calibration was measured.",
+                captured_unix_s,
+            )
+        drift = calibrations.known_drift
+        if drift is not None:
+            yield GaugeMetricFamily(
+                "transientcam_calibration_invalid_pixels_ratio",
+                "Share of pixels whose moments contradict each other by more than noise explains.",
+                drift.invalid_share,
+            )
+
+    def _clients(self) -> Iterator[Metric]:
+        hub = self._service.hub
+        yield GaugeMetricFamily("transientcam_stream_clients", "Streams open now.", hub.clients)
+        yield GaugeMetricFamily(
+            "transientcam_preview_clients",
+            "Clients that receive a preview as MJPEG now.",
+            self._service.mjpeg_clients,
+        )
+        yield CounterMetricFamily(
+            "transientcam_frames_dropped",
+            "Frames that clients were too slow for, of all clients together.",
+            hub.dropped,
+        )
+        yield GaugeMetricFamily(
+            "transientcam_lease_held",
+            "Whether a client holds the lease.",
+            self._service.lease.current is not None,
+        )
+
+
+class RecordingCollector(Collector):
+    """Collects what a library counts anyway."""
+
+    def __init__(self, library: Library) -> None:
+        self._library = library
+
+    def describe(self) -> Iterator[Metric]:
+        """Describe no metrics in advance: a registry has one such collector."""
+        return iter(())
+
+    def collect(self) -> Iterator[Metric]:
+        """Return the values of this moment."""
+        totals = self._library.totals
+        yield GaugeMetricFamily(
+            "transientcam_recording_active",
+            "Whether frames are being recorded.",
+            self._library.active_id is not None,
+        )
+        yield CounterMetricFamily(
+            "transientcam_recording_frames", "Frames that were recorded.", totals.frames
+        )
+        yield CounterMetricFamily(
+            "transientcam_recording_dropped_frames",
+            "Frames that the disk was too slow for.",
+            totals.dropped_frames,
+        )
+        yield CounterMetricFamily(
+            "transientcam_recording_bytes", "Bytes that were written.", totals.size_bytes
+        )
+        ended = CounterMetricFamily(
+            "transientcam_recordings_ended", "Recordings, by why they ended.", labels=("reason",)
+        )
+        for reason, count in totals.ended.items():
+            ended.add_metric((reason,), count)
+        yield ended
+        free_bytes = self._library.free_bytes()
+        if free_bytes is not None:
+            yield GaugeMetricFamily(
+                "transientcam_recording_disk_free_bytes",
+                "What the disk has left where recordings are kept.",
+                free_bytes,
+            )

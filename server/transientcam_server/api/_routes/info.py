@@ -1,0 +1,66 @@
+"""What answers here, and which versions of the interface it serves."""
+
+from fastapi import APIRouter
+
+import transientcam_moments as tm
+from transientcam import wire
+from transientcam_server.api._auth.permissions import PrincipalOf
+from transientcam_server.api._dependencies import ServiceOf
+from transientcam_server.api._docs import asyncapi
+from transientcam_server.api._documents.frame import HistoryDocument
+from transientcam_server.api._documents.service import InfoDocument, VersionsDocument
+from transientcam_server.imaging import ENCODINGS, Product
+from transientcam_server.service import VERSION
+
+router = APIRouter(tags=["info"])
+versions = APIRouter(tags=["info"])
+
+
+@versions.get("/api/versions", summary="Versions of the interface")
+async def read_versions() -> VersionsDocument:
+    """Return which versions of the interface are served; this path itself has no version."""
+    api = [VersionsDocument.ApiDocument(name="v1", path="/api/v1")]
+    return VersionsDocument(name="transientcam", version=VERSION, api=api)
+
+
+@router.get("/info", summary="The service")
+async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
+    """Return what this service is, which products its frames have, and what the caller may do."""
+    return InfoDocument(
+        name=service.identity["name"],
+        version=service.identity["version"],
+        service_id=service.identity["service_id"],
+        path=service.identity["path"],
+        api="v1",
+        stream=InfoDocument.StreamDocument(
+            path="/api/v1/stream",
+            subprotocol=wire.SUBPROTOCOL,
+            asyncapi=asyncapi.PATH,
+            encodings=list(wire.encoding_names()),
+        ),
+        products=[_product(product) for product in service.pipeline.products.values()],
+        absent_products=[
+            InfoDocument.AbsentDocument(name=name, reason=reason)
+            for name, reason in service.pipeline.absent.items()
+        ],
+        caller=InfoDocument.CallerDocument.model_validate(
+            {"name": principal.name, "role": str(principal.role)}
+        ),
+        history=HistoryDocument(**service.history.to_document()),
+        clients=service.hub.clients,
+        kernels=dict(tm.kernels.state()),
+        reconstruction=service.pipeline.reconstruction.settings.model_dump(),
+    )
+
+
+def _product(product: Product) -> InfoDocument.ProductDocument:
+    return InfoDocument.ProductDocument(
+        name=product.name,
+        unit=product.description.unit,
+        axes=list(product.description.axes),
+        dtype=product.description.dtype,
+        summary=product.description.summary,
+        formats=[name for name, encoding in ENCODINGS.items() if encoding.fits(product)],
+        over_time=product.over_time,
+        streamed=not product.over_time,
+    )

@@ -1,0 +1,126 @@
+"""Accuracy and time: which sequence for a target or a budget."""
+
+from functools import partial
+from typing import Final
+
+from fastapi import APIRouter, Request, Response, status
+
+from transientcam_driver import Sequence
+from transientcam_server.api import _planned as planned
+from transientcam_server.api._auth import Role
+from transientcam_server.api._auth.permissions import needs
+from transientcam_server.api._dependencies import ServiceOf
+from transientcam_server.api._documents.job import JobDocument
+from transientcam_server.api._documents.plan import PlanDocument, PlanRequest
+from transientcam_server.api._job_answers import ACCEPTED
+from transientcam_server.api._problems import documented
+from transientcam_server.errors import kinds
+from transientcam_server.planning import Goal, Progress, SceneStatistics, uniform_scene
+from transientcam_server.service import Service
+
+router = APIRouter(tags=["accuracy"])
+KIND: Final = "plan"
+"""Of the jobs that make a plan."""
+_REFUSALS: Final = (
+    kinds.BAD_REQUEST,
+    kinds.INVALID_REQUEST,
+    kinds.INVALID_SEQUENCE,
+    kinds.TARGET_UNREACHABLE,
+    kinds.ONLY_MOMENTS,
+    kinds.NO_FRAME_YET,
+    kinds.SHUTTING_DOWN,
+    kinds.PLANNING_BUSY,
+)
+
+
+@router.post(
+    "/plan",
+    summary="A sequence for a target accuracy or a budget of time",
+    responses=documented(*_REFUSALS),
+)
+@needs(Role.VIEWER, lease=False)
+async def make_plan(service: ServiceOf, request: PlanRequest, http: Request) -> PlanDocument:
+    """Recommend a sequence and an estimator with predicted accuracy, and neighbours.
+
+    With targets it is the quickest one that reaches all of them with margin within the budgets;
+    with budgets alone the most accurate one within them. Where no scene is given it is looked at:
+    before a simulated camera by another one in virtual time, at all frequencies; before any other
+    by the current frame, and the plan cannot consider what that does not resolve. A camera of fixed
+    frequencies is refused; `takes` of the problem says what more of them give. Nothing is changed:
+    `sequence` of the answer is the body for a `PUT /sequence`. A client that leaves ends the work;
+    `POST /plan/jobs` reports its progress.
+    """
+    return await planned.for_request(http, await _work(service, request, http))
+
+
+@router.post(
+    "/plan/jobs",
+    status_code=status.HTTP_202_ACCEPTED,
+    summary="Make a plan as a job, with progress",
+    responses=ACCEPTED | documented(*_REFUSALS, kinds.TOO_MANY_JOBS),
+)
+@needs(Role.VIEWER, lease=False)
+async def start_plan(
+    service: ServiceOf, request: PlanRequest, http: Request, response: Response
+) -> JobDocument:
+    """Begin to make the plan that `POST /plan` answers with, which is the `result` of the job.
+
+    What that would be refused with is the `problem` of the job. It goes on when the client leaves;
+    `POST /jobs/{job}/cancel` ends it.
+    """
+    return planned.as_job(service, KIND, await _work(service, request, http), response)
+
+
+async def _work(
+    service: Service, request: PlanRequest, http: Request
+) -> planned.Work[PlanDocument]:
+    """Return what makes the plan; a goal that cannot be meant or planned is refused at once."""
+    await planned.require_plannable(service, planned.address_of(http))
+    if request.scene is None:
+        planned.require_scene(service)
+    return partial(_made, service, request, _goal(service, request), planned.address_of(http))
+
+
+def _goal(service: Service, request: PlanRequest) -> Goal:
+    document = {"base_frequency_hz": service.applied.sequence.base_frequency_hz, **request.fixed}
+    goal = Goal(
+        **request.target.model_dump(),
+        **request.budget.model_dump(),
+        base=Sequence.from_document(document),
+        fixed=frozenset(request.fixed),
+        estimator=request.estimator,
+    )
+    goal.require_sensible()
+    return goal
+
+
+async def _made(
+    service: Service, request: PlanRequest, goal: Goal, address: str, progress: Progress
+) -> PlanDocument:
+    """Plan once there is a place for the address."""
+    async with service.planning.place_of(address):
+        scene = await _scene(service, request, goal.base, progress.part(0.0, planned.LOOKED))
+        made = await service.planning.run(
+            service.planner.plan_document,
+            goal,
+            scene,
+            progress=progress.part(planned.LOOKED, 1.0),
+        )
+        return PlanDocument.model_validate(made)
+
+
+async def _scene(
+    service: Service, request: PlanRequest, base: Sequence, progress: Progress
+) -> SceneStatistics:
+    scene = request.scene
+    if scene is not None:
+        return uniform_scene(
+            scene.brightness_dn_per_s,
+            [(each.range_m, each.weight) for each in scene.returns],
+            ambient_dn_per_s=scene.ambient_dn_per_s,
+        )
+    if service.looks.needs_frame:
+        frame = await service.hub.newest(after=0, wait_s=planned.FRAME_WITHIN_S)
+        return await service.looks.of_frame(frame, request.ambient_dn_per_s)
+    same = Sequence(base_frequency_hz=base.base_frequency_hz, sub_phases=base.sub_phases)
+    return await service.looks.of_twin(same, request.ambient_dn_per_s, progress)

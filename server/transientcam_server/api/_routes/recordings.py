@@ -1,0 +1,161 @@
+"""Recordings: start one, stop it, look through them, take them home."""
+
+import asyncio
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Path, status
+from fastapi.responses import FileResponse
+
+from transientcam_server.api import _downloads as downloads
+from transientcam_server.api._auth import Role
+from transientcam_server.api._auth.permissions import needs
+from transientcam_server.api._dependencies import ServiceOf
+from transientcam_server.api._documents.recording import (
+    RecordingChange,
+    RecordingDocument,
+    RecordingLimitsDocument,
+    RecordingRequest,
+    RecordingsDocument,
+    document,
+)
+from transientcam_server.api._problems import documented
+from transientcam_server.errors import kinds
+from transientcam_server.recording import Limits, RecordingOptions
+
+router = APIRouter(tags=["recordings"])
+
+HDF5: Final = "application/x-hdf5"
+RecordingName = Annotated[
+    str,
+    Path(
+        description="its id, as the list has it",
+        max_length=200,
+        examples=["20261120T081500Z-3f9c2a"],
+    ),
+]
+
+
+@router.get("/recordings", summary="All recordings")
+async def read_recordings(service: ServiceOf) -> RecordingsDocument:
+    """List the recordings, the newest first, with the one that runs."""
+    library = service.recordings
+    described = await asyncio.to_thread(library.describe_all)
+    return RecordingsDocument(
+        directory=str(library.directory),
+        free_bytes=await asyncio.to_thread(library.free_bytes),
+        active=library.active_id,
+        limits=RecordingLimitsDocument(
+            **service.settings.recordings.model_dump(
+                include=set(RecordingLimitsDocument.model_fields)
+            )
+        ),
+        recordings=[document(each) for each in described],
+    )
+
+
+@router.post(
+    "/recordings",
+    status_code=status.HTTP_201_CREATED,
+    summary="Start a recording",
+    responses=documented(
+        kinds.BAD_REQUEST,
+        kinds.RECORDING_RUNS,
+        kinds.CAMERA_BUSY,
+        kinds.ONLY_MOMENTS,
+        kinds.INVALID_REQUEST,
+        kinds.RECORDING_NOT_STORED,
+    ),
+)
+@needs(Role.OPERATOR, lease=False)  # it does not disturb the client that controls the camera
+async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> RecordingDocument:
+    """Record every frame from now on, raw, until it is stopped or a limit is reached.
+
+    With `history_s` it begins with the frames of the last seconds, as far as they are kept and of
+    the same sequence. One recording runs at a time. A change of the sequence ends it.
+    """
+    service.acquisition.require_free()  # what a calibration captures is not recorded
+    limits = Limits(duration_s=wanted.duration_s, size_bytes=wanted.max_bytes, frames=wanted.frames)
+    order = RecordingOptions(name=wanted.name, limits=limits, annotations=wanted.annotations)
+    return document(await service.record(order, history_s=wanted.history_s))
+
+
+@router.get(
+    "/recordings/{recording}",
+    summary="A recording",
+    responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST),
+)
+async def read_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
+    """Describe a recording."""
+    return document(await asyncio.to_thread(service.recordings.describe, recording))
+
+
+@router.patch(
+    "/recordings/{recording}",
+    summary="Annotate a recording",
+    responses=documented(
+        kinds.BAD_REQUEST,
+        kinds.UNKNOWN_RECORDING,
+        kinds.RECORDING_UNFINISHED,
+        kinds.INVALID_REQUEST,
+        kinds.RECORDING_NOT_STORED,
+    ),
+)
+@needs(Role.OPERATOR, lease=False)
+async def annotate_recording(
+    service: ServiceOf, recording: RecordingName, change: RecordingChange
+) -> RecordingDocument:
+    """Replace what is written about a recording, also while it runs."""
+    annotate = service.recordings.annotate
+    return document(await asyncio.to_thread(annotate, recording, change.annotations))
+
+
+@router.post(
+    "/recordings/{recording}/stop",
+    summary="Stop a recording",
+    responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST),
+)
+@needs(Role.OPERATOR, lease=False)
+async def stop_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
+    """End a recording and wait until it is on the disk; one that has ended stays as it is."""
+    return document(await asyncio.to_thread(service.recordings.stop, recording))
+
+
+@router.delete(
+    "/recordings/{recording}",
+    summary="Delete a recording",
+    responses=documented(
+        kinds.UNKNOWN_RECORDING,
+        kinds.RECORDING_UNFINISHED,
+        kinds.INVALID_REQUEST,
+        kinds.RECORDING_NOT_STORED,
+    ),
+)
+@needs(Role.ADMIN, lease=False)
+async def delete_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
+    """Delete a recording for good; the answer says what it was."""
+    return document(await asyncio.to_thread(service.recordings.delete, recording))
+
+
+@router.get(
+    "/recordings/{recording}/file",
+    summary="The file of a recording",
+    response_class=FileResponse,
+    responses=downloads.documented_file(HDF5)
+    | documented(
+        kinds.UNKNOWN_RECORDING,
+        kinds.RECORDING_UNFINISHED,
+        kinds.RANGE_NOT_SATISFIABLE,
+        kinds.INVALID_REQUEST,
+    ),
+)
+async def read_recording_file(
+    service: ServiceOf,
+    recording: RecordingName,
+    wanted: downloads.Range = None,
+) -> FileResponse:
+    """Download a recording as HDF5; h5py, xarray and MATLAB open it."""
+    path = await asyncio.to_thread(service.recordings.path, recording)
+    name = await asyncio.to_thread(service.recordings.download_name, recording)
+    return await downloads.answer(
+        path, wanted, gone=kinds.UNKNOWN_RECORDING, media_type=HDF5, filename=name
+    )

@@ -1,5 +1,0 @@
-"""Who may do what: tokens and their roles, the guard of requests, permissions of routes."""
-
-from transientcam_server.api.auth.tokens import Role, TokenFile
-
-__all__ = ["Role", "TokenFile"]

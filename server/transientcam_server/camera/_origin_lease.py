@@ -1,0 +1,44 @@
+"""The lease of the service that is relayed, had as long as a client has this one's."""
+
+import asyncio
+from concurrent.futures import Future
+from functools import partial
+
+from transientcam_server.camera._acquisition import Acquisition
+from transientcam_server.camera._lease import Lease
+from transientcam_server.relay import RelayCamera
+
+
+class OriginLease:
+    """Takes and gives back on the thread of the camera, in the order of all other changes."""
+
+    def __init__(self, relay: RelayCamera, acquisition: Acquisition) -> None:
+        self._relay = relay
+        self._acquisition = acquisition
+        self._released: Future[None] | None = None
+
+    async def take(self, lease: Lease, *, takeover: bool) -> None:
+        """Take it on the terms of a lease that was granted here.
+
+        Raises
+        ------
+        OriginRefused, CameraLost
+            It cannot be had.
+        """
+        take = partial(
+            self._relay.take_lease,
+            lease.holder,
+            duration_s=lease.duration_s,
+            on_lapse=lease.on_lapse,
+            takeover=takeover,
+        )
+        await asyncio.wrap_future(self._acquisition.submit(take))
+
+    def release(self) -> None:
+        """Give it back, behind the changes that were made under it."""
+        self._released = self._acquisition.submit(self._relay.release_lease)
+
+    async def released(self) -> None:
+        """Wait until it is given back."""
+        if self._released is not None:
+            await asyncio.wrap_future(self._released)

@@ -1,0 +1,223 @@
+"""Accepts connections, and counts them from there on: how many, and how fast they come."""
+
+import asyncio
+import contextlib
+import logging
+import socket
+import ssl
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import Final
+
+from transientcam_server.daemon._fair_queue import Turns
+from transientcam_server.daemon._metering import metered
+from transientcam_server.daemon._rate_limit import RateLimiter
+from transientcam_server.daemon._read_limiter import PORTION_BYTES, Intake
+from transientcam_server.daemon._refusals import refusal
+from transientcam_server.errors import Problem, kinds
+from transientcam_server.settings import LimitSettings
+
+_log = logging.getLogger("transientcam_server.daemon.acceptor")
+AT_ONCE: Final = 16
+"""Connections accepted before other tasks run."""
+PAUSE_S: Final = 0.5
+"""Before the next one is accepted where the system has no descriptors left."""
+REQUESTS_SHARE: Final = 0.4
+"""Of the event loop's thread, for requests and their answers, as far as they are made there."""
+UNWATCHED_SHARE: Final = 0.9
+"""The same while no frames are sent or recorded."""
+STREAMS_SHARE: Final = 0.2
+"""Of it, for what the clients of streams send. The rest is for what these are sent."""
+_REMEMBERED_ADDRESSES: Final = 1024
+
+
+def turns_of_requests(
+    loop: asyncio.AbstractEventLoop,
+    *,
+    limits: LimitSettings,
+    watched: Callable[[], bool],
+    clock: Callable[[], float] = time.monotonic,
+    spent: Callable[[], float] = time.thread_time,
+) -> Turns:
+    """Return what shares a loop's time between requests: nearly all of it while none watches."""
+    return Turns(
+        loop,
+        share=lambda: REQUESTS_SHARE if watched() else UNWATCHED_SHARE,
+        share_of_one=lambda: limits.address_share if watched() else UNWATCHED_SHARE,
+        clock=clock,
+        spent=spent,
+    )
+
+
+class Admission:
+    """Decides which connections are accepted.
+
+    Parameters
+    ----------
+    limits
+        How many there may be, together and of one address, and how fast new ones may come.
+    clock
+        Time in s.
+    """
+
+    def __init__(self, limits: LimitSettings, *, clock: Callable[[], float]) -> None:
+        self._limits = limits
+        self._clock = clock
+        self._open: Counter[str] = Counter()
+        self._rates: dict[str, RateLimiter] = {}
+
+    @property
+    def open(self) -> int:
+        """How many are open."""
+        return self._open.total()
+
+    def admit(self, host: str) -> Problem | None:
+        """Count a connection from an address, or return why it is refused."""
+        most, most_of_one = self._limits.max_connections, self._limits.max_connections_per_address
+        rate_hz = self._limits.max_connects_hz
+        if not self._rate(host).allow():
+            detail = f"More than {rate_hz:g} connections a second came from {host}."
+            return Problem(kinds.TOO_MANY_FROM_ONE_ADDRESS, detail, limit=rate_hz)
+        if self.open >= most:
+            return Problem(kinds.TOO_MANY_CONNECTIONS, f"{most} connections are open.", limit=most)
+        if self._open[host] >= most_of_one:
+            detail = f"{most_of_one} connections are open from {host}."
+            return Problem(kinds.TOO_MANY_FROM_ONE_ADDRESS, detail, limit=most_of_one)
+        self._open[host] += 1
+        return None
+
+    def release(self, host: str) -> None:
+        """Count a connection no more."""
+        self._open[host] -= 1
+        if not self._open[host]:
+            del self._open[host]
+
+    def _rate(self, host: str) -> RateLimiter:
+        found = self._rates.get(host)
+        if found is None:
+            if len(self._rates) >= _REMEMBERED_ADDRESSES:
+                self._rates = {key: each for key, each in self._rates.items() if not each.full}
+            found = self._rates[host] = RateLimiter(
+                self._limits.max_connects_hz,
+                burst=self._limits.max_connections_per_address,
+                clock=self._clock,
+            )
+        return found
+
+
+class Acceptor:
+    """Accepts the connections of a listening socket from `open` to `close`.
+
+    Parameters
+    ----------
+    listener
+        It stays the caller's.
+    protocol
+        Makes the protocol of a connection.
+    watched
+        Whether frames are sent or recorded at present, for which time has to be left.
+    tls
+        With what connections are encrypted; None for not at all.
+    """
+
+    def __init__(
+        self,
+        listener: socket.socket,
+        *,
+        protocol: Callable[[], asyncio.Protocol],
+        limits: LimitSettings,
+        watched: Callable[[], bool],
+        tls: ssl.SSLContext | None = None,
+    ) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._listener = listener
+        self._protocol = protocol
+        self._tls = tls
+        self._limits = limits
+        self._requests = turns_of_requests(self._loop, limits=limits, watched=watched)
+        self._streams = Turns(
+            self._loop, share=lambda: STREAMS_SHARE, share_of_one=lambda: STREAMS_SHARE
+        )
+        self._admission = Admission(limits, clock=self._loop.time)
+        self._refusals: dict[str, bytes] = {}
+        self._handshakes: set[asyncio.Task[None]] = set()
+        self._pause: asyncio.TimerHandle | None = None
+
+    def open(self) -> None:
+        """Accept from now on."""
+        self._pause = None
+        self._loop.add_reader(self._listener, self._accept)
+
+    async def close(self) -> None:
+        """Accept nothing more, and give handshakes up; connections that stand are left alone."""
+        if self._pause is not None:
+            self._pause.cancel()
+        self._loop.remove_reader(self._listener)
+        if self._tls is not None:
+            # without TLS they are done at once; uvloop would not notify their protocols
+            for task in self._handshakes:
+                task.cancel()
+        await asyncio.gather(*self._handshakes, return_exceptions=True)
+
+    def _accept(self) -> None:
+        for _ in range(AT_ONCE):
+            try:
+                connection, address = self._listener.accept()
+            except (BlockingIOError, InterruptedError, ConnectionAbortedError):
+                return
+            except OSError as error:
+                _log.warning("no connection can be accepted for %g s: %s", PAUSE_S, error)
+                self._loop.remove_reader(self._listener)
+                self._pause = self._loop.call_later(PAUSE_S, self.open)
+                return
+            connection.setblocking(False)
+            self._begin(connection, str(address[0]))
+
+    def _begin(self, connection: socket.socket, host: str) -> None:
+        problem = self._admission.admit(host)
+        if problem is None:
+            connecting = metered(self._connect(connection, host), self._requests.account(host))
+            task = self._loop.create_task(connecting)
+            self._handshakes.add(task)
+            task.add_done_callback(self._handshakes.discard)
+            return
+        with contextlib.suppress(OSError):
+            if self._tls is None:
+                connection.send(self._refusal(problem))
+                connection.recv(PORTION_BYTES)  # unread, it would reset the connection
+        connection.close()
+
+    def _refusal(self, problem: Problem) -> bytes:
+        """Return an answer that a flood requests again and again."""
+        known = self._refusals.get(problem.detail)
+        if known is None:
+            if len(self._refusals) >= _REMEMBERED_ADDRESSES:
+                self._refusals.clear()
+            known = self._refusals[problem.detail] = refusal(problem)
+        return known
+
+    async def _connect(self, connection: socket.socket, host: str) -> None:
+        """Hand a connection to a protocol once its handshake is done."""
+        counted = contextlib.ExitStack()
+        counted.callback(self._admission.release, host)
+        try:
+            await self._loop.connect_accepted_socket(
+                lambda: Intake(
+                    self._protocol(),
+                    requests=self._requests.account(host),
+                    streams=self._streams.account(host),
+                    lost=counted.close,
+                ),
+                connection,
+                ssl=self._tls,
+                ssl_handshake_timeout=None if self._tls is None else self._limits.head_s,
+            )
+        except (OSError, EOFError) as error:  # those of TLS among them
+            _log.debug("no handshake with %s: %s", host, error)
+            counted.close()
+            connection.close()
+        except BaseException:
+            counted.close()
+            connection.close()
+            raise

@@ -1,0 +1,194 @@
+"""What clients send, in portions: a flood on one connection delays no other one.
+
+Between the transport of a connection and its protocol stands an `Intake`. It reads no more than
+`PORTION_BYTES` at once, and hands them over when `Turns` has time for its address.
+"""
+
+import asyncio
+import threading
+from collections.abc import Callable
+from typing import Any, Final, cast
+
+from transientcam_server.daemon._fair_queue import Account
+
+PORTION_BYTES: Final = 2048
+"""Read of one connection at once: 340 of the smallest WebSocket frames, 1.5 ms of parsing."""
+
+
+class _Portion(threading.local):
+    """A buffer for all connections of one loop: it is emptied before another one reads."""
+
+    def __init__(self) -> None:
+        self.buffer = memoryview(bytearray(PORTION_BYTES))
+
+
+_portion: Final = _Portion()
+"""Of each thread: several services in one process have a loop each."""
+
+
+class Intake(asyncio.BufferedProtocol):
+    """Reads a connection for a protocol, portion by portion.
+
+    Parameters
+    ----------
+    protocol
+        An `asyncio.Protocol`; its transport is a `Valve`.
+    requests, streams
+        What the address of the client has of the time for requests, and for WebSockets.
+    lost
+        Called once when the connection has ended.
+    """
+
+    def __init__(
+        self,
+        protocol: asyncio.Protocol,
+        *,
+        requests: Account,
+        streams: Account,
+        lost: Callable[[], None],
+    ) -> None:
+        self.protocol = protocol
+        self.account = requests
+        self._streams = streams
+        self._lost = lost
+        self._valve: Valve | None = None
+        self._portion = b""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Hand the connection on."""
+        self._valve = Valve(cast("asyncio.Transport", transport), self)
+        self.protocol.connection_made(cast("asyncio.Transport", self._valve))
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Hand the loss on, and forget what was not handed over."""
+        self._portion = b""
+        self._lost()
+        self.protocol.connection_lost(exc)
+
+    def get_buffer(self, sizehint: int) -> memoryview:
+        """Return the buffer."""
+        return _portion.buffer
+
+    def buffer_updated(self, nbytes: int) -> None:
+        """Take a portion, and hand it over in turn."""
+        assert self._valve is not None  # noqa: S101 - bytes come after the connection
+        self._portion += bytes(_portion.buffer[:nbytes])
+        if not self.account.run(self.hand_over):
+            self._valve.shut("turn")
+
+    def hand_over(self) -> None:
+        """Hand the portion over, unless the protocol reads nothing for now."""
+        valve = self._valve
+        assert valve is not None  # noqa: S101 - bytes come after the connection
+        if valve.held or not self._portion:
+            return
+        portion, self._portion = self._portion, b""
+        if not valve.is_closing():
+            self.protocol.data_received(portion)
+        valve.open("turn")
+
+    def upgrade(self, protocol: asyncio.Protocol) -> None:
+        """Hand everything to the protocol of a WebSocket from now on."""
+        self.protocol = protocol
+        self.account = self._streams
+
+    def eof_received(self) -> bool | None:
+        """Hand it on."""
+        return self.protocol.eof_received()
+
+    def pause_writing(self) -> None:
+        """Hand it on."""
+        self.protocol.pause_writing()
+
+    def resume_writing(self) -> None:
+        """Hand it on."""
+        self.protocol.resume_writing()
+
+    @property
+    def waits(self) -> bool:
+        """Whether a portion was not handed over yet."""
+        return bool(self._portion)
+
+
+class Valve:
+    """The transport that a protocol behind an `Intake` has: the real one, but for reading."""
+
+    def __init__(self, transport: asyncio.Transport, intake: Intake) -> None:
+        self._transport = transport
+        self._intake = intake
+        self._reasons: set[str] = set()
+        self._shut = False
+        self.write = transport.write
+        self.writelines = transport.writelines
+        self.is_closing = transport.is_closing
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._transport, name)
+
+    @property
+    def account(self) -> Account:
+        """What the address of the client has of the loop's time."""
+        return self._intake.account
+
+    @property
+    def held(self) -> bool:
+        """Whether the protocol reads nothing for now."""
+        return "protocol" in self._reasons or "work" in self._reasons
+
+    def pause_reading(self) -> None:
+        """Read nothing more for now."""
+        self.shut("protocol")
+
+    def resume_reading(self) -> None:
+        """Read on."""
+        self.open("protocol")
+        self._hand_over()
+
+    def hold(self) -> None:
+        """Read nothing more until `release`, whatever `resume_reading` says."""
+        self.shut("work")
+
+    def release(self, work: Callable[[], None]) -> None:
+        """Read on after ``work``, which has its turn like what arrives, and may `hold` again."""
+
+        def go_on() -> None:
+            self._reasons.discard("work")
+            if not self.is_closing():
+                work()
+            self._settle()
+            self._hand_over()
+
+        self._intake.account.run(go_on)
+
+    def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
+        """Hand everything to another protocol from now on; there is one, that of WebSockets."""
+        self._intake.upgrade(cast("asyncio.Protocol", protocol))
+
+    def get_protocol(self) -> asyncio.Protocol:
+        """Return the protocol."""
+        return self._intake.protocol
+
+    def shut(self, reason: str) -> None:
+        """Read nothing more while this reason lasts."""
+        self._reasons.add(reason)
+        self._settle()
+
+    def open(self, reason: str) -> None:
+        """Read on where no other reason is left."""
+        if reason in self._reasons:
+            self._reasons.discard(reason)
+            self._settle()
+
+    def _settle(self) -> None:
+        shut = bool(self._reasons)
+        if shut == self._shut or self.is_closing():
+            return
+        self._shut = shut
+        if shut:
+            self._transport.pause_reading()
+        else:
+            self._transport.resume_reading()
+
+    def _hand_over(self) -> None:
+        if self._intake.waits and not self.held:
+            self._intake.account.run(self._intake.hand_over)

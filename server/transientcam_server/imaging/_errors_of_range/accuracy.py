@@ -1,0 +1,232 @@
+"""Noise and bias of a frame's range, pixel by pixel, as far as the frame itself shows them.
+
+Noise is that of the sensor, drawn and put through the estimator. Bias is known by disagreement
+(decision 8): the frame's own estimator without its highest harmonic, the likelihood and
+Pisarenko's resolve returns differently, and where nothing is left to resolve they agree. Noise
+makes them disagree, too, but in neighbouring pixels independently, so that the median over these
+is taken. It is a figure of the frame alone; a plan rests on a look at more frequencies.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam_moments.reconstruction import least_harmonics
+from transientcam_server.imaging._errors_of_range.deviation import typical_deviation
+from transientcam_server.imaging._errors_of_range.noise import moment_noise
+from transientcam_server.imaging._errors_of_range.ranging import ranges_m
+from transientcam_server.imaging._recipe.recipe import Recipe
+
+_Array = NDArray[Any]
+OUTLIER_DEVIATIONS: Final = 5.0
+"""A range further off than so many times the error of the median pixel is an outlier."""
+NEIGHBOURS_PX: Final = 5
+"""Side of the square of pixels whose median separates bias from noise."""
+DRAWS: Final = 4
+"""Noisy copies of a frame."""
+SPARSE_PX: Final = 4
+"""Rows and columns between pixels, where there is no time for all of them."""
+_OTHERS: Final = ("likelihood", "pisarenko")
+_QUICK: Final = ("likelihood", "pisarenko", "single-frequency")
+"""Estimators that compiled kernels make quick."""
+_SEED: Final = 0
+
+
+@dataclass(frozen=True, eq=False)
+class RangeAccuracy:
+    """Predicted errors of a frame's range.
+
+    Attributes
+    ----------
+    std_m
+        (H, W) standard deviation by the noise of the sensor; NaN without a range.
+    bias_m
+        (H, W) how far the range is off for good, without sign, as far as the frame shows it; NaN
+        without a range, and where there is one frequency alone.
+    outlier_share
+        Share of the ranges that noise throws off by more than `OUTLIER_DEVIATIONS` times the
+        median error, or that are biased by as much; None where no error is known. A bias that none
+        of the frame's frequencies shows is not in it.
+    every_px
+        The errors are of one pixel in so many rows and columns, and stand for those around it.
+    """
+
+    std_m: _Array
+    bias_m: _Array
+    outlier_share: float | None
+    every_px: int = 1
+
+    @cached_property
+    def error_m(self) -> _Array:
+        """(H, W) root sum of squares of noise and bias."""
+        return np.hypot(self.std_m, self.bias_m)
+
+    def to_document(self) -> dict[str, float | None]:
+        """Return the errors of the median pixel with a range as a frame's metadata have them."""
+        return {
+            "range_error_m": _median(self.error_m),
+            "range_std_m": _median(self.std_m),
+            "range_bias_m": _median(self.bias_m),
+            "outlier_share": self.outlier_share,
+            "every_px": self.every_px,
+        }
+
+
+def spacing_px(recipe: Recipe, *, ready: Callable[[str, int], bool] = tm.kernels.ready) -> int:
+    """Return how far apart the pixels are whose errors a live frame has time for.
+
+    All of them where every estimator that is needed is compiled (0.1 s at 163 x 120 pixels); in
+    NumPy, and by maximum entropy, that takes 1 to 5 s, and `SPARSE_PX` a sixteenth of it.
+
+    Parameters
+    ----------
+    ready
+        Says whether the kernel of an estimator and an order is compiled, and prepares it.
+    """
+    m, own = recipe.applied.sequence.harmonics, recipe.technique
+    orders = [m] if m > 1 else []  # nothing else is asked where m = 1
+    if own == "likelihood":
+        orders += [1] if m == 1 else [m - 1]
+    compiled = [ready("likelihood", order) for order in orders]  # each is asked for, and prepared
+    return 1 if own in _QUICK and all(compiled) else SPARSE_PX
+
+
+def range_accuracy(recipe: Recipe, found: tm.Reconstruction, every_px: int = 1) -> RangeAccuracy:
+    """Predict noise, bias and outliers of a frame's range.
+
+    Parameters
+    ----------
+    recipe
+        With a sensor.
+    found
+        (H, W) pixels.
+    every_px
+        One pixel in so many rows and columns is predicted, and stands for those around it.
+    """
+    if not recipe.applied.sequence.sampling.consecutive:
+        return _of_gaps(found)
+    grid = np.s_[..., every_px // 2 :: every_px, every_px // 2 :: every_px]
+    has_range = np.asarray(found.has_range)
+    seen = has_range[grid]
+    range_m = np.asarray(found.range_m)[grid]
+    frame = _Frame(
+        recipe,
+        np.asarray(found.smoothed)[grid][:, seen],
+        np.asarray(moment_noise(recipe, found).variance, dtype=np.float32)[grid][:, seen],
+    )
+    drawn_m = frame.drawn_m()
+    std_m = _placed(typical_deviation(drawn_m), seen)
+    shifts_m = [_placed(other_m, seen) - range_m for other_m in frame.others_m()]
+    unknown = np.full(seen.shape, np.nan, dtype=np.float32)
+    bias_m = np.max([np.abs(median_around(each)) for each in shifts_m], axis=0, initial=0.0)
+    bias_m = np.where(np.isfinite(range_m), bias_m, np.nan) if shifts_m else unknown
+    outlier_share = _outliers(drawn_m - range_m[seen], std_m, bias_m, seen)
+    std_m, bias_m = (_around(each, has_range, every_px) for each in (std_m, bias_m))
+    return RangeAccuracy(std_m, bias_m, outlier_share, every_px)
+
+
+def _around(plane: _Array, has_range: _Array, every_px: int) -> _Array:
+    """Let pixels of a coarser grid stand for those around them that have a range."""
+    if every_px == 1:
+        return plane
+    nearest = [
+        np.minimum(np.arange(n) // every_px, m - 1)
+        for n, m in zip(has_range.shape, plane.shape, strict=True)
+    ]
+    return np.where(has_range, plane[np.ix_(*nearest)], np.float32(np.nan))
+
+
+def _of_gaps(found: tm.Reconstruction) -> RangeAccuracy:
+    """Return what an estimate of any multiples says of itself; nothing disagrees with it."""
+    shape = np.shape(found.range_m)
+    std_m = np.asarray(found.range_scatter_m(), dtype=np.float32).reshape(shape)
+    return RangeAccuracy(std_m, np.full_like(std_m, np.nan), None)
+
+
+@dataclass(frozen=True, eq=False)
+class _Frame:
+    """Smoothed moments (m + 1, P) of the pixels with a range, and the variance of their parts."""
+
+    recipe: Recipe
+    b: _Array
+    variance: _Array
+
+    def drawn_m(self) -> _Array:
+        """Return the ranges (D, P) of noisy copies."""
+        variance = self.variance.copy()
+        if self.recipe.applied.sequence.zeroth == "estimated":
+            variance[0] = 0
+        random = np.random.default_rng(_SEED)
+        drawn = tm.noise.draw(self.b, tm.noise.MomentNoise(variance), random, draws=DRAWS)
+        spread = np.broadcast_to(self.variance[:, None], drawn.shape)
+        flat = (len(self.b), -1)
+        own = self.recipe.technique
+        return self._ranges_m(drawn.reshape(flat), spread.reshape(flat), own).reshape((DRAWS, -1))
+
+    def others_m(self) -> list[_Array]:
+        """Return the range (P) by every other way that there is; none where m = 1."""
+        m = len(self.b) - 1
+        if m == 1:
+            return []
+        own = self.recipe.technique
+        fewer = own if m > least_harmonics(own) and m > 2 else "single-frequency"
+        ways = [(self.b[:m], self.variance[:m], fewer)]
+        ways += [(self.b, self.variance, other) for other in _OTHERS if other != own]
+        return [self._ranges_m(*each) for each in ways]
+
+    def _ranges_m(self, b: _Array, variance: _Array, estimator: str) -> _Array:
+        sequence = self.recipe.applied.sequence
+        return ranges_m(
+            b,
+            variance,
+            estimator,
+            sequence.base_frequency_hz,
+            self.recipe.settings,
+            zeroth=sequence.zeroth,
+        )
+
+
+def median_around(plane: _Array) -> _Array:
+    """Return the median (H, W) of the finite values around each pixel; 0 where there is none.
+
+    Parameters
+    ----------
+    plane
+        (H, W), NaN where nothing is known.
+    """
+    reach = NEIGHBOURS_PX // 2
+    known = np.where(np.isfinite(plane), plane, np.nan).astype(np.float32)
+    padded = np.pad(known, reach, constant_values=np.nan)
+    windows = sliding_window_view(padded, (NEIGHBOURS_PX, NEIGHBOURS_PX))
+    ranked = np.sort(windows.reshape((*plane.shape, -1)), axis=-1)  # what is not known comes last
+    count = np.isfinite(ranked).sum(axis=-1)
+    middle = np.maximum(count - 1, 0) // 2
+    found: _Array = np.take_along_axis(ranked, middle[..., None], axis=-1)[..., 0]
+    return np.nan_to_num(found)
+
+
+def _placed(values: _Array, seen: _Array) -> _Array:
+    """Return values of the pixels that are seen in their places, NaN elsewhere."""
+    plane = np.full(seen.shape, np.nan, dtype=np.float32)
+    plane[seen] = values
+    return plane
+
+
+def _outliers(off_m: _Array, std_m: _Array, bias_m: _Array, seen: _Array) -> float | None:
+    """Return the share of drawn ranges (D, P) that are off by too much, or missing."""
+    middle_m = _median(np.hypot(std_m, bias_m))
+    if middle_m is None:
+        return None
+    near = np.hypot(off_m, bias_m[seen]) <= OUTLIER_DEVIATIONS * middle_m
+    return 1.0 - float(near.mean())
+
+
+def _median(plane: _Array) -> float | None:
+    known = plane[np.isfinite(plane)]
+    return float(np.median(known)) if known.size else None

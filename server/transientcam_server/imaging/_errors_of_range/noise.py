@@ -1,0 +1,244 @@
+"""The noise of frames: of their moments and of their range, and what it does not explain."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam_moments.noise import direct_phase_noise
+from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
+from transientcam_server.imaging._recipe.recipe import Recipe
+
+_Array = NDArray[Any]
+SAMPLED_PIXELS: Final = 256
+"""Pixels of each frame whose deviation is predicted by Pisarenko's returns."""
+FITTED_PIXELS: Final = 1 << 14
+"""And whose deviation is taken from an estimate that has it of all of them."""
+EXPLAINED_DEVIATIONS: Final = 4.0
+"""Standard deviations of a negative eigenvalue that noise explains."""
+_UNLIT: Final = np.uint8(tm.Flags.NO_SIGNAL | tm.Flags.NON_FINITE | tm.Flags.SATURATED)
+_BLOCK_PIXELS: Final = 1 << 16
+_FEW: Final = 1 / 16
+"""Share of the pixels up to which their neighbourhoods are quicker to average one by one."""
+
+
+@dataclass(frozen=True, slots=True)
+class RangeNoise:
+    """Predicted standard deviation of a frame's range between frames, by noise alone.
+
+    To first order, of the returns that the frame shows; `range_accuracy` draws noise.
+
+    Attributes
+    ----------
+    median_m, p90_m
+        Half of the pixels, and 90 % of them, are better.
+    first_order_share
+        Share of the pixels where first order holds, which with the likelihood is where its returns
+        explain the moments; that of the others is by the order of magnitude.
+    """
+
+    median_m: float
+    p90_m: float
+    first_order_share: float
+
+    def to_document(self) -> dict[str, float]:
+        """Return it as a frame's metadata have it."""
+        return {
+            "median": self.median_m,
+            "p90": self.p90_m,
+            "first_order_share": self.first_order_share,
+        }
+
+
+def moment_noise(recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoise:
+    """Return the noise of a frame's smoothed moments (m + 1, H, W), of the recipe's sensor."""
+    return tm.noise.smoothed_of(
+        partial(_of_pixels, recipe),
+        np.asarray(found.smoothed[0].real),
+        recipe.settings.smoothing_px,
+        ambient=found.ambient,
+    )
+
+
+def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
+    """Predict the deviation of a frame's range from its own returns.
+
+    None where no pixel has a range. That of `OF_ANY_MULTIPLES` is the estimate's own; of another
+    estimator it is that of Pisarenko's returns in a sample of pixels, which is cheap enough for
+    every frame.
+    """
+    has_range = np.asarray(found.has_range)  # compared anew whenever it is read
+    if not has_range.any():
+        return None
+    if recipe.technique in OF_ANY_MULTIPLES:
+        std_m = np.asarray(found.range_scatter_m(_sample(has_range.ravel(), FITTED_PIXELS)))
+        first_order = np.asarray(found.estimate.explained())[has_range]
+    else:
+        std_m, first_order = _of_pisarenko(recipe, found, has_range)
+    known = std_m[np.isfinite(std_m)]
+    if not known.size:
+        return None
+    median_m, p90_m = np.quantile(known, (0.5, 0.9)).tolist()
+    return RangeNoise(median_m, p90_m, float(first_order.mean()))
+
+
+def _of_pisarenko(
+    recipe: Recipe, found: tm.Reconstruction, has_range: _Array
+) -> tuple[_Array, _Array]:
+    """Return the deviation of the range in m in a sample of pixels, and where first order holds."""
+    sample = _sample(has_range.ravel())
+
+    def sampled(planes: _Array) -> _Array:
+        return np.asarray(planes).reshape((planes.shape[0], -1))[:, sample]
+
+    returns = tm.Returns(
+        sampled(found.returns.phase_rad),
+        sampled(found.returns.weight),
+        np.asarray(found.returns.uniform).ravel()[sample],
+        np.asarray(found.returns.count).ravel()[sample],
+    )
+    noise = tm.noise.smoothed_at(
+        partial(_of_pixels, recipe),
+        np.asarray(found.smoothed[0].real),
+        sample,
+        recipe.settings.smoothing_px,
+        ambient=found.ambient,
+    )
+    std_rad, holds = direct_phase_noise(returns, noise, threshold=recipe.settings.return_threshold)
+    return np.asarray(tm.range_m(std_rad, recipe.base_frequency_hz)), np.asarray(holds)
+
+
+def _sample(seen: _Array, pixels: int = SAMPLED_PIXELS) -> _Array:
+    """Return the places of at least so many of the pixels that are seen, if there are, evenly."""
+    count = int(np.count_nonzero(seen))
+    step = max(1, count // pixels)
+    return np.arange(0, count, step) if count == seen.size else np.flatnonzero(seen)[::step]
+
+
+def _of_pixels(
+    recipe: Recipe, brightness: _Array, ambient: _Array | float = 0.0
+) -> tm.noise.MomentNoise:
+    """Return the noise of moments with this brightness and other light, each pixel by itself."""
+    light = np.maximum(brightness, 0)
+    variance = recipe.moment_variance.astype(light.dtype)
+    dark, slope, other = variance.reshape((3, -1, *(1,) * light.ndim))
+    return tm.noise.MomentNoise(dark + slope * light + other * ambient)
+
+
+def contradictions(recipe: Recipe, found: tm.Reconstruction) -> _Array | None:
+    """Return where a frame's moments contradict each other by more than its noise explains.
+
+    They do where gain or phase of the frequencies do not go together any more: thermal drift after
+    calibration (Sec. 6.4), images out of step, light that moved.
+
+    Returns
+    -------
+    boolean array, shape (H, W)
+        None where that cannot be known: without a sensor, where b_0 is estimated, as any moments
+        then agree, and where their frequencies are not consecutive multiples.
+    """
+    sequence = recipe.applied.sequence
+    if recipe.sensor is None or sequence.zeroth == "estimated":
+        return None
+    if not sequence.sampling.consecutive:
+        return None
+    dark, slope, other = recipe.moment_variance.sum(axis=1).tolist()
+
+    def of_all(light: _Array, ambient: _Array | float = 0.0) -> tm.noise.MomentNoise:
+        """Return the variance of all moments together, which grows linearly with the light."""
+        return tm.noise.MomentNoise((dark + slope * light + other * ambient)[None])
+
+    return beyond_noise(found, of_all, recipe.settings.smoothing_px)
+
+
+def beyond_noise(
+    found: tm.Reconstruction,
+    noise_of: Callable[..., tm.noise.MomentNoise],
+    smoothing_px: float,
+) -> _Array:
+    """Return which lit pixels have moments that noise alone does not explain.
+
+    Moments of light have a Toeplitz matrix without negative eigenvalues (Proposition 1); here the
+    smallest one is negative by more than `EXPLAINED_DEVIATIONS`.
+
+    Parameters
+    ----------
+    found
+        The frame, (m + 1, H, W).
+    noise_of
+        Returns the noise of moments with a brightness above 0 before smoothing, to which its
+        variance is affine: of each moment (m + 1, ...), or of all together (1, ...). Called with
+        ``ambient=`` where there is other light than the camera's.
+    smoothing_px
+        What the frame was smoothed with.
+
+    Returns
+    -------
+    boolean array, shape (H, W)
+    """
+    beyond = _beyond_own_share(found, noise_of, smoothing_px)
+    doubtful = np.flatnonzero(beyond)
+    if not doubtful.size:
+        return beyond
+    brightness = np.asarray(found.smoothed[0].real)
+    eigenvalue = np.asarray(found.validity).flat[doubtful] * brightness.flat[doubtful]
+    ambient = found.ambient
+    if doubtful.size > _FEW * beyond.size:
+        noise = tm.noise.smoothed_of(noise_of, brightness, smoothing_px, ambient=ambient).variance
+        noise = noise.reshape((len(noise), -1))[:, doubtful]
+    else:
+        noise = tm.noise.smoothed_at(
+            noise_of, brightness, doubtful, smoothing_px, ambient=ambient
+        ).variance
+    std = np.sqrt(noise.sum(axis=0))
+    beyond.flat[doubtful] = eigenvalue < -EXPLAINED_DEVIATIONS * std
+    return beyond
+
+
+def _beyond_own_share(
+    found: tm.Reconstruction,
+    noise_of: Callable[..., tm.noise.MomentNoise],
+    smoothing_px: float,
+) -> _Array:
+    """Return where the part of the noise that is a pixel's own does not explain its moments.
+
+    That of other light than the camera's is left for later: most frames have none. Noise moves no
+    eigenvalue by more than the norm of its own Toeplitz matrix, and a pixel's own share of it
+    settles most pixels without a look at their neighbours.
+    """
+    limit = EXPLAINED_DEVIATIONS**2 * tm.noise.own_share(smoothing_px)
+    beyond = _lit(found)
+    places = beyond.reshape(-1)
+    light = np.asarray(found.smoothed[0].real).reshape(-1)
+    validity = np.asarray(found.validity).reshape(-1)
+    # affine in the light: with what two brightnesses have, no block needs its planes of moments
+    dark, lit = noise_of(np.array([0, 1], light.dtype)).variance.sum(axis=0).tolist()
+    slope, dark = limit * (lit - dark), limit * dark
+    room = np.empty((2, min(places.size, _BLOCK_PIXELS)), light.dtype)
+    for start in range(0, places.size, _BLOCK_PIXELS):  # which stay in the caches
+        block = slice(start, start + _BLOCK_PIXELS)
+        square, most = room[:, : places[block].size]
+        most[:] = light[block]  # real parts lie apart: once is enough; lit, so above 0
+        np.multiply(validity[block], most, out=square)
+        np.multiply(square, square, out=square)
+        most *= slope
+        most += dark
+        places[block] &= square > most
+        places[block] &= validity[block] < 0
+    return beyond
+
+
+def contradictory_share(recipe: Recipe, found: tm.Reconstruction) -> float | None:
+    """Return the share of the pixels with light that contradict themselves; None if unknown."""
+    contradictory, lit = contradictions(recipe, found), _lit(found)
+    if contradictory is None or not lit.any():
+        return None
+    return float(contradictory[lit].mean())
+
+
+def _lit(found: tm.Reconstruction) -> _Array:
+    return np.asarray(np.asarray(found.flags) & _UNLIT == 0)

@@ -1,0 +1,278 @@
+"""How images become moments and moments become returns."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam_driver import AppliedSequence, RawFrame, Sampling, Sequence
+from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
+from transientcam_server.errors import Problem, kinds
+from transientcam_server.imaging._recipe.calibration import FACTORY_ID, Gains, nominal_gains
+from transientcam_server.imaging._recipe.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsics
+from transientcam_server.imaging._recipe.moment_frame import MomentFrame
+from transientcam_server.settings import ReconstructionSettings
+
+_log = logging.getLogger("transientcam_server.imaging.recipe")
+_UNTIL_COMPILED: Final = "pisarenko"
+"""In NumPy as in compiled lanes fast enough for a camera of 163 x 120 pixels."""
+_ONE_RETURN: Final = "unwrapped-phase"
+"""For frequencies with gaps: in NumPy the only one that keeps up with 512 x 424 pixels."""
+_LEAST_FOR_PAIRS: Final = 3
+"""Frequencies of which two returns leave something to judge them by."""
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsVersion:
+    """Settings of the reconstruction, and the number that frames computed with them carry.
+
+    Attributes
+    ----------
+    id
+        Counts the settings from 1, those the service started with.
+    """
+
+    id: int
+    settings: ReconstructionSettings
+
+    def for_live_frames(
+        self, sequence: Sequence, *, ready: Callable[[str, int], bool] = tm.kernels.ready
+    ) -> "SettingsVersion":
+        """Return these settings with an estimator that keeps up with a camera now.
+
+        ``automatic`` stays where ``ready`` says that the kernel of its estimator is compiled for
+        this order. Until then it is Pisarenko's returns, and the unwrapped phase of one return for
+        multiples that have gaps.
+        """
+        if self.settings.estimator != "automatic":
+            return self
+        if sequence.sampling.consecutive:
+            kernel, until = "likelihood", _UNTIL_COMPILED
+        else:
+            kernel, until = "pairs", _ONE_RETURN
+            if _for_gaps(sequence.sampling) == until:
+                return self
+        if ready(kernel, sequence.multiples[-1]):
+            return self
+        return replace(self, settings=self.settings.model_copy(update={"estimator": until}))
+
+    def followed_by(self, settings: ReconstructionSettings) -> "SettingsVersion":
+        """Return the next version; the same one where the settings are equal."""
+        return self if settings == self.settings else SettingsVersion(self.id + 1, settings)
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the settings by their names, and ``reconstruction_id``."""
+        return self.settings.model_dump() | {"reconstruction_id": self.id}
+
+
+def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, field: str) -> None:
+    """Refuse an estimator and a sequence that do not go together.
+
+    Parameters
+    ----------
+    field
+        Which of the two the request changes: "estimator" or "harmonics".
+
+    Raises
+    ------
+    Problem
+        ``estimator-misfit``.
+    """
+    if not _serves(settings, sequence.sampling):
+        raise Problem(
+            kinds.ESTIMATOR_MISFIT,
+            f"The estimator {settings.estimator} needs consecutive multiples of one frequency, and "
+            f"this camera measures the multiples {listed(sequence.multiples)}.",
+            field="estimator",
+            value=settings.estimator,
+            limit=f"one of {', '.join(OF_ANY_MULTIPLES)}",
+        )
+    least, harmonics = settings.least_harmonics, sequence.harmonics
+    if harmonics >= least:
+        return
+    raise Problem(
+        kinds.ESTIMATOR_MISFIT,
+        f"The estimator {settings.estimator} needs {least} harmonics, and there are {harmonics}.",
+        field=field,
+        value=harmonics if field == "harmonics" else settings.estimator,
+        limit=f"at least {least}"
+        if field == "harmonics"
+        else f"one that does with {harmonics} harmonics",
+    )
+
+
+def suited(settings: ReconstructionSettings, sampling: Sampling) -> ReconstructionSettings:
+    """Return settings with an estimator that goes with the frequencies of a camera."""
+    if _serves(settings, sampling):
+        return settings
+    _log.warning(
+        "the camera measures the multiples %s, which %s cannot serve: the estimator is %s",
+        listed(sampling.multiples),
+        settings.estimator,
+        _for_gaps(sampling),
+    )
+    return settings.model_copy(update={"estimator": "automatic"})
+
+
+def _serves(settings: ReconstructionSettings, sampling: Sampling) -> bool:
+    """Return whether the settings' estimator goes with the multiples that are measured."""
+    return sampling.consecutive or settings.estimator in ("automatic", *OF_ANY_MULTIPLES)
+
+
+def _for_gaps(sampling: Sampling) -> str:
+    """Return what `automatic` is for multiples that have gaps."""
+    return "two-returns" if len(sampling.multiples) >= _LEAST_FOR_PAIRS else _ONE_RETURN
+
+
+def listed(multiples: tuple[int, ...]) -> str:
+    """Return multiples in words: "2, 10 and 15"."""
+    *first, last = map(str, multiples)
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """All that a frame is computed with beside its images.
+
+    Attributes
+    ----------
+    applied, settings
+        The sequence that was captured, and how its images become moments and returns.
+    full_scale
+        The largest value that the sensor gives, in DN.
+    gains
+        Of the calibration; None for the nominal ones.
+    settings_version
+        Counts the settings there were.
+    intrinsics
+        Where the pixels look; None for a usual field of view.
+    sensor
+        Whose noise the images have; None where that is not known.
+    """
+
+    applied: AppliedSequence
+    settings: ReconstructionSettings
+    full_scale: float
+    gains: Gains | None = None
+    settings_version: int = 1
+    intrinsics: Intrinsics | None = None
+    sensor: tm.noise.Sensor | None = None
+
+    @property
+    def technique(self) -> str:
+        """The estimator of its frames, by its name in `transientcam_moments`."""
+        sampling, chosen = self.applied.sequence.sampling, self.settings.estimator
+        if not sampling.consecutive:
+            return chosen if chosen in OF_ANY_MULTIPLES else _for_gaps(sampling)
+        return self.settings.technique(noise_known=self.sensor is not None)
+
+    @property
+    def waveform(self) -> NDArray[Any] | None:
+        """Harmonics of the modulation (m, K) that are taken out of the moments, if any."""
+        known = None if self.gains is None else self.gains.waveform
+        return known if self.settings.modulation_harmonics == "take-out" else None
+
+    @property
+    def fills(self) -> bool:
+        """Whether the frame before is needed."""
+        return self.settings.spoilt_images == "fill"
+
+    def lens(self, height: int, width: int) -> Intrinsics:
+        """Return where the pixels look, as it is known or else assumed."""
+        if self.intrinsics is not None:
+            return self.intrinsics
+        return Intrinsics.of_field(ASSUMED_FIELD_OF_VIEW_DEG, width=width, height=height)
+
+    @property
+    def base_frequency_hz(self) -> float:
+        """The frequency whose period is the unambiguous time of flight."""
+        return self.applied.sequence.base_frequency_hz
+
+    @cached_property
+    def nominal_gains(self) -> NDArray[np.complex128]:
+        """The gains (m + 1,) that sub-phases and the camera's delay alone give."""
+        return nominal_gains(self.applied.sequence, delay_s=self.applied.delay_s)
+
+    @cached_property
+    def noise_gains(self) -> NDArray[Any]:
+        """The gains (m + 1,) that noise is predicted with, of all pixels.
+
+        They are the nominal ones also with a measured calibration, whose pixels differ by their
+        noise, too.
+        """
+        factory = self.gains is not None and self.gains.id == FACTORY_ID
+        return self.gains.sizes if factory and self.gains is not None else self.nominal_gains
+
+    @cached_property
+    def moment_variance(self) -> NDArray[np.float64]:
+        """Variance of the moments of a dark pixel, and how it grows with light: (3, m + 1).
+
+        For each DN of b_0, and for each DN an image of light that is not the camera's. Only with a
+        sensor, whose noise is an affine function of both.
+        """
+        assert self.sensor is not None  # noqa: S101 - callers have one, or no noise to predict
+        sequence = self.applied.sequence
+        noise = tm.noise.moment_noise(
+            np.array([0.0, 1.0, 0.0]),
+            self.sensor,
+            calibration=self.noise_gains,
+            zeroth=sequence.zeroth,
+            takes=sequence.takes,
+            ambient=np.array([0.0, 0.0, 1.0]),
+            phases_rad=sequence.sampling.phases_rad,
+        )
+        dark, lit, other = np.asarray(noise.variance).T
+        return np.stack([dark, lit - dark, other - dark])
+
+    def reconstruct(
+        self,
+        raw: RawFrame,
+        previous: RawFrame | None = None,
+        *,
+        spread: tm.kernels.Spread = tm.kernels.at_once,
+    ) -> tm.Reconstruction:
+        """Return the reconstruction of a capture; it computes what is read of it.
+
+        ``previous``, where it has the same sequence, is what spoilt images are filled in from;
+        ``spread`` is how compiled lanes use several threads.
+        """
+        if isinstance(raw, MomentFrame):
+            return self._reconstructor.of_measured(
+                raw.moments,
+                saturated_pixels=raw.saturated,
+                ambient_dn=raw.ambient_dn,
+                spread=spread,
+            )
+        before = None if previous is None or previous.epoch != raw.epoch else _in_turn(previous)
+        return self._reconstructor(_in_turn(raw), previous=before, spread=spread)
+
+    @cached_property
+    def _reconstructor(self) -> tm.Reconstructor:
+        """What frames with this recipe share: prepared for the first one."""
+        sequence, gains = self.applied.sequence, self.gains
+        chosen = self.settings.model_copy(update={"estimator": self.technique})
+        settings = chosen.for_moments(
+            base_frequency_hz=sequence.base_frequency_hz,
+            zeroth=sequence.zeroth,
+            takes=sequence.takes,
+            multiples=sequence.multiples,
+            phases_rad=sequence.sampling.phases_rad,
+            full_scale=self.full_scale,
+            sensor=self.sensor,
+        )
+        return tm.Reconstructor(
+            settings,
+            calibration=self.nominal_gains if gains is None else gains.planes,
+            bad_pixels=None if gains is None else gains.bad,
+            waveform=self.waveform,
+        )
+
+
+def _in_turn(raw: RawFrame) -> NDArray[np.uint16]:
+    """Return the images take by take, whatever order they were captured in."""
+    return raw.by_take.reshape(raw.images.shape)

@@ -1,0 +1,193 @@
+"""One recorded frame and what is computed of it, each stage once, with the daemon's arithmetic."""
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any, Final, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam import Frame as ProductFrame
+from transientcam.errors import ParameterError
+from transientcam.frame import FrameMeta
+from transientcam_driver import RawFrame
+from transientcam_server.imaging import (
+    DEFAULT_BINS,
+    FIRST,
+    PRODUCTS,
+    Computed,
+    Crop,
+    Product,
+    Recipe,
+    View,
+    compute,
+    evenly,
+    frame_meta,
+    unmet,
+)
+
+KNOWN: Final = {
+    name: product
+    for name, product in PRODUCTS.items()
+    # there is no truth of a recording, and no sensor whose noise is known
+    if product.needs != "truth" and not product.of_noise
+}
+"""Products that recorded frames have."""
+
+
+class ComputedFrame:
+    """A frame of a recording; see `transientcam.RecordedFrame`.
+
+    Parameters
+    ----------
+    index
+        Counted from 0.
+    recipe
+        What it is computed with.
+    read
+        Returns the images of a frame by its index.
+    """
+
+    def __init__(self, index: int, recipe: Recipe, read: Callable[[int], RawFrame]) -> None:
+        self.index = index
+        self.recipe = recipe
+        self._read = read
+        self._computed = Computed()
+
+    @cached_property
+    def raw_frame(self) -> RawFrame:
+        """Its images with their labels and times."""
+        return self._read(self.index)
+
+    @cached_property
+    def _previous(self) -> RawFrame | None:
+        """The frame before, where images may be filled in from it."""
+        return self._read(self.index - 1) if self.recipe.fills and self.index else None
+
+    @property
+    def raw(self) -> NDArray[np.uint16]:
+        """Its images (N, H, W) in DN."""
+        return self.raw_frame.images
+
+    @property
+    def range_m(self) -> NDArray[np.float32]:
+        """The product ``range`` (H, W) in m."""
+        return self.product("range").array
+
+    @property
+    def reconstruction(self) -> tm.Reconstruction:
+        """All that follows from its moments."""
+        return self._found(FIRST)
+
+    @property
+    def meta(self) -> dict[str, Any]:
+        """Its metadata, as the daemon's frames have them; the frame's number counts from 1."""
+        return frame_meta(self.index + 1, self.raw_frame, self.recipe, self._computed, None)
+
+    def product(
+        self,
+        name: str,
+        *,
+        time_s: Sequence[float] | None = None,
+        bins: int | None = None,
+        y: int | None = None,
+        region: Sequence[int] | None = None,
+        decimation: int | None = None,
+    ) -> ProductFrame:
+        """Return a product with unit, axes and metadata.
+
+        Parameters
+        ----------
+        name
+            `KNOWN` has them.
+        time_s, bins
+            Times of flight of a product over time in s, or how many, evenly over one period.
+        y
+            Row of a streak.
+        region, decimation
+            Column, row, width and height of the part; every so many of its pixels.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such product, or not of these frequencies, or it has no times or rows.
+        Problem
+            If region or decimation do not fit the frame.
+        MomentsError
+            If the estimator of the settings cannot work with this sequence.
+        """
+        product = known_product(name)
+        sequence = self.recipe.applied.sequence
+        reason = unmet(product, sequence.sampling, {sequence.zeroth})
+        if reason is not None:
+            raise ParameterError("name", name, f"another product: {reason}")
+        view = self._view(product, time_s, bins, y, region, decimation)
+        given = self.raw_frame if product.needs == "raw" else self._found(product.needs)
+        array = product.compute(self.recipe, given, view)
+        if not product.cropped:
+            array = view.crop.apply(array, product.description.axes)
+        height, width = self.raw.shape[1:]
+        return ProductFrame(
+            product.name,
+            product.description.unit,
+            product.description.axes,
+            cast("FrameMeta", self.meta | view.crop.to_meta(height, width)),
+            np.asarray(array, dtype=product.description.dtype, order="C"),
+            extra=product.with_fields(self.recipe, self.raw_frame, view),
+        )
+
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        if name.startswith("_") or name not in KNOWN:
+            raise AttributeError(f"a recorded frame has no {name!r}; products: {', '.join(KNOWN)}")
+        return self.product(name).array
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *KNOWN})
+
+    def __repr__(self) -> str:
+        images, height, width = self.raw.shape
+        return f"<RecordedFrame {self.index}: {images} images of {width} x {height} pixels>"
+
+    def _repr_html_(self) -> str:
+        """Return the map of its range, for notebooks."""
+        return self.product("range")._repr_html_()
+
+    def _found(self, stage: str) -> tm.Reconstruction:
+        computed = compute(self._computed, self.recipe, self.raw_frame, self._previous, {stage})
+        if stage in computed.failures:
+            raise computed.failures[stage]
+        self._computed = computed
+        assert computed.reconstruction is not None  # noqa: S101 - nothing failed
+        return computed.reconstruction
+
+    def _view(
+        self,
+        product: Product,
+        time_s: Sequence[float] | None,
+        bins: int | None,
+        y: int | None,
+        region: Sequence[int] | None,
+        decimation: int | None,
+    ) -> View:
+        height, width = self.raw.shape[1:]
+        crop = Crop.of(region, decimation, height=height, width=width)
+        for field, value in (("time_s", time_s), ("bins", bins)):
+            if value is not None and not product.over_time:
+                raise ParameterError(field, value, f"left out: {product.name} has no such axis")
+        if y is not None and not (product.of_row and 0 <= y < height):
+            raise ParameterError("y", y, f"a row of a streak, 0 to {height - 1}")
+        times: tuple[float, ...] = ()
+        if product.over_time and time_s is not None:
+            times = tuple(np.asarray(time_s, dtype=float).ravel().tolist())
+        elif product.over_time:
+            times = evenly(self.recipe.base_frequency_hz, bins or DEFAULT_BINS)
+        return View(times, crop, y)
+
+
+def known_product(name: str) -> Product:
+    """Return a product that recorded frames have, or raise a ParameterError."""
+    try:
+        return KNOWN[name]
+    except KeyError:
+        raise ParameterError("product", name, f"one of {', '.join(KNOWN)}") from None

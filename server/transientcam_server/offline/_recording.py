@@ -1,0 +1,262 @@
+"""Products of every frame of a recording, into a file that an interruption does not spoil.
+
+A second run goes on after the last frame that is in the file.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver import AppliedSequence, RawFrame
+from transientcam_server.errors import InputError
+from transientcam_server.imaging import PRODUCTS, Column, Product, SettingsVersion, unmet
+from transientcam_server.offline._computing import KNOWN, ComputedFrame
+from transientcam_server.offline._formats import SINKS, Block, Content, Row, sink_of, write
+from transientcam_server.recording import (
+    FORMAT,
+    Recording,
+    recorded_recipe,
+    require_sound_heaps,
+    salvage,
+    swmr,
+)
+from transientcam_server.settings import ReconstructionSettings
+
+DEFAULT_PRODUCTS: Final = ("range", "direct", "indirect", "brightness", "validity", "flags")
+KNOWN_PRODUCTS: Final = tuple(name for name in KNOWN if name != "raw")
+HDF5_SUFFIXES: Final = (".h5", ".hdf5")
+_DESCRIBED: Final = ("units", "long_name")
+_SERIES: Final = ("device_time_s", "host_time_s", "frame")
+Progress = Callable[[int, int], None]
+
+
+def default_products(applied: AppliedSequence) -> tuple[str, ...]:
+    """Return those of `DEFAULT_PRODUCTS` that frames of a sequence have."""
+    given = applied.sequence.sampling, {applied.sequence.zeroth}
+    return tuple(name for name in DEFAULT_PRODUCTS if unmet(PRODUCTS[name], *given) is None)
+
+
+@dataclass(frozen=True, slots=True)
+class BatchOptions:
+    """Products and settings; ``bins`` times of flight for products over time."""
+
+    products: tuple[str, ...] = DEFAULT_PRODUCTS
+    settings: ReconstructionSettings = field(default_factory=ReconstructionSettings)
+    bins: int = 256
+
+
+class BatchReconstructor:
+    """Computes products of frames, each stage once a frame."""
+
+    def __init__(self, recording: Recording, options: BatchOptions) -> None:
+        capabilities = recording.header.capabilities
+        self.recipe = recorded_recipe(recording.header, SettingsVersion(1, options.settings))
+        self._size = capabilities.height, capabilities.width
+        self.products = [PRODUCTS[name] for name in options.products]
+        self.time_s = np.arange(options.bins) / (options.bins * self.recipe.base_frequency_hz)
+
+    def shape(self, product: Product) -> tuple[int, ...]:
+        """Shape of a product of one frame."""
+        return product.shape(self.recipe.applied, *self._size, times=len(self.time_s))
+
+    def compute(self, raw: RawFrame, previous: RawFrame | None = None) -> dict[str, NDArray[Any]]:
+        """Return the products of a frame by name; it may be filled in from the ``previous`` one."""
+        frames = [raw] if previous is None else [previous, raw]
+        frame = ComputedFrame(len(frames) - 1, self.recipe, frames.__getitem__)
+        return {
+            each.name: frame.product(
+                each.name, time_s=self.time_s.tolist() if each.over_time else None
+            ).array
+            for each in self.products
+        }
+
+
+def reconstruct_recording(
+    recording: Recording,
+    output: Path,
+    options: BatchOptions,
+    *,
+    progress: Progress = lambda done, total: None,
+) -> int:
+    """Compute products of all frames into ``output``; return how many were there already.
+
+    The suffix says the format: .h5, .npz, .nc or .zarr. Until it is complete there is an HDF5 file
+    ``<output>.part``, whatever the format, which a second run continues.
+
+    Raises
+    ------
+    NotConvertible
+        If the suffix names no format.
+    MissingExtra
+        If the format's library is not installed.
+    InputError
+        If the unfinished file is of another recording, or made with other settings.
+    DamagedFrame
+        If a frame is not what was recorded; those before it stay done.
+    FileExistsError
+        If the output is there already.
+    OSError
+        If the output cannot be written.
+    """
+    if output.exists():
+        raise FileExistsError(17, "it is there already", str(output))
+    sink = None
+    if output.suffix.lower() not in HDF5_SUFFIXES:
+        sink = sink_of(output, SINKS, what="products of a recording", also=HDF5_SUFFIXES)
+    reconstructor = BatchReconstructor(recording, options)
+    part = output.with_name(output.name + ".part")
+    document = document_of(recording, options)
+    if part.exists():
+        file = _resumed(part, document)
+    else:
+        file = swmr.open_file(part, "x", libver=swmr.LIBVER)
+        _lay_out(file, recording, reconstructor, document)
+    rows = swmr.Appender(file, list(options.products), list(_SERIES))
+    done = rows.rows
+    previous = recording.frame(done - 1) if 0 < done < recording.frames else None
+    try:
+        for index in range(done, recording.frames):
+            progress(index, recording.frames)
+            raw = recording.frame(index)
+            series = {
+                "device_time_s": raw.device_time_s,
+                "host_time_s": raw.host_time_s,
+                "frame": raw.number,
+            }
+            rows.append(reconstructor.compute(raw, previous), series)
+            previous = raw
+        progress(recording.frames, recording.frames)
+    finally:
+        rows.close()
+    if sink is None:
+        part.rename(output)
+    else:
+        with swmr.open_file(part, "r") as finished:
+            write(output, _content(finished), _rows(finished), sink)
+        part.unlink()
+    swmr.synchronise(output.parent)
+    return done
+
+
+def _content(file: swmr.File) -> Content:
+    """Return what a file of products holds, for another format."""
+    columns, blocks = {}, {}
+    for name, dataset in file.items():
+        own = (name,) if dataset.is_scale else None
+        axes = own or tuple(each[0].name.lstrip("/") for each in dataset.dims)
+        attributes = {key: dataset.attrs[key] for key in _DESCRIBED if key in dataset.attrs}
+        if dataset.ndim > 1:
+            blocks[name] = Block(axes, dataset.shape, dataset.dtype.str, attributes)
+        else:
+            columns[name] = Column(axes, dataset[()], attributes)
+    return Content(columns, blocks, dict(file.attrs))
+
+
+def _rows(file: swmr.File) -> Iterator[Row]:
+    for name, dataset in file.items():
+        for index in range(len(dataset) if dataset.ndim > 1 else 0):
+            yield name, index, dataset[index]
+
+
+def document_of(recording: Recording, options: BatchOptions) -> dict[str, str]:
+    """Return the attributes that must agree for an unfinished file to be continued."""
+    header = recording.header
+    return {
+        "format": FORMAT,
+        "recording_id": header.recording_id,
+        "title": header.name,
+        "Conventions": "CF-1.11",
+        "sequence": json.dumps(header.applied.to_document()),
+        "reconstruction": json.dumps(options.settings.model_dump(), sort_keys=True),
+        "calibration": json.dumps(dict(header.calibration)),
+        "products": json.dumps([*options.products, options.bins]),
+    }
+
+
+def content_of(
+    recording: Recording, reconstructor: BatchReconstructor, document: Mapping[str, str]
+) -> Content:
+    """Return what a store of products holds: all but the products, which are empty."""
+    columns = {
+        name: Column(("frame",), recording.series(name), {"units": "s"})
+        for name in _SERIES
+        if name != "frame"
+    }
+    blocks = {}
+    for product in reconstructor.products:
+        description, shape = product.description, reconstructor.shape(product)
+        attributes = {"units": description.unit, "long_name": description.summary}
+        axes = ("frame", *description.axes)
+        sizes = (recording.frames, *shape)
+        blocks[product.name] = Block(axes, sizes, description.dtype, attributes)
+        for name, size in zip(description.axes, shape, strict=True):
+            values = reconstructor.time_s if name == "time" else np.arange(size)
+            columns[name] = Column((name,), values)
+    versions = json.dumps(dict(recording.header.versions))
+    return Content(columns, blocks, {**document, "versions": versions})
+
+
+def _lay_out(
+    file: swmr.File,
+    recording: Recording,
+    reconstructor: BatchReconstructor,
+    document: Mapping[str, str],
+) -> None:
+    file.attrs.update(document)
+    file.attrs["versions"] = json.dumps(dict(recording.header.versions))
+    swmr.create_series(file, "device_time_s", "<f8", units="s")
+    swmr.create_series(file, "host_time_s", "<f8", units="s")
+    swmr.create_series(file, "frame", "<u8")
+    file["frame"].make_scale("frame")
+    for name in ("device_time_s", "host_time_s"):
+        file[name].dims[0].attach_scale(file["frame"])
+    for product in reconstructor.products:
+        description, shape = product.description, reconstructor.shape(product)
+        blocks = swmr.create_blocks(
+            file, product.name, shape, description.dtype, units=description.unit
+        )
+        blocks.attrs["long_name"] = description.summary
+        axes = ("frame", *description.axes)
+        for axis, (name, size) in enumerate(zip(axes, (0, *shape), strict=True)):
+            if name not in file:
+                values = reconstructor.time_s if name == "time" else np.arange(size)
+                file.create_dataset(name, data=values).make_scale(name)
+            blocks.dims[axis].attach_scale(file[name])
+
+
+def _resumed(part: Path, document: Mapping[str, str]) -> swmr.File:
+    """Open an unfinished file to append to, repaired first."""
+    scratch = part.with_name(part.name + ".resuming")
+    try:
+        with part.open("rb") as stream:
+            require_sound_heaps(stream)
+        with swmr.open_unfinished(part) as begun:
+            require_same(part, begun.attrs, document)
+            products: Sequence[str] = json.loads(document["products"])[:-1]
+            rows = min(len(begun[name]) for name in (*products, *_SERIES))
+            salvage(begun, scratch, rows, row_axis="frame")
+        scratch.rename(part)
+    except (KeyError, RuntimeError, ValueError) as error:
+        raise InputError(str(part), "its content", swmr.in_words(error), "products") from error
+    finally:
+        scratch.unlink(missing_ok=True)
+    return swmr.open_file(part, "r+", libver=swmr.LIBVER)
+
+
+def require_same(part: Path | str, begun: Mapping[str, Any], document: Mapping[str, str]) -> None:
+    """Refuse to go on with products that were begun of something else, or otherwise.
+
+    Raises
+    ------
+    InputError
+        If they were.
+    """
+    for key, value in document.items():
+        if begun.get(key) != value:
+            expected = f"{value} to go on with; delete the file to begin anew"
+            raise InputError(str(part), key, str(begun.get(key)), expected)

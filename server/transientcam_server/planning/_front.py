@@ -1,0 +1,111 @@
+"""The Pareto front of the scene before the camera, kept for ten seconds."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from transientcam_driver import AppliedSequence, Sequence
+from transientcam_server.imaging import Frame, Workers
+from transientcam_server.planning._looks import CACHED_S, Looks
+from transientcam_server.planning._planner import Planner, range_error
+from transientcam_server.planning._process.progress import Progress
+from transientcam_server.planning._process.queue import PlanningQueue
+from transientcam_server.planning._search.goal import Goal
+
+_WIDE: Final = 1e9  # a target that every sequence reaches: it only requests the prediction
+
+
+@dataclass(frozen=True, slots=True)
+class _CachedFront:
+    made_with: tuple[int, int]
+    frame: int
+    until_s: float
+    document: dict[str, Any]
+
+
+class FrontCache:
+    """Pareto fronts of the present scene; on the event loop, computed elsewhere."""
+
+    def __init__(
+        self,
+        planner: Planner,
+        workers: Workers,
+        queue: PlanningQueue,
+        looks: Looks,
+        *,
+        simulated: bool,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._planner = planner
+        self._workers = workers
+        self._queue = queue
+        self._looks = looks
+        self._simulated = simulated
+        self._clock = clock
+        self._cached: dict[str, _CachedFront] = {}
+        self._predicting = asyncio.Lock()
+
+    async def of(
+        self, frame: Frame, by: str, looking: Progress, predicting: Progress
+    ) -> dict[str, Any]:
+        """Return the front compared by target ``by``, and the frame's own place, as JSON.
+
+        ``predicting`` shows the same document with the front so far; what either progress raises
+        ends the work, unless it is done.
+        """
+        around = {
+            "compared_by": by,
+            "scene_of_frame": frame.number,
+            "current": await self._current(frame),
+        }
+        shown = predicting.part(0.0, 1.0, show=lambda part: predicting.show(around | part))
+        async with self._predicting:
+            cached = self._cached.get(by)
+            made_with = frame.raw.epoch, frame.recipe.settings_version
+            if cached is None or cached.made_with != made_with or self._clock() > cached.until_s:
+                document = await self._predicted(frame, by, looking, shown)
+                cached = _CachedFront(made_with, frame.number, self._clock() + CACHED_S, document)
+                self._cached[by] = cached
+        return around | {"scene_of_frame": cached.frame} | cached.document
+
+    def forget(self) -> None:
+        """Drop the fronts, as when the scene is another one."""
+        self._cached.clear()
+        self._looks.forget()
+
+    async def _predicted(
+        self, frame: Frame, by: str, looking: Progress, predicting: Progress
+    ) -> dict[str, Any]:
+        base = frame.recipe.applied.sequence
+        if self._looks.needs_frame:
+            scene = await self._looks.of_frame(frame, None)
+        else:
+            frequency_hz = base.base_frequency_hz
+            base = Sequence(base_frequency_hz=frequency_hz, sub_phases=base.sub_phases)
+            scene = await self._looks.of_twin(base, None, looking)
+        goal = Goal(
+            base=base,
+            range_std_m=_WIDE if by == "range_std_m" else None,
+            bound_width=_WIDE if by == "bound_width" else None,
+        )
+        return await self._queue.run(
+            self._planner.tradeoff_document, goal, scene, progress=predicting
+        )
+
+    async def _current(self, frame: Frame) -> dict[str, Any]:
+        found = await frame.reconstruction("returns")
+        await frame.accuracy()  # for its metadata
+        applied: AppliedSequence = frame.recipe.applied
+        error = None
+        if self._simulated:
+            truth = await frame.truth()
+            error, _ = await self._workers.run(range_error, found, truth)
+        return {
+            "meta": frame.meta(),
+            "sequence": applied.sequence.to_document(),
+            "capture_s": applied.capture_s,
+            "frame_rate_hz": applied.frame_rate_hz,
+            "range_error_m": error,
+        }

@@ -1,0 +1,139 @@
+"""Plans sequences for the scene that a camera sees. Runs in `PlanningProcess`."""
+
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import transientcam_moments as tm
+from transientcam_driver import Capabilities, Sequence, Truth
+from transientcam_server.planning._prediction.prediction import Predictor
+from transientcam_server.planning._prediction.timing import timer_of
+from transientcam_server.planning._process.progress import Progress
+from transientcam_server.planning._scene.look import STEPS, FrameSource, look_at
+from transientcam_server.planning._scene.scene import SceneStatistics
+from transientcam_server.planning._search.candidates import ComputingTime, curves
+from transientcam_server.planning._search.choice import Choice
+from transientcam_server.planning._search.families import Family, families, require_plannable
+from transientcam_server.planning._search.goal import Goal
+from transientcam_server.planning._search.plan import Plan, plan
+from transientcam_server.planning._search.tradeoff import fronts, lines, tradeoff_document
+from transientcam_server.settings import ReconstructionSettings
+
+
+class Planner:
+    """Recommends sequences from the noise of one sensor and one way to reconstruct.
+
+    Parameters
+    ----------
+    capabilities
+        Of the camera.
+    sensor
+        Whose noise its images have.
+    settings
+        Of the reconstruction.
+    """
+
+    def __init__(
+        self,
+        capabilities: Capabilities,
+        sensor: tm.noise.Sensor,
+        settings: ReconstructionSettings,
+    ) -> None:
+        self._capabilities = capabilities
+        self._sensor = sensor
+        self._settings = settings
+
+    def reconstruct_with(self, settings: ReconstructionSettings) -> None:
+        """Predict with other settings of the reconstruction from now on."""
+        self._settings = settings
+
+    def look(
+        self,
+        camera: FrameSource,
+        base: Sequence,
+        *,
+        ambient_dn_per_s: float | None = None,
+        progress: Progress | None = None,
+    ) -> SceneStatistics:
+        """Look at the scene before a camera; see `look_at`."""
+        shown = progress or Progress()
+        done = itertools.count()
+
+        return look_at(
+            camera,
+            self._sensor,
+            self._settings,
+            base=base,
+            ambient_dn_per_s=ambient_dn_per_s,
+            go_on=lambda stage: shown.at(next(done) / STEPS, stage),
+        )
+
+    def require_possible(self) -> None:
+        """Refuse a camera whose captures are not predicted (Problem ``target-unreachable``)."""
+        require_plannable(self._capabilities)
+
+    def plan(self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None) -> Plan:
+        """Recommend a sequence; see `planning.plan`. What is raised by ``progress`` ends it."""
+        progress = progress or Progress()
+        predictor = self._predictor(scene, progress)
+        timed = self._computing_time(goal, progress)
+        return plan(goal, predictor, self._capabilities, timed=timed, progress=progress)
+
+    def plan_document(
+        self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
+    ) -> dict[str, Any]:
+        """Return `plan` as JSON."""
+        return self.plan(goal, scene, progress).to_document()
+
+    def families(self, goal: Goal, scene: SceneStatistics) -> list[Family]:
+        """Return all that is searched for a goal; see `planning.families`."""
+        return families(goal, self._predictor(scene), self._capabilities)
+
+    def tradeoff_document(
+        self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
+    ) -> dict[str, Any]:
+        """Return all that no other beats, and the lines they lie on, as JSON: seconds of work.
+
+        ``progress`` shows the same document, without lines, after each point of the front; what it
+        raises ends the work.
+        """
+        progress = progress or Progress()
+        predictor = self._predictor(scene, progress)
+        found = families(goal, predictor, self._capabilities)
+        candidates = curves(found, goal, predictor, self._computing_time(goal, progress))
+        choices: list[Choice] = []
+        for choices in fronts(candidates, goal.leading, progress.part(0.0, 0.8)):
+            progress.show(tradeoff_document(choices, [], scene))
+        progress.at(0.8, "lines")
+        return tradeoff_document(choices, lines(candidates, choices), scene)
+
+    def _predictor(
+        self, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
+    ) -> Predictor:
+        return Predictor(scene, self._sensor, self._settings, go_on=go_on)
+
+    def _computing_time(self, goal: Goal, progress: Progress) -> ComputingTime:
+        """Return what times frames; a budget of computing time needs kernels that are compiled."""
+        timer = timer_of(self._capabilities, self._settings)
+        if goal.computing_share is None:
+            return timer
+
+        def compiled(sequence: Sequence, estimator: str) -> float | None:
+            known_s = timer(sequence, estimator)
+            if known_s is not None:
+                return known_s
+            progress.at(0.0, f"compiling kernels for m = {sequence.harmonics}")
+            return timer.once_compiled(sequence, estimator)
+
+        return compiled
+
+
+def range_error(found: tm.Reconstruction, truth: Truth) -> dict[str, float] | None:
+    """Return how far a frame's range is off the simulated truth, in m; None without any range."""
+    error_m = np.abs(np.asarray(found.range_m) - truth.range_m)
+    error_m = error_m[np.isfinite(error_m)]
+    if not error_m.size:
+        return None
+    return {"median": float(np.median(error_m)), "rms": float(np.sqrt(np.mean(error_m**2)))}

@@ -1,0 +1,315 @@
+"""What accuracy a sequence will have on a scene, before it is captured.
+
+Noisy moments are drawn around those of the scene and go through the estimator itself, so that
+noise, bias and outliers come from one computation, whatever the estimator. What is drawn depends on
+a sequence by its frequencies and by how noisy it is: a few steps of noise serve every exposure and
+number of takes.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from statistics import NormalDist
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam_driver import Sequence
+from transientcam_server.imaging import MEDIAN_OF_NORMAL, ranges_m
+from transientcam_server.planning._prediction.intervals import (
+    DISAGREEING,
+    DOUBTFUL,
+    KNOWN,
+    RESAMPLED,
+    UNKNOWN,
+    Figure,
+    between,
+    figure,
+)
+from transientcam_server.planning._prediction.measures import PixelErrors, pixel_errors
+from transientcam_server.planning._prediction.resolving import Resolving
+from transientcam_server.planning._scene.estimation import MOST_HARMONICS
+from transientcam_server.planning._scene.sampling import resampled
+from transientcam_server.planning._scene.scene import SceneStatistics
+from transientcam_server.settings import ReconstructionSettings
+
+_Array = NDArray[Any]
+DRAWS: Final = 6
+"""Noisy captures of each pixel for a first prediction."""
+FINE_DRAWS: Final = 30
+"""And for the one that is stated."""
+FEW: Final = slice(None, None, 2)
+"""The pixels that first predictions are made of: every other one of each kind."""
+STEP: Final = 4.0
+"""Factor between steps of noise."""
+NOMINAL: Final = Sequence(exposure_s=1e-3, zeroth="estimated")
+"""The steps are multiples of its noise."""
+_HARDLY: Final = 0.8
+_NORMAL: Final = np.array([NormalDist().inv_cdf(0.5 + (k + 0.5) / 64) for k in range(32)])
+"""Absolute values of a standard normal variable, each as likely."""
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """Predicted errors of the range.
+
+    Attributes
+    ----------
+    range_std, range_error
+        Noise, and the root sum of squares of noise and bias, pixel by pixel.
+    range_bias_m
+        Systematic error of the median pixel.
+    outlier_share
+        Share of the ranges beyond five standard deviations.
+    most_bias_m
+        Bias of the median pixel if the light begins where the moments only just allow it.
+    bias_known
+        Whether the moments tell the bias: not where shapes of light that explain them alike put
+        the range elsewhere, nor where estimators disagree about the direct range at all
+        frequencies, nor where many pixels may be lit by other surfaces alone.
+    """
+
+    range_std: Figure
+    range_error: Figure
+    range_bias_m: float
+    outlier_share: float
+    most_bias_m: float
+    bias_known: bool
+
+
+class Predictor:
+    """Predicts for one scene, one sensor and one way to reconstruct.
+
+    Parameters
+    ----------
+    scene
+        Of typical pixels.
+    sensor
+        Of the camera.
+    settings
+        Of the reconstruction; `estimator` is that of sequences that name none.
+    seed
+        Of all draws: the same arguments give the same result.
+    go_on
+        Called several times a second while this computes; whatever it raises ends that.
+    closely
+        Predict with all pixels of the scene, and not with few of them.
+    """
+
+    def __init__(
+        self,
+        scene: SceneStatistics,
+        sensor: tm.noise.Sensor,
+        settings: ReconstructionSettings,
+        *,
+        seed: int = 0,
+        go_on: Callable[[], None] = lambda: None,
+        closely: bool = False,
+    ) -> None:
+        self._go_on = go_on
+        self._whole = scene
+        self.scene = scene if closely else scene.few()
+        self.sensor = sensor
+        self.settings = settings
+        self._seed = seed
+        self._left = tm.noise.smoothing_factor(settings.smoothing_px)
+        self._nominal = self.relative_noise(NOMINAL)
+        self._column = lru_cache(maxsize=None)(self._drawn_column)
+        self._exact = lru_cache(maxsize=None)(self._bias_without_noise)
+        self.resolving = Resolving(self.scene, settings, seed=seed, go_on=go_on)
+
+    def longest_exposure_s(self) -> float:
+        """Exposure at which the scene's bright pixels just do not saturate."""
+        light = self.scene.brightest_dn_per_s
+        return self.sensor.brightest / light if light > 0 else math.inf
+
+    def noise_scale(self, sequence: Sequence) -> float:
+        """Return how noisy a sequence is, in units of a nominal one: 1 ms, one take."""
+        return float(np.median(self.relative_noise(sequence) / self._nominal))
+
+    def quick(self, estimator: str, sequence: Sequence, scale: float) -> tuple[float, float, float]:
+        """Return deviation, bias and error in m of the median pixel at a scale of noise.
+
+        Between the steps that were drawn the logarithms of each pixel's errors are interpolated.
+        """
+        key = (estimator, self._harmonics(estimator, sequence), sequence.base_frequency_hz)
+        place = math.log(scale) / math.log(STEP)
+        below = math.floor(place)
+        part = place - below
+        low, high = (self._column(*key, below + k) for k in (0, 1))
+        std, bias = (
+            np.exp((1 - part) * np.log(one) + part * np.log(other))
+            for one, other in ((low[0], high[0]), (low[1], high[1]))
+        )
+        return float(_typical(std)), float(np.median(bias)), float(np.median(np.hypot(std, bias)))
+
+    def least_noise_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
+        """Return a bound in m on the noise of the median pixel: that of Cramer and Rao.
+
+        Of one return with all the light; the sum of squares of 1 to m is in it.
+        """
+        m = self._harmonics(estimator, sequence)
+        noise = float(np.median(self._nominal)) * scale
+        std_rad = noise / math.sqrt(m * (m + 1) * (2 * m + 1) / 6)
+        return float(tm.range_m(std_rad, sequence.base_frequency_hz))
+
+    def least_bias_m(self, estimator: str, sequence: Sequence) -> float:
+        """Return what the bias of the median pixel hardly falls below: that without noise."""
+        m = self._harmonics(estimator, sequence)
+        return self._exact(estimator, m, sequence.base_frequency_hz)
+
+    def _bias_without_noise(
+        self, estimator: str, harmonics: int, base_frequency_hz: float
+    ) -> float:
+        """Bias in m of the median pixel that no exposure and no takes reduce."""
+        self._go_on()
+        scene = self.scene
+        b = scene.relative_moments(harmonics, base_frequency_hz)[:, FEW]
+        variance = np.broadcast_to((self._nominal[FEW] * STEP**-4) ** 2, b.shape).astype(np.float32)
+        variance[0] = 0
+        range_m = ranges_m(b, variance, estimator, base_frequency_hz, self.settings)
+        bias_m = np.hypot(range_m - scene.direct_m[FEW], scene.uncertainty_m[FEW])
+        # noise of the look itself is in this, and in the direct range
+        return _HARDLY * float(np.median(np.nan_to_num(bias_m, nan=math.inf)))
+
+    def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
+        """Predict the errors of a sequence and an estimator, with intervals.
+
+        ``closely``, with all pixels of the scene: several times the work, and narrower intervals.
+        """
+        if closely:
+            return self._closer.predict(estimator, sequence)
+        harmonics = self._harmonics(estimator, sequence)
+        noise = self.relative_noise(sequence)
+        errors = self._errors(
+            estimator, harmonics, sequence.base_frequency_hz, noise, FINE_DRAWS, sequence.zeroth
+        )
+        farthest_m = errors.farthest_m(self.scene.earliest_m, self.scene.latest_m)
+        known = bool(
+            not self.scene.lit_in_part
+            and self.scene.disagreement_m <= DISAGREEING * _median(errors.error_m)
+            and _median(np.hypot(errors.std_m, farthest_m)) <= DOUBTFUL * _median(errors.error_m)
+        )
+        picks = resampled(noise.size, RESAMPLED, self._seed)
+        return Prediction(
+            figure(errors.std_m, _typical, picks),
+            _error(errors, None if known else farthest_m, picks),
+            float(_median(errors.bias_m)),
+            errors.outlier_share,
+            float(_median(farthest_m)),
+            bias_known=known,
+        )
+
+    def beyond_scene(self, sequence: Sequence) -> bool:
+        """Whether a sequence sees more of the scene than the look that describes it."""
+        scene = self.scene
+        if scene.relative_noise is None:
+            return False
+        finer = float(np.median(self.relative_noise(sequence) / scene.relative_noise)) < 0.5
+        return finer or not scene.covers(sequence.harmonics, sequence.base_frequency_hz)
+
+    def bound_width(self, sequence: Sequence) -> float:
+        """Predict the width of the bounds on the density, over the mean density, median pixel."""
+        return self.resolving.bound_width(sequence, self.relative_noise(sequence))
+
+    def separation(self, sequence: Sequence, distance_m: float) -> float:
+        """Predict how often two equal returns at a distance are both found, in a typical pixel."""
+        return self.resolving.separation(sequence, self.relative_noise(sequence), distance_m)
+
+    def relative_noise(self, sequence: Sequence) -> _Array:
+        """Return the deviation (P) of the parts of the moments, over each pixel's brightness."""
+        b0 = np.maximum(self.scene.brightness_dn_per_s * sequence.exposure_s, 1e-12)
+        sub_phases = sequence.sub_phases
+        noise = tm.noise.moment_noise(
+            b0,
+            self.sensor,
+            calibration=tm.nominal_calibration(
+                1, sub_phases.phases_rad, sub_phases.weights, zeroth=sequence.zeroth
+            ),
+            zeroth=sequence.zeroth,
+            takes=sequence.takes,
+            ambient=self.scene.ambient_dn_per_s * sequence.exposure_s,
+        )
+        relative: _Array = np.sqrt(noise.variance[1] * self._left) / b0
+        return relative
+
+    @cached_property
+    def _closer(self) -> "Predictor":
+        arguments = self._whole, self.sensor, self.settings
+        return Predictor(*arguments, seed=self._seed, go_on=self._go_on, closely=True)
+
+    def _harmonics(self, estimator: str, sequence: Sequence) -> int:
+        """How many harmonics the estimator looks at."""
+        return min(sequence.harmonics, MOST_HARMONICS.get(estimator, sequence.harmonics))
+
+    def _drawn_column(
+        self, estimator: str, harmonics: int, base_frequency_hz: float, step: int
+    ) -> tuple[_Array, _Array]:
+        """Deviation and bias (P) at a step of noise, none of them 0."""
+        noise = self._nominal * STEP**step
+        errors = self._errors(
+            estimator, harmonics, base_frequency_hz, noise, DRAWS, NOMINAL.zeroth, FEW
+        )
+        return np.clip(errors.std_m, 1e-9, 1e3), np.clip(errors.bias_m, 1e-9, 1e3)
+
+    def _errors(
+        self,
+        estimator: str,
+        harmonics: int,
+        base_frequency_hz: float,
+        noise: _Array,
+        draws: int,
+        zeroth: str,
+        pixels: slice = slice(None),
+    ) -> PixelErrors:
+        self._go_on()
+        b = self.scene.relative_moments(harmonics, base_frequency_hz)[:, pixels]
+        variance = np.broadcast_to(noise[pixels] ** 2, b.shape).astype(np.float32)
+        if zeroth == "estimated":
+            variance[0] = 0
+        random = np.random.default_rng((self._seed, harmonics, draws))
+        drawn = tm.noise.draw(b, tm.noise.MomentNoise(variance), random, draws=draws)
+        spread = np.broadcast_to(variance[:, None], drawn.shape)
+        range_m = ranges_m(
+            drawn.reshape((len(b), -1)),
+            spread.reshape((len(b), -1)),
+            estimator,
+            base_frequency_hz,
+            self.settings,
+            zeroth=zeroth,
+        )
+        return pixel_errors(
+            range_m.reshape((draws, -1)),
+            self.scene.direct_m[pixels],
+            self.scene.uncertainty_m[pixels],
+        )
+
+
+def _error(errors: PixelErrors, farthest_m: _Array | None, picks: _Array) -> Figure:
+    """Return the figure of the error; ``farthest_m`` (P) is the most bias, where none is known."""
+    reach = KNOWN if farthest_m is None else UNKNOWN
+    least_m, most_m = reach.least_bias * errors.bias_m, reach.most_bias * errors.bias_m
+    if farthest_m is not None:
+        most_m = np.maximum(most_m, farthest_m)
+    least, most = (
+        figure(np.hypot(errors.std_m, bias_m), _median, picks, reach.spread)
+        for bias_m in (least_m, most_m)
+    )
+    return between(figure(errors.error_m, _median, picks), least, most)
+
+
+def _typical(deviations: _Array) -> _Array:
+    """Return the typical difference of two captures over pixels (..., P), as a deviation (...).
+
+    The same measure as of captured frames, whose bright and dark pixels are mixed.
+    """
+    mixed = (_NORMAL[:, None] * deviations[..., None, :]).reshape((*deviations.shape[:-1], -1))
+    return _median(mixed) / MEDIAN_OF_NORMAL
+
+
+def _median(values: _Array) -> _Array:
+    """Return the median over pixels (..., P), which are last."""
+    return np.asarray(np.median(values, axis=-1))

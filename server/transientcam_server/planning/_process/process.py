@@ -1,0 +1,122 @@
+"""A process of its own for plans, which frames go before.
+
+What plans is Python in large part: on a thread of the service it would hold the interpreter's lock,
+which every frame needs many times, and memory that the service would keep (decision 15).
+"""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, TypeVar
+
+import transientcam_moments as tm
+from transientcam_compiled import ChildProcess, ProcessEnded, Tell
+from transientcam_server.errors import Problem, kinds
+from transientcam_server.planning._process.progress import Progress
+
+_T = TypeVar("_T")
+
+
+class PlanningProcess:
+    """Calls functions in another process, one at a time.
+
+    It is started by the first call, or before it (`prepare`), stays for the next one, and is killed
+    where a call is given up. Once it is idle it makes kernels ready: a plan is a look and, right
+    after it, a search.
+    """
+
+    def __init__(self) -> None:
+        self._calling = threading.Lock()
+        self._child = ChildProcess(_planning, tm.kernels.make_ready)
+        self._closing = threading.Event()
+
+    def run(self, compute: Callable[..., _T], *arguments: object, progress: Progress) -> _T:
+        """Return ``compute(*arguments, progress)`` of the other process; waits for it.
+
+        Parameters
+        ----------
+        compute
+            A function of a module, or a method of what can be pickled.
+        arguments
+            Pickled.
+        progress
+            Of this process. What it raises kills the other one, and is raised here.
+
+        Raises
+        ------
+        Problem
+            ``shutting-down`` from `close` on, ``internal-error`` where the process is gone.
+        Exception
+            What ``compute`` raises.
+        """
+
+        def ask() -> None:
+            if self._closing.is_set():
+                raise Problem(kinds.SHUTTING_DOWN, "The service is shutting down.")
+            progress()
+
+        def told(said: Any) -> None:
+            if isinstance(said, tuple):
+                progress.at(*said)
+            else:
+                progress.show(said)
+
+        with self._calling:
+            ask()
+            try:
+                value: _T = self._child.call(_compute, compute, arguments, ask=ask, told=told)
+            except ProcessEnded:
+                raise Problem(kinds.INTERNAL_ERROR, "The process that plans has ended.") from None
+        return value
+
+    def prepare(self) -> None:
+        """Start the process, so that the first call need not wait for its imports; at once.
+
+        Where the system gives no process, the first call says so.
+        """
+        self._unless_it_computes(self._start)
+
+    def leave(self) -> None:
+        """End the process, unless it computes: its memory is given back. From any thread."""
+        self._unless_it_computes(self._child.end)
+
+    def close(self) -> None:
+        """End what is computed: it raises ``shutting-down``. From any thread."""
+        self._closing.set()
+        self.leave()  # else the call that computes ends it
+
+    def _start(self) -> None:
+        if not self._closing.is_set():
+            with suppress(OSError):
+                self._child.start()
+
+    def _unless_it_computes(self, do: Callable[[], None]) -> None:
+        if self._calling.acquire(blocking=False):
+            try:
+                do()
+            finally:
+                self._calling.release()
+
+
+@contextmanager
+def _planning() -> Iterator[None]:
+    """Use one thread inside, and only note which kernels calls want."""
+    tm.kernels.use_one_thread()
+    with tm.kernels.only_note():
+        yield
+
+
+def _compute(compute: Callable[..., _T], arguments: tuple[object, ...], tell: Tell) -> _T:
+    """Call in the other process; a step is told where it is another one than before.
+
+    This side asks by itself whether to go on.
+    """
+    reported: tuple[float, str] | None = None
+
+    def report(share: float, step: str) -> None:
+        nonlocal reported
+        if reported != (share, step):
+            reported = share, step
+            tell(reported)
+
+    return compute(*arguments, Progress(report, show=tell))

@@ -1,0 +1,188 @@
+"""The scene as predictions see it: light, returns and true range of typical pixels."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam_moments.moment_problem import DIRECT_THRESHOLD
+from transientcam_server.planning._scene.sampling import STRATUM, one_of_each
+
+_Array = NDArray[Any]
+PIXELS: Final = 1024
+"""How many lit pixels stand for a scene, a multiple of `sampling.STRATUM` squared."""
+FEW_PIXELS: Final = PIXELS // STRATUM
+"""How many of them nearly all is predicted with."""
+MOSTLY_DIM: Final = 0.25
+"""Share of dim pixels from which on it matters to the median one."""
+AMBIGUOUS_SHARE: Final = 0.02
+"""Share of the pixels whose direct return may lie beyond the unambiguous range."""
+LATE_SHARE: Final = 0.05
+"""Share of those with a later return beyond it, which is then taken for the direct one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneStatistics:
+    """Typical lit pixels of a scene, P of them.
+
+    Attributes
+    ----------
+    brightness_dn_per_s
+        (P) zeroth moment b_0 in DN for each second of exposure.
+    ambient_dn_per_s
+        (P) light that is not the camera's, in DN an image for each second of exposure.
+    brightest_dn_per_s
+        What the brightest pixels of an image hold above the dark level, ambient light included;
+        they must not saturate.
+    direct_m
+        (P) range of the direct return.
+    uncertainty_m
+        (P) by how much that may be wrong: what the look at the scene did not resolve.
+    earliest_m, latest_m
+        (P) between which ranges the direct return lies: what the moments do not contradict.
+    delay_s, share
+        (K, P) returns: time of flight (NaN where unused) and share of the pixel's light (0 where
+        unused). What the shares leave to 1 comes back evenly at all times.
+    measured
+        (M + 1, P) measured moments over the brightness, at multiples of `base_frequency_hz`; None
+        where the returns are given exactly.
+    relative_noise
+        (P) deviation of these moments over the brightness.
+    lit_share
+        Share of all pixels whose light stands clear of the noise.
+    dim_share
+        Share of the lit pixels that other surfaces may light alone.
+    moving_share
+        Share of the lit pixels that changed while the scene was looked at.
+    ambiguity_checked
+        Whether `direct_m` is known not to be short by a multiple of the unambiguous range.
+    """
+
+    brightness_dn_per_s: _Array
+    ambient_dn_per_s: _Array
+    brightest_dn_per_s: float
+    direct_m: _Array
+    uncertainty_m: _Array
+    earliest_m: _Array
+    latest_m: _Array
+    delay_s: _Array
+    share: _Array
+    base_frequency_hz: float = 0.0
+    measured: _Array | None = None
+    relative_noise: _Array | None = None
+    lit_share: float = 1.0
+    dim_share: float = 0.0
+    moving_share: float = 0.0
+    ambiguity_checked: bool = True
+
+    def few(self) -> "SceneStatistics":
+        """Return what fewer pixels show, `FEW_PIXELS` of them."""
+        count = self.direct_m.size
+        if count <= FEW_PIXELS:
+            return self
+        chosen = one_of_each(count)
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        of_pixels: dict[str, Any] = {
+            name: value[..., chosen]
+            for name, value in values.items()
+            if isinstance(value, np.ndarray)
+        }
+        return replace(self, **of_pixels)
+
+    def to_document(self) -> dict[str, Any]:
+        """Return what was seen, as JSON."""
+        return {
+            "range_m": float(np.median(self.direct_m)),
+            "brightness_dn_per_s": float(np.median(self.brightness_dn_per_s)),
+            "ambient_dn_per_s": float(np.median(self.ambient_dn_per_s)),
+            "lit_share": self.lit_share,
+            "dim_share": self.dim_share,
+            "moving_share": self.moving_share,
+            "ambiguity_checked": self.ambiguity_checked,
+        }
+
+    @property
+    def lit_in_part(self) -> bool:
+        """Whether so many pixels may be lit by other surfaces alone that no range is certain."""
+        return self.dim_share >= MOSTLY_DIM
+
+    @property
+    def disagreement_m(self) -> float:
+        """What the look did not resolve of the direct range, in the median pixel."""
+        return float(np.median(self.uncertainty_m))
+
+    def covers(self, harmonics: int, base_frequency_hz: float) -> bool:
+        """Whether moments at these frequencies are known without a model of the returns."""
+        if self.measured is None:
+            return True
+        multiple = self._multiple(base_frequency_hz)
+        return multiple > 0 and multiple * harmonics < len(self.measured)
+
+    def relative_moments(self, harmonics: int, base_frequency_hz: float) -> _Array:
+        """Return moments (m + 1, P) of pixels with a brightness of 1."""
+        if self.measured is not None and self.covers(harmonics, base_frequency_hz):
+            step = self._multiple(base_frequency_hz)
+            return np.array(self.measured[: step * harmonics + 1 : step])
+        j = np.arange(harmonics + 1)[:, None, None]
+        phase = 2 * np.pi * base_frequency_hz * np.nan_to_num(self.delay_s)
+        moments = (self.share * np.exp(1j * j * phase)).sum(axis=1)
+        moments[0] = 1.0
+        return np.asarray(moments, np.complex64)
+
+    def ambiguous(self, unambiguous_range_m: float) -> bool:
+        """Whether ranges beyond this one are too frequent, of the direct or of later returns.
+
+        Returns too weak to be taken for the direct one do not count.
+        """
+        counts = (self.share >= DIRECT_THRESHOLD * self.share.max(axis=0)) & (self.share > 0)
+        late_m = np.where(counts, tm.SPEED_OF_LIGHT_M_S / 2 * np.nan_to_num(self.delay_s), 0.0)
+        late = (late_m >= unambiguous_range_m).any(axis=0)
+        direct = self.direct_m >= unambiguous_range_m
+        return bool(direct.mean() > AMBIGUOUS_SHARE or late.mean() > LATE_SHARE)
+
+    def _multiple(self, base_frequency_hz: float) -> int:
+        """Return which multiple of the base frequency of the look this is; 0 where it is none."""
+        if self.base_frequency_hz <= 0:
+            return 0
+        ratio = base_frequency_hz / self.base_frequency_hz
+        nearest = round(ratio)
+        return nearest if abs(ratio - nearest) < 1e-6 * ratio else 0
+
+
+def uniform_scene(
+    brightness_dn_per_s: float,
+    returns: Iterable[tuple[float, float]],
+    *,
+    ambient_dn_per_s: float = 0.0,
+) -> SceneStatistics:
+    """Describe a scene of equal pixels.
+
+    Parameters
+    ----------
+    brightness_dn_per_s
+        b_0 in DN for each second of exposure.
+    returns
+        Range in m and relative weight of each.
+    ambient_dn_per_s
+        As in `SceneStatistics`.
+    """
+    range_m, weight = np.array(list(returns), dtype=float).T
+    repeated = (len(range_m), FEW_PIXELS)
+    delay_s = np.broadcast_to(2 * range_m[:, None] / tm.SPEED_OF_LIGHT_M_S, repeated)
+    share = np.broadcast_to(weight[:, None] / weight.sum(), repeated)
+    counts = weight >= DIRECT_THRESHOLD * weight.max()
+    direct_m = np.full(FEW_PIXELS, range_m[counts].min())
+    return SceneStatistics(
+        brightness_dn_per_s=np.full(FEW_PIXELS, brightness_dn_per_s),
+        ambient_dn_per_s=np.full(FEW_PIXELS, ambient_dn_per_s),
+        brightest_dn_per_s=brightness_dn_per_s + ambient_dn_per_s,
+        direct_m=direct_m,
+        uncertainty_m=np.zeros(FEW_PIXELS),
+        earliest_m=direct_m,
+        latest_m=direct_m,
+        delay_s=delay_s,
+        share=share,
+    )

@@ -1,0 +1,114 @@
+"""One sequence and estimator with their predicted accuracy and cost."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from transientcam_driver import AppliedSequence, Sequence
+from transientcam_server.planning._prediction.prediction import Prediction
+
+
+def in_words(sequence: Sequence, estimator: str) -> str:
+    """State a sequence and an estimator: frequencies, exposure, takes."""
+    takes = f" x {sequence.takes}" if sequence.takes > 1 else ""
+    return (
+        f"m = {sequence.harmonics} at {sequence.base_frequency_hz / 1e6:g} MHz, "
+        f"{sequence.exposure_s * 1e3:.3g} ms{takes}, {estimator}"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A sequence, an estimator, and their predicted accuracy and cost.
+
+    Attributes
+    ----------
+    applied
+        As the camera would set it.
+    estimator
+        What its range is taken from.
+    predicted
+        Errors of the range.
+    beyond_scene
+        Whether it sees more than the look that describes the scene, so that the prediction is a
+        lower bound of the error.
+    timed
+        Returns the computing time of one frame in s, measured on demand; None where its kernels are
+        not compiled yet.
+    bound_width, separation_share
+        Predicted where the goal has them.
+    """
+
+    applied: AppliedSequence
+    estimator: str
+    predicted: Prediction
+    beyond_scene: bool
+    timed: Callable[[], float | None] = field(compare=False)
+    bound_width: float | None = None
+    separation_share: float | None = None
+
+    @property
+    def computing_share(self) -> float | None:
+        """Share of a core's time between two frames that goes into reconstruction, if known."""
+        reconstruct_s = self.timed()
+        return None if reconstruct_s is None else reconstruct_s * self.applied.frame_rate_hz
+
+    def error(self, target: str) -> float:
+        """Return the error that a target limits, as it is expected."""
+        if target == "bound_width":
+            return math.inf if self.bound_width is None else self.bound_width
+        if target == "separation_m":
+            return 1.0 if self.separation_share is None else 1.0 - self.separation_share
+        figure = self.predicted.range_std if target == "range_std_m" else self.predicted.range_error
+        return figure.median
+
+    def error_with_margin(self, target: str) -> float:
+        """Return what most of the captures stay below."""
+        if target == "range_error_m":
+            return self.predicted.range_error.with_margin
+        if target == "range_std_m":
+            return self.predicted.range_std.with_margin
+        return self.error(target)
+
+    def relative_errors(self, targets: Mapping[str, float]) -> tuple[float, float]:
+        """Return the worst error, and the worst with margin, over the largest that targets allow.
+
+        Targets are reached where the latter is 1 at most.
+        """
+        return (
+            max((self.error(name) / limit for name, limit in targets.items()), default=0.0),
+            max(
+                (self.error_with_margin(name) / limit for name, limit in targets.items()),
+                default=0.0,
+            ),
+        )
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the choice as JSON; ``sequence`` is the body of a PUT."""
+        document = self.applied.to_document()
+        del document["sequence_id"]
+        return {
+            "sequence": self.applied.sequence.to_document(),
+            "estimator": self.estimator,
+            "applied": document,
+            "capture_s": self.applied.capture_s,
+            "frame_rate_hz": self.applied.frame_rate_hz,
+            "reconstruct_s": self.timed(),
+            "computing_share": self.computing_share,
+            "predicted": {
+                "range_error_m": self.predicted.range_error.to_document(),
+                "range_std_m": self.predicted.range_std.to_document(),
+                "range_bias_m": self.predicted.range_bias_m,
+                "range_bias_most_m": self.predicted.most_bias_m,
+                "bias_known": self.predicted.bias_known,
+                "outlier_share": self.predicted.outlier_share,
+                "beyond_scene": self.beyond_scene,
+                "bound_width": self.bound_width,
+                "separation_share": self.separation_share,
+            },
+        }
+
+    def in_words(self) -> str:
+        """State the sequence and the estimator."""
+        return in_words(self.applied.sequence, self.estimator)

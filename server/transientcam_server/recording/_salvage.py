@@ -1,0 +1,115 @@
+"""Makes of an unfinished file a new one that any HDF5 reader opens, with all that is whole."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from transientcam_server.errors import NotARecording
+from transientcam_server.recording import _layout as layout, _swmr as swmr
+from transientcam_server.recording._seal import SealedFrame, seal
+from transientcam_server.recording._storage import Storage, is_one_chunk_a_row
+
+_SCALE_ATTRIBUTES: Final = frozenset(
+    ("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid")
+)
+
+
+def salvage(source: swmr.File, target: Path, rows: int, *, row_axis: str) -> None:
+    """Copy an unfinished file, and bring the copy to the disk.
+
+    Chunks are copied as they are. ``row_axis`` is the series whose length counts the rows; every
+    dataset that can grow is cut to ``rows``. Copying whole groups or repairing in place
+    (`h5clear`) were tried and fail on such files: the end of the allocated space that the file
+    states is out of date.
+
+    Raises
+    ------
+    ValueError
+        If it is not as an `Appender` writes it; of a damaged file h5py may raise anything else.
+    OSError
+        If the copy cannot be written.
+    """
+    storage = Storage(source, Path(source.filename).stat().st_size)
+    datasets = {name: storage.dataset(name) for name in source}
+    growing = [name for name, each in datasets.items() if each.maxshape[:1] == (None,)]
+    if row_axis not in growing:
+        raise ValueError(f"no series {row_axis}")
+    with swmr.open_file(target, "w", libver=swmr.LIBVER) as copy:
+        copy.attrs.update(source.attrs)
+        first: dict[swmr.Dataset, str] = {}  # datasets are equal where they are the same one
+        for name, dataset in datasets.items():
+            if first.setdefault(dataset, name) != name:  # another name of it
+                copy[name] = copy[first[dataset]]
+                continue
+            if name not in growing:
+                copy.create_dataset(name, data=storage.values(name), dtype=dataset.dtype)
+            elif dataset.ndim == 1:
+                swmr.create_series(copy, name, dataset.dtype)
+                copy[name].resize(rows, 0)
+                copy[name][:] = storage.values(name)[:rows]
+            else:
+                _copy_blocks(dataset, copy, rows)
+            _copy_attributes(dataset, copy[name])
+        _restore_scales(datasets, copy)
+    swmr.synchronise(target)
+
+
+def rebuild(part: Path, target: Path, frames: Sequence[SealedFrame]) -> None:
+    """Make a recording anew of frames found in an unfinished one, and bring it to the disk.
+
+    Raises
+    ------
+    NotARecording
+        If what was known before the first frame cannot be read, or its frames have no seals.
+    OSError
+        If it cannot be written.
+    """
+    try:
+        with swmr.open_unfinished(part) as source:
+            storage = Storage(source, part.stat().st_size)
+            storage.attribute("seals")
+            header = layout.read_header(storage, with_images=False)
+            annotations = layout.read_document(storage, "annotations")
+    except Exception as error:  # h5py raises anything of a damaged file
+        raise NotARecording(str(part), str(error)) from error
+    target.write_bytes(layout.image(header, annotations))
+    with swmr.open_file(target, "r+", libver=swmr.LIBVER) as file, part.open("rb") as stream:
+        raw = file["raw"]
+        raw.resize(len(frames), 0)
+        for row, frame in enumerate(frames):
+            stream.seek(frame.offset)
+            chunk = stream.read(frame.size)
+            raw.id.write_direct_chunk((row, 0, 0, 0), chunk + seal(row, chunk, frame.values))
+        for name, (kind, _) in layout.SERIES.items():
+            file[name].resize(len(frames), 0)
+            file[name][:] = np.array([frame.values[name] for frame in frames], kind)
+    swmr.synchronise(target)
+
+
+def _copy_blocks(dataset: swmr.Dataset, copy: swmr.File, rows: int) -> None:
+    if not is_one_chunk_a_row(dataset):
+        raise ValueError(f"{dataset.name} was not written as a recording's blocks are")
+    blocks = swmr.create_blocks(copy, dataset.name, dataset.shape[1:], dataset.dtype)
+    blocks.resize(rows, 0)
+    for row in range(rows):
+        place = (row, *(0,) * (dataset.ndim - 1))
+        mask, chunk = dataset.id.read_direct_chunk(place)
+        blocks.id.write_direct_chunk(place, chunk, filter_mask=mask)
+
+
+def _copy_attributes(dataset: swmr.Dataset, copy: swmr.Dataset) -> None:
+    for name in dataset.attrs:
+        if name not in _SCALE_ATTRIBUTES:
+            copy.attrs[name] = dataset.attrs[name]
+
+
+def _restore_scales(datasets: dict[str, swmr.Dataset], copy: swmr.File) -> None:
+    for name, dataset in datasets.items():
+        if dataset.is_scale:
+            copy[name].make_scale(name)
+    for name, dataset in datasets.items():
+        for axis, dimension in enumerate(dataset.dims):
+            for scale in dimension.values():
+                copy[name].dims[axis].attach_scale(copy[scale.name])

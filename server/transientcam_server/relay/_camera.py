@@ -1,0 +1,371 @@
+"""The camera of another service, as a `transientcam_driver.Camera`."""
+
+import secrets
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any, Final
+
+import transientcam
+from transientcam_driver import (
+    AppliedSequence,
+    CameraError,
+    CameraLost,
+    CameraState,
+    FrameTimeout,
+    NotStreaming,
+    ProtocolError,
+    RawFrame,
+    Sequence,
+    Status,
+)
+from transientcam_driver.camera import HostCamera
+from transientcam_driver.clock import Clock, RealClock
+from transientcam_server.imaging import NOMINAL_ID
+from transientcam_server.relay._frames import RAW, SUBSCRIBED, Collector, Parts, capture_of
+from transientcam_server.relay._origin import Described, Origin, require_same_camera
+from transientcam_server.relay._reports import RelayCounters, hops_of, status_of
+
+_SLICE_S: Final = 0.05
+"""How long a reader may wait before it looks whether the camera was stopped."""
+SILENT_S: Final = 1.0
+SILENT_PERIODS: Final = 5.0
+"""Without a frame for so long, the larger of both, the origin is asked whether it captures."""
+_CAPTURING: Final = frozenset(("starting", "streaming", "held"))
+
+
+class RelayCamera(HostCamera):
+    """Frames of another service, numbered on across its restarts; changes are made there.
+
+    The camera is shared: it captures what and when the origin does, whichever client sets that.
+    ``start``, ``stop``, ``safe_off`` and ``configure`` are made at the origin and raise
+    `OriginRefused` where it refuses; ``close`` switches off only what this relay has switched on.
+
+    The connection is closed with the camera, also where this cannot be opened.
+
+    Attributes
+    ----------
+    service_id
+        That of the service this camera belongs to; by it a loop of relays is found.
+    origin
+        What is relayed, as it described itself last.
+    relayed
+        What was missed on the way.
+
+    Raises
+    ------
+    CameraLost
+        The origin does not answer, is too old, lacks what is to be relayed, or relays this very
+        service.
+    """
+
+    def __init__(
+        self,
+        origin: Origin,
+        *,
+        clock: Clock | None = None,
+        unix_time_s: Callable[[], float] = time.time,
+    ) -> None:
+        super().__init__(clock or RealClock(), None)
+        self.service_id = secrets.token_hex(8)
+        self.relayed = RelayCounters()
+        self._link = origin
+        self._unix_time_s = unix_time_s
+        self._stream: transientcam.Stream | None = None
+        self._sequence_id = -1
+        self._epochs = 0
+        self._last: int | None = None  # as the origin counts frames
+        self._added = 0  # to that, so that numbers go on after its restart
+        self._device_time_s = 0.0
+        self._switched_on = False
+        self._outdated = False
+        self._former_id: str | None = None
+        self._gone: str | None = None
+        self._heard_s = 0.0
+        try:
+            self.origin = origin.describe()
+            self._capabilities = self.origin.capabilities
+            self._connect(self.origin)
+        except BaseException:
+            origin.close()
+            raise
+
+    @property
+    def path(self) -> tuple[str, ...]:
+        """The ids of all services from this one to the camera."""
+        return (self.service_id, *self.origin.path)
+
+    @property
+    def url(self) -> str:
+        """Address of the origin."""
+        return self._link.url
+
+    @property
+    def product(self) -> str:
+        """What is relayed: ``raw`` or ``measured_moments``."""
+        return self._link.product
+
+    @property
+    def has_images(self) -> bool:
+        """Whether frames have images, and not their moments alone."""
+        return self.product == RAW
+
+    def device_time_s(self) -> float:
+        """Time of the last frame, by the clock of the device."""
+        return self._device_time_s
+
+    def configure(self, sequence: Sequence) -> AppliedSequence:
+        """Set a sequence at the origin, for all its clients."""
+        self._require_connected()
+        self._capabilities.validate(sequence)
+        self._adopt(self._link.configure(sequence.to_document()))
+        return self._applied
+
+    def start(self) -> None:
+        """Let the origin capture; nothing is asked of one that does."""
+        self._require_connected()
+        with self._control:
+            if self._state is not CameraState.STREAMING:
+                self._link.set_running(True)
+                self._switched_on = True
+                self._begin()
+
+    def stop(self) -> None:
+        """Stop the capture at the origin, for all its clients."""
+        self._switch_off(lambda: self._link.set_running(False))
+
+    def safe_off(self) -> None:
+        """Switch the light off at the origin, whichever client holds the lease there."""
+        self._switch_off(self._link.safe_off)
+
+    def status(self) -> Status:
+        """Ask the origin for the status of its camera, and whether it captures."""
+        self._require_connected()
+        document = self._ask()
+        if document["status"] is None:
+            raise self._lost("the origin's camera does not answer")
+        return status_of(document["status"], epoch=self._applied.epoch)
+
+    def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
+        """Wait for the next frame that the origin sends."""
+        end_s = self._clock.now_s() + timeout_s
+        while True:
+            self._require_connected()
+            if self._state is not CameraState.STREAMING:
+                raise NotStreaming(self._state)
+            now_s = self._clock.now_s()
+            raw = self._receive(max(0.0, min(_SLICE_S, end_s - now_s)))
+            if raw is not None:
+                return raw
+            if self._outdated:
+                self._refresh()
+            if now_s - self._heard_s > self._silent_s:
+                self._ask()
+            if now_s >= end_s:
+                raise FrameTimeout(timeout_s)
+
+    def reconnect(self) -> None:
+        """Find the origin again, and go on after the last frame where that is kept."""
+        with self._control:
+            self._require_open()
+            if self._state is CameraState.DISCONNECTED:
+                self._connect(self._link.describe())
+                self.relayed.reconnects += 1
+
+    def close(self) -> None:
+        """Leave the origin, and switch off what this relay has switched on."""
+        if self._closed:
+            return
+        if self._switched_on:
+            with suppress(CameraError):
+                self._link.set_running(False)
+        self._closed = True
+        self._state = CameraState.DISCONNECTED
+        self._link.close()
+
+    def take_lease(self, holder: str, **terms: Any) -> None:
+        """Take the lease of the origin for a client of this relay; terms as `Camera.lease` has."""
+        self._require_connected()
+        self._link.take_lease(f"{holder} (through a relay)", **terms)
+
+    def release_lease(self) -> None:
+        """Give the lease of the origin back, if this relay has it."""
+        self._link.release_lease()
+
+    # -- what the origin is at ------------------------------------------------------------------
+
+    def _connect(self, found: Described) -> None:
+        if self.service_id in found.path:
+            raise CameraLost(f"{self.url} relays this very service: a loop of relays")
+        require_same_camera(self._capabilities, found.capabilities)
+        if self.origin.service_id != found.service_id:  # it counts frames and sequences anew
+            self.relayed.restarts += 1
+            self._added += self._last or 0
+            self._last, self._sequence_id, self._switched_on = None, -1, False
+        self.origin, self._outdated, self._gone = found, False, None
+        self._adopt(found.sequence)
+        start = None if self._last is None else self._last + 1
+        self._stream = self._link.stream(start=start, on_notice=self._noticed)
+        self._collector = Collector(SUBSCRIBED[self._link.product])
+        self._state = CameraState.IDLE
+        self._ask()
+
+    def _ask(self) -> dict[str, Any]:
+        """Return the document of the origin's camera, and follow whether it captures."""
+        self._heard_s = self._clock.now_s()
+        try:
+            document = self._link.camera()
+        except CameraLost as error:
+            raise self._lost(error.reason) from error
+        if document["state"] == "lost":
+            raise self._lost(f"the origin has lost its camera: {document['reason']}")
+        if document["state"] != "calibrating":  # frames go on afterwards
+            self._follow(document["state"] in _CAPTURING)
+        return document
+
+    def _follow(self, capturing: bool) -> None:
+        with self._control:
+            if not capturing:
+                self._state, self._switched_on = CameraState.IDLE, False
+            elif self._state is not CameraState.STREAMING:
+                self._begin()
+
+    def _begin(self) -> None:
+        self._state, self._heard_s = CameraState.STREAMING, self._clock.now_s()
+
+    def _switch_off(self, request: Callable[[], None]) -> None:
+        self._require_connected()
+        request()
+        self._follow(capturing=False)
+
+    def _refresh(self) -> None:
+        """Take over what the origin has changed beside its sequence."""
+        self._outdated = False
+        try:
+            found = self._link.describe()
+        except CameraLost as error:
+            raise self._lost(error.reason) from error
+        if found.service_id != self.origin.service_id:
+            raise self._lost("the origin was started anew")
+        self.origin = found
+
+    def _adopt(self, document: Mapping[str, Any]) -> None:
+        """Take over a newer sequence of the origin."""
+        with self._control:
+            sequence_id = int(document["sequence_id"])
+            if sequence_id <= self._sequence_id:  # an older one, of a notice that was on its way
+                return
+            sequence = Sequence.from_document(document)
+            self._epochs += 1
+            self._applied = self._capabilities.describe(sequence, epoch=self._epochs)
+            self._sequence_id = sequence_id
+
+    def _lost(self, reason: str) -> CameraLost:
+        with self._control:
+            self._state = CameraState.DISCONNECTED
+            if self._stream is not None:
+                self._stream.close()
+        return CameraLost(reason)
+
+    # -- frames ---------------------------------------------------------------------------------
+
+    @property
+    def _silent_s(self) -> float:
+        return max(SILENT_S, SILENT_PERIODS / self._applied.frame_rate_hz)
+
+    def _noticed(self, notice: transientcam.Notice) -> None:
+        """Note what a notice of the stream says; it is acted on between two messages."""
+        match notice.kind:
+            case "camera-lost":
+                self._gone = f"the origin has lost its camera: {notice.details.get('reason')}"
+            case "calibration-changed" | "simulation-changed":
+                self._outdated = True
+            case "reconstruction-changed" if not self.has_images:  # of spoilt ones, it may be
+                self._outdated = True
+            case "dropped" if notice.details["channel"] == self._counted:
+                self.relayed.dropped_frames += int(notice.details["count"])
+
+    @property
+    def _counted(self) -> int | None:
+        """The channel whose frames are counted: all products of one are dropped together."""
+        hello = None if self._stream is None else self._stream.hello
+        return None if hello is None else hello.channels[0].channel
+
+    def _receive(self, timeout_s: float) -> RawFrame | None:
+        """Return the next frame of the sequence that is set, None if none came in time."""
+        stream = self._stream
+        assert stream is not None  # noqa: S101 - a connected camera has one
+        frame = None
+        try:
+            with suppress(transientcam.FrameTimeout):
+                frame = stream.receive(timeout_s=timeout_s)
+        except transientcam.TransientcamError as error:
+            self._require_open()
+            raise self._lost(str(error)) from error
+        if self._gone is not None:
+            raise self._lost(self._gone)
+        if stream.hello is not None:
+            if stream.hello.server.get("service_id") != self.origin.service_id:
+                raise self._lost("the origin was started anew")
+            self._adopt(stream.sequence)
+        if frame is None:
+            return None
+        self._heard_s = self._clock.now_s()
+        parts = self._collector.add(frame)
+        return None if parts is None else self._capture(parts)
+
+    def _capture(self, parts: Parts) -> RawFrame | None:
+        frame = next(iter(parts.values()))
+        meta, applied = frame.meta, self._applied
+        replaced = meta["sequence_id"] != self._sequence_id
+        if not (replaced or self.has_images or self._calibrated_alike(meta["calibration_id"])):
+            return None  # counted as missed with the next one
+        missed = 0 if self._last is None else max(0, frame.frame - self._last - 1)
+        self._last = frame.frame
+        self.relayed.missed_frames += missed
+        if replaced:
+            return None
+        lost = meta["lost_images"] + missed * applied.images
+        try:
+            capture = capture_of(
+                parts,
+                applied,
+                self._capabilities,
+                number=self._added + frame.frame,
+                lost_images=lost,
+                hops=hops_of(
+                    meta,
+                    service_id=self.service_id,
+                    now_unix_s=self._unix_time_s(),
+                    missed_frames=self.relayed.missed_frames,
+                ),
+            )
+        except ProtocolError:
+            self._lost("")
+            raise
+        self._device_time_s = meta["device_time_s"]
+        self.counters.frames += 1
+        self.counters.images += applied.images
+        self.counters.lost += lost
+        return capture
+
+    def _calibrated_alike(self, calibration_id: str) -> bool:
+        """Return whether moments have the calibration that is known here; another is asked for.
+
+        Those of a former one, which the origin still keeps, do not: their gains and bad pixels are
+        not known any more.
+        """
+        if calibration_id != self._calibration_id and (
+            self._outdated or calibration_id != self._former_id
+        ):
+            self._former_id = calibration_id  # unless it is the new one
+            self._refresh()
+        return calibration_id == self._calibration_id
+
+    @property
+    def _calibration_id(self) -> str:
+        """What frames of the origin say that they are calibrated by."""
+        calibration = self.origin.calibration
+        if calibration is None or calibration.capture.misfit(self._applied, self._capabilities):
+            return NOMINAL_ID
+        return calibration.gains.id

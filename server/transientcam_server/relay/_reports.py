@@ -1,0 +1,67 @@
+"""What a relay reports: the way of a frame, what was missed, and the status of the camera."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from transientcam.frame import FrameMeta
+from transientcam_driver import Status
+from transientcam_driver.camera import DeviceState, Hop, StatusFlag
+
+_FLAGS = {
+    "light_on": StatusFlag.LIGHT_ON,
+    "interlock_closed": StatusFlag.INTERLOCK_CLOSED,
+    "watchdog_tripped": StatusFlag.WATCHDOG_TRIPPED,
+}
+
+
+@dataclass(slots=True)
+class RelayCounters:
+    """What happened between an origin and its relay, since the relay was opened.
+
+    Attributes
+    ----------
+    missed_frames
+        Frames that the origin captured and the relay never got, by their numbers; how many there
+        were across a restart of the origin is not known.
+    dropped_frames
+        Those of them that the origin dropped because the relay, or the network, was too slow.
+    reconnects, restarts
+        How often the origin was found again, and how often it was another process then.
+    """
+
+    missed_frames: int = 0
+    dropped_frames: int = 0
+    reconnects: int = 0
+    restarts: int = 0
+
+
+def hops_of(
+    meta: FrameMeta, *, service_id: str, now_unix_s: float, missed_frames: int
+) -> tuple[Hop, ...]:
+    """Return the relays that a frame has come through, this one last."""
+    before = tuple(
+        Hop(str(hop["service_id"]), float(hop["latency_s"]), int(hop["missed_frames"]))
+        for hop in meta.get("hops", ())
+    )
+    left_s = meta["host_time_s"] + sum(hop.latency_s for hop in before)
+    return (*before, Hop(service_id, now_unix_s - left_s, missed_frames))
+
+
+def status_of(document: Mapping[str, Any], *, epoch: int) -> Status:
+    """Return the status that ``GET /camera`` of an origin has, with the epoch of this relay."""
+    flags = StatusFlag(0)
+    for name, flag in _FLAGS.items():
+        if document[name]:
+            flags |= flag
+    return Status(
+        state=DeviceState[str(document["state"]).upper()],
+        flags=flags,
+        epoch=epoch,
+        next_image=int(document["next_image"]),
+        device_time_s=float(document["device_time_s"]),
+        dropped_images=int(document["dropped_images"]),
+        fifo_bytes=int(document["fifo_bytes"]),
+        fifo_high_water_bytes=int(document["fifo_high_water_bytes"]),
+        temperature_c=float(document["temperature_c"]),
+    )

@@ -1,0 +1,155 @@
+"""Cameras that expose on request: order, settling, losses, and no unrequested light."""
+
+from dataclasses import replace
+
+import pytest
+
+from tests.driver.cameras.triggered.scripted import EXPOSED_S, SETTLES_S, Cable
+from transientcam_driver import (
+    CameraLost,
+    CameraNotFound,
+    FrameTimeout,
+    NotStreaming,
+    Sequence,
+    SubPhases,
+)
+from transientcam_driver.camera import CameraState
+from transientcam_driver.clock import VirtualClock
+
+NONE = SubPhases("none")
+ONE = Sequence(base_frequency_hz=10e6, harmonics=1, zeroth="estimated", sub_phases=NONE)
+TWO = replace(ONE, harmonics=2, zeroth="low-frequency", takes=2)
+
+
+def test_images_stand_where_their_labels_say() -> None:
+    with Cable().camera() as camera:
+        applied = camera.configure(TWO)
+        camera.start()
+        frame = camera.read_frame()
+
+    assert frame.labels == applied.labels
+    assert [int(image[0, 0]) for image in frame.images] == list(range(24))
+    assert frame.temperature_c == 40.0
+
+
+def test_each_frequency_settles_before_its_four_phases_are_exposed() -> None:
+    cable = Cable()
+    with cable.camera() as camera:
+        camera.configure(TWO)
+        camera.start()
+        frame = camera.read_frame()
+
+    assert [harmonic for harmonic, _ in cable.asked] == [0, 1, 2, 0, 1, 2]
+    between_s = [b - a for (_, a), (_, b) in zip(cable.asked, cable.asked[1:], strict=False)]
+    assert between_s == pytest.approx([SETTLES_S + EXPOSED_S] * 5)
+    assert frame.capture_s == pytest.approx(5 * SETTLES_S + 6 * EXPOSED_S)
+
+
+def test_the_time_to_settle_is_in_what_a_capture_is_said_to_take() -> None:
+    with Cable().camera() as camera:
+        two, one = camera.validate(TWO), camera.validate(ONE)
+
+    exposed_s = 24 * (TWO.exposure_s + 1e-3)
+    assert two.capture_s == pytest.approx(exposed_s + 6 * SETTLES_S)
+    assert two.frame_rate_hz == pytest.approx(1 / two.capture_s)
+    assert one.capture_s == pytest.approx(4 * (one.sequence.exposure_s + 1e-3))
+
+
+def test_exposures_are_on_the_cameras_grid() -> None:
+    with Cable().camera() as camera:
+        applied = camera.configure(replace(ONE, exposure_s=25.4e-6))
+
+    assert applied.sequence.exposure_s == 25e-6
+
+
+def test_what_a_timeout_interrupts_goes_on() -> None:
+    cable = Cable(delayed=3)
+    with cable.camera() as camera:
+        camera.configure(TWO)
+        camera.start()
+        for _ in range(3):
+            with pytest.raises(FrameTimeout):
+                camera.read_frame(timeout_s=0.04)
+        camera.read_frame()
+
+    assert [harmonic for harmonic, _ in cable.asked] == [0, 1, 2, 0, 1, 2]
+
+
+def test_nothing_is_exposed_unless_a_frame_is_read() -> None:
+    cable = Cable()
+    with cable.camera() as camera:
+        camera.start()
+        camera.status()
+        assert cable.asked == []
+        camera.read_frame()
+        asked = len(cable.asked)
+        camera.stop()
+        with pytest.raises(NotStreaming):
+            camera.read_frame()
+
+    assert len(cable.asked) == asked
+
+
+def test_lost_images_cost_their_frame_alone() -> None:
+    cable = Cable()
+    with cable.camera() as camera:
+        camera.configure(TWO)
+        camera.start()
+        camera.read_frame()
+        cable.groups_to_lose = 2
+        after, later = camera.read_frame(), camera.read_frame()
+
+    assert (after.number, after.lost_images, later.number, later.lost_images) == (3, 8, 4, 0)
+    counters = camera.counters
+    assert (counters.lost, counters.incomplete_frames, counters.frames) == (8, 2, 3)
+
+
+def test_images_that_arrive_after_another_sequence_was_set_are_dropped() -> None:
+    cable = Cable(delayed=1)
+    with cable.camera() as camera:
+        camera.start()
+        with pytest.raises(FrameTimeout):
+            camera.read_frame(timeout_s=0.0)
+        applied = camera.configure(TWO)
+        frame = camera.read_frame()
+
+    assert frame.epoch == applied.epoch
+    assert len(frame.images) == 24
+
+
+def test_another_device_at_the_same_address_is_not_taken_for_it() -> None:
+    cable = Cable()
+    with cable.camera() as camera:
+        camera.start()
+        cable.plugged = False
+        with pytest.raises(Exception, match="cable"):
+            camera.read_frame()
+        cable.plugged, cable.serial = True, "S-2"
+        with pytest.raises(CameraNotFound, match="S-1"):
+            camera.reconnect()
+        cable.serial = "S-1"
+        camera.reconnect()
+        assert camera.state == CameraState.STREAMING
+        camera.read_frame()
+
+
+def test_time_is_the_clocks() -> None:
+    cable = Cable(clock=VirtualClock(start_s=50.0, unix_s=1.7e9))
+    with cable.camera() as camera:
+        camera.start()
+        camera.read_frame()
+        frame = camera.read_frame()
+
+    assert frame.device_time_s == pytest.approx(cable.asked[len(cable.asked) // 2][1] - 50.0)
+    assert frame.host_time_s == pytest.approx(1.7e9 + cable.clock.now_s() - 50.0)
+
+
+def test_a_camera_whose_images_never_come_is_lost_with_the_reason() -> None:
+    cable = Cable(groups_to_lose=5)
+    with cable.camera() as camera:
+        camera.start()
+        with pytest.raises(CameraLost, match="5 times in a row images were lost: as the test"):
+            camera.read_frame()
+        assert camera.state == CameraState.DISCONNECTED
+        camera.reconnect()
+        assert camera.read_frame().lost_images == 20

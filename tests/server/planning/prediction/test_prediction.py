@@ -1,0 +1,126 @@
+"""Predicted errors against closed forms and captures."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+import transientcam_moments as tm
+from benchmarks.accuracy.promises import measured
+from tests.server.planning.looks import SETTINGS, looked
+from transientcam_driver import Sequence
+from transientcam_server.planning import Goal, Planner, SceneStatistics, uniform_scene
+from transientcam_server.planning._prediction.prediction import Predictor
+from transientcam_server.planning._scene.sampling import one_of_each
+
+FREQUENCY_HZ = 23e6
+
+
+@pytest.fixture(scope="module")
+def wall() -> tuple[Planner, SceneStatistics]:
+    return looked("sim:wall?seed=7")
+
+
+def test_deviation_of_one_return_at_one_frequency_is_the_closed_form() -> None:
+    sensor = tm.noise.Sensor()
+    predictor = Predictor(uniform_scene(4e5, [(2.0, 1.0)]), sensor, SETTINGS)
+    sequence = Sequence(harmonics=1, exposure_s=0.001, takes=2, zeroth="estimated")
+
+    predicted = predictor.predict("single-frequency", sequence)
+
+    b0, gain = (
+        400.0,
+        abs(tm.nominal_calibration(1, sequence.sub_phases.phases_rad, zeroth="on-off")[1]),
+    )
+    variance = (b0 / 9.0 + 2 * (30 / 9.0) ** 2 + 1 / 6) / gain**2 / 2
+    std_rad = np.sqrt(variance * tm.noise.smoothing_factor(0.6)) / b0
+    expected_m = tm.range_m(std_rad, FREQUENCY_HZ)
+    assert predicted.range_std.median == pytest.approx(expected_m, rel=0.05)
+    # the median over 30 draws is itself that noisy
+    assert predicted.range_bias_m < 0.25 * expected_m
+    assert predictor.least_noise_m(
+        "single-frequency", sequence, predictor.noise_scale(sequence)
+    ) == pytest.approx(expected_m, rel=1e-3)
+
+
+def test_more_pixels_know_an_error_more_closely() -> None:
+    """Each has a second return of its own."""
+    one = uniform_scene(1e6, [(2.0, 1.0)])
+    random = np.random.default_rng(4)
+    pixels = 1024
+    full: dict[str, Any] = {
+        each.name: np.repeat(value, pixels // value.shape[-1], axis=-1)
+        for each in dataclasses.fields(one)
+        if isinstance(value := getattr(one, each.name), np.ndarray)
+    }
+    delay_s = 2 * random.uniform(2.2, 4.0, (1, pixels)) / tm.SPEED_OF_LIGHT_M_S
+    share = np.linspace(0, 0.5, pixels)[None]
+    scene = dataclasses.replace(
+        one,
+        **full
+        | {
+            "delay_s": np.concatenate([full["delay_s"], delay_s]),
+            "share": np.concatenate([full["share"] - share, share]),
+        },
+    )
+    predictor = Predictor(scene, tm.noise.Sensor(), SETTINGS)
+    sequence = Sequence(harmonics=1, exposure_s=0.002, takes=100, zeroth="estimated")
+
+    few = predictor.predict("single-frequency", sequence).range_error
+    many = predictor.predict("single-frequency", sequence, closely=True).range_error
+
+    turn = 4 * np.pi * sequence.base_frequency_hz / tm.SPEED_OF_LIGHT_M_S
+    mixed = (1 - share) * np.exp(2j * turn) + share * np.exp(
+        1j * turn * delay_s * tm.SPEED_OF_LIGHT_M_S / 2
+    )
+    bias_m = np.abs(np.remainder(np.angle(mixed) / turn - 2.0 + np.pi, 2 * np.pi) - np.pi)
+    assert many.median == pytest.approx(np.median(bias_m), rel=0.02)
+    assert few.median == pytest.approx(np.median(bias_m[:, one_of_each(pixels)]), rel=0.02)
+    assert few.median != pytest.approx(np.median(bias_m), rel=0.1)
+
+
+def test_the_bias_of_a_second_return_is_that_of_the_phase_of_the_sum() -> None:
+    scene = uniform_scene(1e6, [(1.5, 3.0), (2.5, 1.0)])
+    predictor = Predictor(scene, tm.noise.Sensor(), SETTINGS)
+    sequence = Sequence(harmonics=1, exposure_s=0.002, takes=100, zeroth="estimated")
+
+    predicted = predictor.predict("single-frequency", sequence)
+
+    period_m = tm.SPEED_OF_LIGHT_M_S / (2 * FREQUENCY_HZ)
+    turn = 2 * np.pi / period_m
+    mixed = np.angle(3 * np.exp(1j * turn * 1.5) + np.exp(1j * turn * 2.5)) / turn
+    assert predicted.range_bias_m == pytest.approx(mixed - 1.5, rel=0.01)
+    assert predicted.range_error.median == pytest.approx(mixed - 1.5, rel=0.01)
+
+
+@pytest.mark.parametrize("goal", [Goal(range_error_m=0.005), Goal(capture_s=0.05)])
+def test_the_recommended_sequence_measures_as_predicted(
+    goal: Goal, wall: tuple[Planner, SceneStatistics]
+) -> None:
+    planner, scene = wall
+
+    best = planner.plan(goal, scene).recommended
+
+    values, device_s, saturated = measured("wall", best.applied.sequence, best.estimator, 10)
+    figure = best.predicted.range_error
+    assert values["error"] == pytest.approx(figure.median, rel=0.2)
+    assert device_s == pytest.approx(best.applied.capture_s, rel=5e-3)
+    assert saturated == 0.0
+    if goal.range_error_m is not None:
+        assert values["error"] <= goal.range_error_m
+
+
+@pytest.mark.parametrize(("apart_m", "known"), [(0.0, True), (0.0005, True), (0.02, False)])
+def test_a_bias_is_not_known_where_the_estimators_of_a_look_disagree(
+    apart_m: float, known: bool
+) -> None:
+    one = uniform_scene(4e5, [(2.0, 1.0)])
+    scene = dataclasses.replace(one, uncertainty_m=np.full_like(one.direct_m, apart_m))
+
+    found = Predictor(scene, tm.noise.Sensor(), SETTINGS).predict(
+        "likelihood", Sequence(harmonics=3)
+    )
+
+    assert found.range_error.median > apart_m
+    assert found.bias_known is known

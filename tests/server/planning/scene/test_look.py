@@ -1,0 +1,106 @@
+"""Looks: light, ambiguity and motion of a scene."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.server.planning.looks import SCENE, SETTINGS, looked
+from transientcam_driver import Camera, RawFrame, Sequence, open_camera
+from transientcam_driver.clock import VirtualClock
+from transientcam_server.camera import sensor_of
+from transientcam_server.errors import Problem
+from transientcam_server.planning import Goal, Planner, Progress
+from transientcam_server.planning._scene.look import FRAMES, STILL_FRAMES, STILL_SHARE
+from transientcam_server.settings import SensorSettings
+
+
+def test_a_look_knows_the_range_beyond_the_unambiguous_one_and_the_light_of_the_sun(
+    tmp_path: Any,
+) -> None:
+    path = tmp_path / "far.toml"
+    path.write_text(SCENE.format(light=4e8, ambient=6e6, away_m=9.0, width_m=9.0))
+
+    planner, scene = looked(f"sim:{path}?seed=7")
+
+    assert np.median(scene.direct_m) == pytest.approx(9.0, abs=0.3)
+    assert np.median(scene.ambient_dn_per_s) == pytest.approx(0.8 * 6e6 / 9.0, rel=0.5)
+    assert scene.ambiguity_checked
+    best = planner.plan(Goal(capture_s=0.1), scene).recommended
+    assert best.applied.unambiguous_range_m > 9.0
+
+
+def test_a_look_counts_lit_pixels_alone(tmp_path: Any) -> None:
+    path = tmp_path / "panel.toml"
+    path.write_text(SCENE.format(light=5e7, ambient=0.0, away_m=2.0, width_m=0.6))
+
+    _, scene = looked(f"sim:{path}?seed=7")
+
+    with open_camera(f"sim:{path}", clock=VirtualClock()) as camera:
+        assert camera.simulation is not None
+        lit_share = np.isfinite(camera.simulation.truth().range_m).mean()
+    assert scene.lit_share == pytest.approx(lit_share, rel=0.02)
+
+
+def test_a_dark_scene_is_refused(tmp_path: Any) -> None:
+    path = tmp_path / "dark.toml"
+    path.write_text(SCENE.format(light=1.0, ambient=0.0, away_m=2.0, width_m=3.0))
+
+    with pytest.raises(Problem, match="No pixel has light"):
+        looked(f"sim:{path}?seed=7")
+
+
+def test_a_look_can_be_ended() -> None:
+    class EnoughError(Exception):
+        pass
+
+    shares = []
+
+    def report(share: float, step: str) -> None:
+        shares.append(share)
+        if step == "all frequencies":
+            raise EnoughError
+
+    with open_camera("sim:wall", clock=VirtualClock()) as camera:
+        planner = Planner(camera.capabilities, sensor_of(camera, SensorSettings()), SETTINGS)
+        with pytest.raises(EnoughError):
+            planner.look(camera, Sequence(), progress=Progress(report))
+
+    assert shares == sorted(shares)
+    assert 0 < shares[-1] < 0.5
+
+
+class Carried:
+    """A camera that is turned by so many pixels from frame to frame."""
+
+    def __init__(self, camera: Camera, pixels: int) -> None:
+        self.capabilities = camera.capabilities
+        self.configure, self.start, self.stop = camera.configure, camera.start, camera.stop
+        self._camera, self._pixels, self._read = camera, pixels, 0
+
+    def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
+        raw = self._camera.read_frame(timeout_s=timeout_s)
+        self._read += 1
+        images = np.roll(np.asarray(raw.images), self._pixels * self._read, axis=2)
+        return dataclasses.replace(raw, images=images)
+
+
+@pytest.mark.parametrize(("pixels", "frames"), [(0, STILL_FRAMES), (2, FRAMES)])
+def test_only_what_stands_still_is_looked_at_for_long(
+    pixels: int, frames: int, tmp_path: Any
+) -> None:
+    path = tmp_path / "panel.toml"
+    path.write_text(SCENE.format(light=5e7, ambient=0.0, away_m=2.0, width_m=0.6))
+    steps = []
+
+    with open_camera(f"sim:{path}?seed=7", clock=VirtualClock()) as camera:
+        planner = Planner(camera.capabilities, sensor_of(camera, SensorSettings()), SETTINGS)
+        scene = planner.look(
+            Carried(camera, pixels),
+            Sequence(),
+            progress=Progress(lambda share, step: steps.append(step)),
+        )
+
+    assert steps.count("all frequencies") == frames
+    assert (scene.moving_share > STILL_SHARE) == (frames == FRAMES)
