@@ -246,7 +246,7 @@ def test_a_setting_leaves_everything_to_numpy(setting: str) -> None:
 
 
 def test_without_a_compiler_numpy_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in (*COMPILED, "light.compiling"):
+    for name in (*COMPILED, "compiled._compiling"):
         monkeypatch.delitem(sys.modules, f"transientcam_simulation.{name}")
     monkeypatch.setitem(sys.modules, "numba", None)
     lanes = Lanes({})
@@ -261,7 +261,7 @@ def test_lanes_are_compiled_by_another_process_and_loaded_by_this_one(tmp_path: 
     code = (
         "import threading\n"
         "from transientcam_compiled import THREAD\n"
-        "from transientcam_driver.simulation.light.lanes import LANES, OF_IMAGES\n"
+        "from transientcam_simulation.compiled._lanes import LANES, OF_IMAGES\n"
         "LANES.want(OF_IMAGES)\n"
         "[each.join() for each in threading.enumerate() if each.name == THREAD]\n"
         "stats = LANES.find('at_phase').stats\n"
