@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_moments._dispatch import KERNELS, find, lookup
+from transientcam_moments._dispatch import KERNELS, PRECISIONS, lookup
 from transientcam_moments._kernels.one_pass import Constants, OnePass
 from transientcam_moments.images import gaussian_taps
 
@@ -84,7 +84,8 @@ def numpy_alone() -> Iterator[None]:
 
 def lane(name: str, planes: Array) -> Any:
     """Return a compiled lane, which has to be there."""
-    found = find(name, planes)
+    precision = PRECISIONS[planes.dtype.char]
+    found = lookup(name, len(planes) - 1, planes[0].size, precision)
     if found is None:
         raise RuntimeError(f"{name} isn't compiled: {tm.kernels.state()}")
     return found
