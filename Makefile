@@ -15,7 +15,7 @@ DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace
 
 .DEFAULT_GOAL := help
 .PHONY: help serve test test-fast check bench paper docs docs-site dist clean dashboard debian-packages \
-	check-pyright check-mypy check-style check-dashboard
+	check-pyright check-mypy check-style check-dashboard check-newest
 
 help:  ## Say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 16
@@ -112,6 +112,21 @@ clean:  ## Remove everything that was built or installed here
 client/dashboard/node_modules/.package-lock.json: client/dashboard/package-lock.json
 	npm --prefix client/dashboard ci --no-audit --no-fund
 	@touch $@
+
+# pyproject.toml bounds numba and uvicorn, since internals of both are used:
+# - numba: config.CACHE_DIR, the event "numba:compile", and a dispatcher's compile and signatures
+#   (transientcam_compiled/_cache.py); extending, cgutils, castgraph and typing.templates
+#   (transientcam_moments/_kernels/simd.py, portable.py)
+# - uvicorn: HttpToolsProtocol, WebSocketsSansIOProtocol (conn, queue, close_sent, read_paused), FlowControl
+#   (transientcam_server/daemon/connections.py, streams.py); Server's signals and the clock of its loop (server.py)
+# Where this passes with a newer one, the bound may be raised to it.
+check-newest:  ## Test what uses internals of numba and uvicorn with the newest of both
+	$(PYTHON) -m venv build/newest
+	build/newest/bin/python -m pip install --quiet --upgrade --editable '.[test]'
+	build/newest/bin/python -m pip install --quiet --upgrade numba 'uvicorn[standard]'
+	build/newest/bin/python -m pip list | grep -E '^(numba|uvicorn) '
+	build/newest/bin/python -m pytest --numprocesses auto --dist loadfile tests/compiled tests/moments/test_kernels*.py \
+		tests/simulation/light/test_lanes.py tests/server/daemon tests/server/api/stream
 
 # Side by side, the slowest first.
 check-pyright:

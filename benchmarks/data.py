@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from transientcam_moments._dispatch import KERNELS, PRECISIONS, lookup
 from transientcam_moments._kernels.one_pass import Constants, OnePass
-from transientcam_moments._lanes import find, lookup
-from transientcam_moments._lanes.registry import REGISTRY
 from transientcam_moments.images import gaussian_taps
 
 Array = NDArray[Any]
@@ -73,19 +72,20 @@ def constants(m: int) -> Constants:
 @contextmanager
 def numpy_alone() -> Iterator[None]:
     """Leave everything to NumPy inside."""
-    lanes = dict(REGISTRY.compiled)
-    REGISTRY.compiled.clear()
-    automatic, REGISTRY.automatic = REGISTRY.automatic, False
+    lanes = dict(KERNELS.compiled)
+    KERNELS.compiled.clear()
+    automatic, KERNELS.automatic = KERNELS.automatic, False
     try:
         yield
     finally:
-        REGISTRY.automatic = automatic
-        REGISTRY.compiled.update(lanes)
+        KERNELS.automatic = automatic
+        KERNELS.compiled.update(lanes)
 
 
 def lane(name: str, planes: Array) -> Any:
     """Return a compiled lane, which has to be there."""
-    found = find(name, planes)
+    precision = PRECISIONS[planes.dtype.char]
+    found = lookup(name, len(planes) - 1, planes[0].size, precision)
     if found is None:
         raise RuntimeError(f"{name} isn't compiled: {tm.kernels.state()}")
     return found

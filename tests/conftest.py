@@ -40,7 +40,7 @@ _LIBRARY_THREADS = (
     "pydev",
     "OpenBLAS",
     "transientcam-compile",
-    "transientcam-lane",
+    "transientcam-kernel",
     "AnyIO worker",
     "uvloop_",
     "zarr_io",

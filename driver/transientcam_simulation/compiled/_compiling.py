@@ -1,7 +1,6 @@
-"""From functions to lanes: compiled for one signature by numba, or loaded from its cache."""
+"""From functions to lanes: compiled for one signature by numba, or loaded from the cache."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from typing import Any
 
 from numba import (
@@ -14,8 +13,7 @@ from numba import (
     uint16 as numba_uint16,
 )
 
-LANES: dict[str, Callable[..., Any]] = {}
-"""All lanes that are compiled, by their names."""
+from transientcam_simulation.compiled._lanes import CACHE, FUNCTIONS
 
 # numba is only partly annotated
 float32: Any = numba_float32
@@ -58,11 +56,9 @@ def lane(*signature: Any) -> Callable[[Callable[..., Any]], Any]:
 
     def decorate(function: Callable[..., Any]) -> Any:
         dispatcher = njit(nogil=True, error_model="numpy")(function)
-        with suppress(RuntimeError):  # where there is no place to keep it between processes
-            dispatcher.enable_caching()
-        dispatcher.compile(signature)
+        CACHE.compile(dispatcher, signature)
         dispatcher.disable_compile()
-        LANES[function.__name__] = dispatcher
+        FUNCTIONS.setdefault(function.__module__, {})[function.__name__] = dispatcher
         return dispatcher
 
     return decorate

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels import simd
 from transientcam_moments._kernels.compiled_entry import PIXELS, entry, order_type, real_arrays
-from transientcam_moments._lanes.parallel import Spread, at_once
 
 
 @njit(nogil=True, error_model="numpy")

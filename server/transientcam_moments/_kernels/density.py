@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_compiled import Spread, at_once, empty
+from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import simd, toeplitz
 from transientcam_moments._kernels.compiled_entry import (
     FLAG,
@@ -18,9 +20,6 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.phase_groups import ANY, MIRRORED, TURN, grouping
-from transientcam_moments._lanes.parallel import Spread, at_once
-from transientcam_moments._lanes.pool import empty
-from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 _BANK = 240  # pairs of registers of coefficients, which stay in the first cache for all phases
 _PAST_CACHES_BYTES = 1 << 24

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
     REAL,
@@ -20,7 +21,6 @@ from transientcam_moments._kernels.covariance import (
     half_turned,
     interpolation,
 )
-from transientcam_moments._lanes.parallel import Spread, at_once
 
 
 @njit(nogil=True, error_model="numpy")

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_compiled import Spread, at_once, empty
 from transientcam_moments._kernels import simd, toeplitz
 from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
@@ -14,8 +15,6 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._lanes.parallel import Spread, at_once
-from transientcam_moments._lanes.pool import empty
 
 _INTERLEAVE = 4
 

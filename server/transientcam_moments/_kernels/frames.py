@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from transientcam_compiled import Spread, at_once, empty
+from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import inputs, outputs
 from transientcam_moments._kernels.compiled_entry import (
     BYTES,
@@ -17,9 +19,6 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.padding import LEAST_WIDTH, normalisation, row_length
-from transientcam_moments._lanes.parallel import Spread, at_once
-from transientcam_moments._lanes.pool import empty
-from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
 _REAL, _COMPLEX = real_arrays("f"), complex_arrays("f")

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels import simd
 from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
@@ -15,7 +16,6 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._lanes.parallel import Spread, at_once
 
 MOST_ODD = 31
 """The highest harmonic there is room for: b_0 .. b_31m in (m + 12)^2 registers."""

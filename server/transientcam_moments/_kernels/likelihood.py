@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_compiled import Spread, at_once, empty
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -33,8 +34,6 @@ from transientcam_moments._kernels.stages import (
     step_late,
     take_three,
 )
-from transientcam_moments._lanes.parallel import Spread, at_once
-from transientcam_moments._lanes.pool import empty
 from transientcam_moments.likelihood import MOST_RETURNS, TAIL_SHAPE, choice
 
 

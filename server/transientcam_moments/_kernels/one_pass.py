@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from transientcam_compiled import BLOCK, Spread, empty
+from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels.padding import normalisation, row_length
 from transientcam_moments._kernels.refine import Found
-from transientcam_moments._lanes.parallel import BLOCK, Spread
-from transientcam_moments._lanes.pool import empty
-from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 if TYPE_CHECKING:  # it brings along the compiler
     from transientcam_moments._kernels.wide import WideReturns

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import simd
-from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 _INTERLEAVE = 2
 # transientcam_moments.Flags

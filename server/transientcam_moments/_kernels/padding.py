@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from transientcam_moments._lanes.registry import LEAST_PIXELS
+from transientcam_moments._dispatch import LEAST_PIXELS
 
 LEAST_WIDTH = LEAST_PIXELS // 2  # of an image: its rows hold real and imaginary parts
 RAMP = np.arange(LEAST_PIXELS, dtype=np.float32)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels import simd
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
@@ -19,7 +20,6 @@ from transientcam_moments._kernels.compiled_entry import (
     sizes_type,
 )
 from transientcam_moments._kernels.fits import fit_one, portable, vary, write
-from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments.likelihood import (
     COINCIDE,
     COUNT,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_compiled import Spread, at_once, empty
 from transientcam_moments._kernels import simd, toeplitz
 from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
@@ -20,8 +21,6 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.returns import phase_of, sort
-from transientcam_moments._lanes.parallel import Spread, at_once
-from transientcam_moments._lanes.pool import empty
 
 _INTERLEAVE = 2
 _POLE_STEPS = 80  # ten are usual; clusters need more

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import simd, toeplitz
 from transientcam_moments._kernels.circle import circle_roots
 from transientcam_moments._kernels.compiled_entry import (
@@ -21,7 +22,6 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 _INTERLEAVE = 2
 _FAINT = 1024.0  # times what rounding makes of nothing

@@ -24,8 +24,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import Spread, at_once
+from transientcam_compiled import Spread, at_once
+from transientcam_moments._dispatch import accelerated
 from transientcam_moments.arrays import Array, by_blocks, moment_planes, namespace, squared
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.images._calibration import inverse_gains

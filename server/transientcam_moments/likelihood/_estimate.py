@@ -5,8 +5,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import Spread, on_threads
+from transientcam_compiled import Spread
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments.arrays import (
     MAX_HARMONICS,
     Array,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
+from transientcam_moments._dispatch import accelerated
 from transientcam_moments.arrays import (
     Array,
     by_blocks,

@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import on_threads
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments.arrays import (
     MAX_HARMONICS,
     Array,

@@ -4,8 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import on_threads
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments.arrays import (
     Array,
     below_one,

@@ -1,4 +1,4 @@
-"""Memory for the results of lanes, used again once no array refers to it.
+"""Memory for the results of kernels, used again once no array refers to it.
 
 The system clears a page of 4 KiB whenever fresh memory is first written, which takes ten times as
 long as writing it. The results of a frame of 640 x 480 pixels and m = 4 take 54 MB.
@@ -110,5 +110,5 @@ class _Owner:
 
 
 POOL: Final = Pool()
-"""What all lanes of a process share."""
+"""What all kernels of a process share."""
 empty: Final = POOL.empty

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from transientcam_moments._lanes.apart import ThreadsApart
+from transientcam_compiled._affinity import ThreadsApart
 
 if not hasattr(os, "sched_setaffinity"):
     pytest.skip("the system does not let threads be placed", allow_module_level=True)

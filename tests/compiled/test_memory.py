@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from transientcam_moments._lanes.pool import LEAST_BYTES, Pool
+from transientcam_compiled._memory import LEAST_BYTES, Pool
 
 SHAPE = (2, LEAST_BYTES)
 

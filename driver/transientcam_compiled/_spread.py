@@ -10,8 +10,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Protocol
 
-from transientcam_moments._lanes.apart import ThreadsApart
-from transientcam_moments.errors import ParameterError
+from transientcam_compiled._affinity import ThreadsApart
 
 BLOCK = 1 << 15
 """Pixels that stay in the caches from one kernel to the next.
@@ -98,7 +97,7 @@ class _Shared:
         self.__init__()  # type: ignore[misc]  # the lock may be held by a thread that is gone
 
 
-SHARED_THREADS = "transientcam-lane"
+SHARED_THREADS = "transientcam-kernel"
 """How the names of the shared threads begin."""
 _HERE, _SHARED = _Here(), _Shared()
 if hasattr(os, "register_at_fork"):
@@ -121,17 +120,9 @@ def use_all_cores() -> Iterator[None]:
 
 
 def on_threads(threads: int | None) -> Spread:
-    """Return a way to do an image on so many threads, or on all cores, of which one is this.
-
-    Raises
-    ------
-    ParameterError
-        For less than one thread.
-    """
+    """Return a way to do an image on so many threads, or on all cores, of which one is this."""
     if threads is None:
         threads = _HERE.threads or _cores()
-    elif isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-        raise ParameterError("threads", threads, "an integer of at least 1")
     return at_once if threads == 1 else over(_SHARED.get(), threads)
 
 
