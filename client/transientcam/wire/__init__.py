@@ -1,6 +1,9 @@
 """The wire contract of docs/stream.md, for both ends: constants, products, messages, parsing."""
 
-from transientcam.frame import Frame, FrameMeta, PixelCounts, PredictedStd
+from transientcam.documents import FrameMeta
+from transientcam.documents import PixelCountsDocument as PixelCounts
+from transientcam.documents import PredictedStdDocument as PredictedStd
+from transientcam.frame import Frame
 from transientcam.wire.arrays import DTYPES, array_document, parse_array
 from transientcam.wire.codec import ALIGNMENT, pack, unpack
 from transientcam.wire.contract import (
