@@ -93,8 +93,8 @@ def _table(what: str, messages: Mapping[str, _Schema]) -> _Schema:
         name: each.get("content", {}).get("application/json", {}).get("schema", {})
         for name, each in messages.items()
     }
-    named = {name: schema for name, schema in found.items() if "$ref" in schema}
-    return {"description": what, "properties": named}
+    documents = {name: schema for name, schema in found.items() if "$ref" in schema}
+    return {"description": what, "properties": documents}
 
 
 def _beside(meta: _Schema, frame: _Schema) -> _Schema:

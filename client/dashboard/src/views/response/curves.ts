@@ -5,7 +5,7 @@ import { Poles } from "../../physics/poles";
 import { boundsAt, pixelOf, poissonKernel } from "../../physics/reflection";
 import type { Pin, PinName } from "../../store/measures";
 import type { Aspect } from "../../store/pixelSides";
-import type { PixelDocument } from "../../stream/protocol";
+import type { PixelDocument } from "../../stream/documents";
 
 export type Truth = NonNullable<PixelDocument["truth"]>;
 

@@ -1,10 +1,10 @@
 import { useSignal } from "@preact/signals";
 
-import type { Goal } from "../../store/documents";
+import type { PlanRequest } from "../../stream/documents";
 
 interface GoalFormProps {
   readonly disabled: boolean;
-  readonly onGoal: (goal: Goal) => void;
+  readonly onGoal: (goal: PlanRequest) => void;
 }
 
 /** A target, a budget, or both. */
