@@ -41,8 +41,8 @@ _Schema = Mapping[str, Any]
 
 def files() -> dict[Path, str]:
     """Return each file as it should be."""
-    app = build_app(open_camera("sim:mirrors"), Settings())
-    openapi = app.openapi()
+    with open_camera("sim:mirrors") as camera:
+        openapi = build_app(camera, Settings()).openapi()
     streamed = asyncapi(version="", host="", secure=False)["components"]["schemas"]
     operations = dict(_operations(openapi["paths"]))
     answers = _table(
@@ -166,7 +166,7 @@ def _typescript(schema: _Schema) -> str:
         case {"const": value}:
             return json.dumps(value)
         case {"type": list(types)}:
-            return " | ".join(types)
+            return " | ".join(_typescript({"type": each}) for each in types)
         case {"type": "array", "minItems": least, "maxItems": most} if least == most:
             return f"readonly [{', '.join([_typescript(schema['items'])] * least)}]"
         case {"type": "array"}:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from transientcam_server.api.documents.frame import HistoryDocument
 from transientcam_server.errors.exceptions import Problem
 from transientcam_server.imaging.frame import Frame
 from transientcam_server.imaging.history import History
@@ -164,7 +165,7 @@ def test_the_newest_seconds_hold_one_sequence() -> None:
 
 
 def test_what_is_kept_and_its_limits_are_stated() -> None:
-    assert filled(30, max_bytes=550).to_document() == {
+    assert HistoryDocument.model_validate(filled(30, max_bytes=550)).model_dump() == {
         "first": 26,
         "last": 30,
         "count": 5,
