@@ -611,11 +611,29 @@ export interface LivenessDocument {
   readonly status: "alive";
 }
 
+/** The service of a camera, as it announces itself. */
+export interface NeighbourDocument {
+  /** unique on the network */
+  readonly name: string;
+  /** Of its dashboard, and what clients take as its address. */
+  readonly url: string;
+  readonly model: string;
+  readonly serial: string;
+  readonly firmware: string;
+  /** versions of its interface */
+  readonly api: string;
+  readonly tls: boolean;
+  /** What its camera does; empty where that is not announced. */
+  readonly state: "" | "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
+  /** since it answered, in s */
+  readonly seen_s: number;
+}
+
 /** The cameras that announce themselves on the local network by mDNS.
  *
  * Everything in it is what they announce: no request was sent to any of them. */
 export interface NeighboursDocument {
-  readonly cameras: readonly transientcam_server__api___documents__neighbours__NeighboursDocument__NeighbourDocument[];
+  readonly cameras: readonly NeighbourDocument[];
   /** how many more were announced */
   readonly left_out: number;
   /** why the network could not be searched */
@@ -737,9 +755,31 @@ export interface PlanDocument {
   readonly summary: string;
   readonly scene: SeenDocument;
   /** What half the time gives; null where nothing is that quick. */
-  readonly half_time: transientcam_server__api___documents__plan__NeighbourDocument | null;
+  readonly half_time: PlanNeighbourDocument | null;
   /** What half the error costs; null where nothing is that accurate. */
-  readonly twice_accuracy: transientcam_server__api___documents__plan__NeighbourDocument | null;
+  readonly twice_accuracy: PlanNeighbourDocument | null;
+}
+
+/** Another choice on the front, beside the recommended one. */
+export interface PlanNeighbourDocument {
+  /** The body for `PUT /sequence`. */
+  readonly sequence: SequenceDocument;
+  /** What the range is to be taken from, as in `PUT /reconstruction`. */
+  readonly estimator: string;
+  /** What the camera would make of it. */
+  readonly applied: Readonly<Record<string, unknown>>;
+  readonly capture_s: number;
+  readonly frame_rate_hz: number;
+  /** Processor time of one frame on this machine; null as long as the kernels that it needs are
+   * not compiled. With a budget `computing_share` they are, before the answer. */
+  readonly reconstruct_s: number | null;
+  /** That over the time between two frames: what a core is busy with. */
+  readonly computing_share: number | null;
+  readonly predicted: PredictedDocument;
+  /** Its capture time over the recommended one's. */
+  readonly time_factor: number;
+  /** Its error over the recommended one's. */
+  readonly error_factor: number | null;
 }
 
 /** What a sequence is wanted for. */
@@ -1265,46 +1305,6 @@ export interface VersionsDocument {
   readonly name: string;
   readonly version: string;
   readonly api: readonly ApiDocument[];
-}
-
-/** The service of a camera, as it announces itself. */
-export interface transientcam_server__api___documents__neighbours__NeighboursDocument__NeighbourDocument {
-  /** unique on the network */
-  readonly name: string;
-  /** Of its dashboard, and what clients take as its address. */
-  readonly url: string;
-  readonly model: string;
-  readonly serial: string;
-  readonly firmware: string;
-  /** versions of its interface */
-  readonly api: string;
-  readonly tls: boolean;
-  /** What its camera does; empty where that is not announced. */
-  readonly state: "" | "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
-  /** since it answered, in s */
-  readonly seen_s: number;
-}
-
-/** Another choice on the front, beside the recommended one. */
-export interface transientcam_server__api___documents__plan__NeighbourDocument {
-  /** The body for `PUT /sequence`. */
-  readonly sequence: SequenceDocument;
-  /** What the range is to be taken from, as in `PUT /reconstruction`. */
-  readonly estimator: string;
-  /** What the camera would make of it. */
-  readonly applied: Readonly<Record<string, unknown>>;
-  readonly capture_s: number;
-  readonly frame_rate_hz: number;
-  /** Processor time of one frame on this machine; null as long as the kernels that it needs are
-   * not compiled. With a budget `computing_share` they are, before the answer. */
-  readonly reconstruct_s: number | null;
-  /** That over the time between two frames: what a core is busy with. */
-  readonly computing_share: number | null;
-  readonly predicted: PredictedDocument;
-  /** Its capture time over the recommended one's. */
-  readonly time_factor: number;
-  /** Its error over the recommended one's. */
-  readonly error_factor: number | null;
 }
 
 export type Notice =
