@@ -15,7 +15,7 @@ DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace
 
 .DEFAULT_GOAL := help
 .PHONY: help serve test test-fast check bench paper docs docs-site dist clean dashboard debian-packages \
-	check-pyright check-mypy check-style check-dashboard check-newest
+	check-pyright check-mypy check-style check-documents check-dashboard check-newest
 
 help:  ## Say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 16
@@ -32,7 +32,7 @@ test-fast: .venv/test.stamp  ## Run the tests of mathematics, wire format and pl
 		tests/moments tests/stability tests/client/wire tests/server/planning
 
 check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lint, types, import laws
-	@$(MAKE) --no-print-directory --jobs 2 check-pyright check-mypy check-style check-dashboard
+	@$(MAKE) --no-print-directory --jobs 2 check-pyright check-mypy check-style check-documents check-dashboard
 
 bench: .venv/test.stamp  ## Measure speed, everything in one run on the same data
 	$(BIN)/python -m benchmarks
@@ -41,6 +41,7 @@ paper: .venv/test.stamp  ## Make the paper's figures, beside what the paper says
 	$(BIN)/transientcam paper -o docs
 
 docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (more than an hour on a quiet machine)
+	$(BIN)/python -m benchmarks.documents --write
 	$(BIN)/python -m benchmarks.reference --write
 	$(BIN)/python -m benchmarks.examples --write
 	$(BIN)/python -m benchmarks --write
@@ -125,7 +126,7 @@ check-newest:  ## Test what uses internals of numba and uvicorn with the newest 
 	build/newest/bin/python -m pip install --quiet --upgrade --editable '.[test]'
 	build/newest/bin/python -m pip install --quiet --upgrade numba 'uvicorn[standard]'
 	build/newest/bin/python -m pip list | grep -E '^(numba|uvicorn) '
-	build/newest/bin/python -m pytest --numprocesses auto --dist loadfile tests/compiled tests/moments/kernels \
+	build/newest/bin/python -m pytest --numprocesses auto --dist loadfile tests/compiled tests/moments/test_kernels*.py \
 		tests/simulation/light/test_lanes.py tests/server/daemon tests/server/api/stream
 
 # Side by side, the slowest first.
@@ -139,6 +140,10 @@ check-style:
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/lint-imports
+
+# Of OpenAPI and AsyncAPI the types of both clients follow; biome formats those of the page.
+check-documents:
+	$(BIN)/python -m benchmarks.documents
 
 check-dashboard:
 	npm --prefix client/dashboard run check

@@ -54,7 +54,7 @@ def stated_and_observed() -> list[Stated]:
                         scene,
                         short(sequence),
                         float(np.median(std_m[known])),
-                        np.nan if predicted is None else predicted.median_m,
+                        np.nan if predicted is None else predicted["median"],
                         float(np.median(typical_deviation(ranges[:, known]))),
                     )
                 )

@@ -1,7 +1,7 @@
 """Another process of this program: it calls functions, while this one goes on working.
 
 What is Python in large part, as compiling and planning are, would hold the interpreter's lock on a
-thread, which all other threads need (decisions 10 and 15).
+thread, which all other threads need (decisions 15 and 10).
 """
 
 import os

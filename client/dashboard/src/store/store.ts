@@ -2,7 +2,7 @@ import { computed, effect, type Signal, signal } from "@preact/signals";
 import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 
-import type { AppliedSequence, CameraDocument } from "../stream/protocol";
+import type { AppliedDocument, CameraDocument } from "../stream/documents";
 import { Accuracy } from "./accuracy";
 import { Api, kindOf } from "./api";
 import { Calibrations } from "./calibrations";
@@ -59,7 +59,7 @@ export class Store {
   readonly events = new Events();
   readonly settings: Settings;
   /** The sequence in use, by the service; null until it is known. */
-  readonly sequence = signal<AppliedSequence | null>(null);
+  readonly sequence = signal<AppliedDocument | null>(null);
   /** Changes it. */
   readonly sequencing: Sequencing;
   /** What accuracy costs in time. */

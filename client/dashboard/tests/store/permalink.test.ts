@@ -1,10 +1,9 @@
 import { beforeEach, describe, expect, test, vi } from "vitest";
 
 import { Api } from "../../src/store/api";
-import type { RecordingDocument } from "../../src/store/documents";
 import { copyLink, keepAddress } from "../../src/store/permalink";
 import { Store } from "../../src/store/store";
-import type { AppliedSequence } from "../../src/stream/protocol";
+import type { AppliedDocument, RecordingDocument } from "../../src/stream/documents";
 import { SIDE } from "../../src/views/response/sides";
 
 class FakeWindow {
@@ -33,7 +32,7 @@ function page(hash = "") {
   const store = new Store({ shelf: null, api: refused });
   const opened = vi.spyOn(store.replay, "open").mockResolvedValue();
   keepAddress(target as unknown as Window, store);
-  store.sequence.value = { base_frequency_hz: 25e6 } as AppliedSequence;
+  store.sequence.value = { base_frequency_hz: 25e6 } as AppliedDocument;
   vi.advanceTimersByTime(1000);
   const copied = async (): Promise<string> => {
     await copyLink(target as unknown as Window, store);

@@ -6,7 +6,7 @@ import { type Frame, Frames } from "../../src/store/frames";
 import { Player } from "../../src/store/player";
 import { aBoolean, aNumber, oneOf, type Setting, Settings, type Shelf } from "../../src/store/settings";
 import { Status } from "../../src/store/status";
-import type { FrameMeta } from "../../src/stream/protocol";
+import type { FrameMeta } from "../../src/stream/documents";
 
 const meta = (frame: number, host_time_s = 0): FrameMeta => ({ frame, host_time_s }) as FrameMeta;
 const frame = (product: string, number: number): Frame => ({ product, meta: meta(number) }) as Frame;

@@ -23,9 +23,12 @@ JsonInteger = Annotated[int, BeforeValidator(_whole)]
 
 
 class Document(BaseModel):
-    """A JSON document whose fields are described beside them, and whose example was captured."""
+    """A JSON document whose fields are described beside them, and whose example was captured.
 
-    model_config = ConfigDict(use_attribute_docstrings=True)
+    ``model_validate`` makes one of any value that has attributes of the same names.
+    """
+
+    model_config = ConfigDict(use_attribute_docstrings=True, from_attributes=True)
 
     @classmethod
     def __get_pydantic_json_schema__(

@@ -242,7 +242,9 @@ def test_the_meta_states_what_the_computation_took_and_found(camera: Camera, raw
         await frame.product(pipeline.product("range"))
         meta = frame.meta()
 
+        assert meta["reconstruct_s"] is not None
         assert meta["reconstruct_s"] > 0.0
+        assert meta["pixels"] is not None
         assert meta["pixels"]["total"] == 163 * 120
         # which pixels are there is known of each answer alone
         assert set(meta) == set(wire.FrameMeta.__annotations__) - {"region", "decimation"}

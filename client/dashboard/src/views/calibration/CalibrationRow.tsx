@@ -1,8 +1,8 @@
 import { useSignal } from "@preact/signals";
 import { engineering, fixed } from "../../scales/format";
 import { calibrationPath } from "../../store/api";
-import type { CalibrationDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
+import type { CalibrationDocument } from "../../stream/documents";
 import { ActionMenu } from "../../ui/ActionMenu";
 import { download } from "../../ui/files";
 import { Steer } from "../../ui/Steer";

@@ -1,8 +1,8 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { fixed } from "../../scales/format";
-import type { CalibrationDocument, JobDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
+import type { CalibrationDocument, JobDocument } from "../../stream/documents";
 import { Confirm } from "../../ui/Confirm";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";

@@ -3,11 +3,11 @@ import { DEGREE } from "../../physics/constants";
 import type { Pixel } from "../../store/pixel";
 import { aNumber, type Setting } from "../../store/settings";
 import type { Store } from "../../store/store";
-import type { Intrinsics } from "../../stream/protocol";
+import type { IntrinsicsDocument } from "../../stream/documents";
 import { fillCloud, makeCloud, type Pinhole, pinholeOf } from "./cloud";
 
 /** What the service knows of the lens; null where it only assumes. */
-export function knownLens({ camera }: Store): Intrinsics | null {
+export function knownLens({ camera }: Store): IntrinsicsDocument | null {
   const lens = camera.value?.intrinsics;
   return lens === undefined || lens.source === "assumed" ? null : lens;
 }

@@ -1,8 +1,7 @@
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-
-import type { ParameterDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
+import type { ParameterDocument } from "../../stream/documents";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";

@@ -1,7 +1,6 @@
 import { useSignal } from "@preact/signals";
-
-import type { RecordingDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
+import type { RecordingDocument } from "../../stream/documents";
 import { Dialog } from "../../ui/Dialog";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";

@@ -1,8 +1,8 @@
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { grouped } from "../../scales/format";
-import type { RecordingDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
+import type { RecordingDocument } from "../../stream/documents";
 import { Confirm } from "../../ui/Confirm";
 import { Panel } from "../../ui/Panel";
 import { TaskLine } from "../../ui/Steer";

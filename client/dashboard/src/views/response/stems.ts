@@ -1,6 +1,6 @@
 import type uPlot from "uplot";
 
-import type { PixelDocument } from "../../stream/protocol";
+import type { PixelDocument } from "../../stream/documents";
 import type { Truth } from "./curves";
 import { type ReturnHistory, sifted } from "./returns";
 

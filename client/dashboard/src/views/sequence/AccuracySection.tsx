@@ -1,6 +1,6 @@
 import { engineering, fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
-import type { AppliedSequence, Choice } from "../../stream/protocol";
+import type { AppliedDocument, ChoiceDocument } from "../../stream/documents";
 import { useProducts } from "../../ui/hooks";
 import { Obstacle, Steer } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
@@ -15,7 +15,7 @@ import { errorWords } from "./words";
 import "./AccuracySection.css";
 
 /** What accuracy costs in time on the scene before the camera: the front, and a slider along it that sets the sequence. */
-export function AccuracySection({ applied }: { applied: AppliedSequence }) {
+export function AccuracySection({ applied }: { applied: AppliedDocument }) {
   const store = useStore();
   const { accuracy, sequencing, obstacle } = store;
   const task = useTask();
@@ -28,7 +28,7 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
   const truth_m = judged ? (tradeoff.current.range_error_m?.median ?? null) : null;
   const looked = accuracy.looked.value;
   const busy = accuracy.job.value !== null || task.busy.value !== null;
-  const look = (choice: Choice): void => {
+  const look = (choice: ChoiceDocument): void => {
     accuracy.looked.value = choice;
   };
   const apply = async (): Promise<void> => {
@@ -68,7 +68,7 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
   );
 }
 
-function LookedFigures({ choice }: { choice: Choice }) {
+function LookedFigures({ choice }: { choice: ChoiceDocument }) {
   return (
     <>
       <strong data-field="choice_range_error_m">± {engineering(choice.predicted.range_error_m.median, "m")}</strong>{" "}
@@ -79,7 +79,7 @@ function LookedFigures({ choice }: { choice: Choice }) {
 }
 
 /** How well the camera does now, by the figure of the header; and where the truth is known how far it is off. */
-function NowFigures({ applied, truth_m }: { applied: AppliedSequence; truth_m: number | null }) {
+function NowFigures({ applied, truth_m }: { applied: AppliedDocument; truth_m: number | null }) {
   const { status, rangeErrors } = useStore();
   const error = status.newest.value?.sequence_id === applied.sequence_id ? rangeErrors.now.value : null;
   return (

@@ -1,5 +1,5 @@
 /** Sequences to begin with. */
-import type { SequenceDocument } from "../../stream/protocol";
+import type { SequenceDocument } from "../../stream/documents";
 
 export interface Preset {
   readonly name: string;

@@ -1,7 +1,8 @@
 import { useEffect } from "preact/hooks";
 import { engineering } from "../../scales/format";
-import type { EffectChoice, EffectDocument, Fault } from "../../store/documents";
+import type { EffectChoice, Fault } from "../../store/simulation";
 import { useStore } from "../../store/store";
+import type { EffectDocument } from "../../stream/documents";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
@@ -41,7 +42,7 @@ export function SimulationView() {
         {world !== null && (
           <fieldset class="faults">
             <legend>Let something go wrong</legend>
-            {world.faults.map((fault) => (
+            {(world.faults as readonly Fault[]).map((fault) => (
               <FaultButton key={fault} fault={fault} task={task} />
             ))}
           </fieldset>
