@@ -119,7 +119,7 @@ client/dashboard/node_modules/.package-lock.json: client/dashboard/package-lock.
 #   (transientcam_compiled/_cache.py); extending, cgutils, castgraph and typing.templates
 #   (transientcam_moments/_kernels/simd.py, portable.py)
 # - uvicorn: HttpToolsProtocol, WebSocketsSansIOProtocol (conn, queue, close_sent, read_paused), FlowControl
-#   (transientcam_server/daemon); Server's signals and the clock of its loop
+#   (transientcam_server/daemon/connections.py, streams.py); Server's signals and the clock of its loop (server.py)
 # Where this passes with a newer one, the bound may be raised to it.
 check-newest:  ## Test what uses internals of numba and uvicorn with the newest of both
 	$(PYTHON) -m venv build/newest
