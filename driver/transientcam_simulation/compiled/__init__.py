@@ -1,31 +1,36 @@
 """Compiling of what the simulated light computes pixel by pixel."""
 
-from transientcam_simulation.compiled._compiling import (
-    AROUND,
-    CODES,
-    DOUBLES,
-    FLAGS,
-    INDICES,
-    LINE,
-    MARKS,
-    NUMBERS,
-    PIXELS,
-    PLACES,
-    PLANE,
-    PLANES,
-    REGION,
-    ROWS,
-    STACK,
-    TILES,
-    WHOLE,
-    float32,
-    float64,
-    inner,
-    int32,
-    int64,
-    lane,
-)
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from transientcam_simulation.compiled._lanes import CHUNK, LANES
+
+if TYPE_CHECKING:
+    from transientcam_simulation.compiled._compiling import (
+        AROUND,
+        CODES,
+        DOUBLES,
+        FLAGS,
+        INDICES,
+        LINE,
+        MARKS,
+        NUMBERS,
+        PIXELS,
+        PLACES,
+        PLANE,
+        PLANES,
+        REGION,
+        ROWS,
+        STACK,
+        TILES,
+        WHOLE,
+        float32,
+        float64,
+        inner,
+        int32,
+        int64,
+        lane,
+    )
 
 __all__ = [
     "AROUND",
@@ -54,3 +59,10 @@ __all__ = [
     "int64",
     "lane",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Return what only compiled modules need, which imports numba."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}._compiling"), name)

@@ -246,7 +246,7 @@ def test_a_setting_leaves_everything_to_numpy(setting: str) -> None:
 
 
 def test_without_a_compiler_numpy_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in (*COMPILED, "light.compiling"):
+    for name in (*COMPILED, "compiled._compiling"):
         monkeypatch.delitem(sys.modules, f"transientcam_simulation.{name}")
     monkeypatch.setitem(sys.modules, "numba", None)
     lanes = Lanes({})
