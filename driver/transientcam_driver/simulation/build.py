@@ -20,6 +20,7 @@ from transientcam_driver.simulation.light import (
     load_responses,
     shared_scenery,
 )
+from transientcam_driver.simulation.light.compiler import load_compiled
 from transientcam_driver.simulation.responses import SparseResponses
 from transientcam_driver.simulation.scene import (
     BUILT_IN,
@@ -162,9 +163,13 @@ def world_before(
     ------
     SceneError
         A file that the scene names cannot be read, or has other content.
+    CompilerMissing
+        It moves, and there is no compiler.
     """
 
     def world_of_scene(scene: Scene) -> World:
+        if scene.moves:
+            load_compiled()  # rather than when the first image is due
         return world_of(scene, width=width, height=height, seed=seed, readout_s=readout_s)
 
     quiet = {each.name: "off" for each in NOISE if scene.effects.get(each.name) == "off"}

@@ -1,8 +1,7 @@
 """Electrons of an image, and their codes: compiled arithmetic, the same bytes as in NumPy."""
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import NDArray
 
 from transientcam_driver.simulation.light.compiling import (
     CODES,
@@ -14,6 +13,9 @@ from transientcam_driver.simulation.light.compiling import (
     lane,
 )
 
+Plane = NDArray[np.float32]
+Codes = NDArray[np.uint16]
+Noise = tuple[np.float32, np.float32, np.float32, np.float32, np.float32]
 _ZERO = np.float32(0)
 _WHOLE = np.float32(3 << 22)
 """Added and taken away, it rounds what is between 0 and 2^22 to whole numbers, as `rint` does."""
@@ -22,7 +24,10 @@ _BLOCK = 4096
 
 
 @inner
-def _turn(offset: Any, in_phase: Any, quadrature: Any, of: Any, electrons: Any) -> None:
+def _turn(
+    offset: Plane, in_phase: Plane, quadrature: Plane, of: tuple[np.float32, np.float32],
+    electrons: Plane,
+) -> None:  # fmt: skip
     cosine, sine = of
     for i in range(len(offset)):
         light = offset[i] + in_phase[i] * cosine
@@ -31,7 +36,9 @@ def _turn(offset: Any, in_phase: Any, quadrature: Any, of: Any, electrons: Any) 
 
 
 @lane(WHOLE, WHOLE, WHOLE, float32, float32)
-def at_phase(offset: Any, in_phase: Any, quadrature: Any, cosine: Any, sine: Any) -> Any:
+def at_phase(
+    offset: Plane, in_phase: Plane, quadrature: Plane, cosine: np.float32, sine: np.float32
+) -> Plane:
     """Return the electrons of an image at a phase, given its cosine and sine."""
     electrons = np.empty(offset.shape, float32)
     for row in range(len(offset)):
@@ -40,7 +47,9 @@ def at_phase(offset: Any, in_phase: Any, quadrature: Any, cosine: Any, sine: Any
 
 
 @inner
-def _code(signal: Any, bins: Any, quantiles: Any, of: Any, noise: Any, codes: Any) -> Any:
+def _code(
+    signal: Plane, bins: Codes, quantiles: Plane, of: Noise, noise: Plane, codes: Codes
+) -> int:  # fmt: skip
     """Put the codes of a block of pixels; return how many have one of the outermost bins."""
     light, variance_e2, dn_per_e, dark_dn, highest_dn = of
     outermost = 0
@@ -57,9 +66,9 @@ def _code(signal: Any, bins: Any, quantiles: Any, of: Any, noise: Any, codes: An
 
 @lane(LINE, CODES, LINE, float32, float32, float32, float32, float32)
 def coded(
-    signal: Any, bins: Any, quantiles: Any, light: Any, variance_e2: Any, dn_per_e: Any,
-    dark_dn: Any, highest_dn: Any,
-) -> Any:  # fmt: skip
+    signal: Plane, bins: Codes, quantiles: Plane, light: np.float32, variance_e2: np.float32,
+    dn_per_e: np.float32, dark_dn: np.float32, highest_dn: np.float32,
+) -> tuple[Codes, NDArray[np.int64]]:  # fmt: skip
     """Return codes of pixels with noise, and the places of those with one of the outermost bins.
 
     The variance of the noise is the signal times ``light``, and the same everywhere.

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import Any, TypeVar
 
 from numba import float32 as numba_float32
 from numba import float64 as numba_float64
@@ -12,6 +12,7 @@ from numba import njit
 from numba import types as numba_types
 from numba import uint16 as numba_uint16
 
+Function = TypeVar("Function", bound=Callable[..., Any])
 LANES: dict[str, Callable[..., Any]] = {}
 """All lanes that are compiled, by their names."""
 
@@ -31,6 +32,7 @@ STACK = _types.Array(float32, 3, "C")
 TILES = _types.boolean[:, :, ::1]
 MARKS = _types.boolean[:, ::1]
 FLAGS = _types.boolean[::1]
+FLAG = _types.boolean
 PLACES = int64[::1]
 CODES = _types.Array(numba_uint16, 1, "C")
 NUMBERS = int64[:, ::1]
@@ -42,25 +44,27 @@ REGION = _types.UniTuple(int64, 4)
 """First row and column, numbers of rows and columns."""
 
 
-def inner(function: Callable[..., Any]) -> Any:
+def inner(function: Function) -> Function:
     """Have a function compiled into those that call it, which are in the same file.
 
     The cache notices changes of that file only. Calls that remain would count references of every
     array they pass, one by one between all cores: a fourth of the time of loops over short rows.
     """
-    return njit(nogil=True, error_model="numpy", forceinline=True)(function)
+    compiled: Function = njit(nogil=True, error_model="numpy", forceinline=True)(function)
+    return compiled
 
 
-def lane(*signature: Any) -> Callable[[Callable[..., Any]], Any]:
+def lane(*signature: Any) -> Callable[[Function], Function]:
     """Compile a function now, and for this signature only: no call starts the compiler."""
 
-    def decorate(function: Callable[..., Any]) -> Any:
-        dispatcher = njit(nogil=True, error_model="numpy")(function)
+    def decorate(function: Function) -> Function:
+        dispatcher: Any = njit(nogil=True, error_model="numpy")(function)
         with suppress(RuntimeError):  # where there is no place to keep it between processes
             dispatcher.enable_caching()
         dispatcher.compile(signature)
         dispatcher.disable_compile()
         LANES[function.__name__] = dispatcher
-        return dispatcher
+        compiled: Function = dispatcher
+        return compiled
 
     return decorate

@@ -16,14 +16,6 @@ THREAD: Final = "transientcam-compile-light"
 """Name of the thread that compiles."""
 OF_IMAGES: Final = ("compiled_images",)
 """Modules of the lanes that images of any scene use."""
-COMPILED: Final = (
-    *OF_IMAGES,
-    "light.compiled_chunks",
-    "light.compiled_edges",
-    "light.compiled_light",
-    "light.compiled_tiles",
-)
-"""Modules of all lanes."""
 WORTH_PIXELS: Final = 100_000_000
 """Of images in NumPy, after which their lanes are asked for.
 
@@ -53,7 +45,7 @@ class Lanes:
         """Return a lane, or None where NumPy is to be used."""
         return self._ready.get(name)
 
-    def want(self, modules: tuple[str, ...] = COMPILED) -> None:
+    def want(self, modules: tuple[str, ...] = OF_IMAGES) -> None:
         """Have lanes made ready in the background, once; returns at once."""
         with self._starting:
             wanted = tuple(name for name in modules if name not in self._wanted)
@@ -69,7 +61,7 @@ class Lanes:
         if self._pixels >= WORTH_PIXELS:
             self.want(OF_IMAGES)
 
-    def compile_now(self, modules: tuple[str, ...] = COMPILED) -> None:
+    def compile_now(self, modules: tuple[str, ...] = OF_IMAGES) -> None:
         """Make lanes ready before returning.
 
         Raises

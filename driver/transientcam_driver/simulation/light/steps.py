@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.simulation.light import compiled_light
 from transientcam_driver.simulation.light.bundle import Region, numbers, union
 from transientcam_driver.simulation.light.coverage import single
-from transientcam_driver.simulation.light.lanes import LANES
 from transientcam_driver.simulation.light.layers import MovingResponses
 from transientcam_driver.simulation.responses import Moments
 from transientcam_driver.simulation.scene.motion import Motion
@@ -124,21 +124,15 @@ class Between:
 
     def moments_in(self, region: Region, frequency_hz: float) -> Moments:
         """Moments of a region that holds all that differs."""
-        (one, first), (other, second) = self._parts
-        lane = LANES.find("blended")
-        if lane is not None:
-            parts = (
-                (np.float32(share), of.differing(frequency_hz).view(np.float32), numbers(of.region))
-                for share, of in self._parts
-            )
-            total = first.unchanged(frequency_hz)
-            plane = total.view(np.float32)
-            of = plane, plane.shape[1] // total.shape[1], numbers(region)
-            mixed: NDArray[np.float32] = lane(*of, *chain.from_iterable(parts))
-            return mixed.view(np.complex64) if frequency_hz else mixed
-        moments = np.float32(one) * first.moments_in(region, frequency_hz)
-        moments += np.float32(other) * second.moments_in(region, frequency_hz)
-        return moments
+        parts = (
+            (np.float32(share), of.differing(frequency_hz).view(np.float32), numbers(of.region))
+            for share, of in self._parts
+        )
+        total = self._parts[0][1].unchanged(frequency_hz)
+        plane = total.view(np.float32)
+        of = plane, plane.shape[1] // total.shape[1], numbers(region)
+        mixed = compiled_light.blended(*of, *chain.from_iterable(parts))
+        return mixed.view(np.complex64) if frequency_hz else mixed
 
     @cached_property
     def reflectance(self) -> NDArray[np.float32]:

@@ -1,0 +1,49 @@
+"""Functions of numbers that NumPy and compiled code share, from `coverage`: compiled here."""
+
+from typing import Any
+
+import numpy as np
+from numba import extending
+
+from transientcam_driver.simulation.light.compiling import Function, inner
+from transientcam_driver.simulation.light.coverage import (
+    Plane,
+    Plate,
+    at_border,
+    ball_of,
+    half_plane,
+    near_ellipsoid,
+    on_rectangle,
+    select,
+    slope,
+)
+
+__all__ = ["at_border", "ball_of", "near_ellipsoid", "on_rectangle", "rows_of"]
+_HOW = {"nogil": True, "error_model": "numpy", "forceinline": True}
+_extending: Any = extending  # numba is only partly annotated
+
+
+def _compile_as_it_is(function: Function) -> None:
+    _extending.register_jitable(**_HOW)(function)
+
+
+for _each in (slope, half_plane, at_border, ball_of, near_ellipsoid, on_rectangle):
+    _compile_as_it_is(_each)
+
+
+def _choose(condition: bool, one: np.float32, other: np.float32) -> np.float32:
+    return one if condition else other
+
+
+_extending.overload(select, jit_options=_HOW, strict=False)(lambda *_types: _choose)
+
+
+@inner
+def rows_of(plate: Plane) -> Plate:
+    """Return what `on_rectangle` takes: rows of numbers, which need no array."""
+    one, two, three = plate[0], plate[1], plate[2]
+    return (
+        (one[0], one[1], one[2], one[3], one[4]),
+        (two[0], two[1], two[2], two[3], two[4]),
+        (three[0], three[1], three[2], three[3], three[4]),
+    )
