@@ -9,7 +9,6 @@ from transientcam_driver.simulation.light.compiling import (
     WHOLE,
     float32,
     inner,
-    int64,
     lane,
 )
 
@@ -40,7 +39,7 @@ def at_phase(
     offset: Plane, in_phase: Plane, quadrature: Plane, cosine: np.float32, sine: np.float32
 ) -> Plane:
     """Return the electrons of an image at a phase, given its cosine and sine."""
-    electrons = np.empty(offset.shape, float32)
+    electrons = np.empty(offset.shape, np.float32)
     for row in range(len(offset)):
         _turn(offset[row], in_phase[row], quadrature[row], (cosine, sine), electrons[row])
     return electrons
@@ -73,8 +72,8 @@ def coded(
 
     The variance of the noise is the signal times ``light``, and the same everywhere.
     """
-    count, noise = len(signal), np.empty(_BLOCK, float32)
-    codes, outermost, found = np.empty(count, np.uint16), np.empty(count, int64), 0
+    count, noise = len(signal), np.empty(_BLOCK, np.float32)
+    codes, outermost, found = np.empty(count, np.uint16), np.empty(count, np.int64), 0
     of = light, variance_e2, dn_per_e, dark_dn, highest_dn
     for start in range(0, count, _BLOCK):
         stop = min(start + _BLOCK, count)

@@ -10,9 +10,7 @@ from transientcam_driver.simulation.light.compiling import (
     PIXELS,
     PLACES,
     WHOLE,
-    float32,
     inner,
-    int32,
     int64,
     lane,
 )
@@ -71,8 +69,8 @@ def around(
 ) -> Indices:
     """Return what is around points in a region of an image."""
     count, wide = len(rows), width + 2
-    place = np.full((height + 2) * wide, count, int32)
-    at, beside = np.empty(count, int32), np.empty((4, count), int32)
+    place = np.full((height + 2) * wide, count, np.int32)
+    at, beside = np.empty(count, np.int32), np.empty((4, count), np.int32)
     for i in range(count):
         at[i] = (rows[i] - top + 1) * wide + columns[i] - left + 1
     for i in range(count):
@@ -88,12 +86,12 @@ def around(
 @lane(PLACES, AROUND)
 def among(on: Places, beside: Indices) -> Indices:
     """Return what is beside some of the points, by their own indices."""
-    place = np.empty(beside.shape[1] + 1, int32)
+    place = np.empty(beside.shape[1] + 1, np.int32)
     for k in range(len(place)):
         place[k] = len(on)
     for k in range(len(on)):
         place[on[k]] = k
-    found = np.empty((4, len(on)), int32)
+    found = np.empty((4, len(on)), np.int32)
     for side in range(4):
         for k in range(len(on)):
             found[side, k] = place[beside[side, on[k]]]
@@ -108,7 +106,7 @@ def reach(beside: Indices) -> tuple[Places, NDArray[np.bool_]]:
     """
     count = beside.shape[1]
     chunks = (count + CHUNK - 1) // CHUNK
-    reached, rim = np.zeros((chunks, 8), int64), np.zeros(count, np.bool_)
+    reached, rim = np.zeros((chunks, 8), np.int64), np.zeros(count, np.bool_)
     for c in range(chunks):
         start, stop = c * CHUNK, min((c + 1) * CHUNK, count)
         alone = rim[start:stop]
@@ -147,9 +145,9 @@ def boxes(x: Plane, y: Plane, z: Plane) -> Plane:
     """Return boxes (6, C) around successive chunks of points: lowest coordinates, then highest."""
     count = len(x)
     chunks = (count + CHUNK - 1) // CHUNK
-    found = np.empty((6, chunks), float32)
-    bits = found.view(int32)
-    u, v, w = x.view(int32), y.view(int32), z.view(int32)
+    found = np.empty((6, chunks), np.float32)
+    bits = found.view(np.int32)
+    u, v, w = x.view(np.int32), y.view(np.int32), z.view(np.int32)
     for c in range(chunks):
         a, b = c * CHUNK, min((c + 1) * CHUNK, count)
         bits[0, c], bits[3, c] = _bounds(u[a:b])

@@ -21,7 +21,8 @@ def beside(place: int, count: int) -> tuple[int, int]:
 @inner
 def row_of(plane: Plane, row: int) -> Plane:
     """Return a row of a plane; of one that holds a single row, that one stands for all."""
-    return plane[min(row, len(plane) - 1)]
+    line: Plane = plane[min(row, len(plane) - 1)]
+    return line
 
 
 @inner
@@ -55,9 +56,7 @@ def part_above(values: Plane, row: int, column: int) -> np.float32:
 
 
 @inner
-def mark_borders(
-    inside: Plane, row: int, start: int, end: int, border: NDArray[np.bool_]
-) -> None:
+def mark_borders(inside: Plane, row: int, start: int, end: int, border: NDArray[np.bool_]) -> None:
     """Mark pixels of a row, from ``start`` to ``end``, with a neighbour on the other side of 0.
 
     In loops that a compiler makes vectors of: few pixels are at a border.

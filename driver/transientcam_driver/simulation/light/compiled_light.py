@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.simulation.light.bundle import Numbers
-
 from transientcam_driver.simulation.light.compiling import (
     DOUBLES,
     INDICES,
@@ -55,8 +54,8 @@ def received(
 ) -> Planes3:  # fmt: skip
     """Return lengths of the ways to a lamp, irradiance, and cosines to its axis, of some points."""
     count = len(on)
-    length_m, irradiance = np.empty(count, float32), np.empty(count, float32)
-    cosine = np.empty(count, float32)
+    length_m, irradiance = np.empty(count, np.float32), np.empty(count, np.float32)
+    cosine = np.empty(count, np.float32)
     of = (lamp[0], lamp[1], lamp[2]), (axis[0], axis[1], axis[2])
     put = length_m, irradiance, cosine
     if count == len(x):
@@ -109,7 +108,7 @@ def remaining(
     """
     top, start, height, width = of
     parts = total.shape[1] // uncovered.shape[1]
-    moments = np.empty((height, parts * width), float32)
+    moments = np.empty((height, parts * width), np.float32)
     for row in range(height):
         r, line = top + row, moments[row]
         _copy(total[r, parts * start : parts * (start + width)], line)
@@ -130,7 +129,7 @@ def remaining(
 @lane(DOUBLES, float64)
 def phases(delay_s: Doubles, angular_hz: float) -> Plane:
     """Return phases of light with some times of flight."""
-    phase_rad = np.empty(len(delay_s), float32)
+    phase_rad = np.empty(len(delay_s), np.float32)
     for i in range(len(delay_s)):
         phase_rad[i] = angular_hz * delay_s[i]
     return phase_rad
@@ -170,7 +169,7 @@ def upright(x: Plane, y: Plane, z: Plane, balls: Plane, spans: Indices) -> Plane
 
     ``balls`` (N, 6) are their centres and squared radii.
     """
-    normal = np.empty((3, len(x)), float32)
+    normal = np.empty((3, len(x)), np.float32)
     for n in range(len(balls)):
         ball = balls[n, 0], balls[n, 1], balls[n, 2], balls[n, 3], balls[n, 4], balls[n, 5]
         a, b = spans[n, 0], spans[n, 1]
@@ -186,7 +185,7 @@ def returned(
     albedos: Doubles, index: NDArray[np.int32],
 ) -> tuple[Doubles, Doubles]:  # fmt: skip
     """Return throughput and reflectance of points that are seen from in front, of others 0."""
-    facing, reflectance = np.empty(len(x), float64), np.empty(len(x), float64)
+    facing, reflectance = np.empty(len(x), np.float64), np.empty(len(x), np.float64)
     for i in range(len(x)):
         towards = ZERO + across[i] * x[i] + along[i] * y[i] + up[i] * z[i]
         facing[i] = throughput[i] if towards < ZERO else 0.0
@@ -202,16 +201,16 @@ def arrived(
 ) -> tuple[Doubles, Doubles]:  # fmt: skip
     """Return times of flight and weights of the light on some points."""
     count = len(on)
-    delay_s, weight = np.empty(count, float64), np.empty(count, float64)
+    delay_s, weight = np.empty(count, np.float64), np.empty(count, np.float64)
     if count == len(sent):
         for i in range(count):
-            delay_s[i] = (float64(length_m[i]) + float64(distance_m[i])) / metres_per_s
-            weight[i] = sent[i] * float64(irradiance[i])
+            delay_s[i] = (np.float64(length_m[i]) + np.float64(distance_m[i])) / metres_per_s
+            weight[i] = sent[i] * np.float64(irradiance[i])
         return delay_s, weight
     for k in range(count):
         i = on[k]
-        delay_s[k] = (float64(length_m[k]) + float64(distance_m[i])) / metres_per_s
-        weight[k] = sent[i] * float64(irradiance[k])
+        delay_s[k] = (np.float64(length_m[k]) + np.float64(distance_m[i])) / metres_per_s
+        weight[k] = sent[i] * np.float64(irradiance[k])
     return delay_s, weight
 
 
@@ -252,8 +251,8 @@ def blended(
     A moment has so many parts.
     """
     top, left, height, width = of
-    mixed = np.empty((height, parts * width), float32)
-    then, later = np.empty(parts * width, float32), np.empty(parts * width, float32)
+    mixed = np.empty((height, parts * width), np.float32)
+    then, later = np.empty(parts * width, np.float32), np.empty(parts * width, np.float32)
     for row in range(height):
         r = top + row
         still = total[r, parts * left : parts * (left + width)]

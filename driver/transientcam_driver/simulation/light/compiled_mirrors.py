@@ -18,9 +18,7 @@ from transientcam_driver.simulation.light.compiling import (
     LINE,
     NUMBERS,
     WHOLE,
-    float32,
     inner,
-    int64,
     lane,
 )
 from transientcam_driver.simulation.light.coverage import ONE, TOUCHING, ZERO, Plane, Plate
@@ -44,14 +42,14 @@ def _meet(
         one, other, t, facing = on_rectangle(axes, x[i] - apex[0], y[i] - apex[1], z[i] - apex[2])
         shows = (t > ZERO + TOUCHING) & (t < ONE - TOUCHING) & (facing > ZERO)
         first[i], second[i], at[i] = one if shows else _NAN, other if shows else _NAN, t
-        met += shows & (one > ZERO) & (other > ZERO)
+        met += int(shows & (one > ZERO) & (other > ZERO))
     return met > 0
 
 
 @inner
 def _count(values: Plane, chunks: int) -> Chunks:
     """Count the chunks of which any value is above 0, and those of which all are."""
-    some, whole = np.zeros(chunks + 1, int64), np.zeros(chunks + 1, int64)
+    some, whole = np.zeros(chunks + 1, np.int64), np.zeros(chunks + 1, np.int64)
     for c in range(chunks):
         a, b = c * CHUNK, min((c + 1) * CHUNK, len(values) - 1)
         on = count_above(values[a:b])
@@ -97,7 +95,7 @@ def _show(
     first, second = values
     found, count, chunks = 0, len(rim), len(reach)
     (along, along_whole), (across, across_whole) = _count(first, chunks), _count(second, chunks)
-    other, border = np.empty(CHUNK, float32), np.empty(CHUNK, np.bool_)
+    other, border = np.empty(CHUNK, np.float32), np.empty(CHUNK, np.bool_)
     for c in range(chunks):
         a, b = c * CHUNK, min((c + 1) * CHUNK, count)
         if not (
@@ -152,21 +150,21 @@ def shown(
     unless all are, the points that are kept.
     """
     corner, count = (apex[0], apex[1], apex[2]), len(x)
-    first, second = np.empty(count + 1, float32), np.empty(count + 1, float32)
-    at, share = np.empty(count, float32), np.empty(count, float32)
+    first, second = np.empty(count + 1, np.float32), np.empty(count + 1, np.float32)
+    at, share = np.empty(count, np.float32), np.empty(count, np.float32)
     first[count] = second[count] = _NAN
     found = 0
     if _meet(rows_of(plate), corner, x, y, z, (first[:count], second[:count], at)):
         found = _show((first, second), around, reach, rim, share)
     if found == count:
-        lines = np.empty((4, count), float32)
+        lines = np.empty((4, count), np.float32)
         lines[0] = at
         _lines_to(x, y, z, corner, lines)
         return np.arange(count), share, lines
-    lines, room = np.empty((7, found), float32), np.empty(found + 1, np.int64)
+    lines, room = np.empty((7, found), np.float32), np.empty(found + 1, np.int64)
     if found:
         _gather(share, room)
-    kept, part = room[:found], np.empty(found, float32)
+    kept, part = room[:found], np.empty(found, np.float32)
     _choose(share, kept, part)
     _choose(at, kept, lines[0])
     _choose(x, kept, lines[4])

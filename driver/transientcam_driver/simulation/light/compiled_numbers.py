@@ -1,41 +1,43 @@
 """Functions of numbers that NumPy and compiled code share, from `coverage`: compiled here."""
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, cast
 
 import numpy as np
 from numba import extending
 
-from transientcam_driver.simulation.light.compiling import Function, inner
-from transientcam_driver.simulation.light.coverage import (
-    Plane,
-    Plate,
-    at_border,
-    ball_of,
-    half_plane,
-    near_ellipsoid,
-    on_rectangle,
-    select,
-    slope,
-)
+from transientcam_driver.simulation.light import coverage
+from transientcam_driver.simulation.light.compiling import inner
+from transientcam_driver.simulation.light.coverage import Ball, Plane, Plate, ball_of
 
 __all__ = ["at_border", "ball_of", "near_ellipsoid", "on_rectangle", "rows_of"]
 _HOW = {"nogil": True, "error_model": "numpy", "forceinline": True}
 _extending: Any = extending  # numba is only partly annotated
+One = np.float32
+Three = tuple[One, One, One]
+Four = tuple[One, One, One, One]
+at_border = cast("Callable[[One, One, One, One, One], Four]", coverage.at_border)
+near_ellipsoid = cast("Callable[[Ball, One, One, One], Three]", coverage.near_ellipsoid)
+on_rectangle = cast("Callable[[Plate, One, One, One], Four]", coverage.on_rectangle)
 
 
-def _compile_as_it_is(function: Function) -> None:
-    _extending.register_jitable(**_HOW)(function)
-
-
-for _each in (slope, half_plane, at_border, ball_of, near_ellipsoid, on_rectangle):
-    _compile_as_it_is(_each)
+_PORTABLE: tuple[Callable[..., Any], ...] = (
+    coverage.slope,
+    coverage.half_plane,
+    at_border,
+    ball_of,
+    near_ellipsoid,
+    on_rectangle,
+)
+for _each in _PORTABLE:
+    _extending.register_jitable(**_HOW)(_each)
 
 
 def _choose(condition: bool, one: np.float32, other: np.float32) -> np.float32:
     return one if condition else other
 
 
-_extending.overload(select, jit_options=_HOW, strict=False)(lambda *_types: _choose)
+_extending.overload(coverage.select, jit_options=_HOW, strict=False)(lambda *_types: _choose)
 
 
 @inner

@@ -9,7 +9,7 @@ import numpy as np
 
 from transientcam_driver.simulation.light.bundle import Numbers
 from transientcam_driver.simulation.light.compiled_edges import beside, part_above
-from transientcam_driver.simulation.light.compiling import FLAG, PLANE, float32, inner, lane
+from transientcam_driver.simulation.light.compiling import FLAG, PLANE, inner, lane
 from transientcam_driver.simulation.light.coverage import LEAST, ONE, ZERO, Plane
 
 
@@ -26,7 +26,7 @@ def overlap(
     first, second = one[top + row, start + column], other[row, column]
     if sign < ZERO:
         second = ONE - second
-    across = first * second
+    across: np.float32 = first * second
     if not (first > ZERO and first < ONE and second > ZERO and second < ONE):
         return across
     (up, down), (left, right) = beside(row, height), beside(column, width)
@@ -42,13 +42,14 @@ def overlap(
     along = max(first + second - ONE, ZERO)
     if cosine > ZERO:
         along = min(first, second)
-    return across + cosine * cosine * (along - across)
+    across += cosine * cosine * (along - across)
+    return across
 
 
 @lane(PLANE, PLANE)
 def overlapped(one: Plane, other: Plane) -> Plane:
     """Return the share of each pixel (H, W) that lies in both of two shapes, given each's."""
-    both = np.empty(one.shape, float32)
+    both = np.empty(one.shape, np.float32)
     of = 0, 0, one.shape[0], one.shape[1]
     for row in range(one.shape[0]):
         for column in range(one.shape[1]):

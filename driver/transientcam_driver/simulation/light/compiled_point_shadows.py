@@ -25,7 +25,6 @@ from transientcam_driver.simulation.light.compiling import (
     NUMBERS,
     PLANES,
     WHOLE,
-    float32,
     inner,
     int64,
     lane,
@@ -148,10 +147,10 @@ def dim_behind_ellipsoids(
     those with a box that lines may meet one before are looked at. Boxes are of ways from the apex.
     """
     count, chunks = len(x), len(reach)
-    values, counts = np.full(count + 1, _NAN, float32), np.zeros(chunks + 1, int64)
+    values, counts = np.full(count + 1, _NAN, np.float32), np.zeros(chunks + 1, np.int64)
     known, stale = np.ones(chunks + 1, np.bool_), np.zeros(chunks, np.bool_)
-    share, border = np.empty(CHUNK, float32), np.empty(CHUNK, np.bool_)
-    corner = float32(apex[0]), float32(apex[1]), float32(apex[2])
+    share, border = np.empty(CHUNK, np.float32), np.empty(CHUNK, np.bool_)
+    corner = np.float32(apex[0]), np.float32(apex[1]), np.float32(apex[2])
     lines = corner, x, y, z, near, index
     low, high = (boxes[0], boxes[1], boxes[2]), (boxes[3], boxes[4], boxes[5])
     for n in range(len(axes)):
@@ -197,16 +196,16 @@ def dim_softly_behind_rectangle(
 ) -> None:  # fmt: skip
     """Take from the light at points what a rectangle covers of the pixels around them."""
     count, axes, (a, b, c) = len(x), rows_of(plate), (apex[0], apex[1], apex[2])
-    first, second = np.full(count + 1, _NAN, float32), np.full(count + 1, _NAN, float32)
+    first, second = np.full(count + 1, _NAN, np.float32), np.full(count + 1, _NAN, np.float32)
     met, mine = False, np.int32(own)
     for i in range(count):
         one, other, at, _facing = on_rectangle(axes, x[i] - a, y[i] - b, z[i] - c)
         if (at > near[i] + TOUCHING) & (at < ONE - TOUCHING) & (index[i] != mine):
             first[i], second[i] = one, other
-            met |= (one > ZERO) & (other > ZERO)
+            met |= bool((one > ZERO) & (other > ZERO))
     if not met:
         return
-    share, part = np.empty(CHUNK, float32), np.empty(CHUNK, float32)
+    share, part = np.empty(CHUNK, np.float32), np.empty(CHUNK, np.float32)
     border = np.empty(CHUNK, np.bool_)
     for start in range(0, count, CHUNK):
         size = min(CHUNK, count - start)

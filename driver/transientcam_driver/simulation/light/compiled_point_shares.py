@@ -16,9 +16,10 @@ from transientcam_driver.simulation.light.lanes import CHUNK
 @inner
 def share_at_border(values: Plane, around: NDArray[np.int32], i: int) -> np.float32:
     """Return the share of one of some pixels at a border."""
-    up, down = values[around[0, i]], values[around[1, i]]
-    left, right = values[around[2, i]], values[around[3, i]]
-    return at_border(values[i], up, down, left, right)[0]
+    up, down = values[int(around[0, i])], values[int(around[1, i])]
+    left, right = values[int(around[2, i])], values[int(around[3, i])]
+    share: np.float32 = at_border(values[i], up, down, left, right)[0]
+    return share
 
 
 @inner
@@ -57,9 +58,9 @@ def count_reached(counts: NDArray[np.int64], reach: NDArray[np.int64], c: int) -
 
     ``counts`` are of all chunks before each.
     """
-    found = counts[c + 1] - counts[c]
+    found: int = counts[c + 1] - counts[c]
     for k in range(0, 8, 2):
-        found += counts[reach[c, k + 1]] - counts[reach[c, k]]
+        found += counts[int(reach[c, k + 1])] - counts[int(reach[c, k])]
     return found
 
 
@@ -77,7 +78,7 @@ def any_beside(
             continue
         places = around[side, c * CHUNK : min((c + 1) * CHUNK, len(values) - 1)]
         for i in range(len(places)):
-            found |= values[places[i]] > ZERO
+            found |= bool(values[int(places[i])] > ZERO)
     return found
 
 

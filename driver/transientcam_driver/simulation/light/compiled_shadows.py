@@ -20,7 +20,6 @@ from transientcam_driver.simulation.light.compiling import (
     REGION,
     TILES,
     WHOLE,
-    float32,
     inner,
     int64,
     lane,
@@ -48,7 +47,7 @@ def _runs(tiles: NDArray[np.bool_], side: int, of: Numbers, grown: bool) -> NDAr
     top, start, height, width = of
     first_tile, tile_after = start // side, (start + width + side - 1) // side
     rows, columns = (height + side - 1) // side, tile_after - first_tile
-    runs, count = np.empty((rows * (columns // 2 + 1), 4), int64), 0
+    runs, count = np.empty((rows * (columns // 2 + 1), 4), np.int64), 0
     wanted = np.empty(columns + 1, np.bool_)
     wanted[columns] = False
     for k in range(rows):
@@ -109,8 +108,8 @@ def _shade(
     """Take from shares of light what an ellipsoid blocks; whether it blocks any."""
     x, y, z, near, far = lines
     top, start, height, width = of
-    inside, closest = np.empty((height, width), float32), np.empty((height, width), float32)
-    share, marks = np.empty((height, width), float32), np.zeros(width, np.bool_)
+    inside, closest = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
+    share, marks = np.empty((height, width), np.float32), np.zeros(width, np.bool_)
     for run in _runs(tiles, side, of, True):
         first, end = run[2], run[3]
         for row in range(run[0], run[1]):
@@ -153,7 +152,7 @@ def _take(
 ) -> None:
     """Take shares of pixels from what is left of light."""
     top, start, _height, _width = of
-    kept = np.empty(len(border), float32)
+    kept = np.empty(len(border), np.float32)
     for k in range(len(border)):  # before anything is taken that others are compared with
         kept[k] = overlap(left, share, border[k, 0], border[k, 1], of, -ONE)
     for run in runs:

@@ -16,9 +16,7 @@ from transientcam_driver.simulation.light.compiling import (
     REGION,
     ROWS,
     WHOLE,
-    float32,
     inner,
-    int64,
     lane,
 )
 from transientcam_driver.simulation.light.coverage import ZERO, Ball, Plane
@@ -52,7 +50,7 @@ def _cross(
     """Cross the lines of a region; row by row, put where pixels may be covered in ``spans``."""
     top, left, height, width = of
     right = left + width
-    met = np.empty((height, 2), int64)
+    met = np.empty((height, 2), np.int64)
     for row in range(height):
         r = top + row
         met[row, 0], met[row, 1] = _cross_row(
@@ -86,8 +84,8 @@ def seen(
     """
     top, left, height, width = of
     ball = ball_of(axes[0], axes[1], apex)
-    inside, at = np.empty((height, width), float32), np.empty((height, width), float32)
-    share, spans = np.zeros((height, width), float32), np.empty((height, 2), int64)
+    inside, at = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
+    share, spans = np.zeros((height, width), np.float32), np.empty((height, 2), np.int64)
     border = np.zeros(width, np.bool_)
     _cross(ball, x, y, z, of, inside, at, spans)
     for row in range(height):

@@ -9,8 +9,6 @@ from transientcam_driver.simulation.light.compiling import (
     PLANES,
     ROWS,
     WHOLE,
-    float32,
-    float64,
     inner,
     int64,
     lane,
@@ -52,7 +50,7 @@ def tangents(axes: Doubles, apex: Doubles, frame: Doubles) -> Doubles:
     To the first of the directions of a frame, in the planes with each of the two others.
     ``axes`` (N, 2, 3) are centres and radii. Infinite where one reaches behind the apex.
     """
-    limits = np.empty((len(axes), 2, 2), float64)
+    limits = np.empty((len(axes), 2, 2), np.float64)
     for n in range(len(axes)):
         away, radii = axes[n, 0] - apex, axes[n, 1]
         for k in range(2):
@@ -88,7 +86,7 @@ def met(
     """
     count, height, width = len(limits), low.shape[1], low.shape[2]
     tiles = np.zeros((count, height, width), np.bool_)
-    spans = np.zeros((count, 4), int64)
+    spans = np.zeros((count, 4), np.int64)
     for n in range(count):
         first, last = limits[n, 0, 0], limits[n, 0, 1]
         start, end = limits[n, 1, 0], limits[n, 1, 1]
@@ -115,7 +113,7 @@ def shown_tiles(shown: Plane, side: int) -> Tiles:
     """Return tiles (R, C) of pixels whose shares are not all 0."""
     height, width = shown.shape
     rows, columns = (height + side - 1) // side, (width + side - 1) // side
-    line, tiles = np.empty(columns * side, float32), np.zeros((rows, columns), np.bool_)
+    line, tiles = np.empty(columns * side, np.float32), np.zeros((rows, columns), np.bool_)
     for row in range(rows):
         for i in range(len(line)):
             line[i] = ZERO

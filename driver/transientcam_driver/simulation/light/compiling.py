@@ -50,7 +50,8 @@ def inner(function: Function) -> Function:
     The cache notices changes of that file only. Calls that remain would count references of every
     array they pass, one by one between all cores: a fourth of the time of loops over short rows.
     """
-    compiled: Function = njit(nogil=True, error_model="numpy", forceinline=True)(function)
+    dispatcher: Any = njit(nogil=True, error_model="numpy", forceinline=True)(function)
+    compiled: Function = dispatcher
     return compiled
 
 

@@ -4,13 +4,13 @@ Lines through one apex are tested against a shape. What is computed of each line
 the silhouette and is smooth across it, so that its differences between neighbouring pixels say how
 far the silhouette is from the pixel's centre.
 
-Functions of numbers (`Number`) serve planes of them in NumPy, and are compiled for one at a time
-(see `portable`): they hold for both only as long as they have no branches.
+Functions of planes that have no branches are also compiled, for one number at a time: see
+`compiled_numbers`.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Points, Rectangle, Shape
 
 Plane = NDArray[np.float32]
-Number = TypeVar("Number", np.float32, Plane)
+Values: TypeAlias = NDArray[Any]
+"""Of a plane, whose type NumPy's stubs lose in arithmetic."""
 Ball: TypeAlias = tuple[np.float32, ...]
 """1 / radii, origin of lines over the radii, 1 - its square, and what keeps from dividing by 0."""
 Plate: TypeAlias = Sequence[Sequence[np.float32]] | Plane
@@ -80,7 +81,7 @@ def ball_of(centre: Points, radii: Points, apex: Points) -> Ball:
     )
 
 
-def near_ellipsoid(ball: Ball, x: Number, y: Number, z: Number) -> tuple[Number, Number, Number]:
+def near_ellipsoid(ball: Ball, x: Values, y: Values, z: Values) -> tuple[Values, Values, Values]:
     """Return where lines (x, y, z) are closest to an ellipsoid's centre.
 
     1 minus the squared distance there, where the ellipsoid is a unit sphere; the t; and the squared
@@ -104,8 +105,8 @@ def plate_of(shape: Rectangle, apex: Points) -> Plane:
 
 
 def on_rectangle(
-    plate: Plate, x: Number, y: Number, z: Number
-) -> tuple[Number, Number, Number, Number]:
+    plate: Plate, x: Values, y: Values, z: Values
+) -> tuple[Values, Values, Values, Values]:
     """Return where lines (x, y, z) meet a rectangle's plane.
 
     Functions that are above 0 within its width and its height; the t; and the lines' component
@@ -141,8 +142,8 @@ def covered(inside: Plane) -> Plane:
 
 
 def at_border(
-    value: Number, up: Number, down: Number, left: Number, right: Number
-) -> tuple[Number, Number, Number, Number]:
+    value: Values, up: Values, down: Values, left: Values, right: Values
+) -> tuple[Values, Values, Values, Values]:
     """Return the share of a pixel where a function is above 0, its mean over it, and its slopes.
 
     By the values at the pixel's centre and those of its neighbours.
@@ -154,7 +155,7 @@ def at_border(
     return share, mean, along, across
 
 
-def slope(before: Number, after: Number) -> tuple[Number, Number]:
+def slope(before: Values, after: Values) -> tuple[Values, Values]:
     """Size of a slope and its change, given the differences to both neighbours.
 
     About an extremum, or beside pixels that have no value, it is the smaller difference.
@@ -165,7 +166,7 @@ def slope(before: Number, after: Number) -> tuple[Number, Number]:
     return select(even, np.abs(before + after) / TWO, smaller), select(even, after - before, ZERO)
 
 
-def half_plane(value: Number, steep: Number, gentle: Number) -> Number:
+def half_plane(value: Values, steep: Values, gentle: Values) -> Values:
     """Area of a unit square where ``value + steep x + gentle y`` is above 0, about its centre."""
     steep = np.maximum(steep, LEAST)
     gentle = np.maximum(gentle, _GENTLEST * steep)
@@ -180,11 +181,10 @@ def half_plane(value: Number, steep: Number, gentle: Number) -> Number:
 
 
 def select(
-    condition: np.bool_ | NDArray[np.bool_], one: Number | np.float32, other: Number | np.float32
-) -> Number:
+    condition: NDArray[np.bool_], one: Values | np.float32, other: Values | np.float32
+) -> Values:
     """Return one number where a condition holds, and else the other."""
-    chosen: Number = np.where(condition, one, other)  # type: ignore[assignment]
-    return chosen
+    return np.where(condition, one, other)
 
 
 def _at_border(positive: NDArray[np.bool_]) -> NDArray[np.bool_]:

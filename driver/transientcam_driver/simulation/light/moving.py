@@ -17,6 +17,7 @@ from transientcam_driver.simulation.light.bundle import (
     Bundle,
     Region,
     inside,
+    numbers,
     overlap,
     union,
 )
@@ -64,7 +65,7 @@ class _Seen:
 
         Rows and columns (2, P); shares, distances, and points and ways by component (8, P).
         """
-        bundle, corner = self.sight.bundle, (of.start for of in self.region)
+        bundle, corner = self.sight.bundle, numbers(self.region)[:2]
         apex = bundle.apex.astype(np.float32)
         compiled_chunks.points(
             self.share, self.at_m, *bundle.way, *corner, apex, start, places, lines
@@ -165,9 +166,7 @@ class MovingLight:
         parts = tuple(slice(*pair) for pair in pairwise(ends))
         return Layers(places, share, lit, parts)
 
-    def _shadow(
-        self, shapes: list[Shape], chain: int, shows: NDArray[np.bool_]
-    ) -> Shadow | None:
+    def _shadow(self, shapes: list[Shape], chain: int, shows: NDArray[np.bool_]) -> Shadow | None:
         """Share of the light by a chain of mirrors that is left on what stands still.
 
         Only near tiles that show any of it: each shape takes light at the edge of another one by

@@ -57,9 +57,7 @@ def axes_of(shapes: Iterable[Shape]) -> NDArray[np.float64]:
     return np.array(axes, dtype=np.float64).reshape(-1, 2, 3)
 
 
-def meeting(
-    shapes: list[Shape], bundle: Bundle
-) -> tuple[NDArray[np.bool_], list[Region | None]]:
+def meeting(shapes: list[Shape], bundle: Bundle) -> tuple[NDArray[np.bool_], list[Region | None]]:
     """Return which tiles (N, R, C) have lines that may meet shapes, and regions that hold them.
 
     A region is None if there are none.

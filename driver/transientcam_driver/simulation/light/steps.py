@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
 from typing import Literal
 
 import numpy as np
@@ -124,14 +123,15 @@ class Between:
 
     def moments_in(self, region: Region, frequency_hz: float) -> Moments:
         """Moments of a region that holds all that differs."""
-        parts = (
-            (np.float32(share), of.differing(frequency_hz).view(np.float32), numbers(of.region))
-            for share, of in self._parts
-        )
-        total = self._parts[0][1].unchanged(frequency_hz)
+        (one, first), (other, second) = self._parts
+        total = first.unchanged(frequency_hz)
         plane = total.view(np.float32)
-        of = plane, plane.shape[1] // total.shape[1], numbers(region)
-        mixed = compiled_light.blended(*of, *chain.from_iterable(parts))
+        mixed = compiled_light.blended(
+            plane, plane.shape[1] // total.shape[1], numbers(region),
+            np.float32(one), first.differing(frequency_hz).view(np.float32), numbers(first.region),
+            np.float32(other), second.differing(frequency_hz).view(np.float32),
+            numbers(second.region),
+        )  # fmt: skip
         return mixed.view(np.complex64) if frequency_hz else mixed
 
     @cached_property

@@ -25,6 +25,7 @@ def without_scattering(scene: Scene) -> Scene:
     surfaces = tuple(replace(each, scatter=None) for each in scene.surfaces)
     return replace(scene, surfaces=surfaces)
 
+
 def still_scene(scene: Scene) -> Scene:
     """Return the scene without what moves; surfaces keep their indices."""
     surfaces = tuple(
