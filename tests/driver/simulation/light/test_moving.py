@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from transientcam_driver.simulation.build import find_scene
 from transientcam_driver.simulation.light.layers import MovingResponses
-from transientcam_driver.simulation.light.moving import MovingLight, still_scene
+from transientcam_driver.simulation.light.moving import MovingLight
 from transientcam_driver.simulation.light.paths import light_rays
 from transientcam_driver.simulation.light.rays import camera_rays, rays_through
 from transientcam_driver.simulation.light.steps import Steps
 from transientcam_driver.simulation.light.still import StillLight
+from transientcam_driver.simulation.light.variants import still_scene
 from transientcam_driver.simulation.scene.geometry import Ellipsoid, Rectangle
 from transientcam_driver.simulation.scene.motion import Motion
 from transientcam_driver.simulation.scene.scene import Light, Scene, Surface, Transport, Viewpoint
