@@ -3,6 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from transientcam_simulation.compiled._compiling import FLAG
 from transientcam_simulation.compiled._lanes import CHUNK, LANES
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ __all__ = [
     "CHUNK",
     "CODES",
     "DOUBLES",
+    "FLAG",
     "FLAGS",
     "INDICES",
     "LANES",

@@ -14,14 +14,6 @@ from transientcam_compiled import Cache, Kernels
 
 OF_IMAGES: Final = ("imaging._compiled_images",)
 """Modules of the lanes that images of any scene use."""
-COMPILED: Final = (
-    *OF_IMAGES,
-    "light._compiled_chunks",
-    "light._compiled_edges",
-    "light._compiled_light",
-    "light._compiled_tiles",
-)
-"""Modules of all lanes."""
 WORTH_PIXELS: Final = 100_000_000
 """Of images in NumPy, after which their lanes are asked for.
 
@@ -32,8 +24,8 @@ CHUNK: Final = 64
 FUNCTIONS: Final[dict[str, dict[str, Callable[..., Any]]]] = {}
 """Those that each module has compiled, by their names."""
 _PACKAGE: Final = "transientcam_simulation"
-CACHE: Final = Cache(f"{_PACKAGE}.compiled._lanes", f"{_PACKAGE}.compiled._compiling")
-"""numba itself notices changes of each file of lanes, which use no functions of another."""
+CACHE: Final = Cache(*(f"{_PACKAGE}.{room}" for room in ("compiled", "imaging", "light")))
+"""Functions are shared between files: what is compiled is kept for one state of all of them."""
 
 
 def _load(name: str) -> dict[str, Callable[..., Any]]:
@@ -58,7 +50,7 @@ class Lanes:
         """Return a lane, or None where NumPy is to be used."""
         return self._ready.get(name)
 
-    def want(self, modules: tuple[str, ...] = COMPILED) -> None:
+    def want(self, modules: tuple[str, ...] = OF_IMAGES) -> None:
         """Have lanes made ready in the background, once; returns at once."""
         for name in modules:
             self.kernels.want(name)
@@ -71,7 +63,7 @@ class Lanes:
 
     def compile_now(self) -> None:
         """Make all lanes ready before returning."""
-        for name in COMPILED:
+        for name in OF_IMAGES:
             self.kernels.make_ready(name)
 
     def _add(self, _module: str, functions: dict[str, Callable[..., Any]]) -> None:
