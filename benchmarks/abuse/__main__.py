@@ -16,7 +16,7 @@ from benchmarks.abuse.attacks import ATTACKS
 from benchmarks.abuse.measuring import measure
 from benchmarks.abuse.page import PAGE, mixed_page, page, page_with, page_with_before, row
 from benchmarks.abuse.soaking import soak
-from benchmarks.machine import commit_of
+from benchmarks.common.machine import commit_of
 
 CONNECTIONS = (1, 16)
 DURATION_S = 5.0

@@ -15,8 +15,8 @@ from typing import Final
 import httpx
 import trustme
 
-from benchmarks.daemon import Process
-from benchmarks.viewers import Viewer, cut, watch
+from benchmarks.common.daemon import Process
+from benchmarks.service.viewers import Viewer, cut, watch
 from transientcam import wire
 
 VIDEO = {"base_frequency_hz": 23e6, "harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}

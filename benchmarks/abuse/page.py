@@ -7,7 +7,7 @@ from typing import Final
 from benchmarks.abuse.attacks import HEALTHY, NICE, SOURCE
 from benchmarks.abuse.measuring import COMES_BACK_S, GIVE_UP_S, Seen
 from benchmarks.abuse.soaking import Soak
-from benchmarks.machine import machine
+from benchmarks.common.machine import machine
 
 PAGE: Final = Path(__file__).parents[2] / "docs" / "abuse.md"
 _MIB = 2**20

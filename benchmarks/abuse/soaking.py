@@ -8,8 +8,8 @@ from typing import Final
 import httpx
 
 from benchmarks.abuse.measuring import GIVE_UP_S, RANGE, attacked, prepare, served, stream_url
-from benchmarks.soak import Samples
-from benchmarks.viewers import Viewer, cut, watch
+from benchmarks.service.soak import Samples
+from benchmarks.service.viewers import Viewer, cut, watch
 
 CONNECTIONS: Final = 8
 SAMPLE_S: Final = 2.0

@@ -20,7 +20,7 @@ from benchmarks.accuracy.page import report
 from benchmarks.accuracy.pictures import drawn
 from benchmarks.accuracy.promises import BUILT_IN
 from benchmarks.accuracy.stated import stated_and_observed
-from benchmarks.measured_scenes import composite_scene
+from benchmarks.common.measured_scenes import composite_scene
 from transientcam_experiments import tradeoff
 from transientcam_experiments.tradeoff.report import file_name
 

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 from typing import Final
 
-from benchmarks.machine import machine
+from benchmarks.common.machine import machine
 
 PAGE: Final = Path(__file__).parents[2] / "docs" / "plans.md"
 PARTS: Final = {

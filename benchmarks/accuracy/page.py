@@ -7,7 +7,7 @@ from benchmarks.accuracy.noise import FRAMES, Compared
 from benchmarks.accuracy.opening import Documents, opening
 from benchmarks.accuracy.stated import FRAMES as OF_FRAMES
 from benchmarks.accuracy.stated import Stated
-from benchmarks.machine import machine
+from benchmarks.common.machine import machine
 from transientcam_driver import Sequence
 from transientcam_experiments import tradeoff
 from transientcam_experiments.tradeoff.report import file_name

@@ -17,7 +17,7 @@ from benchmarks.accuracy.promises import (
     looked,
     measured,
 )
-from benchmarks.machine import machine
+from benchmarks.common.machine import machine
 from transientcam_driver import Sequence
 from transientcam_experiments.tradeoff.picture import error_picture, saved
 from transientcam_server.planning import Goal

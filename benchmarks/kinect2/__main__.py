@@ -10,8 +10,8 @@ from typing import Final
 
 from rich.console import Console
 
+from benchmarks.common.machine import machine
 from benchmarks.kinect2 import corner, decoding, returns, seen
-from benchmarks.machine import machine
 
 PAGE: Final = Path(__file__).parents[2] / "docs" / "kinect2.md"
 _MARKS: Final = ("<!-- measured: begin -->", "<!-- measured: end -->")

@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.tables import Table
 from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import TOO_LONG
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array
-from benchmarks.tables import Table
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.entries.kinect2 import PLUGIN
 from transientcam_driver.kinect2.layout import SAMPLING

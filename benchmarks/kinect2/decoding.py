@@ -5,10 +5,10 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.tables import Table, verdict
+from benchmarks.common.timing import duration, measure
 from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Scene, folder, load, noise
-from benchmarks.tables import Table, verdict
-from benchmarks.timing import duration, measure
 from transientcam_driver.kinect2 import encoder, measurement
 from transientcam_driver.kinect2.layout import SUB_IMAGES
 from transientcam_driver.kinect2.packets import Assembler

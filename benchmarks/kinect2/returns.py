@@ -5,10 +5,10 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.tables import Table, verdict
 from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import NOISY_STD, ROUNDING, TOO_LONG
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array, Scene, load, noise
-from benchmarks.tables import Table, verdict
 from transientcam_driver.kinect2 import codes, encoder, measurement
 from transientcam_driver.kinect2.layout import BASE_FREQUENCY_HZ, HEIGHT, SAMPLING, WIDTH
 from transientcam_driver.kinect2.tables import P0Tables

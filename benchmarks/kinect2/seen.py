@@ -10,10 +10,10 @@ from typing import Any, Final
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.tables import Table
 from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import ROUNDING, TOO_LONG
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array, noise
-from benchmarks.tables import Table
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.entries.kinect2 import PLUGIN
 from transientcam_driver.kinect2.camera import Kinect2Camera

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from rich.console import Console
 
+from benchmarks.common.machine import machine
+from benchmarks.common.measured_scenes import data_folder
+from benchmarks.common.tables import Table
 from benchmarks.likelihood import captures, shapes, sparse, speed
-from benchmarks.machine import machine
-from benchmarks.measured_scenes import data_folder
-from benchmarks.tables import Table
 
 PAGE = Path(__file__).parents[2] / "docs" / "likelihood.md"
 INTRODUCTION = """# Few returns by their likelihood

@@ -9,6 +9,8 @@ from typing import Final, Literal
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.measured_scenes import composite_scene, cornell_scene
+from benchmarks.common.tables import Table
 from benchmarks.likelihood.errors import (
     COLUMNS,
     ESTIMATORS,
@@ -19,8 +21,6 @@ from benchmarks.likelihood.errors import (
     ranges,
     turn_m,
 )
-from benchmarks.measured_scenes import composite_scene, cornell_scene
-from benchmarks.tables import Table
 from transientcam_driver import Sequence as Capture
 from transientcam_driver import Truth
 from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.tables import Table
 from benchmarks.likelihood.errors import Array, errors_of, ranges, turn_m
-from benchmarks.tables import Table
 from transientcam_moments.likelihood import MODEL_ERROR
 from transientcam_moments.likelihood.choice import TAIL_SHAPE
 

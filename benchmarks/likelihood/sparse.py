@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.tables import Table
 from benchmarks.likelihood.errors import COLUMNS, Array, ranges, turn_m
-from benchmarks.tables import Table
 
 BASE_HZ: Final = 23e6
 NOISE_SHARE: Final = 1 / 200

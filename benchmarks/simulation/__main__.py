@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
-from benchmarks.corner import range_errors
-from benchmarks.machine import machine
+from benchmarks.common.corner import range_errors
+from benchmarks.common.machine import machine
 from benchmarks.simulation import accuracy, bounces
 from benchmarks.simulation.accuracy import SEQUENCES, accuracy_lines
 from benchmarks.simulation.bounces import bounce_lines

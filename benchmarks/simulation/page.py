@@ -1,6 +1,6 @@
 """The parts of ``docs/simulation.md`` that are not measured here: rules, and sizes by scene."""
 
-from benchmarks.corner import RangeError
+from benchmarks.common.corner import RangeError
 from benchmarks.simulation.scenes import BUILT_IN, scene_named, unseen
 from transientcam_driver import Sequence
 from transientcam_driver.cli.explain import scenes_table

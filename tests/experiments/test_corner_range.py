@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.corner import RangeError, range_errors
+from benchmarks.common.corner import RangeError, range_errors
 
 
 @pytest.fixture(scope="module")

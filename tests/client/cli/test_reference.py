@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks import reference
+from benchmarks.pages import reference
 from transientcam import cli
 
 _REMEDY = "run: python -m benchmarks.reference --write"

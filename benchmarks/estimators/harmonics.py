@@ -1,0 +1,228 @@
+"""Harmonics of the modulation: errors before and after they are taken out, by scene and modulation.
+
+Run it with ``python -m benchmarks.harmonics [--waveform FILE.npy] [--write]``. The simulated camera
+modulates by a square wave, whose correlation with itself is a triangle, and by a measured
+waveform where a file of one is given: (rows, samples) over one period, opposite rows in pairs.
+Each is calibrated through the diffusor with a phase sweep. The mean of many takes then shows
+what noise does not explain.
+"""
+
+import argparse
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+import transientcam_moments as tm
+from benchmarks.common.data import PAPER, SETTINGS, VGA, images
+from benchmarks.common.machine import machine
+from benchmarks.common.tables import Table
+from transientcam_driver import Camera, SubPhases, Truth, capture_calibration
+from transientcam_driver import Sequence as Capture
+from transientcam_driver.calibration import DEFAULT_TAKES
+from transientcam_driver.clock import VirtualClock
+from transientcam_driver.simulation.build import DEFAULT_HEIGHT, DEFAULT_WIDTH, build, find_scene
+from transientcam_driver.simulation.device.bus import SimulatedBus
+from transientcam_driver.simulation.imperfections import DeviceProfile, Pattern, Waveform
+from transientcam_driver.usb import open_transport
+from transientcam_driver.usb_camera import UsbCamera
+from transientcam_server.imaging.calibration import Calibration, evaluate
+from transientcam_server.imaging.waveform import SweepEvaluation
+
+PAGE: Final = Path(__file__).parents[1] / "docs" / "harmonics.md"
+_BEGIN: Final = "<!-- measured -->"
+_TAKES: Final = 16
+_FRAMES: Final = 15
+_LANES: Final = ("measure", "smooth", "smallest_eigenvalue", "levinson", "harmonics", "reconstruct")
+_SEQUENCE: Final = Capture(harmonics=4, takes=_TAKES)
+_SCENES: Final = ("wall", "mirrors", "corner")
+_SCHEMES: Final = (
+    SubPhases("none"),
+    SubPhases("harmonic-cancellation", 3),
+    SubPhases("arccos", 4),
+    SubPhases("arccos", 8),
+)
+_PATTERN: Final = Pattern(delay_s=1.2e-9, gain=0.01)  # the prototype's
+_Array = NDArray[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """Of the mean of many takes: moments over b_0 (NaN where unknown), and ranges in m."""
+
+    moments: _Array
+    range_m: _Array
+
+    def texts(self) -> list[str]:
+        """Return both as columns have them."""
+        worst = self.moments[np.isfinite(self.moments)]
+        off = np.abs(self.range_m[np.isfinite(self.range_m)]) * 1e3
+        moment = (
+            "-" if not worst.size else f"{np.median(worst):.2%} / {np.percentile(worst, 90):.2%}"
+        )
+        return [moment, f"{np.median(off):.2f} / {np.percentile(off, 90):.1f}"]
+
+
+@contextmanager
+def camera_at(scene: str, waveform: Path, sequence: Capture) -> Iterator[Camera]:
+    """Open a simulated camera of this waveform, as fast as it computes."""
+    device = DeviceProfile("swept", waveform=Waveform(file=waveform), pattern=_PATTERN)
+    clock = VirtualClock()
+    emulated, simulation = build(
+        replace(find_scene(scene), device=device),
+        width=DEFAULT_WIDTH,
+        height=DEFAULT_HEIGHT,
+        seed=1,
+        clock=clock,
+    )
+    bus = SimulatedBus([emulated])
+    with UsbCamera(
+        lambda serial: open_transport(serial, backend=bus), clock=clock, simulation=simulation
+    ) as camera:
+        camera.configure(sequence)
+        yield camera
+
+
+def calibration(waveform: Path, sequence: Capture) -> tuple[Calibration, str | None]:
+    """Calibrate through the diffusor; also return why no harmonics are known."""
+    with camera_at("calibration", waveform, sequence) as camera:
+        sweep = SweepEvaluation(camera.capabilities, takes=DEFAULT_TAKES)
+        capture = capture_calibration(camera, average=tm.average_takes, waveform=sweep)
+    return evaluate(capture), sweep.reason
+
+
+def errors(scene: str, waveform: Path, sequence: Capture, known: Calibration) -> list[Errors]:
+    """Return the errors of a scene without and with the harmonics of a calibration."""
+    with camera_at(scene, waveform, sequence) as camera:
+        assert camera.simulation is not None
+        camera.start()
+        captured = camera.read_frame().images
+        camera.stop()
+        truth = camera.simulation.truth()
+    settings = tm.Settings(
+        base_frequency_hz=sequence.base_frequency_hz,
+        zeroth=sequence.zeroth,
+        takes=sequence.takes,
+        estimator="maximum-entropy",
+    )
+    gains = known.gains
+    found = []
+    for each in (None, gains.waveform):
+        result = tm.reconstruct(captured, settings, calibration=gains.planes, waveform=each)
+        off_m = np.asarray(result.range_m) - truth.range_m
+        found.append(Errors(_moment_errors(np.asarray(result.smoothed), truth, sequence), off_m))
+    return found
+
+
+def _moment_errors(moments: _Array, truth: Truth, sequence: Capture) -> _Array:
+    """Return the worst error of b_1 .. b_m over b_0 where the truth has all returns."""
+    if truth.kind != "sparse":
+        return np.full(moments.shape[1:], np.nan)
+    turn = 2j * np.pi * sequence.base_frequency_hz * np.nan_to_num(truth.delay_s)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        true = np.stack(
+            [(truth.weight * np.exp(j * turn)).sum(axis=0) for j in range(len(moments))]
+        )
+        # relative brightness is the weights' in both
+        true = true / true[0].real
+        error = np.abs(moments / moments[0].real - tm.smooth(true)).max(axis=0)
+    # where neighbours differ, light of both is smoothed by their brightness
+    smooth_here = np.abs(tm.smooth(true) - true).max(axis=0) < 1e-3
+    return np.where(smooth_here, error, np.nan)
+
+
+def waveforms(folder: Path, measured: Path | None) -> dict[str, Path]:
+    """Return files of correlation functions by their names."""
+    samples = 2048
+    turn = np.arange(samples) / samples
+    np.save(folder / "square.npy", (1 - 4 * np.abs(turn - 0.5))[None])
+    found = {"square wave": folder / "square.npy"}
+    return found if measured is None else found | {f"measured ({measured.stem})": measured}
+
+
+def table(measured: Path | None) -> Table:
+    """Measure all scenes and modulations."""
+    rows: list[Sequence[str]] = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, path in waveforms(Path(folder), measured).items():
+            for scheme in _SCHEMES:
+                sequence = replace(_SEQUENCE, sub_phases=scheme)
+                known, reason = calibration(path, sequence)
+                waveform = known.gains.waveform
+                largest = "too strong" if waveform is None else f"{np.abs(waveform).max():.2%}"
+                assert waveform is not None or reason is not None
+                for scene in _SCENES:
+                    plain, without = errors(scene, path, sequence, known)
+                    label = scheme.scheme + (f" {scheme.n}" if scheme.n > 1 else "")
+                    (b, r), (b_out, r_out) = plain.texts(), without.texts()
+                    rows.append([f"{name}, {label}, {scene}", largest, b, b_out, r, r_out])
+    columns = (
+        "modulation, sub-phases, scene",
+        "largest harmonic",
+        "moments, calibrated",
+        "harmonics taken out",
+        "range in mm, calibrated",
+        "harmonics taken out",
+    )
+    notes = [
+        f"m = 4 at 23 MHz, mean of {_TAKES} takes, calibration with {DEFAULT_TAKES} takes and a "
+        "phase sweep; noise, and delays of the pixels, as the simulated prototype has them. The "
+        "largest harmonic is over the fundamental, behind the sub-phases. Moments: the worst error "
+        "of b_1 to b_4 over b_0, median and 90 % of the pixels, where the truth has all returns. "
+        "Range (maximum entropy): median and 90 % of the absolute error.",
+    ]
+    return Table("Before and after", columns, rows, notes)
+
+
+def cost() -> Table:
+    """Measure the processor time of a frame without and with the correction."""
+    rows: list[Sequence[str]] = []
+    for m, shape in ((3, PAPER), (4, PAPER), (4, VGA)):
+        tm.kernels.compile([m], ["float32"], names=_LANES)
+        raw = images(m, shape)
+        gains = np.exp(0.2j * np.random.default_rng(m).normal(size=(m + 1, *shape)))
+        texts = []
+        for waveform in (None, np.tile(0.01 / np.arange(1, 5), (m, 1))):
+            reconstruct = tm.Reconstructor(SETTINGS, calibration=gains, waveform=waveform)
+            texts.append(f"{_processor_s(lambda: reconstruct(raw)) * 1e3:.1f}")  # noqa: B023 - called now
+        rows.append([f"m = {m}, {shape[1]} x {shape[0]}", *texts])
+    notes = ["Processor time in ms of a frame in single precision, with four harmonics."]
+    return Table("What it costs", ("frame", "calibrated", "harmonics taken out"), rows, notes)
+
+
+def _processor_s(frame: Callable[[], object]) -> float:
+    frame()
+    measured = []
+    for _ in range(_FRAMES):
+        begin_s = time.process_time()
+        frame()
+        measured.append(time.process_time() - begin_s)
+    return float(np.median(measured))
+
+
+def main() -> None:
+    """Measure, print, and with ``--write`` keep the table."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.harmonics", description=__doc__)
+    parser.add_argument("--waveform", type=Path, help="a measured correlation function, .npy")
+    parser.add_argument("--write", action="store_true", help=f"write the table of docs/{PAGE.name}")
+    options = parser.parse_args()
+    tables = [table(options.waveform), cost()]
+    for each in tables:
+        each.show(Console(width=200))
+    if options.write:
+        above = PAGE.read_text(encoding="utf-8").partition(_BEGIN)[0]
+        command = "python -m benchmarks.harmonics --waveform FILE --write"
+        shown = "\n".join(each.markdown() for each in tables)
+        said = f"Written by `{command}` on: {machine()}.\n"
+        PAGE.write_text(f"{above}{_BEGIN}\n\n{shown}\n{said}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,268 @@
+"""Measure the page: pictures a second, processor time, memory. ``python -m benchmarks.dashboard``.
+
+The light plays, first with the camera stopped and then while frames stream, and is moved along the
+timeline by hand, in Chromium without a graphics processor; daemon, simulation and page share the
+machine. With ``--sensors 640x480
+--harmonics 8`` that alone is measured. ``--hours 1`` lets it play for as many frames as the video
+setting gives in that time, as fast as the camera can, and follows its memory. ``--write`` writes
+docs/dashboard.md.
+"""
+
+import argparse
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import httpx
+import numpy as np
+from playwright.sync_api import Page, sync_playwright
+
+import transientcam_moments as tm
+from benchmarks.common.machine import machine
+from tests.browser.dashboard import open_page
+from tests.serving import serving
+
+# Pictures of the light and frames that the page drew, both a second.
+_COUNT_PICTURES = """
+(span_s) => new Promise((done) => {
+  const { store } = transientcam;
+  const read = () => [store.player.turn.peek(), store.frames.of("coefficients").peek().meta.frame];
+  const start = performance.now();
+  let [pictures, frames, [turn, frame]] = [0, 0, read()];
+  const count = (now) => {
+    const [nextTurn, nextFrame] = read();
+    if (nextTurn !== turn) pictures += 1;
+    if (nextFrame !== frame) frames += 1;
+    [turn, frame] = [nextTurn, nextFrame];
+    if (now - start < 1000 * span_s) requestAnimationFrame(count);
+    else done([pictures, frames].map((each) => (1000 * each) / (now - start)));
+  };
+  requestAnimationFrame(count);
+})
+"""
+# The timeline is held, and moved to another place before each refresh of the screen, until it is
+# let go.
+_HOLD_TIMELINE = """
+() => {
+  const slider = document.querySelector(".timeline input");
+  const tell = (kind) => slider.dispatchEvent(new PointerEvent(kind, { bubbles: true }));
+  let held = true;
+  tell("pointerdown");
+  const move = () => {
+    slider.valueAsNumber = (slider.valueAsNumber + 0.003) % 1;
+    slider.dispatchEvent(new InputEvent("input", { bubbles: true }));
+    if (held) requestAnimationFrame(move);
+  };
+  requestAnimationFrame(move);
+  window.letGo = () => { held = false; tell("pointerup"); };
+}
+"""
+PAGE = Path(__file__).parents[1] / "docs" / "dashboard.md"
+_VIDEO_HZ = 18.6  # the paper's video setting
+_LOOK_EVERY_MS = 15_000
+_ORDERS = (3, 4, 8)
+_SENSORS = ("163x120", "640x480")
+_SETTLING_MS = 15_000  # the page finds out within it how many frames it can take
+_PATIENCE_S = 120.0  # a laden machine answers in its own time
+_TICKS_S = os.sysconf("SC_CLK_TCK")
+
+
+def _browser() -> set[int]:
+    """Return the processes of the browser, not the compilers and drivers beside it."""
+    return {pid for pid in _descendants(os.getpid()) if _name(pid) == "chromium"}
+
+
+def _name(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/comm").read_text().strip()
+    except OSError:  # it ended meanwhile
+        return ""
+
+
+def _descendants(pid: int) -> set[int]:
+    """Return the processes below ``pid``."""
+    parents: dict[int, int] = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+        except OSError:  # it ended meanwhile
+            continue
+        parents[int(stat.parent.name)] = int(fields[1])
+    found: set[int] = set()
+    new = {pid}
+    while new:
+        new = {child for child, parent in parents.items() if parent in new} - found
+        found |= new
+    return found
+
+
+def _processor_s(pids: set[int]) -> float:
+    """Return the processor time that processes have used."""
+    total = 0.0
+    for pid in pids:
+        try:
+            fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        total += (int(fields[11]) + int(fields[12])) / _TICKS_S
+    return total
+
+
+def _heap_mb(page: Page) -> float:
+    """Return the memory of the page's scripts after a garbage collection."""
+    session = page.context.new_cdp_session(page)
+    session.send("HeapProfiler.collectGarbage")
+    used = session.send("Runtime.getHeapUsage")
+    session.detach()
+    return float(used["usedSize"] + used.get("backingStorageSize", 0)) / 1e6
+
+
+def _run(url: str, *, running: bool) -> None:
+    """Start or stop the camera."""
+    httpx.put(
+        f"{url}/api/v1/acquisition", json={"running": running}, timeout=_PATIENCE_S
+    ).raise_for_status()
+
+
+def measure(page: Page, url: str, *, harmonics: int, span_s: float) -> str:
+    """Return the row of the table for one order."""
+    document = httpx.get(f"{url}/api/v1/sequence", timeout=_PATIENCE_S).json()
+    known = ("takes", "sub_phases")
+    wanted = {name: document[name] for name in known} | {
+        "harmonics": harmonics,
+        "exposure_s": 0.0005,
+        "zeroth": "estimated",
+        "base_frequency_hz": 15e6,  # eight times more would be beyond the device
+    }
+    httpx.put(f"{url}/api/v1/sequence", json=wanted, timeout=_PATIENCE_S).raise_for_status()
+    _run(url, running=True)
+    open_page(page, f"{url}/?debug")
+    page.wait_for_function(
+        "(m) => transientcam.store.frames.of('coefficients').peek()?.coefficients?.harmonics === m",
+        arg=harmonics,
+    )
+    page.evaluate("() => { transientcam.store.player.playing.value = true; }")
+    _run(url, running=False)
+    page.wait_for_function("() => transientcam.store.status.running.peek() === false")
+    still_hz, _ = page.evaluate(_COUNT_PICTURES, span_s)
+    _run(url, running=True)
+    page.wait_for_function("() => transientcam.store.status.running.peek() === true")
+    page.wait_for_timeout(_SETTLING_MS)
+    before_s, begin_s, first = _processor_s(_browser()), time.monotonic(), page.evaluate(_NEWEST)
+    streaming_hz, drawn_hz = page.evaluate(_COUNT_PICTURES, span_s)
+    took_s = time.monotonic() - begin_s  # a laden page begins and answers late
+    used_s, frames = _processor_s(_browser()) - before_s, page.evaluate(_NEWEST) - first
+    asked_for, heap_mb = _asked_for(page), _heap_mb(page)
+    page.evaluate(_HOLD_TIMELINE)
+    page.wait_for_timeout(_SETTLING_MS)
+    by_hand_hz, _ = page.evaluate(_COUNT_PICTURES, span_s)
+    page.evaluate("() => letGo()")
+    size = page.locator("canvas[data-product=transient]").evaluate(
+        "(canvas) => `${canvas.width} x ${canvas.height}`"
+    )
+    return (
+        f"| {size} | {harmonics} | {still_hz:.1f} | {streaming_hz:.1f} | {by_hand_hz:.1f} | "
+        f"{drawn_hz:.1f} of {frames / took_s:.1f} | {asked_for} | {used_s / took_s:.2f} "
+        f"| {heap_mb:.1f} MB |"
+    )
+
+
+def _asked_for(page: Page) -> str:
+    """Return the header's words for what the page asks for."""
+    sign = page.locator("[data-field=link]")
+    return (sign.text_content() or "").replace("\u202f", " ") if sign.count() else "all"
+
+
+_NEWEST = "() => transientcam.store.status.newest.peek().frame"
+
+
+def endurance(page: Page, url: str, *, frames: int) -> list[str]:
+    """Return a table of the page's memory over so many frames."""
+    quickest = {"harmonics": 1, "zeroth": "estimated", "exposure_s": 0.0001}
+    answer = httpx.put(f"{url}/api/v1/sequence", json=quickest, timeout=_PATIENCE_S)
+    applied = answer.raise_for_status().json()
+    open_page(page, f"{url}/?debug")
+    page.evaluate("() => { transientcam.store.player.playing.value = true; }")
+    first, begin_s = page.evaluate(_NEWEST), time.monotonic()
+    seen: list[tuple[int, float]] = []
+    while not seen or seen[-1][0] < frames:
+        page.wait_for_timeout(_LOOK_EVERY_MS)
+        seen.append((page.evaluate(_NEWEST) - first, _heap_mb(page)))
+        print(f"{seen[-1][0]} frames, {seen[-1][1]:.1f} MB", flush=True)
+    settled = np.array(seen[len(seen) // 4 :])  # caches fill at first
+    slope_mb, _ = np.polyfit(settled[:, 0], settled[:, 1], 1)
+    marks = [seen[round(share * (len(seen) - 1))] for share in (0, 0.25, 0.5, 0.75, 1)]
+    rate_hz = seen[-1][0] / (time.monotonic() - begin_s)
+    return [
+        "| after frames | " + " | ".join(str(count) for count, _ in marks) + " |",
+        "|---|" + "---:|" * len(marks),
+        "| heap after collecting | " + " | ".join(f"{mb:.2f} MB" for _, mb in marks) + " |",
+        "",
+        f"{seen[-1][0]} frames, of which an hour has {_VIDEO_HZ * 3600:.0f} at the video setting, "
+        f"captured at {applied['frame_rate_hz']:.1f} Hz and shown from a stream of {rate_hz:.1f} "
+        f"Hz. Slope over the last three quarters: {1e3 * slope_mb * _VIDEO_HZ * 3.6:+.3f} MB "
+        "in as many frames as an hour has.",
+    ]
+
+
+def main() -> None:
+    """Measure every size and order, and print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--span-s", type=float, default=8.0, help="length of each measurement")
+    parser.add_argument("--sensors", nargs="+", default=_SENSORS, metavar="WIDTHxHEIGHT")
+    parser.add_argument("--harmonics", nargs="+", type=int, default=_ORDERS, metavar="M")
+    parser.add_argument("--hours", type=float, default=0.0, help="of video, to follow the memory")
+    parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name} anew")
+    arguments = parser.parse_args()
+    lines = [
+        "| sensor | m | pictures/s, still | streaming | by hand | frames/s drawn | asked for "
+        "| cores of the browser | heap |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    tm.kernels.compile(arguments.harmonics, ["float32"])  # not beside what is measured
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=shutil.which("chromium"))
+        page = chromium.new_page(viewport={"width": 1280, "height": 800})
+        page.set_default_timeout(1e3 * _PATIENCE_S)
+        for sensor in arguments.sensors:
+            width, height = sensor.split("x")
+            with serving(f"sim:mirrors?width={width}&height={height}") as served:
+                for harmonics in arguments.harmonics:
+                    row = measure(page, served.url, harmonics=harmonics, span_s=arguments.span_s)
+                    lines.append(row)
+                    print(row, flush=True)
+                page.goto("about:blank")
+        if arguments.hours:
+            with serving("sim:mirrors") as served:
+                frames = round(arguments.hours * _VIDEO_HZ * 3600)
+                lines += ["", "## Memory", "", *endurance(page, served.url, frames=frames)]
+                page.goto("about:blank")
+        chromium.close()
+    print("\n".join(lines))
+    if arguments.write:
+        command = " ".join(["python -m benchmarks.dashboard", *sys.argv[1:]])
+        PAGE.write_text("\n".join([*_head(command), *lines, ""]), encoding="utf-8")
+
+
+def _head(command: str) -> list[str]:
+    return [
+        "# What the dashboard takes",
+        "",
+        f"Written by `{command}` on: {machine()}.",
+        "",
+        "Light in flight plays in Chromium without a graphics processor, first with the camera",
+        "stopped, then while frames of 12, 16 or 32 images stream; daemon, simulation and page",
+        "share the machine. Where pictures become fewer than 30 a second, the page asks for fewer",
+        f"frames (decision 1069): streaming is measured {_SETTLING_MS / 1000:.0f} s after it",
+        "began, with what was asked for then, in the words of the page's header. Frames drawn are",
+        "of those that the camera took. Then, as long after, the timeline is held and moved by",
+        "hand before each refresh of the screen, while all this goes on. Cores are those of all",
+        "processes of the browser; the heap is that of the page's scripts after collecting.",
+        "",
+    ]
+
+
+if __name__ == "__main__":
+    main()
