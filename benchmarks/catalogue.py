@@ -45,6 +45,7 @@ class Measurement:
 
 _MOMENTS: Final = ("server/transientcam_moments",)
 _SERVER: Final = ("server/transientcam_server",)
+_COMPARISONS: Final = ("server/transientcam_moments/comparisons",)
 _IMAGING: Final = ("server/transientcam_server/imaging",)
 _RECORDING: Final = ("server/transientcam_server/recording",)
 
@@ -85,7 +86,11 @@ _ALL: Final = (
         timed=False,
     ),
     Measurement(
-        "relay_tree", "service.relay:tables", "relay", ("server/transientcam_server/relay",), level=3
+        "relay_tree",
+        "service.relay:tables",
+        "relay",
+        ("server/transientcam_server/relay",),
+        level=3,
     ),
     Measurement(
         "cluster", "service.cluster:tables", "cluster", ("server/transientcam_server/offline",), 3
@@ -114,6 +119,72 @@ _ALL: Final = (
         "measured/fuzzed-recordings",
         _RECORDING,
     ),
+    # -- estimators
+    Measurement(
+        "techniques", "estimators.estimators:techniques", "estimators", _COMPARISONS, timed=False
+    ),
+    Measurement("estimators", "estimators.estimators:tables", "estimators", _MOMENTS),
+    Measurement(
+        "camera_returns", "estimators.cameras:tables", "cameras", _MOMENTS, level=3, timed=False
+    ),
+    Measurement("harmonics", "estimators.harmonics:tables", "harmonics", (*_MOMENTS, *_IMAGING)),
+    Measurement(
+        "lost_sync",
+        "estimators.lost_sync:tables",
+        "lost-synchronisation",
+        (*_MOMENTS, "driver"),
+        timed=False,
+    ),
+    Measurement("stability", "estimators.stability:tables", "measured/stability", _MOMENTS),
+    Measurement(
+        "calibration_verdicts",
+        "estimators.calibration_verdicts:tables",
+        "measured/calibration-verdicts",
+        (*_IMAGING, "driver"),
+        timed=False,
+    ),
+    Measurement("corner_strip", "estimators.corner_strip:draw"),
+    # -- likelihood
+    Measurement("sparse", "likelihood.sparse:tables", "measured/likelihood", _MOMENTS, timed=False),
+    Measurement(
+        "captures", "likelihood.captures:tables", "measured/likelihood", _MOMENTS, timed=False
+    ),
+    Measurement("shapes", "likelihood.shapes:tables", "measured/likelihood", _MOMENTS, timed=False),
+    Measurement("likelihood_speed", "likelihood.speed:tables", "measured/likelihood", _MOMENTS),
+    # -- simulation
+    *(
+        Measurement(
+            f"simulation_{name}",
+            f"simulation.{function}",
+            "measured/simulation",
+            ("driver",),
+            timed=name == "costs",
+        )
+        for name, function in {
+            "costs": "costs:tables",
+            "rules": "rules:tables",
+            "left_out": "accuracy:tables",
+            "bounces": "bounces:tables",
+            "noise": "noise:tables",
+            "range": "rules:ranges",
+        }.items()
+    ),
+    # -- Kinect v2
+    *(
+        Measurement(
+            f"kinect2_{name}",
+            f"kinect2.{name}:tables",
+            "kinect2",
+            (*_MOMENTS, "driver"),
+            timed=name == "decoding",
+        )
+        for name in ("corner", "seen", "returns", "decoding")
+    ),
+    Measurement("by_libfreenect2", "kinect2.by_libfreenect2:store", by_hand=True),
+    # -- attacks
+    Measurement("abuse", "abuse.bars:tables", "measured/abuse", _SERVER),
+    Measurement("abuse_before", "abuse.bars:before", "measured/abuse", _SERVER, by_hand=True),
+    Measurement("abuse_soak", "abuse.soaking:tables", "measured/abuse-soak", _SERVER),
 )
 MEASUREMENTS: Final = {each.name: each for each in _ALL}
 """By their names, in the order of their pages."""

@@ -4,7 +4,9 @@ import os
 from pathlib import Path
 from typing import Final
 
-_DEFAULT: Final = Path(__file__).parents[2] / "shared" / "data"
+from benchmarks.common.records import ROOT
+
+_DEFAULT: Final = ROOT.parent / "shared" / "data"
 COMPOSITE: Final = """
 name = "composite"
 description = "One photon-counting measurement and two through foam, one after the other"

@@ -61,7 +61,8 @@ class Table:
     @classmethod
     def from_document(cls, document: Mapping[str, Any]) -> "Table":
         """Return a table that `to_document` made."""
-        columns = [each if isinstance(each, str) else Column(*each) for each in document["columns"]]
+        heads = document.get("columns", ())
+        columns = [each if isinstance(each, str) else Column(*each) for each in heads]
         return cls(**{**document, "columns": columns})
 
     def markdown(self, level: int = 2) -> str:

@@ -1,11 +1,5 @@
-"""What the service says of calibrations measured on diffusors and on scenes.
+"""What the service says of calibrations measured on diffusors and on scenes."""
 
-Run it with ``python -m benchmarks.calibration_verdicts [--write]``; ``--write`` keeps the page in
-docs/. Nothing is timed. The measured scenes and phases need TRANSIENTCAM_TEST_DATA.
-"""
-
-import argparse
-import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,10 +7,10 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 import transientcam_moments as tm
-from benchmarks.common.tables import Table
+from benchmarks.common.measured_scenes import data_folder
+from benchmarks.common.tables import Column, Table
 from transientcam_driver import CalibrationCapture, Sequence
 from transientcam_driver.simulation import find_scene, list_scenes, measured_scene
 from transientcam_driver.simulation.build import world_of
@@ -26,9 +20,6 @@ from transientcam_server.imaging.calibration import Calibration, evaluate
 from transientcam_server.imaging.diffusor import judge
 from transientcam_server.imaging.verdict import Verdict
 
-PAGE = Path(__file__).parents[1] / "docs" / "calibration-verdicts.md"
-COMMAND: Final = "python -m benchmarks.calibration_verdicts --write"
-DEFAULT_DATA: Final = Path(__file__).parents[2] / "shared" / "data"
 TAKES: Final = 6
 HEIGHT, WIDTH = 120, 163
 FULL_SCALE_DN: Final = 65535.0
@@ -222,65 +213,46 @@ def scenes(data: Path) -> Iterator[Case]:
             yield Case(Path(name).stem, scene, False)
 
 
-def table(title: str, cases: Iterator[Case], console: Console) -> Table:
-    """Judge cases."""
-    columns = ("measured on", "verdict", "unlike", "not judged", "residual", "harmonics")
-    found = Table(title, (*columns, "magnitudes", "field", "offset", "right"))
+def tables() -> Iterator[Table]:
+    """Judge everything; measured scenes and phases are in the folder TRANSIENTCAM_TEST_DATA."""
+    data = data_folder() or Path()
+    yield _table("Diffusors", diffusors(data))
+    yield _table("Scenes", scenes(data))
+
+
+def _table(title: str, cases: Iterator[Case]) -> Table:
+    columns = (
+        "measured on",
+        "verdict",
+        Column("unlike", ".1%"),
+        Column("not judged", ".1%"),
+        Column("residual, m", ".3f"),
+        Column("harmonics, rad", ".2f"),
+        Column("magnitudes", ".2f"),
+        Column("field, m", ".3f"),
+        Column("offset, m", "+.3f"),
+        "right",
+    )
+    found = Table(title, columns)
     wrong = 0
     for case in cases:
         given = verdict(case)
         values = {each.test: each.value for each in given.findings}
         right = given.trusted == case.trusted
         wrong += not right
-        found.rows.append(
-            (
-                case.name,
-                given.word,
-                f"{values['unlike_share']:.1%}",
-                f"{values['unknown_share']:.1%}",
-                f"{values['residual_m']:.3f} m",
-                f"{values['harmonic_phase_rad']:.2f} rad",
-                f"{values['magnitude_share']:.2f}",
-                f"{values['field_m']:.3f} m",
-                f"{values['offset_m']:+.3f} m",
-                "yes" if right else "**no**",
-            )
-        )
-        console.print(case.name, given.word, "" if right else "WRONG", highlight=False)
+        shown = [values[name] for name in _SHOWN]
+        found.rows.append((case.name, given.word, *shown, "yes" if right else "**no**"))
+        print(case.name, given.word, "" if right else "WRONG", flush=True)
     found.notes.append(f"{wrong} of {len(found.rows)} verdicts are wrong.")
     return found
 
 
-_INTRODUCTION = f"""# Verdicts on calibrations
-
-Written by `{COMMAND}`, which measures with simulated cameras ({WIDTH} x {HEIGHT} pixels, {TAKES}
-takes, {SEQUENCE.base_frequency_hz / 1e6:.0f} MHz, m = {SEQUENCE.harmonics}, zeroth moment
-{SEQUENCE.zeroth}, unless a row says otherwise). The numbers do not depend on the machine.
-
-Only what is judged `diffusor` is used without being forced. *residual*, *harmonics* and
-*magnitudes* are what all but 5 % of the blocks keep, besides what noise explains; see
-[calibration](calibration.md#was-it-a-diffusor) for the tests and their limits.
-
-"""
-
-
-def main() -> None:
-    """Judge everything, print it, and write the page if asked to."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--write", action="store_true", help="write docs/calibration-verdicts.md")
-    arguments = parser.parse_args()
-    data = Path(os.environ.get("TRANSIENTCAM_TEST_DATA", DEFAULT_DATA)).resolve()
-    console = Console(stderr=True)
-    tables = [
-        table("Diffusors", diffusors(data), console),
-        table("Scenes", scenes(data), console),
-    ]
-    for each in tables:
-        each.show(Console(width=200))
-    if arguments.write:
-        text = _INTRODUCTION + "\n".join(each.markdown() for each in tables)
-        PAGE.write_text(text, encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+_SHOWN: Final = (
+    "unlike_share",
+    "unknown_share",
+    "residual_m",
+    "harmonic_phase_rad",
+    "magnitude_share",
+    "field_m",
+    "offset_m",
+)

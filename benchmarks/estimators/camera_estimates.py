@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from benchmarks.common.tables import Table
+from benchmarks.common.tables import Column, Table
 from transientcam_moments.four_bucket import demodulate
 from transientcam_moments.phase_steps import FOUR_PHASES_RAD
 
@@ -53,8 +53,8 @@ SETS: Final = (
 
 def table() -> Table:
     """Measure the deviation of the nearer return's distance, as a median over noisy pixels."""
-    apart = (f"{each:g} m apart" for each in SEPARATIONS_M)
-    made = Table("Median error of the nearer return's distance", ("frequencies, estimator", *apart))
+    apart = [Column(f"{each:g} m apart, mm", ".0f") for each in SEPARATIONS_M]
+    made = Table("Median error of the nearer return's distance", ["frequencies, estimator", *apart])
     estimators: dict[str, Callable[[Measured, float], float | None]] = {
         "Cramer-Rao bound": _bound_m,
         "least squares of two returns": lambda *case: _error_m(_least_squares_rad, *case),
@@ -65,8 +65,8 @@ def table() -> Table:
         for name, estimate in estimators.items():
             found = [estimate(measured, each) for each in SEPARATIONS_M]
             if None not in found:
-                texts = (f"{1e3 * (each or 0.0):.0f} mm" for each in found)
-                made.rows.append((f"{measured.name}: {name}", *texts))
+                errors_mm = (1e3 * (each or 0.0) for each in found)
+                made.rows.append((f"{measured.name}: {name}", *errors_mm))
     made.notes.append(
         f"All estimators have the same {_PIXELS} pixels, with returns at {FIRST_M:g} m and behind, "
         f"the second {RATIO:g} as strong, and noise of {NOISE:.0%} of b_0 in each real part of a "

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from benchmarks.common.data import numpy_alone
-from benchmarks.common.machine import machine
 from benchmarks.common.tables import Table
 from benchmarks.common.timing import duration, measure
 from transientcam_moments.likelihood.estimate import dense, prepared
@@ -134,7 +133,7 @@ def cost() -> str:
     compiled = measure(search).median_s / _PIXELS
     return (
         f"Two returns by all pairs at the multiples {MULTIPLES}: {duration(compiled)} a pixel in "
-        f"a compiled lane, {duration(planar)} in NumPy, on one core of {machine()}."
+        f"a compiled lane, {duration(planar)} in NumPy."
     )
 
 

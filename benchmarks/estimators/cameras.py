@@ -1,20 +1,17 @@
 """How far apart two returns have to be for a camera: bounds, estimators, and one frame.
 
-Run it with ``python -m benchmarks.cameras [--write] [--cost]``; with ``--write`` all go into
-docs/cameras.md. The bound is arithmetic; moments have noise of a known seed, and so has the frame
-of the emulated TOFcam660, so that none depends on the machine. ``--cost`` times the measurement of
-moments and the search for pairs instead, which does.
+The bound is arithmetic; moments have noise of a known seed, and so has the frame of the emulated
+TOFcam660, so that none depends on the machine.
 """
 
-import argparse
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
-from rich.console import Console
 
 import transientcam_moments as tm
+from benchmarks.common.machine import machine
 from benchmarks.common.tables import Table
 from benchmarks.estimators import camera_estimates, camera_pairs
 from benchmarks.estimators.camera_estimates import FIRST_M, NOISE, RATIO
@@ -23,10 +20,8 @@ from transientcam_driver.tofcam660.image import FULL_SCALE_DN
 from transientcam_server.imaging.recipe import Recipe
 from transientcam_server.settings import ReconstructionSettings
 
-PAGE: Final = Path(__file__).parents[1] / "docs" / "cameras.md"
 SEPARATIONS_M: Final = (0.3, 0.6, 1.2, 2.4, 5.0)
 HALL: Final = "tofcam660:emulated?scene=hall&settle_s=0&seed=1"
-_MARKS: Final = ("<!-- resolution: begin -->", "<!-- resolution: end -->")
 
 
 @dataclass(frozen=True)
@@ -105,38 +100,14 @@ def _shown(std_m: float) -> str:
     return f"{std_m * 1e3:.0f} mm" if std_m < 1.0 else f"{std_m:.1f} m"
 
 
-def main() -> None:
-    """Print the table, or write it into docs/cameras.md."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.cameras", description=__doc__)
-    parser.add_argument("--write", action="store_true", help=f"write it into docs/{PAGE.name}")
-    parser.add_argument(
-        "--cost",
-        action="store_true",
-        help="time the measurement of moments, and the search for pairs",
-    )
-    arguments = parser.parse_args()
-    if arguments.cost:
-        Console(width=140).print(f"{camera_estimates.cost()}\n{camera_pairs.cost()}")
+def tables(*, cost: bool = False) -> Iterator[Table]:
+    """Compare estimators and bounds; or time the measurement of moments and the pairs' search."""
+    if cost:
+        costs = [camera_estimates.cost(), camera_pairs.cost()]
+        yield Table("", text=[f"{each} One core of {machine()}." for each in costs])
         return
-    estimates = camera_estimates.table()
-    pairs = camera_pairs.table()
-    for each in (estimates, pairs):
-        each.show(Console(width=140))
+    yield camera_estimates.table()
+    yield camera_pairs.table()
     made = table()
-    made.notes.append("")
     made.notes.append(frame_of_hall())
-    made.show(Console(width=140))
-    if arguments.write:
-        text = PAGE.read_text(encoding="utf-8")
-        before, rest = text.split(_MARKS[0])
-        _, after = rest.split(_MARKS[1])
-        body = "\n".join(
-            each.markdown().replace("## ", "### ", 1) for each in (estimates, pairs, made)
-        )
-        written = "Written by `python -m benchmarks.cameras --write`; no machine has a part in it."
-        page = f"{before}{_MARKS[0]}\n{body}\n{written}\n{_MARKS[1]}{after}"
-        PAGE.write_text(page, encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+    yield made

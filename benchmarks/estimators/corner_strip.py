@@ -1,7 +1,4 @@
-"""Run ``python -m benchmarks.corner_strip``: points of the corner, seen from above, by estimator.
-
-Writes docs/figures/corner-points.png: the same capture of one take, four times.
-"""
+"""Points of the corner, seen from above: the same capture of one take by several estimators."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +13,7 @@ from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench
 from transientcam_server.imaging.lens import Intrinsics
 
-FIGURE: Final = Path(__file__).parents[1] / "docs" / "figures" / "corner-points.png"
+FIGURE: Final = "corner-points.png"
 SEQUENCE: Final = Sequence(base_frequency_hz=23e6, harmonics=4, takes=1)
 SHOWN: Final = ("single-frequency", "pisarenko", "maximum-entropy", "likelihood")
 FIELD_DEG: Final = 40.0
@@ -24,8 +21,8 @@ ROWS: Final = slice(40, 80)
 """Near the middle, where the walls are seen from above as lines."""
 
 
-def main() -> None:
-    """Capture, draw and say how far the points are off."""
+def draw(figures: Path) -> None:
+    """Draw corner-points.png, and say how far the points are off."""
     bench = Bench(seed=1)
     shot = bench.shot("corner", SEQUENCE, options=WITHOUT_OUTLIERS)
     gains = bench.calibration(SEQUENCE, options=WITHOUT_OUTLIERS).gains.planes
@@ -47,9 +44,5 @@ def main() -> None:
             axes.set(xlabel="x / m", xlim=(-0.75, 0.75), ylim=(1.5, 2.75), xticks=(-0.5, 0, 0.5))
             print(f"{label}: median / 90 % / RMSE / bias, mm: {errors}")
         panels[0].set(ylabel="depth / m")
-        FIGURE.write_bytes(style.png(picture))
-    print(f"{FIGURE.name}: one take of {1e3 * shot.applied.capture_s:.0f} ms")
-
-
-if __name__ == "__main__":
-    main()
+        (figures / FIGURE).write_bytes(style.png(picture))
+    print(f"{FIGURE}: one take of {1e3 * shot.applied.capture_s:.0f} ms")

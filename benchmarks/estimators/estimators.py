@@ -1,11 +1,8 @@
-"""Run ``python -m benchmarks.estimators [--write]``: every technique, what it says and does.
+"""Every technique, what it says of itself, and what it does on the same frames."""
 
-``--write`` keeps the page as docs/estimators.md.
-"""
-
-import argparse
+import itertools
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import get_args
@@ -13,29 +10,34 @@ from typing import get_args
 from rich.progress import Progress, TaskID
 
 import transientcam_moments as tm
-from benchmarks.common.machine import machine
+from benchmarks.common.tables import Cell, Column, Table
 from transientcam_experiments import tradeoff
 from transientcam_experiments.tradeoff.estimating import SAMPLE_PIXELS
 from transientcam_moments.comparisons import TECHNIQUES, Technique
 from transientcam_server.settings import Estimator, ReconstructionSettings
 
-PAGE = Path(__file__).parents[1] / "docs" / "estimators.md"
 SCENES = ("mirrors", "corner")
 HARMONICS = (4, 8)
 SEED = 1
 REPETITIONS = 3
 
 
-def main() -> None:
-    """Measure, print the page, and with ``--write`` keep it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--write", action="store_true", help="write docs/estimators.md")
-    arguments = parser.parse_args()
+def tables() -> Iterator[Table]:
+    """Measure time and error on the same frames."""
     with tempfile.TemporaryDirectory() as folder:
-        page = report(measured(Path(folder)))
-    print(page)
-    if arguments.write:
-        PAGE.write_text(page, encoding="utf-8")
+        yield from _tables(measured(Path(folder)))
+
+
+def techniques() -> Iterator[Table]:
+    """State what each technique says of itself."""
+    columns = ("name", "follows", "returns", "looks at", "least m", "daemon")
+    yield Table("", columns, [_row(technique) for technique in TECHNIQUES.values()])
+    said = [
+        f"- **{each.name}**, {each.label}. Takes for granted: {each.assumptions} Costs: "
+        f"{each.cost} Fails: {each.failure}"
+        for each in TECHNIQUES.values()
+    ]
+    yield Table("What each takes for granted, costs, and how it fails", text=said)
 
 
 def measured(folder: Path) -> list[tradeoff.Record]:
@@ -58,125 +60,59 @@ def _advance(progress: Progress, task: TaskID, kind: str) -> None:
     progress.advance(task)
 
 
-def report(records: Iterable[tradeoff.Record]) -> str:
-    """Return the page."""
-    results = list(records)
-    lines = [
-        "# Estimators",
-        "",
-        "Written by `python -m benchmarks.estimators --write` on",
-        f"{machine()}.",
-        "",
-        *_INTRODUCTION,
-        "| name | follows | returns | looks at | least m | daemon |",
-        "|---|---|---|---|---|---|",
-        *(_row(technique) for technique in TECHNIQUES.values()),
-        "",
-        *_OF_ANY_FREQUENCIES,
-        "## What each takes for granted, costs, and how it fails",
-        "",
-    ]
-    for technique in TECHNIQUES.values():
-        lines += [
-            f"**{technique.name}**, {technique.label}",
-            "",
-            f"- takes for granted: {technique.assumptions}",
-            f"- costs: {technique.cost}",
-            f"- fails: {technique.failure}",
-            "",
-        ]
-    return "\n".join([*lines, *_measurements(results)]) + "\n"
-
-
-_INTRODUCTION = (
-    "The range of a frame is that of its first return. Which method finds it is the setting "
-    "`reconstruction.estimator` of the daemon, `PUT /api/v1/reconstruction` while it runs, and "
-    "`tm.Settings(estimator=...)` in Python. The daemon's default is `automatic`: "
-    "`likelihood`, which errs least over the scenes of [likelihood.md](likelihood.md), "
-    "and `pisarenko` until its kernel is compiled. The paper's own are `pisarenko`, as printed and "
-    "the default of `tm.Settings`, and `maximum-entropy`; `pisarenko-merged` merges returns that "
-    "noise split. All others are there to be compared with. "
-    "Direct and indirect light are those of the estimator, too, and uniform light is what they "
-    "leave of the brightness.",
-    "",
-    "`transientcam_moments.comparisons.TECHNIQUES` holds all of them in one form: "
-    "`technique.estimate(moments)` gives an impulse response with `cumulative(phase_rad)`, "
-    '`first_phase_rad()` and `separate()`. "After ..." says that a technique follows what is '
-    "known of a publication whose text was not at hand; none is the authors' own implementation. "
-    "None but the maximum entropy estimate looks at b_0.",
-    "",
-    "The daemon offers those that compute all pixels at once. The others solve an optimisation "
-    "for each pixel and take seconds to minutes a frame; `coded` needs another measurement "
-    "altogether (`comparisons.coded`). Where an estimator needs more harmonics than the sequence "
-    "has, the daemon refuses whichever of the two was asked for last (`estimator-misfit`), and "
-    "`tm.Reconstruction` raises a `ParameterError` that says how many it takes.",
-    "",
-)
-
-
-_OF_ANY_FREQUENCIES = (
-    "Two more are for [frequencies with gaps](cameras.md#fixed-frequencies), and take consecutive "
-    "ones, too; they are not held against the others here.",
-    "",
-    "| name | follows | returns | looks at |",
-    "|---|---|---|---|",
-    "| `two-returns` | least squares over all pairs of returns (`tm.two_returns`) | 2 | any |",
-    "| `unwrapped-phase` | least squares over all wrap counts (`tm.unwrap`) | 1 | any |",
-    "",
-)
-
-
-def _row(technique: Technique) -> str:
-    offered = "yes" if technique.name in get_args(Estimator) else "no"
+def _row(technique: Technique) -> tuple[Cell, ...]:
     return (
-        f"| `{technique.name}` | {technique.label} | {technique.returns} "
-        f"| {technique.frequencies} | {technique.least_harmonics} | {offered} |"
+        f"`{technique.name}`",
+        technique.label,
+        technique.returns,
+        technique.frequencies,
+        technique.least_harmonics,
+        "yes" if technique.name in get_args(Estimator) else "no",
     )
 
 
-def _measurements(records: list[tradeoff.Record]) -> list[str]:
-    lines = [
-        "## Time and error on the same frames",
-        "",
+def _tables(records: list[tradeoff.Record]) -> Iterator[Table]:
+    text = (
         "One single-take capture of a simulated scene by the simulated camera with its noise, over "
         "the emulated USB; the range is held against the truth "
         f"in {SAMPLE_PIXELS} pixels. Times are of a frame of 163 x 120 pixels, for techniques "
         "that go pixel by pixel those pixels' time multiplied; `sra-table` had its table already, "
         "`regularised` had no neighbours to look at. `transientcam tradeoff` measures the same on "
-        "any scene.",
-        "",
-    ]
-    for scene in SCENES:
-        for m in HARMONICS:
-            mine = [
-                record
-                for record in records
-                if record.scene == scene and record.point["harmonics"] == m
-            ]
-            if mine:
-                lines += _table(scene, m, mine)
-    return lines
+        "any scene."
+    )
+    yield Table("Time and error on the same frames", text=[text])
+    for scene, m in itertools.product(SCENES, HARMONICS):
+        yield _table(
+            f"{scene}, m = {m}",
+            [each for each in records if each.scene == scene and each.point["harmonics"] == m],
+        )
 
 
-def _table(scene: str, m: int, records: list[tradeoff.Record]) -> list[str]:
-    return [
-        f"### {scene}, m = {m}",
-        "",
+def _table(title: str, records: list[tradeoff.Record]) -> Table:
+    columns = {
+        "seconds": (1.0, Column("s a frame", ".2g")),
+        "range_median_m": (1e3, Column("median error / mm", ".3g")),
+        "range_p90_m": (1e3, Column("9 of 10 below / mm", ".3g")),
+        "range_outliers": (1.0, Column("off by > 0.1 m", ".0%")),
+        "range_missing": (1.0, Column("no range", ".0%")),
+    }
+    text = (
         f"Closest to the truth in a typical pixel: {_best(records, 'range_median_m')}; in nine of "
-        f"ten: {_best(records, 'range_p90_m')}. {_fewer_outliers(records)}",
-        "",
-        "| estimator | s a frame | median error / mm | 9 of 10 below / mm | off by > 0.1 m "
-        "| no range |",
-        "|---|---|---|---|---|---|",
-        *(
-            f"| `{record.point['estimator']}` | {_seconds(record)} "
-            f"| {_scaled(record, 'range_median_m', 1e3)} | {_scaled(record, 'range_p90_m', 1e3)} "
-            f"| {_scaled(record, 'range_outliers', 1, '{:.0%}')} "
-            f"| {_scaled(record, 'range_missing', 1, '{:.0%}')} |"
-            for record in records
-        ),
-        "",
+        f"ten: {_best(records, 'range_p90_m')}. {_fewer_outliers(records)}"
+    )
+    rows = [
+        (
+            f"`{record.point['estimator']}`",
+            *(_scaled(record, name, factor) for name, (factor, _) in columns.items()),
+        )
+        for record in records
     ]
+    return Table(title, ("estimator", *(each for _, each in columns.values())), rows, text=[text])
+
+
+def _scaled(record: tradeoff.Record, name: str, factor: float) -> float | None:
+    value = record.values[name]
+    return None if value is None else factor * value
 
 
 def _best(records: list[tradeoff.Record], quantity: str) -> str:
@@ -193,16 +129,3 @@ def _fewer_outliers(records: list[tradeoff.Record]) -> str:
     if not fewer:
         return f"None has fewer pixels off by more than 0.1 m than `{default}`."
     return f"Fewer pixels off by more than 0.1 m than `{default}`: {', '.join(fewer)}."
-
-
-def _seconds(record: tradeoff.Record) -> str:
-    return f"{record.values['seconds'] or 0.0:.2g}"
-
-
-def _scaled(record: tradeoff.Record, name: str, factor: float, form: str = "{:.3g}") -> str:
-    value = record.values[name]
-    return "–" if value is None else form.format(value * factor)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,13 +1,11 @@
-"""Harmonics of the modulation: errors before and after they are taken out, by scene and modulation.
+"""Harmonics of the modulation: errors before and after they are taken out, by modulation.
 
-Run it with ``python -m benchmarks.harmonics [--waveform FILE.npy] [--write]``. The simulated camera
-modulates by a square wave, whose correlation with itself is a triangle, and by a measured
-waveform where a file of one is given: (rows, samples) over one period, opposite rows in pairs.
-Each is calibrated through the diffusor with a phase sweep. The mean of many takes then shows
+The simulated camera modulates by a square wave, whose correlation with itself is a triangle, and by
+a measured waveform where a file of one is given: (rows, samples) over one period, opposite rows in
+pairs. Each is calibrated through the diffusor with a phase sweep. The mean of many takes then shows
 what noise does not explain.
 """
 
-import argparse
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -18,12 +16,10 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 import transientcam_moments as tm
 from benchmarks.common.data import PAPER, SETTINGS, VGA, images
-from benchmarks.common.machine import machine
-from benchmarks.common.tables import Table
+from benchmarks.common.tables import Column, Table
 from transientcam_driver import Camera, SubPhases, Truth, capture_calibration
 from transientcam_driver import Sequence as Capture
 from transientcam_driver.calibration import DEFAULT_TAKES
@@ -36,8 +32,6 @@ from transientcam_driver.usb_camera import UsbCamera
 from transientcam_server.imaging.calibration import Calibration, evaluate
 from transientcam_server.imaging.waveform import SweepEvaluation
 
-PAGE: Final = Path(__file__).parents[1] / "docs" / "harmonics.md"
-_BEGIN: Final = "<!-- measured -->"
 _TAKES: Final = 16
 _FRAMES: Final = 15
 _LANES: Final = ("measure", "smooth", "smallest_eigenvalue", "levinson", "harmonics", "reconstruct")
@@ -183,18 +177,19 @@ def table(measured: Path | None) -> Table:
 
 def cost() -> Table:
     """Measure the processor time of a frame without and with the correction."""
-    rows: list[Sequence[str]] = []
+    rows = []
     for m, shape in ((3, PAPER), (4, PAPER), (4, VGA)):
         tm.kernels.compile([m], ["float32"], names=_LANES)
         raw = images(m, shape)
         gains = np.exp(0.2j * np.random.default_rng(m).normal(size=(m + 1, *shape)))
-        texts = []
+        times_ms = []
         for waveform in (None, np.tile(0.01 / np.arange(1, 5), (m, 1))):
             reconstruct = tm.Reconstructor(SETTINGS, calibration=gains, waveform=waveform)
-            texts.append(f"{_processor_s(lambda: reconstruct(raw)) * 1e3:.1f}")  # noqa: B023 - called now
-        rows.append([f"m = {m}, {shape[1]} x {shape[0]}", *texts])
-    notes = ["Processor time in ms of a frame in single precision, with four harmonics."]
-    return Table("What it costs", ("frame", "calibrated", "harmonics taken out"), rows, notes)
+            times_ms.append(1e3 * _processor_s(lambda: reconstruct(raw)))  # noqa: B023 - called now
+        rows.append([f"m = {m}, {shape[1]} x {shape[0]}", *times_ms])
+    notes = ["Processor time of a frame in single precision, with four harmonics."]
+    columns = "frame", Column("calibrated, ms", ".1f"), Column("harmonics taken out, ms", ".1f")
+    return Table("What it costs", columns, rows, notes)
 
 
 def _processor_s(frame: Callable[[], object]) -> float:
@@ -207,22 +202,7 @@ def _processor_s(frame: Callable[[], object]) -> float:
     return float(np.median(measured))
 
 
-def main() -> None:
-    """Measure, print, and with ``--write`` keep the table."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.harmonics", description=__doc__)
-    parser.add_argument("--waveform", type=Path, help="a measured correlation function, .npy")
-    parser.add_argument("--write", action="store_true", help=f"write the table of docs/{PAGE.name}")
-    options = parser.parse_args()
-    tables = [table(options.waveform), cost()]
-    for each in tables:
-        each.show(Console(width=200))
-    if options.write:
-        above = PAGE.read_text(encoding="utf-8").partition(_BEGIN)[0]
-        command = "python -m benchmarks.harmonics --waveform FILE --write"
-        shown = "\n".join(each.markdown() for each in tables)
-        said = f"Written by `{command}` on: {machine()}.\n"
-        PAGE.write_text(f"{above}{_BEGIN}\n\n{shown}\n{said}", encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+def tables(*, waveform: Path | None = None) -> Iterator[Table]:
+    """Measure a square wave, and a measured correlation function where its .npy is given."""
+    yield table(waveform)
+    yield cost()

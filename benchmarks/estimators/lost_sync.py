@@ -1,31 +1,25 @@
-"""Images that lost their synchronisation: how many are found, and the error of the range with them.
+"""Images that lost their synchronisation: how many are found, and errors of the range with them.
 
-Run it with ``python -m benchmarks.lost_sync [--frames 20] [--write]``. Each scene is captured twice
-with the simulated camera of the paper's make and the same noise: with the share of images that
-lose their synchronisation, and without any. An image is spoilt where the two differ.
+Each scene is captured twice with the simulated camera of the paper's make and the same noise: with
+the share of images that lose their synchronisation, and without any. An image is spoilt where the
+two differ.
 """
 
-import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 import transientcam_moments as tm
-from benchmarks.common.machine import machine
 from benchmarks.common.tables import Table
 from transientcam_driver import Sequence as Capture
 from transientcam_driver import open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_experiments.paper.bench import DEVICE, WARM_UP_S, Bench
 
-PAGE: Final = Path(__file__).parents[1] / "docs" / "lost-synchronisation.md"
-_BEGIN: Final = "<!-- measured -->"
 _ZEROTHS: Final = ("low-frequency", "on-off", "estimated")
 _FREQUENCY_HZ: Final = 23e6
 _OUTLIER_SHARE_OFF: Final = "&outliers=off"
@@ -127,8 +121,8 @@ def _count(tally: Tally, spoilt: _Array, found: tm.Repair, first: int) -> None:
     tally.missed += int((spoilt & ~found.repaired[0] & ~found.unrepaired[0]).sum())
 
 
-def table(frames: int) -> Table:
-    """Measure all scenes."""
+def tables(*, frames: int = 20) -> Iterator[Table]:
+    """Measure so many captures of each scene."""
     bench = Bench()
     rows: list[Sequence[str]] = []
     total = Tally()
@@ -153,7 +147,6 @@ def table(frames: int) -> Table:
         f"repaired, {total.missed} are not found (most of them turned by so little that noise "
         f"hides it). {total.wrong} good images are rebuilt, which happens where the opposite "
         "one is spoilt as well.",
-        "",
         "Errors of the range in mm (maximum entropy): median and 90 % of all lit pixels, and the "
         "median of the worst frame.",
     ]
@@ -171,22 +164,4 @@ def table(frames: int) -> Table:
         "repaired",
         "repaired and filled",
     )
-    return Table("What becomes of spoilt images", columns, rows, notes)
-
-
-def main() -> None:
-    """Measure, print, and with ``--write`` keep the table."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.lost_sync", description=__doc__)
-    parser.add_argument("--frames", type=int, default=20, help="captures of each scene")
-    parser.add_argument("--write", action="store_true", help=f"write the table of docs/{PAGE.name}")
-    options = parser.parse_args()
-    found = table(options.frames)
-    found.show(Console(width=200))
-    if options.write:
-        above = PAGE.read_text(encoding="utf-8").partition(_BEGIN)[0]
-        said = f"Written by `python -m benchmarks.lost_sync --write` on: {machine()}.\n"
-        PAGE.write_text(f"{above}{_BEGIN}\n\n{found.markdown()}\n{said}", encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+    yield Table("What becomes of spoilt images", columns, rows, notes)

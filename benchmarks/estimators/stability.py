@@ -1,7 +1,4 @@
-"""How exact the mathematics is in its hard cases: writes docs/stability.md and its figures.
-
-Run it as ``python -m benchmarks.stability`` (``make docs`` does); it takes about a minute.
-"""
+"""How exact the mathematics is in its hard cases."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -14,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from benchmarks.common.machine import machine
-from benchmarks.common.tables import Table
+from benchmarks.common.tables import Column, Table
 from tests.moments import oracles
 from tests.stability import exact
 from tests.stability.cases import ORDERS, PRECISIONS, Signal, dense_signals, sparse_signals
@@ -26,21 +22,9 @@ from transientcam_moments.polishing import residual, size
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
 Complex = NDArray[np.complexfloating]
 Worst = dict[str, tuple[float, int]]
 COLOURS = {"float32": "#d55e00", "float64": "#0072b2"}  # distinct to colour-blind readers, too
-
-INTRODUCTION = """\
-# Numerical stability
-
-Written by `python -m benchmarks.stability` on: {machine}.
-
-Errors are those of the planar statements, with NumPy. The oracles are closed forms and 60-digit
-arithmetic (`tests/stability`); the same cases are tests. *Backward error*: how far the moments of
-the result are from the moments given, relative to b_0. *Condition*: how much a result changes when
-the moments are rounded; an error of condition times eps is what any algorithm has to live with.
-"""
 
 
 def note(worst: Worst, name: str, value: float, m: int) -> None:
@@ -224,7 +208,13 @@ def helped() -> Table:
     """Count the pixels that need double precision, and say what it costs."""
     table = Table(
         "Single precision helped by double (163 x 120 pixels)",
-        ("signal", "m", "pixels redone", "closed form", "with help"),
+        (
+            "signal",
+            "m",
+            Column("pixels redone", ".2%"),
+            Column("closed form, ms", ".1f"),
+            Column("with help, ms", ".1f"),
+        ),
     )
     rng = np.random.default_rng(0)
     for m in (3, 4, 8):
@@ -239,9 +229,7 @@ def helped() -> Table:
             redone = size(residual(b, *plain[:3]), b) > tolerance
             alone = median_ms(partial(by_blocks, _pisarenko, b))
             whole = median_ms(partial(tm.pisarenko, b))
-            table.rows.append(
-                (name, f"{m}", f"{100 * redone.mean():.2f} %", f"{alone:.1f} ms", f"{whole:.1f} ms")
-            )
+            table.rows.append((name, m, redone.mean(), alone, whole))
     return table
 
 
@@ -358,25 +346,14 @@ FIGURES = {
 }
 
 
-def main() -> None:
-    """Write the page and its figures."""
-    (DOCS / "figures").mkdir(parents=True, exist_ok=True)
-    parts = [INTRODUCTION.format(machine=machine())]
-    parts.append(targets().markdown())
-    parts.append(fates().markdown())
+def tables(figures: Path) -> Iterator[Table]:
+    """Hold everything against closed forms and 60-digit arithmetic, for about a minute."""
+    yield targets()
+    yield fates()
     for name, (plot, caption) in FIGURES.items():
-        plot(DOCS / "figures" / f"stability-{name}.png")
-        parts.append(f"![{caption}](figures/stability-{name}.png)\n\n{caption}\n")
-    parts.append(helped().markdown())
-    parts.append(
-        case_table("Sparse signals, worst over all m", sparse_signals, sparse_errors).markdown()
-    )
-    parts.append(
-        case_table("Dense signals, worst over all m", dense_signals, dense_errors).markdown()
-    )
-    (DOCS / "stability.md").write_text("\n".join(parts), encoding="utf-8")
-    print(f"wrote {DOCS / 'stability.md'} and {len(FIGURES)} figures")
-
-
-if __name__ == "__main__":
-    main()
+        plot(figures / f"stability-{name}.png")
+        picture = f"![{caption}](../figures/stability-{name}.png)"
+        yield Table("", text=[picture, caption])
+    yield helped()
+    yield case_table("Sparse signals, worst over all m", sparse_signals, sparse_errors)
+    yield case_table("Dense signals, worst over all m", dense_signals, dense_errors)

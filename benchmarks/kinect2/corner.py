@@ -1,5 +1,6 @@
 """The corner of a room in front of an emulated Kinect v2, by one return and by two."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -7,7 +8,7 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
-from benchmarks.common.tables import Table
+from benchmarks.common.tables import Column, Table
 from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import TOO_LONG
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array
@@ -73,9 +74,22 @@ def captured() -> Corner:
     return Corner(found_m, true_m[every[1:]], intrinsics)
 
 
+def tables(figures: Path) -> Iterator[Table]:
+    """Hold the three against the truth, and draw kinect2-corner.png."""
+    corner = captured()
+    draw(corner, figures / "kinect2-corner.png")
+    yield table(corner)
+
+
 def table(corner: Corner) -> Table:
     """Hold the three against the truth."""
-    columns = ("one frame of the corner", "median error", "90 %", "mean", "without a range")
+    columns = (
+        "one frame of the corner",
+        Column("median error, mm", ".1f"),
+        Column("90 %, mm", ".1f"),
+        Column("mean, mm", "+.1f"),
+        Column("without a range", ".2%"),
+    )
     made = Table("A corner of a room", columns)
     for name, found_m in corner.found_m.items():
         off_mm = 1e3 * (found_m - corner.true_m)
@@ -84,10 +98,10 @@ def table(corner: Corner) -> Table:
         made.rows.append(
             (
                 name,
-                f"{np.median(size_mm):.1f} mm",
-                f"{np.percentile(size_mm, 90):.1f} mm",
-                f"{off_mm[there].mean():+.1f} mm",
-                f"{1 - there.mean():.2%}",
+                np.median(size_mm),
+                np.percentile(size_mm, 90),
+                off_mm[there].mean(),
+                1 - there.mean(),
             )
         )
     made.notes.append(

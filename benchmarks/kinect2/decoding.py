@@ -1,5 +1,6 @@
 """How the decoder differs from libfreenect2's, and how fast it is."""
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -22,6 +23,12 @@ ROUNDING: Final = 0.29
 TOO_LONG: Final = libfreenect2.SPEED_OF_LIGHT_M_S / tm.SPEED_OF_LIGHT_M_S
 """libfreenect2 takes the speed of light for 300 000 km/s."""
 _VARIANTS: Final[dict[str, Rows]] = {"off": "bottom", "off_tables_flipped": "top"}
+
+
+def tables() -> Iterator[Table]:
+    """Compare with libfreenect2's outputs, and time the way to moments."""
+    yield differences()
+    yield speed()
 
 
 def infrared(scene: Scene) -> float:
@@ -67,7 +74,6 @@ def differences() -> Table:
         "frequency and amplitude here, and depth is the exact intersection of ray and ellipsoid; "
         "libfreenect2 adds three phases with equal weights, and its geometry is to first order."
     )
-    made.notes.append("")
     made.notes.append(_restated())
     return made
 

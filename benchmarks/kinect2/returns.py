@@ -1,5 +1,6 @@
 """One and two returns by the estimators here, and by libfreenect2's on the same frames."""
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -23,6 +24,14 @@ _AMPLITUDE: Final = 200.0
 _SRA_BINS: Final = 1024
 _SRA_BLOCKS: Final = 12
 """Of the blocks every so many are given to SRA, which takes 50 ms each."""
+
+
+def tables() -> Iterator[Table]:
+    """Compare on synthetic frames, and on returns through codes and back."""
+    yield two_returns()
+    yield separations()
+    yield enough()
+    yield one_return()
 
 
 def one_return() -> Table:

@@ -15,9 +15,10 @@ PAGES = sorted({page_of(each) for each in MEASUREMENTS.values() if each.page is 
 
 def a_record(**changes: object) -> Record:
     rows = [["wall", 1.5, None], ["corner", float("nan"), "12 of 20"]]
-    table = Table("Errors", ["scene", Column("mm", ".2f"), "found"], rows, ["Bar: 2 mm."], ["Of"])
+    heads = ["scene", Column("mm", ".2f"), "found"]
+    tables = [Table("Errors", heads, rows, ["Bar: 2 mm."], ["Of"]), Table("", text=["No table."])]
     known = {"command": "python -m benchmarks x", "commit": "abc", "date": "2026-01-02"}
-    made = {"name": "density", "machine": None, "tables": [table], **known, **changes}
+    made = {"name": "density", "machine": None, "tables": tables, **known, **changes}
     return Record(**made)  # type: ignore[arg-type]
 
 
@@ -74,7 +75,7 @@ def test_a_record_is_rendered_between_the_marks_of_its_name_alone(tmp_path: Path
     assert text == (
         "# Page\n\n<!-- measured: density -->\n## Errors\n\nOf\n\n"
         "| scene | mm | found |\n|---|---:|---:|\n"
-        "| wall | 1.50 | – |\n| corner | – | 12 of 20 |\n\nBar: 2 mm.\n\n"
+        "| wall | 1.50 | – |\n| corner | – | 12 of 20 |\n\nBar: 2 mm.\n\nNo table.\n\n"
         "Measured by `python -m benchmarks x`, at commit abc, 2026-01-02; no machine has a part in "
         "it.\n<!-- end: density -->\nafter\n"
     )
