@@ -47,6 +47,9 @@ _MOMENTS: Final = ("server/transientcam_moments",)
 _SERVER: Final = ("server/transientcam_server",)
 _COMPARISONS: Final = ("server/transientcam_moments/comparisons",)
 _IMAGING: Final = ("server/transientcam_server/imaging",)
+_PLANNED: Final = ("server/transientcam_server/planning", *_MOMENTS, *_IMAGING)
+_TRADED: Final = ("server/transientcam_experiments/tradeoff", *_MOMENTS, *_IMAGING)
+_DASHBOARD: Final = ("client/dashboard/src",)
 _RECORDING: Final = ("server/transientcam_server/recording",)
 
 _ALL: Final = (
@@ -83,7 +86,6 @@ _ALL: Final = (
         "service.relay_moments:tables",
         "relay",
         ("server/transientcam_server/relay",),
-        timed=False,
     ),
     Measurement(
         "relay_tree",
@@ -133,7 +135,6 @@ _ALL: Final = (
         "estimators.lost_sync:tables",
         "lost-synchronisation",
         (*_MOMENTS, "driver"),
-        timed=False,
     ),
     Measurement("stability", "estimators.stability:tables", "measured/stability", _MOMENTS),
     Measurement(
@@ -145,11 +146,9 @@ _ALL: Final = (
     ),
     Measurement("corner_strip", "estimators.corner_strip:draw"),
     # -- likelihood
-    Measurement("sparse", "likelihood.sparse:tables", "measured/likelihood", _MOMENTS, timed=False),
-    Measurement(
-        "captures", "likelihood.captures:tables", "measured/likelihood", _MOMENTS, timed=False
-    ),
-    Measurement("shapes", "likelihood.shapes:tables", "measured/likelihood", _MOMENTS, timed=False),
+    Measurement("sparse", "likelihood.sparse:tables", "measured/likelihood", _MOMENTS),
+    Measurement("captures", "likelihood.captures:tables", "measured/likelihood", _MOMENTS),
+    Measurement("shapes", "likelihood.shapes:tables", "measured/likelihood", _MOMENTS),
     Measurement("likelihood_speed", "likelihood.speed:tables", "measured/likelihood", _MOMENTS),
     # -- simulation
     *(
@@ -158,7 +157,6 @@ _ALL: Final = (
             f"simulation.{function}",
             "measured/simulation",
             ("driver",),
-            timed=name == "costs",
         )
         for name, function in {
             "costs": "costs:tables",
@@ -169,6 +167,20 @@ _ALL: Final = (
             "range": "rules:ranges",
         }.items()
     ),
+    # -- accuracy
+    Measurement("prices", "accuracy.prices:tables", "measured/accuracy", _PLANNED),
+    Measurement("tradeoffs", "accuracy.tradeoffs:tables", "measured/accuracy", _TRADED),
+    Measurement("noise", "accuracy.noise:tables", "measured/accuracy", _TRADED),
+    Measurement("promises", "accuracy.promises:tables", "measured/plans", _PLANNED),
+    Measurement("calibrating", "accuracy.calibrating:tables", "measured/plans", _PLANNED),
+    Measurement(
+        "checking",
+        "accuracy.calibrating:tables",
+        "measured/plans",
+        _PLANNED,
+        given={"seed": 8},
+    ),
+    Measurement("regret", "accuracy.regret:tables", "measured/plans", _PLANNED),
     # -- Kinect v2
     *(
         Measurement(
@@ -185,6 +197,14 @@ _ALL: Final = (
     Measurement("abuse", "abuse.bars:tables", "measured/abuse", _SERVER),
     Measurement("abuse_before", "abuse.bars:before", "measured/abuse", _SERVER, by_hand=True),
     Measurement("abuse_soak", "abuse.soaking:tables", "measured/abuse-soak", _SERVER),
+    # -- pages
+    Measurement("dashboard", "pages.dashboard:tables", "measured/dashboard", _DASHBOARD),
+    Measurement("pictures", "pages.pictures:draw"),
+    Measurement("views", "pages.pictures:draw_views", by_hand=True),
+    Measurement("notebooks", "pages.notebooks:draw"),
+    Measurement("mathematics", "pages.mathematics:draw"),
+    Measurement("reference", "pages.reference:reference"),
+    Measurement("examples", "pages.examples:write_examples"),
 )
 MEASUREMENTS: Final = {each.name: each for each in _ALL}
 """By their names, in the order of their pages."""

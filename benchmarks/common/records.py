@@ -6,7 +6,8 @@ A record is docs/measured/records/NAME.json. A page has, between two marks, what
 
 import json
 import re
-from collections.abc import Sequence
+import subprocess
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -111,3 +112,32 @@ def render(pages: Sequence[Path], docs: Path = DOCS) -> None:
     for page in pages:
         text = page.read_text(encoding="utf-8")
         page.write_text(rendered(text, docs), encoding="utf-8")
+
+
+def changes_since(record: Record, repository: Path = ROOT) -> int | None:
+    """Count the commits that changed what a record measures; None where git does not know."""
+    commit, *_ = record.commit.split()
+    words = ["rev-list", "--count", f"{commit}..HEAD", "--", *MEASUREMENTS[record.name].of]
+    command = ["git", "-C", str(repository), *words]
+    try:
+        counted = subprocess.run(command, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return int(counted.stdout)
+
+
+def marked(
+    text: str, changes: Callable[[Record], int | None] = changes_since, docs: Path = DOCS
+) -> str:
+    """Return a page that says of each record where its code has changed since."""
+
+    def mark(found: re.Match[str]) -> str:
+        record = Record.read(found.group(1), docs)
+        count = changes(record) if record is not None else None
+        if not count:
+            return found.group()
+        commits = "one commit has" if count == 1 else f"{count} commits have"
+        said = f"Since then {commits} changed the code that is measured here."
+        return f"\n```{{note}}\n{said}\n```\n{found.group()}"
+
+    return re.sub(r"<!-- end: (\w+) -->", mark, text)

@@ -27,7 +27,8 @@ class Table:
     title
         What it is about: a heading of the page. Without one the part goes on with the one before.
     columns
-        The first one says what a row is. There may be none: a part may be text alone.
+        Texts, or a `Column` of numbers. The first one says what a row is. There may be none: a part
+        may be text alone.
     rows
         Sequences of `Cell`, one a column.
     notes
@@ -37,14 +38,14 @@ class Table:
     """
 
     title: str
-    columns: Sequence[str | Column] = ()
+    columns: Sequence[Sequence[str]] = ()
     rows: list[Any] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     text: list[str] = field(default_factory=list)
 
     def shown(self) -> list[list[str]]:
         """Return heads and rows as texts."""
-        columns = [Column(each) if isinstance(each, str) else each for each in self.columns]
+        columns = [each if isinstance(each, Column) else Column(str(each)) for each in self.columns]
         rows = [
             [_shown(cell, column.form) for cell, column in zip(row, columns, strict=True)]
             for row in self.rows

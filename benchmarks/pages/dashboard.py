@@ -1,18 +1,14 @@
-"""Measure the page: pictures a second, processor time, memory. ``python -m benchmarks.dashboard``.
+"""The page in a browser: pictures a second, processor time, memory.
 
 The light plays, first with the camera stopped and then while frames stream, and is moved along the
 timeline by hand, in Chromium without a graphics processor; daemon, simulation and page share the
-machine. With ``--sensors 640x480
---harmonics 8`` that alone is measured. ``--hours 1`` lets it play for as many frames as the video
-setting gives in that time, as fast as the camera can, and follows its memory. ``--write`` writes
-docs/dashboard.md.
+machine.
 """
 
-import argparse
 import os
 import shutil
-import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
@@ -20,7 +16,7 @@ import numpy as np
 from playwright.sync_api import Page, sync_playwright
 
 import transientcam_moments as tm
-from benchmarks.common.machine import machine
+from benchmarks.common.tables import Cell, Column, Table
 from tests.browser.dashboard import open_page
 from tests.serving import serving
 
@@ -59,7 +55,6 @@ _HOLD_TIMELINE = """
   window.letGo = () => { held = false; tell("pointerup"); };
 }
 """
-PAGE = Path(__file__).parents[1] / "docs" / "dashboard.md"
 _VIDEO_HZ = 18.6  # the paper's video setting
 _LOOK_EVERY_MS = 15_000
 _ORDERS = (3, 4, 8)
@@ -126,7 +121,7 @@ def _run(url: str, *, running: bool) -> None:
     ).raise_for_status()
 
 
-def measure(page: Page, url: str, *, harmonics: int, span_s: float) -> str:
+def measure(page: Page, url: str, *, harmonics: int, span_s: float) -> tuple[Cell, ...]:
     """Return the row of the table for one order."""
     document = httpx.get(f"{url}/api/v1/sequence", timeout=_PATIENCE_S).json()
     known = ("takes", "sub_phases")
@@ -162,11 +157,9 @@ def measure(page: Page, url: str, *, harmonics: int, span_s: float) -> str:
     size = page.locator("canvas[data-product=transient]").evaluate(
         "(canvas) => `${canvas.width} x ${canvas.height}`"
     )
-    return (
-        f"| {size} | {harmonics} | {still_hz:.1f} | {streaming_hz:.1f} | {by_hand_hz:.1f} | "
-        f"{drawn_hz:.1f} of {frames / took_s:.1f} | {asked_for} | {used_s / took_s:.2f} "
-        f"| {heap_mb:.1f} MB |"
-    )
+    drawn = f"{drawn_hz:.1f} of {frames / took_s:.1f}"
+    cores = used_s / took_s
+    return size, harmonics, still_hz, streaming_hz, by_hand_hz, drawn, asked_for, cores, heap_mb
 
 
 def _asked_for(page: Page) -> str:
@@ -178,7 +171,7 @@ def _asked_for(page: Page) -> str:
 _NEWEST = "() => transientcam.store.status.newest.peek().frame"
 
 
-def endurance(page: Page, url: str, *, frames: int) -> list[str]:
+def endurance(page: Page, url: str, *, frames: int) -> Table:
     """Return a table of the page's memory over so many frames."""
     quickest = {"harmonics": 1, "zeroth": "estimated", "exposure_s": 0.0001}
     answer = httpx.put(f"{url}/api/v1/sequence", json=quickest, timeout=_PATIENCE_S)
@@ -195,74 +188,51 @@ def endurance(page: Page, url: str, *, frames: int) -> list[str]:
     slope_mb, _ = np.polyfit(settled[:, 0], settled[:, 1], 1)
     marks = [seen[round(share * (len(seen) - 1))] for share in (0, 0.25, 0.5, 0.75, 1)]
     rate_hz = seen[-1][0] / (time.monotonic() - begin_s)
-    return [
-        "| after frames | " + " | ".join(str(count) for count, _ in marks) + " |",
-        "|---|" + "---:|" * len(marks),
-        "| heap after collecting | " + " | ".join(f"{mb:.2f} MB" for _, mb in marks) + " |",
-        "",
+    note = (
         f"{seen[-1][0]} frames, of which an hour has {_VIDEO_HZ * 3600:.0f} at the video setting, "
         f"captured at {applied['frame_rate_hz']:.1f} Hz and shown from a stream of {rate_hz:.1f} "
         f"Hz. Slope over the last three quarters: {1e3 * slope_mb * _VIDEO_HZ * 3.6:+.3f} MB "
-        "in as many frames as an hour has.",
-    ]
+        "in as many frames as an hour has."
+    )
+    heads = ("after frames", *(Column(str(count), ".2f") for count, _ in marks))
+    return Table("Memory", heads, [("heap after collecting, MB", *(mb for _, mb in marks))], [note])
 
 
-def main() -> None:
-    """Measure every size and order, and print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--span-s", type=float, default=8.0, help="length of each measurement")
-    parser.add_argument("--sensors", nargs="+", default=_SENSORS, metavar="WIDTHxHEIGHT")
-    parser.add_argument("--harmonics", nargs="+", type=int, default=_ORDERS, metavar="M")
-    parser.add_argument("--hours", type=float, default=0.0, help="of video, to follow the memory")
-    parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name} anew")
-    arguments = parser.parse_args()
-    lines = [
-        "| sensor | m | pictures/s, still | streaming | by hand | frames/s drawn | asked for "
-        "| cores of the browser | heap |",
-        "|---|---|---|---|---|---|---|---|---|",
-    ]
-    tm.kernels.compile(arguments.harmonics, ["float32"])  # not beside what is measured
+def tables(
+    *,
+    span_s: float = 8.0,
+    sensors: tuple[str, ...] = _SENSORS,
+    harmonics: tuple[int, ...] = _ORDERS,
+    hours: float = 0.1,
+) -> Iterator[Table]:
+    """Measure sizes and orders, each for so long; follow the memory over so many hours of video."""
+    columns = (
+        "sensor",
+        "m",
+        Column("pictures/s, still", ".1f"),
+        Column("streaming", ".1f"),
+        Column("by hand", ".1f"),
+        "frames/s drawn",
+        "asked for",
+        Column("cores of the browser", ".2f"),
+        Column("heap, MB", ".1f"),
+    )
+    table = Table("", columns)
+    tm.kernels.compile(harmonics, ["float32"])  # not beside what is measured
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=shutil.which("chromium"))
         page = chromium.new_page(viewport={"width": 1280, "height": 800})
         page.set_default_timeout(1e3 * _PATIENCE_S)
-        for sensor in arguments.sensors:
+        for sensor in sensors:
             width, height = sensor.split("x")
             with serving(f"sim:mirrors?width={width}&height={height}") as served:
-                for harmonics in arguments.harmonics:
-                    row = measure(page, served.url, harmonics=harmonics, span_s=arguments.span_s)
-                    lines.append(row)
-                    print(row, flush=True)
+                for m in harmonics:
+                    table.rows.append(measure(page, served.url, harmonics=m, span_s=span_s))
+                    print(*table.rows[-1], flush=True)
                 page.goto("about:blank")
-        if arguments.hours:
+        yield table
+        if hours:
             with serving("sim:mirrors") as served:
-                frames = round(arguments.hours * _VIDEO_HZ * 3600)
-                lines += ["", "## Memory", "", *endurance(page, served.url, frames=frames)]
+                yield endurance(page, served.url, frames=round(hours * _VIDEO_HZ * 3600))
                 page.goto("about:blank")
         chromium.close()
-    print("\n".join(lines))
-    if arguments.write:
-        command = " ".join(["python -m benchmarks.dashboard", *sys.argv[1:]])
-        PAGE.write_text("\n".join([*_head(command), *lines, ""]), encoding="utf-8")
-
-
-def _head(command: str) -> list[str]:
-    return [
-        "# What the dashboard takes",
-        "",
-        f"Written by `{command}` on: {machine()}.",
-        "",
-        "Light in flight plays in Chromium without a graphics processor, first with the camera",
-        "stopped, then while frames of 12, 16 or 32 images stream; daemon, simulation and page",
-        "share the machine. Where pictures become fewer than 30 a second, the page asks for fewer",
-        f"frames (decision 1069): streaming is measured {_SETTLING_MS / 1000:.0f} s after it",
-        "began, with what was asked for then, in the words of the page's header. Frames drawn are",
-        "of those that the camera took. Then, as long after, the timeline is held and moved by",
-        "hand before each refresh of the screen, while all this goes on. Cores are those of all",
-        "processes of the browser; the heap is that of the page's scripts after collecting.",
-        "",
-    ]
-
-
-if __name__ == "__main__":
-    main()

@@ -1,11 +1,9 @@
 """The examples of the OpenAPI document: what the daemon answers with a simulated camera.
 
-Run it with ``python -m benchmarks.examples [--write]``; without ``--write`` it prints which
-documents have another example now. What differs from run to run (ids, times, numbers of frames) is
-replaced by fixed values, and lists of objects keep their first two.
+What differs from run to run (ids, times, numbers of frames) is replaced by fixed values, and lists
+of objects keep their first two.
 """
 
-import argparse
 import json
 import time
 from collections.abc import Iterator
@@ -211,11 +209,8 @@ def _field(name: str, value: Any, fields: dict[str, Any]) -> Any:
     return fixed
 
 
-def main() -> None:
+def write_examples(*, write: bool) -> None:
     """Write the examples, or print which of them are old."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--write", action="store_true", help="write the examples anew")
-    write = parser.parse_args().write
     found, former = examples(), json.loads(EXAMPLES_FILE.read_text(encoding="utf-8"))
     for name in sorted(found.keys() | former.keys()):
         if found.get(name) != former.get(name):
@@ -223,7 +218,3 @@ def main() -> None:
     if write:
         text = json.dumps(found, indent=1, ensure_ascii=False)
         EXAMPLES_FILE.write_text(text + "\n", encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,22 +1,19 @@
-"""Draw the pictures of docs/mathematics.md: ``python -m benchmarks.mathematics [--to FOLDER]``.
+"""Draw the pictures of docs/mathematics.md.
 
 One pixel without noise, whose moments are known in closed form: two sharp returns and a share of
 uniform light. Nothing is captured, and no number depends on the machine.
 """
 
-import argparse
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 import transientcam_moments as tm
-from transientcam_experiments.tradeoff.picture import saved
+from transientcam_experiments.tradeoff.picture import blank, saved
 
-FIGURES: Final = Path(__file__).parents[1] / "docs" / "figures"
 BASE_FREQUENCY_HZ: Final = 23e6
 RETURNS_S: Final = np.array([10e-9, 17e-9])
 WEIGHTS: Final = np.array([0.6, 0.35])
@@ -45,8 +42,7 @@ def _phases(count: int = 2001) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _figure(columns: int) -> tuple[Figure, np.ndarray]:
-    figure = Figure(figsize=(8.0, 3.2), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = blank(8.0, 3.2)
     return figure, np.atleast_1d(figure.subplots(1, columns))
 
 
@@ -142,16 +138,8 @@ PICTURES: Final = {
 }
 
 
-def main(arguments: list[str] | None = None) -> None:
+def draw(figures: Path) -> None:
     """Write all four."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.mathematics", description=__doc__)
-    parser.add_argument("--to", type=Path, default=FIGURES, help="directory of the pictures")
-    to: Path = parser.parse_args(arguments).to
-    to.mkdir(parents=True, exist_ok=True)
-    for name, draw in PICTURES.items():
-        (to / name).write_bytes(saved(draw(), "png"))
-        print(to / name)
-
-
-if __name__ == "__main__":
-    main()
+    for name, picture in PICTURES.items():
+        (figures / name).write_bytes(saved(picture(), "png"))
+        print(name)

@@ -1,7 +1,4 @@
-"""Run ``python -m benchmarks.notebooks``: the notebooks, and the figures that they show.
-
-Writes docs/figures/notebook-*.png, as the notebooks draw them before a simulated camera.
-"""
+"""The notebooks, run before a simulated camera, and the figures that they show."""
 
 import importlib.util
 from collections.abc import Iterator
@@ -12,15 +9,15 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from benchmarks.common.daemon import daemon
+from benchmarks.common.records import ROOT
 
 CAMERA: Final = "sim:mirrors?seed=1"
-FIGURES: Final = Path(__file__).parents[1] / "docs" / "figures"
-_NOTEBOOKS: Final = Path(__file__).parents[1] / "notebooks"
+_NOTEBOOKS: Final = ROOT / "notebooks"
 _NAMES: Final = ("light_in_flight", "direct_and_indirect", "plan_by_accuracy")
 _DPI: Final = 110
 
 
-def figures(name: str, url: str) -> Iterator[Figure]:
+def shown(name: str, url: str) -> Iterator[Figure]:
     """Run a notebook from beginning to end, and yield the figures among its outputs."""
     spec = importlib.util.spec_from_file_location(name, _NOTEBOOKS / f"{name}.py")
     assert spec is not None
@@ -33,7 +30,7 @@ def figures(name: str, url: str) -> Iterator[Figure]:
         defined["camera"].close()
 
 
-def main() -> None:
+def draw(figures: Path) -> None:
     """Write all figures."""
     mpl.use("agg")
     environment = {
@@ -43,11 +40,7 @@ def main() -> None:
     }
     with daemon("--camera", CAMERA, environment=environment) as process:
         for name in _NAMES:
-            for number, figure in enumerate(figures(name, process.url), start=1):
-                path = FIGURES / f"notebook-{name.replace('_', '-')}-{number}.png"
+            for number, figure in enumerate(shown(name, process.url), start=1):
+                path = figures / f"notebook-{name.replace('_', '-')}-{number}.png"
                 figure.savefig(path, dpi=_DPI, metadata={"Software": None})
                 print(path.name)
-
-
-if __name__ == "__main__":
-    main()

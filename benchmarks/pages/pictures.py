@@ -1,13 +1,10 @@
-"""Make README's film and picture of the page, and a notebook's. ``python -m benchmarks.pictures``.
+"""README's film and picture of the page, a notebook's, and pictures of all views.
 
-They are written to docs/figures. The film is the page's own export, "Film of one pass (GIF)", in
-Chromium without a window, of the simulated scene of mirrors with its noise; the picture is the page
-with the default sequence and its front. The notebook is `notebooks/light_in_flight.py`, served by
-marimo. ``--views DIRECTORY`` makes pictures of every layout and every view instead, light and dark,
-on three sizes of screens, to be looked at.
+The film is the page's own export, "Film of one pass (GIF)", in Chromium without a window, of the
+simulated scene of mirrors with its noise; the picture is the page with the default sequence and its
+front. The notebook is `notebooks/light_in_flight.py`, served by marimo.
 """
 
-import argparse
 import shutil
 import socket
 import subprocess
@@ -23,10 +20,10 @@ import httpx
 from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 import transientcam_moments as tm
+from benchmarks.common.records import ROOT
 from tests.browser.dashboard import choose, open_page, point_at
 from tests.serving import serving
 
-FIGURES = Path(__file__).parents[1] / "docs" / "figures"
 FILM = "light-in-flight.gif"
 PICTURE = "dashboard.png"
 NOTEBOOK = "player.png"
@@ -44,7 +41,7 @@ _PATIENCE_MS = 300_000
 _OF_THE_SEQUENCE = """
 (m) => transientcam.store.frames.of("coefficients").peek()?.coefficients?.harmonics === m
 """
-_NOTEBOOK = Path(__file__).parents[1] / "notebooks" / "light_in_flight.py"
+_NOTEBOOK = ROOT / "notebooks" / "light_in_flight.py"
 _TURN = "0.25"
 _PIXELS = ((62, 40), (110, 52))
 _REGION = ((20, 20), (60, 70))
@@ -164,24 +161,19 @@ _DRAWN = """
 """
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """Write what is asked for."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.pictures", description=__doc__)
-    parser.add_argument("--to", type=Path, default=FIGURES, help="directory of the pictures")
-    parser.add_argument("--views", type=Path, help="directory of pictures of all views instead")
-    chosen = parser.parse_args(arguments)
-    to: Path = chosen.views or chosen.to
-    to.mkdir(parents=True, exist_ok=True)
-    if chosen.views:
-        with _page(_LIVE) as page:
-            views(page, to)
-        return
+def draw(figures: Path, *, to: Path | None = None) -> None:
+    """Write the film and the pictures to docs/figures, or to a folder."""
+    folder = to or figures
+    folder.mkdir(parents=True, exist_ok=True)
     with _page(_FILMED) as page:
-        film(page, to / FILM)
+        film(page, folder / FILM)
     with _page(_LIVE) as page:
-        picture(page, to / PICTURE)
-        notebook(page, to / NOTEBOOK)
+        picture(page, folder / PICTURE)
+        notebook(page, folder / NOTEBOOK)
 
 
-if __name__ == "__main__":
-    main()
+def draw_views(*, to: Path) -> None:
+    """Write pictures of every layout and view, light and dark, on three sizes of screens."""
+    to.mkdir(parents=True, exist_ok=True)
+    with _page(_LIVE) as page:
+        views(page, to)

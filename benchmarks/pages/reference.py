@@ -1,10 +1,5 @@
-"""The reference pages: every verb of the command line, every setting of the daemon.
+"""The reference pages: every verb of the command line, every setting of the daemon."""
 
-Run it with ``python -m benchmarks.reference [--write]``; without ``--write`` it says which page is
-not as it would be written, and fails where one is.
-"""
-
-import argparse
 import re
 import sys
 from collections.abc import Iterator, Mapping
@@ -13,12 +8,12 @@ from typing import Any
 
 import typer
 
+from benchmarks.common.records import DOCS
 from transientcam.cli import app_for
 from transientcam_server.daemon.configuration import ENVIRONMENT_PREFIX
 from transientcam_server.settings import Settings
 
-DOCS = Path(__file__).parents[1] / "docs"
-BEGIN = "<!-- python -m benchmarks.reference --write writes what follows -->"
+BEGIN = "<!-- python -m benchmarks reference --write writes what follows -->"
 _DEFAULT_IN_HELP = re.compile(r"\s*\[default: (.*?)\]")
 _OF_THIS_MACHINE = {
     "calibrations.directory": "calibrations in the state directory",
@@ -175,19 +170,13 @@ def variable(setting: str) -> str:
     return ENVIRONMENT_PREFIX + setting.replace(".", "__").upper()
 
 
-def main() -> None:
-    """Write the pages, or say which of them are old."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--write", action="store_true", help="write the pages anew")
-    write = parser.parse_args().write
+def reference(*, write: bool) -> None:
+    """Write the pages, or say which of them are old, and fail where one is."""
     old = [path for path, text in pages().items() if path.read_text(encoding="utf-8") != text]
     for path in old:
         print(f"{'wrote' if write else 'old'}: {path}")
     if write:
         for path, text in pages().items():
             path.write_text(text, encoding="utf-8")
-    sys.exit(bool(old) and not write)
-
-
-if __name__ == "__main__":
-    main()
+    if old and not write:
+        sys.exit(1)

@@ -117,7 +117,7 @@ def tables() -> Iterator[Table]:
     """Relay a scene with several numbers of takes."""
     with daemon("--camera", SCENE) as origin:
         rows = [_row(relayed(origin, takes)) for takes in TAKES]
-    columns: tuple[str | Column, ...] = (
+    columns = (
         "takes",
         "images",
         *(Column(f"`{each}`, bytes a frame", ",.0f") for each in (RAW, MOMENTS)),

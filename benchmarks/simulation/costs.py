@@ -119,7 +119,7 @@ def tables(*, small: bool = False) -> Iterator[Table]:
     Run it with OMP_NUM_THREADS=1: times are those of one core.
     """
     LANES.compile_now()  # rather than beside what is measured
-    columns: tuple[str | Column, ...] = (
+    columns = (
         "scene",
         "pixels",
         *(Column(f"{each}, ms", ".1f") for each in ("none", "called for", "everything")),

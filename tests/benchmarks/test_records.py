@@ -1,12 +1,21 @@
 """Records of measurements and the pages that they are rendered to."""
 
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
 
 from benchmarks.catalogue import MEASUREMENTS
-from benchmarks.common.records import DOCS, ROOT, Record, page_of, rendered
+from benchmarks.common.records import (
+    DOCS,
+    ROOT,
+    Record,
+    changes_since,
+    marked,
+    page_of,
+    rendered,
+)
 from benchmarks.common.tables import Column, Table
 
 _MARK = re.compile(r"<!-- measured: (\w+) -->")
@@ -94,3 +103,42 @@ def test_columns_of_words_line_up_on_the_left_and_items_of_a_list_stay_together(
     assert (
         table.markdown() == "| what | bars |\n|---|---|\n| 1 | missed: 3 |\n\n- one\n- two\n\nend"
     )
+
+
+def test_a_page_says_where_the_code_has_changed_since(tmp_path: Path) -> None:
+    a_record().written(docs(tmp_path))
+    text = "<!-- measured: density -->\n<!-- end: density -->\n<!-- end: stages -->\n"
+
+    assert marked(text, lambda _: 3, tmp_path) == (
+        "<!-- measured: density -->\n\n```{note}\nSince then 3 commits have changed the code that "
+        "is measured here.\n```\n<!-- end: density -->\n<!-- end: stages -->\n"
+    )
+    assert "one commit has" in marked(text, lambda _: 1, tmp_path)
+    assert marked(text, lambda _: 0, tmp_path) == text
+    assert marked(text, lambda _: None, tmp_path) == text
+
+
+def test_commits_count_that_changed_what_is_measured(tmp_path: Path) -> None:
+    def git(*words: str) -> str:
+        author = ("-c", "user.name=a", "-c", "user.email=a@b")
+        command = ["git", "-C", str(tmp_path), *author, *words]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+    def commit(path: str, text: str) -> str:
+        file = tmp_path / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, encoding="utf-8")
+        git("add", "-A")
+        git("commit", "-qm", text)
+        return git("rev-parse", "HEAD")
+
+    (measured,) = MEASUREMENTS["density"].of
+    git("init", "-q")
+    first = commit(f"{measured}/a.py", "1")
+    commit("elsewhere.py", "2")
+    last = commit(f"{measured}/a.py", "3")
+
+    assert changes_since(a_record(commit=first), tmp_path) == 1
+    assert changes_since(a_record(commit=f"{last} and changes"), tmp_path) == 0
+    assert changes_since(a_record(commit="0" * 40), tmp_path) is None
+    assert changes_since(a_record(commit=first), tmp_path / "nowhere") is None

@@ -5,7 +5,7 @@ import pytest
 from benchmarks.pages import reference
 from transientcam import cli
 
-_REMEDY = "run: python -m benchmarks.reference --write"
+_REMEDY = "run: python -m benchmarks reference --write"
 
 
 @pytest.mark.parametrize("name", ["command-line.md", "settings.md"])

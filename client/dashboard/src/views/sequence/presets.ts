@@ -9,7 +9,7 @@ export interface Preset {
   readonly sequence: Pick<SequenceDocument, "base_frequency_hz" | "harmonics" | "zeroth" | "exposure_s" | "takes">;
 }
 
-/** Measured in docs/default-sequence.md and docs/accuracy.md. */
+/** Measured in docs/measured/default-sequence.md and docs/accuracy.md. */
 export const PRESETS: readonly Preset[] = [
   { name: "Default", words: "two and three returns in a tenth of a second", sequence: { base_frequency_hz: 23e6, harmonics: 4, zeroth: "estimated", exposure_s: 1.92e-3, takes: 1 } },
   { name: "Video", words: "the paper's, 18.6 Hz", sequence: { base_frequency_hz: 23e6, harmonics: 3, zeroth: "estimated", exposure_s: 0.5e-3, takes: 1 } },
