@@ -164,7 +164,6 @@ _ALL: Final = (
             "left_out": "accuracy:tables",
             "bounces": "bounces:tables",
             "noise": "noise:tables",
-            "range": "rules:ranges",
         }.items()
     ),
     # -- accuracy

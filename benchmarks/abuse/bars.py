@@ -8,7 +8,7 @@ from typing import Final
 from benchmarks.abuse.attacks import ATTACKS
 from benchmarks.abuse.measuring import COMES_BACK_S, GIVE_UP_S, Seen, measure
 from benchmarks.common.machine import commit_of
-from benchmarks.common.tables import Cell, Column, Table
+from benchmarks.common.tables import Cell, Table, heads
 
 _MIB = 2**20
 FRAMES_BAR: Final = 0.9
@@ -18,17 +18,9 @@ LIGHT_BAR_S: Final = 1.0
 GROWN_BAR_BYTES: Final = 64 * _MIB
 END_BAR_S: Final = 5.0
 
-_COLUMNS: Final = (
-    "attack",
-    "connections",
-    Column("frames", ".0%"),
-    "/livez",
-    "its processor time",
-    "lapse",
-    "safe-off",
-    "memory, most / left, MiB",
-    "SIGTERM",
-    "bars",
+_COLUMNS: Final = heads(
+    "attack | connections | frames:.0% | /livez | its processor time | lapse | "
+    "safe-off | memory, most / left, MiB | SIGTERM | bars"
 )
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.common.tables import Cell, Column, Table
+from benchmarks.common.tables import Cell, Table, heads
 
 
 @dataclass(frozen=True)
@@ -138,18 +138,9 @@ def _of(rows: list[Kept]) -> str:
 
 def table(rows: list[Kept], refused: list[Refused]) -> Table:
     """Return all plans, and what was refused."""
-    columns = (
-        "scene",
-        "goal",
-        "recommended",
-        Column("ms", ".0f"),
-        Column("noise", ".3g"),
-        Column("bias", ".3g"),
-        "error (90 %) mm",
-        "measured noise, bias, error",
-        Column("ratio", ".2f"),
-        "outliers %",
-        "met",
+    columns = heads(
+        "scene | goal | recommended | ms:.0f | noise:.3g | bias:.3g | error (90 %) mm | "
+        "measured noise, bias, error | ratio:.2f | outliers % | met"
     )
     said = [f"- refused: {each.scene}, {each.goal}: {each.why}" for each in refused]
     return Table("Do plans keep what they promise?", columns, [each.row() for each in rows], said)

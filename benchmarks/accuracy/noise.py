@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from benchmarks.accuracy.capturing import SEED, captured, short
-from benchmarks.common.tables import Cell, Column, Table
+from benchmarks.common.tables import Cell, Column, Table, heads
 from transientcam_driver import Sequence
 from transientcam_experiments.tradeoff import camera_before
 from transientcam_experiments.tradeoff.picture import blank, saved
@@ -112,13 +112,9 @@ def tables(figures: Path) -> Iterator[Table]:
     """Predict noise of pixels, and hold what a frame says of itself against the scatter."""
     compared = predicted_and_observed()
     draw_noise(compared, figures / "noise-prediction.png")
-    columns = (
-        "sequence",
-        Column("holds for", ".0%"),
-        Column("predicted mm", ".3g"),
-        Column("observed mm", ".3g"),
-        Column("rms ratio", ".3f"),
-        Column("within 15 %", ".0%"),
+    columns = heads(
+        "sequence | holds for:.0% | predicted mm:.3g | observed mm:.3g | rms ratio:.3f | "
+        "within 15 %:.0%"
     )
     text = (
         f"Pisarenko's on `mirrors`, from sensor and mean moments to each pixel's deviation, "
@@ -147,8 +143,13 @@ def tables(figures: Path) -> Iterator[Table]:
         "noise of the sensor. `predicted_range_std_m` is that of the likelihood's returns to first "
         "order: that noise changes their number, or makes a tail of them, is not in it."
     )
-    heads = ("scene", "sequence", Column("scatter mm", ".3g"), *(f"{each} mm" for each in stated))
-    yield Table("Does a frame know its noise?", heads, list(_stated()), text=[text])
+    of_frames = (
+        "scene",
+        "sequence",
+        Column("scatter mm", ".3g"),
+        *(f"{each} mm" for each in stated),
+    )
+    yield Table("Does a frame know its noise?", of_frames, list(_stated()), text=[text])
 
 
 def _stated() -> Iterator[tuple[Cell, ...]]:

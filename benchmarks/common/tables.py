@@ -1,6 +1,7 @@
 """Tables of what was measured: plain data, as a record keeps them and as Markdown."""
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -16,6 +17,12 @@ class Column(NamedTuple):
 
     name: str
     form: str = ""
+
+
+def heads(text: str) -> tuple[Column, ...]:
+    """Return columns that are stated as in "scene | error, mm:.1f | found"."""
+    parts = (re.fullmatch(r"(.*?)(?::([+,]?\.\d[a-z%]))?", each) for each in text.split(" | "))
+    return tuple(Column(part.group(1), part.group(2) or "") for part in parts if part)
 
 
 @dataclass(frozen=True)

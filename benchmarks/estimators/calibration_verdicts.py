@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from benchmarks.common.measured_scenes import data_folder
-from benchmarks.common.tables import Column, Table
+from benchmarks.common.tables import Table, heads
 from transientcam_driver import CalibrationCapture, Sequence
 from transientcam_driver.simulation import find_scene, list_scenes, measured_scene
 from transientcam_driver.simulation.build import world_of
@@ -221,17 +221,9 @@ def tables() -> Iterator[Table]:
 
 
 def _table(title: str, cases: Iterator[Case]) -> Table:
-    columns = (
-        "measured on",
-        "verdict",
-        Column("unlike", ".1%"),
-        Column("not judged", ".1%"),
-        Column("residual, m", ".3f"),
-        Column("harmonics, rad", ".2f"),
-        Column("magnitudes", ".2f"),
-        Column("field, m", ".3f"),
-        Column("offset, m", "+.3f"),
-        "right",
+    columns = heads(
+        "measured on | verdict | unlike:.1% | not judged:.1% | residual, m:.3f | "
+        "harmonics, rad:.2f | magnitudes:.2f | field, m:.3f | offset, m:+.3f | right"
     )
     found = Table(title, columns)
     wrong = 0

@@ -1,6 +1,5 @@
 """What estimators make of two returns at the frequencies of a camera, on the same noisy moments."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
@@ -10,8 +9,6 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from benchmarks.common.tables import Column, Table
-from transientcam_moments.four_bucket import demodulate
-from transientcam_moments.phase_steps import FOUR_PHASES_RAD
 
 SEPARATIONS_M: Final = (1.2, 2.4, 5.0)
 FIRST_M: Final = 2.0
@@ -20,8 +17,6 @@ RATIO: Final = 0.5
 NOISE: Final = 0.01
 """Standard deviation of each real part of a moment, over b_0."""
 _PIXELS: Final = 4000
-_IMAGES: Final = (4, 240, 320)
-_REPEATS: Final = 20
 
 
 @dataclass(frozen=True)
@@ -67,39 +62,7 @@ def table() -> Table:
             if None not in found:
                 errors_mm = (1e3 * (each or 0.0) for each in found)
                 made.rows.append((f"{measured.name}: {name}", *errors_mm))
-    made.notes.append(
-        f"All estimators have the same {_PIXELS} pixels, with returns at {FIRST_M:g} m and behind, "
-        f"the second {RATIO:g} as strong, and noise of {NOISE:.0%} of b_0 in each real part of a "
-        "moment. Least squares are `tm.likelihood` with two returns and without b_0; the bound is "
-        "0.67 standard deviations, the median of a normal error. Pisarenko has b_0, and needs "
-        "consecutive multiples. A single frequency sees one return."
-    )
     return made
-
-
-def cost() -> str:
-    """Say what the general measurement costs beside the four-bucket sum; depends on the machine."""
-    images = np.random.default_rng(0).integers(0, 4096, (_IMAGES[0], 4, *_IMAGES[1:]))
-    raw = images.astype(np.uint16)
-    order = [0, 3, 2, 1]
-    general = raw[:, order], np.array(FOUR_PHASES_RAD)[order]
-    same = np.array_equal(demodulate(raw, FOUR_PHASES_RAD), demodulate(*general))
-    thirds = raw[:, :3], 2 * np.pi * np.arange(3) / 3
-    return (
-        f"{_IMAGES[0]} frequencies of 320 x 240 pixels: four-bucket sum "
-        f"{_best_ms(lambda: tm.four_bucket(raw)):.2f} ms, the same images by least-squares weights "
-        f"{_best_ms(lambda: demodulate(*general)):.2f} ms ({'equal' if same else 'not equal'} to "
-        f"the bit), three phases {_best_ms(lambda: demodulate(*thirds)):.2f} ms."
-    )
-
-
-def _best_ms(work: Callable[[], Any]) -> float:
-    best_s = np.inf
-    for _ in range(_REPEATS):
-        begin_s = time.perf_counter()
-        work()
-        best_s = min(best_s, time.perf_counter() - begin_s)
-    return 1e3 * best_s
 
 
 def _returns(measured: Measured, separation_m: float) -> tuple[NDArray[Any], NDArray[Any]]:

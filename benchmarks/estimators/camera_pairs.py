@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from benchmarks.common.data import numpy_alone
 from benchmarks.common.tables import Table
-from benchmarks.common.timing import duration, measure
 from transientcam_moments.likelihood.estimate import dense, prepared
 from transientcam_moments.likelihood.planar import SharpFit
 
@@ -102,39 +100,7 @@ def table() -> Table:
                 row = _shares(pixels, estimate(pixels))
                 shown = ("" if np.isnan(share) else f"{share:.1%}" for share in row)
                 made.rows.append((returns, f"{noise:.1%}", name, *shown))
-    low, high = RATIOS
-    made.notes.append(
-        f"{_PIXELS} pixels a row, the same for all estimators: the nearer return at "
-        f"{FIRST_M[0]:g} to {FIRST_M[1]:g} m, the further one {low:g} to {high:g} times as strong. "
-        "Noise is that of each real part of a moment over all light; where there is none, "
-        f"estimators are given {LEAST_NOISE:.1%}. `likelihood` has three returns or a tail, or two "
-        "returns alone. The range is within 1 and 5 cm of the nearer return. Single returns are "
-        f"split where more is found. Another pair is one whose nearer return is over {WRONG_M:g} m "
-        "off; it fits better where it leaves less than the true pair, fitted from its true ranges "
-        "on: which of the two was there, these moments do not say. Flagged are those that "
-        "`ambiguous` names, as shares of the pixels with another pair and of all others: none of "
-        "`likelihood`."
-    )
     return made
-
-
-def cost() -> str:
-    """Say how long the search for pairs takes on one core; depends on the machine."""
-    pixels = random_pixels(SEPARATIONS_M[0], NOISES[-1])
-    noise = tm.noise.MomentNoise(np.asarray(pixels.noise.variance, np.float32))
-    b = pixels.b.astype(np.complex64)
-
-    def search() -> tm.Likelihood:
-        return tm.two_returns(b, noise, harmonics=MULTIPLES, threads=1)
-
-    with numpy_alone():
-        planar = measure(search).median_s / _PIXELS
-    tm.kernels.compile([MULTIPLES[-1]], ["float32"], names=["pairs"])
-    compiled = measure(search).median_s / _PIXELS
-    return (
-        f"Two returns by all pairs at the multiples {MULTIPLES}: {duration(compiled)} a pixel in "
-        f"a compiled lane, {duration(planar)} in NumPy."
-    )
 
 
 def _shares(pixels: Pixels, found: tm.Likelihood) -> tuple[float, ...]:

@@ -11,7 +11,6 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
-from benchmarks.common.machine import machine
 from benchmarks.common.tables import Table
 from benchmarks.estimators import camera_estimates, camera_pairs
 from benchmarks.estimators.camera_estimates import FIRST_M, NOISE, RATIO
@@ -60,11 +59,6 @@ def table() -> Table:
     for camera in CAMERAS:
         bounds = (first_return_std_m(camera, each) for each in SEPARATIONS_M)
         made.rows.append((camera.name, *map(_shown, bounds)))
-    made.notes.append(
-        f"The second return is {RATIO:g} as strong as the first, at {FIRST_M:g} m; noise is "
-        f"{NOISE:.0%} of b_0 in each real part of a moment. No unbiased estimate does better; the "
-        "uniform part is unknown, and calibration is taken to be perfect."
-    )
     return made
 
 
@@ -100,12 +94,8 @@ def _shown(std_m: float) -> str:
     return f"{std_m * 1e3:.0f} mm" if std_m < 1.0 else f"{std_m:.1f} m"
 
 
-def tables(*, cost: bool = False) -> Iterator[Table]:
-    """Compare estimators and bounds; or time the measurement of moments and the pairs' search."""
-    if cost:
-        costs = [camera_estimates.cost(), camera_pairs.cost()]
-        yield Table("", text=[f"{each} One core of {machine()}." for each in costs])
-        return
+def tables() -> Iterator[Table]:
+    """Compare estimators and bounds."""
     yield camera_estimates.table()
     yield camera_pairs.table()
     made = table()

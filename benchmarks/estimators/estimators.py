@@ -12,7 +12,6 @@ from rich.progress import Progress, TaskID
 import transientcam_moments as tm
 from benchmarks.common.tables import Cell, Column, Table
 from transientcam_experiments import tradeoff
-from transientcam_experiments.tradeoff.estimating import SAMPLE_PIXELS
 from transientcam_moments.comparisons import TECHNIQUES, Technique
 from transientcam_server.settings import Estimator, ReconstructionSettings
 
@@ -72,15 +71,6 @@ def _row(technique: Technique) -> tuple[Cell, ...]:
 
 
 def _tables(records: list[tradeoff.Record]) -> Iterator[Table]:
-    text = (
-        "One single-take capture of a simulated scene by the simulated camera with its noise, over "
-        "the emulated USB; the range is held against the truth "
-        f"in {SAMPLE_PIXELS} pixels. Times are of a frame of 163 x 120 pixels, for techniques "
-        "that go pixel by pixel those pixels' time multiplied; `sra-table` had its table already, "
-        "`regularised` had no neighbours to look at. `transientcam tradeoff` measures the same on "
-        "any scene."
-    )
-    yield Table("Time and error on the same frames", text=[text])
     for scene, m in itertools.product(SCENES, HARMONICS):
         yield _table(
             f"{scene}, m = {m}",

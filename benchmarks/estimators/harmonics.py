@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from benchmarks.common.data import PAPER, SETTINGS, VGA, images
-from benchmarks.common.tables import Column, Table
+from benchmarks.common.tables import Table, heads
 from transientcam_driver import Camera, SubPhases, Truth, capture_calibration
 from transientcam_driver import Sequence as Capture
 from transientcam_driver.calibration import DEFAULT_TAKES
@@ -157,22 +157,11 @@ def table(measured: Path | None) -> Table:
                     label = scheme.scheme + (f" {scheme.n}" if scheme.n > 1 else "")
                     (b, r), (b_out, r_out) = plain.texts(), without.texts()
                     rows.append([f"{name}, {label}, {scene}", largest, b, b_out, r, r_out])
-    columns = (
-        "modulation, sub-phases, scene",
-        "largest harmonic",
-        "moments, calibrated",
-        "harmonics taken out",
-        "range in mm, calibrated",
-        "harmonics taken out",
+    columns = heads(
+        "modulation, sub-phases, scene | largest harmonic | moments, calibrated | "
+        "harmonics taken out | range in mm, calibrated | harmonics taken out"
     )
-    notes = [
-        f"m = 4 at 23 MHz, mean of {_TAKES} takes, calibration with {DEFAULT_TAKES} takes and a "
-        "phase sweep; noise, and delays of the pixels, as the simulated prototype has them. The "
-        "largest harmonic is over the fundamental, behind the sub-phases. Moments: the worst error "
-        "of b_1 to b_4 over b_0, median and 90 % of the pixels, where the truth has all returns. "
-        "Range (maximum entropy): median and 90 % of the absolute error.",
-    ]
-    return Table("Before and after", columns, rows, notes)
+    return Table("Before and after", columns, rows)
 
 
 def cost() -> Table:
@@ -188,7 +177,7 @@ def cost() -> Table:
             times_ms.append(1e3 * _processor_s(lambda: reconstruct(raw)))  # noqa: B023 - called now
         rows.append([f"m = {m}, {shape[1]} x {shape[0]}", *times_ms])
     notes = ["Processor time of a frame in single precision, with four harmonics."]
-    columns = "frame", Column("calibrated, ms", ".1f"), Column("harmonics taken out, ms", ".1f")
+    columns = heads("frame | calibrated, ms:.1f | harmonics taken out, ms:.1f")
     return Table("What it costs", columns, rows, notes)
 
 

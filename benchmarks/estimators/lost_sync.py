@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from benchmarks.common.tables import Table
+from benchmarks.common.tables import Table, heads
 from transientcam_driver import Sequence as Capture
 from transientcam_driver import open_camera
 from transientcam_driver.clock import VirtualClock
@@ -150,18 +150,9 @@ def tables(*, frames: int = 20) -> Iterator[Table]:
         "Errors of the range in mm (maximum entropy): median and 90 % of all lit pixels, and the "
         "median of the worst frame.",
     ]
-    columns = (
-        "scene",
-        "frames spoilt",
-        "images spoilt",
-        "of these in pairs",
-        "rebuilt",
-        "reported",
-        "not found",
-        "good ones rebuilt",
-        "no image spoilt",
-        "as captured",
-        "repaired",
-        "repaired and filled",
+    columns = heads(
+        "scene | frames spoilt | images spoilt | of these in pairs | rebuilt | reported | "
+        "not found | good ones rebuilt | no image spoilt | as captured | repaired | "
+        "repaired and filled"
     )
     yield Table("What becomes of spoilt images", columns, rows, notes)

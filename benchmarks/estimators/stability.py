@@ -3,24 +3,21 @@
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from time import perf_counter
 
-import matplotlib as mpl
 import mpmath as mp
 import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from benchmarks.common.tables import Column, Table
+from benchmarks.common.tables import Table, heads
+from benchmarks.common.timing import measure
 from tests.moments import oracles
 from tests.stability import exact
 from tests.stability.cases import ORDERS, PRECISIONS, Signal, dense_signals, sparse_signals
+from transientcam_experiments.tradeoff.picture import blank, saved
 from transientcam_moments._arrays import by_blocks
 from transientcam_moments.pisarenko import _pisarenko
 from transientcam_moments.polishing import residual, size
-
-mpl.use("Agg")
-from matplotlib import pyplot as plt
 
 Complex = NDArray[np.complexfloating]
 Worst = dict[str, tuple[float, int]]
@@ -208,13 +205,7 @@ def helped() -> Table:
     """Count the pixels that need double precision, and say what it costs."""
     table = Table(
         "Single precision helped by double (163 x 120 pixels)",
-        (
-            "signal",
-            "m",
-            Column("pixels redone", ".2%"),
-            Column("closed form, ms", ".1f"),
-            Column("with help, ms", ".1f"),
-        ),
+        heads("signal | m | pixels redone:.2% | closed form, ms:.1f | with help, ms:.1f"),
     )
     rng = np.random.default_rng(0)
     for m in (3, 4, 8):
@@ -227,26 +218,17 @@ def helped() -> Table:
             plain = by_blocks(_pisarenko, b)
             tolerance = 16 * (m + 1) * np.finfo(np.float32).eps
             redone = size(residual(b, *plain[:3]), b) > tolerance
-            alone = median_ms(partial(by_blocks, _pisarenko, b))
-            whole = median_ms(partial(tm.pisarenko, b))
-            table.rows.append((name, m, redone.mean(), alone, whole))
+            alone = measure(partial(by_blocks, _pisarenko, b)).median_s
+            whole = measure(partial(tm.pisarenko, b)).median_s
+            table.rows.append((name, m, redone.mean(), 1e3 * alone, 1e3 * whole))
     return table
-
-
-def median_ms(run: Callable[[], object], repetitions: int = 7) -> float:
-    """Return the median time in ms."""
-    times = []
-    for _ in range(repetitions):
-        start = perf_counter()
-        run()
-        times.append(perf_counter() - start)
-    return 1e3 * float(np.median(times))
 
 
 def plot_separation(path: Path) -> None:
     """Draw the error against the separation of two returns."""
     apart = np.geomspace(1, 1e-5, 60)
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4), sharex=True, layout="constrained")
+    figure = blank(10, 4)
+    axes = figure.subplots(1, 2, sharex=True)
     for precision, dtype in PRECISIONS.items():
         phase = np.stack([np.full(apart.size, 2.0), 2.0 + apart])
         weight = np.array([[1.0], [0.6]]) * np.ones(apart.size)
@@ -277,7 +259,7 @@ def plot_separation(path: Path) -> None:
         axis.set_ylim(1e-17, 10)
         axis.grid(alpha=0.3)
     axes[0].legend(title="line: condition times eps")
-    figure.savefig(path, dpi=120)
+    path.write_bytes(saved(figure, "png"))
 
 
 W = (mp.mpf(1), mp.mpf("0.6"))
@@ -285,7 +267,8 @@ W = (mp.mpf(1), mp.mpf("0.6"))
 
 def plot_condition(path: Path) -> None:
     """Draw the error against the condition number of random sparse signals."""
-    figure, axis = plt.subplots(figsize=(6, 4.5), layout="constrained")
+    figure = blank(6, 4.5)
+    axis = figure.subplots()
     rng = np.random.default_rng(0)
     for precision, dtype in PRECISIONS.items():
         points = []
@@ -306,12 +289,13 @@ def plot_condition(path: Path) -> None:
     axis.set_ylabel("phase error / rad")
     axis.legend(title="line: condition times eps")
     axis.grid(alpha=0.3)
-    figure.savefig(path, dpi=120)
+    path.write_bytes(saved(figure, "png"))
 
 
 def plot_order(path: Path) -> None:
     """Draw backward errors against m, for returns at about equal distances."""
-    figure, axis = plt.subplots(figsize=(6, 4.5), layout="constrained")
+    figure = blank(6, 4.5)
+    axis = figure.subplots()
     styles = {"reflection coefficients": "o-", "polynomial": "s--", "returns": "^:"}
     orders = np.unique(np.geomspace(1, 32, 14).astype(int))
     for precision, dtype in PRECISIONS.items():
@@ -336,7 +320,7 @@ def plot_order(path: Path) -> None:
     axis.set_ylabel("backward error")
     axis.legend(fontsize=8)
     axis.grid(alpha=0.3)
-    figure.savefig(path, dpi=120)
+    path.write_bytes(saved(figure, "png"))
 
 
 FIGURES = {

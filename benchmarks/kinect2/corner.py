@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
-from benchmarks.common.tables import Column, Table
+from benchmarks.common.tables import Table, heads
 from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import TOO_LONG
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array
@@ -16,6 +16,7 @@ from transientcam_driver.clock import VirtualClock
 from transientcam_driver.entries.kinect2 import PLUGIN
 from transientcam_driver.kinect2.layout import SAMPLING
 from transientcam_driver.plugin import CameraName
+from transientcam_experiments.tradeoff.picture import blank, saved
 from transientcam_server.camera.source import sensor_of
 from transientcam_server.imaging.lens import Intrinsics
 from transientcam_server.settings import SensorSettings
@@ -83,12 +84,9 @@ def tables(figures: Path) -> Iterator[Table]:
 
 def table(corner: Corner) -> Table:
     """Hold the three against the truth."""
-    columns = (
-        "one frame of the corner",
-        Column("median error, mm", ".1f"),
-        Column("90 %, mm", ".1f"),
-        Column("mean, mm", "+.1f"),
-        Column("without a range", ".2%"),
+    columns = heads(
+        "one frame of the corner | median error, mm:.1f | 90 %, mm:.1f | mean, mm:+.1f | "
+        "without a range:.2%"
     )
     made = Table("A corner of a room", columns)
     for name, found_m in corner.found_m.items():
@@ -104,21 +102,13 @@ def table(corner: Corner) -> Table:
                 1 - there.mean(),
             )
         )
-    made.notes.append(
-        f"One frame of `{SPEC}` through packets and codes, with the noise of the simulated "
-        f"sensor; every {STEP}th row and column. Light between the walls of a corner comes back "
-        "over a while, which two returns are a simplification of."
-    )
     return made
 
 
 def draw(corner: Corner, path: Path) -> None:
     """Draw the middle row from above, and how far each estimate is off."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     row = len(corner.true_m) // 2
-    figure = Figure(figsize=(9, 3.6), layout="constrained")
+    figure = blank(9, 3.6)
     above, error = figure.subplots(1, 2)
     columns = STEP * np.arange(corner.true_m.shape[1]) + STEP // 2
     slope = (columns - corner.lens.cx) / corner.lens.fx
@@ -134,4 +124,4 @@ def draw(corner: Corner, path: Path) -> None:
     above.legend(fontsize=8)
     error.axhline(0.0, color="black", linewidth=1.0)
     error.set(title="error of the range", xlabel="column", ylabel="mm")
-    FigureCanvasAgg(figure).print_png(path)  # type: ignore[no-untyped-call]  # matplotlib's
+    path.write_bytes(saved(figure, "png"))

@@ -11,7 +11,7 @@ import numpy as np
 
 import transientcam_moments as tm
 from benchmarks.common.records import ROOT
-from benchmarks.common.tables import Cell, Column, Table
+from benchmarks.common.tables import Cell, Table, heads
 from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import ROUNDING, TOO_LONG
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array, noise
@@ -104,12 +104,9 @@ def stored(scene: str) -> dict[str, Array]:
 
 def tables() -> Iterator[Table]:
     """Hold libfreenect2's depths and our ranges of the same frames against the truth."""
-    columns = (
-        "scene, one frame without noise",
-        Column("median error, mm", ".1f"),
-        Column("90 %, mm", ".1f"),
-        Column("mean, mm", "+.1f"),
-        Column("without a range", ".2%"),
+    columns = heads(
+        "scene, one frame without noise | median error, mm:.1f | 90 %, mm:.1f | "
+        "mean, mm:+.1f | without a range:.2%"
     )
     made = Table("Read by libfreenect2", columns)
     apart_mm, same = 0.0, 1.0

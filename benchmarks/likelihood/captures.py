@@ -86,13 +86,6 @@ def _tables_of(scenes: Mapping[str, str]) -> Iterator[Table]:
         table = Table(
             f"{name}: {HEAD}",
             ("m, takes", "capture / ms", *COLUMNS, "explained", "predicted / mm"),
-            notes=[
-                "Simulated camera `prototype`, its outliers off, all other errors on, calibrated; "
-                "f = 23 MHz, at m = 8 11.5 MHz; smoothed by 0.6 pixels. explained: share of "
-                "pixels whose chi-square noise and model error exceed in more than one of a "
-                "thousand; predicted: median standard deviation by the likelihood's information "
-                "matrix." + _of_truth(scene)
-            ],
         )
         for m in ORDERS:
             for count in TAKES if m <= MOST_OF_SHORT else TAKES_OF_MANY:
@@ -162,16 +155,6 @@ def _row(
         *(str(each) for each in errors.values()),
         f"{model.likelihood.explained()[shot.lit].mean():.0%}",
         f"{np.nanmedian(std_mm):.1f}",
-    )
-
-
-def _of_truth(scene: str) -> str:
-    if scene != SOFT:
-        return ""
-    return (
-        " Half of these pixels have no direct light; they are held to the first maximum of their "
-        "response (Sec. 5.3), not to the mean delay of all their light, which the simulation has "
-        "for them and a single frequency measures by definition."
     )
 
 

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
-from benchmarks.common.tables import Column, Table
+from benchmarks.common.tables import Column, Table, heads
 from benchmarks.likelihood.errors import COLUMNS, Array, ranges, turn_m
 
 BASE_HZ: Final = 23e6
@@ -79,13 +79,9 @@ def _splits() -> Table:
     random = np.random.default_rng(SEED)
     table = Table(
         "Single returns that are taken for something else",
-        (
-            "m",
-            "b_0",
-            Column("as two or three", ".3%"),
-            Column("as one with a tail", ".3%"),
-            Column("explained", ".2%"),
-            Column("reduced chi-square", ".3f"),
+        heads(
+            "m | b_0 | as two or three:.3% | as one with a tail:.3% | explained:.2% | "
+            "reduced chi-square:.3f"
         ),
         notes=[
             f"{SPLIT_PIXELS} pixels each; explained: chi-square below what noise exceeds in one "

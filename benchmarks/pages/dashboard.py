@@ -5,18 +5,18 @@ timeline by hand, in Chromium without a graphics processor; daemon, simulation a
 machine.
 """
 
-import os
+import contextlib
 import shutil
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import httpx
 import numpy as np
+import psutil
 from playwright.sync_api import Page, sync_playwright
 
 import transientcam_moments as tm
-from benchmarks.common.tables import Cell, Column, Table
+from benchmarks.common.tables import Cell, Column, Table, heads
 from tests.browser.dashboard import open_page
 from tests.serving import serving
 
@@ -61,47 +61,16 @@ _ORDERS = (3, 4, 8)
 _SENSORS = ("163x120", "640x480")
 _SETTLING_MS = 15_000  # the page finds out within it how many frames it can take
 _PATIENCE_S = 120.0  # a laden machine answers in its own time
-_TICKS_S = os.sysconf("SC_CLK_TCK")
 
 
-def _browser() -> set[int]:
-    """Return the processes of the browser, not the compilers and drivers beside it."""
-    return {pid for pid in _descendants(os.getpid()) if _name(pid) == "chromium"}
-
-
-def _name(pid: int) -> str:
-    try:
-        return Path(f"/proc/{pid}/comm").read_text().strip()
-    except OSError:  # it ended meanwhile
-        return ""
-
-
-def _descendants(pid: int) -> set[int]:
-    """Return the processes below ``pid``."""
-    parents: dict[int, int] = {}
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = stat.read_text().rpartition(")")[2].split()
-        except OSError:  # it ended meanwhile
-            continue
-        parents[int(stat.parent.name)] = int(fields[1])
-    found: set[int] = set()
-    new = {pid}
-    while new:
-        new = {child for child, parent in parents.items() if parent in new} - found
-        found |= new
-    return found
-
-
-def _processor_s(pids: set[int]) -> float:
-    """Return the processor time that processes have used."""
+def _browser_s() -> float:
+    """Return the processor time of the browser, without the compilers and drivers beside it."""
     total = 0.0
-    for pid in pids:
-        try:
-            fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        total += (int(fields[11]) + int(fields[12])) / _TICKS_S
+    for process in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.NoSuchProcess):  # it ended meanwhile
+            if process.name() == "chromium":
+                times = process.cpu_times()
+                total += times.user + times.system
     return total
 
 
@@ -145,10 +114,10 @@ def measure(page: Page, url: str, *, harmonics: int, span_s: float) -> tuple[Cel
     _run(url, running=True)
     page.wait_for_function("() => transientcam.store.status.running.peek() === true")
     page.wait_for_timeout(_SETTLING_MS)
-    before_s, begin_s, first = _processor_s(_browser()), time.monotonic(), page.evaluate(_NEWEST)
+    before_s, begin_s, first = _browser_s(), time.monotonic(), page.evaluate(_NEWEST)
     streaming_hz, drawn_hz = page.evaluate(_COUNT_PICTURES, span_s)
     took_s = time.monotonic() - begin_s  # a laden page begins and answers late
-    used_s, frames = _processor_s(_browser()) - before_s, page.evaluate(_NEWEST) - first
+    used_s, frames = _browser_s() - before_s, page.evaluate(_NEWEST) - first
     asked_for, heap_mb = _asked_for(page), _heap_mb(page)
     page.evaluate(_HOLD_TIMELINE)
     page.wait_for_timeout(_SETTLING_MS)
@@ -206,16 +175,9 @@ def tables(
     hours: float = 0.1,
 ) -> Iterator[Table]:
     """Measure sizes and orders, each for so long; follow the memory over so many hours of video."""
-    columns = (
-        "sensor",
-        "m",
-        Column("pictures/s, still", ".1f"),
-        Column("streaming", ".1f"),
-        Column("by hand", ".1f"),
-        "frames/s drawn",
-        "asked for",
-        Column("cores of the browser", ".2f"),
-        Column("heap, MB", ".1f"),
+    columns = heads(
+        "sensor | m | pictures/s, still:.1f | streaming:.1f | by hand:.1f | frames/s drawn | "
+        "asked for | cores of the browser:.2f | heap, MB:.1f"
     )
     table = Table("", columns)
     tm.kernels.compile(harmonics, ["float32"])  # not beside what is measured

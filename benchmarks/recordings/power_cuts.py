@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.common.tables import Table
+from benchmarks.common.tables import Table, heads
 from tests.server.fuzzing.recordings import in_memory
 from tests.server.recording.made import frame
 from tests.server.recording.power import DISKS, Event, cut, moments, traced
@@ -88,14 +88,9 @@ def tables(*, cuts: int = 100) -> Iterator[Table]:
     """Cut the power so often for each kind of disk."""
     with tempfile.TemporaryDirectory(dir=in_memory()) as name:  # a disk would be waited for
         found = measure(Path(name), cuts=cuts)
-    columns = (
-        "of what was not brought to the disk, there is",
-        "cuts",
-        "frames acknowledged",
-        "recovered",
-        "acknowledged > 1 s before and lost",
-        "different",
-        "files not opened",
+    columns = heads(
+        "of what was not brought to the disk, there is | cuts | frames acknowledged | "
+        "recovered | acknowledged > 1 s before and lost | different | files not opened"
     )
     yield Table("", columns, [_row(disk, each) for disk, each in found.items()])
 

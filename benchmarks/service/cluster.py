@@ -12,7 +12,7 @@ import xarray
 
 import transientcam
 from benchmarks.common.daemon import daemon
-from benchmarks.common.tables import Column, Table, verdict
+from benchmarks.common.tables import Column, Table, heads, verdict
 from benchmarks.service.byte_counter import ByteCounter
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
@@ -114,12 +114,7 @@ def efficiency(directory: Path) -> tuple[Table, Measured]:
     options = BatchOptions(_PRODUCTS, ReconstructionSettings(estimator=_ESTIMATOR))
     table = Table(
         f"{FRAMES} frames at 163 x 120, m = {_HARMONICS}",
-        (
-            "processes",
-            Column("time, s", ".1f"),
-            Column("frames a second", ".0f"),
-            Column("efficiency", ".0%"),
-        ),
+        heads("processes | time, s:.1f | frames a second:.0f | efficiency:.0%"),
         notes=[
             f"Products {', '.join(_PRODUCTS)}, estimator {_ESTIMATOR}, one thread a process. "
             f"{_DISTINCT} simulated frames are repeated. Workers had computed another recording "

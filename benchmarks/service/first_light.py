@@ -14,7 +14,7 @@ from playwright.sync_api import sync_playwright
 
 import transientcam
 from benchmarks.common.daemon import VIDEO, daemon
-from benchmarks.common.tables import Column, Table, percentiles
+from benchmarks.common.tables import Table, heads, percentiles
 
 SETTLE_S = 5.0
 """Before the measurement: until the kernels are loaded and the new sequence's frames come."""
@@ -115,13 +115,9 @@ def tables(*, stream_s: float = 60.0, starts: int = 3) -> Iterator[Table]:
             text=[f"Median (and range) of {starts} cold and {starts} warm starts:"],
         )
         seen = measure_stream(caches[0], duration_s=stream_s)
-    columns = (
-        Column("for, s", ".0f"),
-        Column("frames/s", ".2f"),
-        "frames missing",
-        "drops reported",
-        Column("daemon's share of one core", ".0%"),
-        "last image's arrival to client, median / 99 %, ms",
+    columns = heads(
+        "for, s:.0f | frames/s:.2f | frames missing | drops reported | "
+        "daemon's share of one core:.0% | last image's arrival to client, median / 99 %, ms"
     )
     share = seen.cpu_s / seen.duration_s
     latency = percentiles(seen.latencies_ms, (50, 99))

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from benchmarks.common.daemon import Process
 from benchmarks.common.records import DOCS, ROOT
-from benchmarks.common.tables import Column, Table
+from benchmarks.common.tables import Table, heads
 
 _START: Final = DOCS / "start.md"
 _ADDRESS: Final = "http://127.0.0.1:8000"
@@ -73,7 +73,7 @@ def tables(wheel: Path | None = None) -> Iterator[Table]:
     """
     table = Table(
         "",
-        ("after this step", Column("it took, s", ".1f"), Column("since the beginning, s", ".1f")),
+        heads("after this step | it took, s:.1f | since the beginning, s:.1f"),
     )
     with tempfile.TemporaryDirectory() as name:
         directory = Path(name)

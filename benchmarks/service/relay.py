@@ -15,7 +15,7 @@ from typing import Final
 
 import transientcam
 from benchmarks.common.daemon import Process, daemon
-from benchmarks.common.tables import Column, Table, percentiles
+from benchmarks.common.tables import Cell, Table, heads, percentiles
 from benchmarks.service.viewers import Viewer, cut, watch
 from transientcam import wire
 
@@ -23,17 +23,6 @@ RELAYS: Final = 4
 VIDEO: Final = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 5e-4}
 SETTLE_S: Final = 4.0
 BACK_WITHIN_S: Final = 30.0
-
-
-@dataclass(frozen=True)
-class Spent:
-    """What a daemon spent while viewers looked, and how old frames were when they had them."""
-
-    what: str
-    viewers: int
-    cpu_share: float
-    resident_bytes: int
-    latencies_s: Sequence[float]
 
 
 @dataclass(frozen=True)
@@ -64,21 +53,19 @@ def viewers_of(process: Process, count: int) -> list[Viewer]:
     return [Viewer(process.stream_url, subscribe) for _ in range(count)]
 
 
-def observe(what: str, process: Process, viewers: list[Viewer], *, duration_s: float) -> Spent:
-    """Return what a daemon spends while all viewers look."""
+def observe(
+    what: str, process: Process, viewers: list[Viewer], *, duration_s: float
+) -> tuple[Cell, ...]:
+    """Return what a daemon spends while all viewers look, and how old frames are for them."""
     watch(viewers, duration_s=SETTLE_S)
     before = [len(each.seen.latencies_s) for each in viewers]
     cpu_s = process.cpu_s()
     elapsed_s = watch(viewers, duration_s=duration_s)
     spent_s = process.cpu_s() - cpu_s
     fresh = [each.seen.latencies_s[b:] for each, b in zip(viewers, before, strict=True)]
-    return Spent(
-        what,
-        len(viewers),
-        spent_s / elapsed_s,
-        process.resident_bytes(),
-        [latency_s for each in fresh for latency_s in each],
-    )
+    latencies = _percentiles([latency_s for each in fresh for latency_s in each])
+    held_mib = process.resident_bytes() / 2**20
+    return what, len(viewers), spent_s / elapsed_s, held_mib, latencies
 
 
 def hop_latencies(url: str, *, frames: int) -> list[float]:
@@ -130,7 +117,9 @@ def watched(viewers: list[Viewer]) -> Iterator[None]:
         reading.join()
 
 
-def measure(viewers: int, *, duration_s: float) -> tuple[list[Spent], list[float], Killed]:
+def measure(
+    viewers: int, *, duration_s: float
+) -> tuple[list[tuple[Cell, ...]], list[float], Killed]:
     """Measure everything, the origin with the same camera each time."""
     spent = []
     with daemon("--camera", "sim:mirrors") as origin, transientcam.Camera(origin.url) as camera:
@@ -157,23 +146,10 @@ def measure(viewers: int, *, duration_s: float) -> tuple[list[Spent], list[float
 def tables(*, viewers: int = 50, seconds: float = 20.0) -> Iterator[Table]:
     """Measure with so many viewers of each relay, each case for so many seconds."""
     spent, added_s, killed = measure(viewers, duration_s=seconds)
-    columns = (
-        "viewers",
-        "of them",
-        Column("origin's share of one core", ".0%"),
-        Column("origin's memory, MiB", ".0f"),
-        "age of a frame at the viewer, 50 / 99 %, ms",
+    columns = heads(
+        "viewers | of them | origin's share of one core:.0% | origin's memory, MiB:.0f | "
+        "age of a frame at the viewer, 50 / 99 %, ms"
     )
-    rows = [
-        (
-            each.what,
-            each.viewers,
-            each.cpu_share,
-            each.resident_bytes / 2**20,
-            _percentiles(each.latencies_s),
-        )
-        for each in spent
-    ]
     notes = [
         f"- A relay adds {_percentiles(added_s)} ms (50 / 99 %) to the way of a frame, from its "
         f"arrival at the origin to its arrival at the relay; {len(added_s)} frames.",
@@ -182,7 +158,7 @@ def tables(*, viewers: int = 50, seconds: float = 20.0) -> Iterator[Table]:
         f"- {killed.others} viewers elsewhere in the tree missed {killed.missing} frames "
         "meanwhile.",
     ]
-    yield Table("", columns, rows, notes)
+    yield Table("", columns, spent, notes)
 
 
 def _percentiles(values_s: Sequence[float]) -> str:

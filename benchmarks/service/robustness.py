@@ -15,9 +15,10 @@ from pathlib import Path
 import httpx
 
 import transientcam
-from benchmarks.common.daemon import VIDEO, Process, daemon
+from benchmarks.common.daemon import VIDEO, daemon
 from benchmarks.common.tables import Table, met
 from benchmarks.recordings import kills as killing
+from benchmarks.service.soak import Samples
 from benchmarks.service.viewers import Viewer, cut, watch
 from transientcam.stream_state import Reconnect
 
@@ -50,9 +51,7 @@ class Unplugs:
 
     seen_s: list[float] = field(default_factory=list)
     back_s: list[float] = field(default_factory=list)
-    memory_bytes: list[int] = field(default_factory=list)
-    descriptors: list[int] = field(default_factory=list)
-    threads: list[int] = field(default_factory=list)
+    samples: Samples = field(default_factory=Samples)
     missing: list[int] = field(default_factory=list)
     recorded: int = 0
 
@@ -75,7 +74,7 @@ def measure_unplugs(directory: Path, *, unplugs: int, viewers: int) -> Unplugs:
             try:
                 for _ in range(unplugs):
                     _unplug(camera, stream, watching, found)
-                    _look(process, found)
+                    found.samples.take(process)
             finally:
                 cut(each.connection for each in watching)
         found.recorded = camera.stop_recording(recording["id"])["frames"]
@@ -119,12 +118,6 @@ def _drain(stream: transientcam.Stream) -> None:
         pass
 
 
-def _look(process: Process, found: Unplugs) -> None:
-    found.memory_bytes.append(process.resident_bytes())
-    found.descriptors.append(process.descriptors())
-    found.threads.append(process.threads())
-
-
 def measure_ends(directory: Path) -> list[tuple[float, float, bool]]:
     """Return for some moments how long the end took after SIGTERM, and whether it compiled then."""
     ends = []
@@ -150,22 +143,22 @@ def tables(*, unplugs: int = 100, viewers: int = 10, kills: int = 100) -> Iterat
 
 
 def _unplugged(seen: Unplugs, viewers: int) -> Table:
-    rows = []
+    held, rows = seen.samples, []
     for name, values_s, bar_s in (
         ("unplug to the notice `camera-lost`", seen.seen_s, SEEN_BAR_S),
         ("replug to the next frame", seen.back_s, BACK_BAR_S),
     ):
         median, longest = statistics.median(values_s), max(values_s)
-        held = f"{bar_s:g} s, {met(longest <= bar_s)}"
-        rows.append((name, f"{median:.2f} s", f"{longest:.2f} s", held))
+        reached = f"{bar_s:g} s, {met(longest <= bar_s)}"
+        rows.append((name, f"{median:.2f} s", f"{longest:.2f} s", reached))
     return Table(
         "Unplugged under load",
         ("", "median", "longest", "bar"),
         rows,
         [
-            f"Growth from unplug {WARM_UP} to the last: "
-            f"{_growth(seen.memory_bytes) / 2**20:+.1f} MiB of memory, "
-            f"{_growth(seen.descriptors):+d} descriptors, {_growth(seen.threads):+d} threads. "
+            f"Growth from unplug {WARM_UP} to the last: {_growth(held.memory_bytes) / 2**20:+.1f} "
+            f"MiB of memory, {_growth(held.descriptors):+d} descriptors, "
+            f"{_growth(held.threads):+d} threads. "
             "Frames that a viewer neither received nor had reported as dropped: "
             f"{max(seen.missing)} at most. Frames in the recording: {seen.recorded}."
         ],

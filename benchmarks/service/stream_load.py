@@ -23,7 +23,7 @@ from websockets.exceptions import ConnectionClosed
 
 import transientcam
 from benchmarks.common.daemon import VIDEO, Process, daemon, running
-from benchmarks.common.tables import Cell, Column, Table, met, percentiles
+from benchmarks.common.tables import Cell, Column, Table, heads, met, percentiles
 from benchmarks.service.viewers import Viewer, cut, stuck, watch
 from transientcam import wire
 from transientcam_driver import open_camera
@@ -160,25 +160,15 @@ def _one_message(url: str) -> bytes:
 # -- how long a frame takes --------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Travelled:
-    """How long frames of one size took to one viewer."""
-
-    width: int
-    height: int
-    rate_hz: float
-    latencies_s: Sequence[float]
-
-
-def measure_travel(width: int, height: int, *, duration_s: float) -> Travelled:
-    """Return what one viewer of range sees."""
+def measure_travel(width: int, height: int, *, duration_s: float) -> tuple[float, list[float]]:
+    """Return the frames a second that one viewer of range sees, and how long each took, in ms."""
     with daemon("--camera", f"sim:mirrors?width={width}&height={height}") as process:
         viewer = _settled_viewer(process)
         begin = len(viewer.seen.numbers)
         elapsed_s = watch([viewer], duration_s=duration_s)
         viewer.connection.close()
-    latencies_s = viewer.seen.latencies_s[begin:]
-    return Travelled(width, height, len(latencies_s) / elapsed_s, latencies_s)
+    latencies_ms = [1e3 * latency_s for latency_s in viewer.seen.latencies_s[begin:]]
+    return len(latencies_ms) / elapsed_s, latencies_ms
 
 
 def _settled_viewer(process: Process) -> Viewer:
@@ -275,7 +265,7 @@ def _observe(
 def tables(*, seconds: float = 60.0, viewers: int = 200, stuck: int = 50) -> Iterator[Table]:
     """Measure many viewers for so many seconds, some stuck; one; and the stream beside a server."""
     yield _loads(measure_load(viewers=viewers, stuck_viewers=stuck, duration_s=seconds))
-    yield _travels([measure_travel(*size, duration_s=8.0) for size in SIZES])
+    yield _travels({size: measure_travel(*size, duration_s=8.0) for size in SIZES})
     with tempfile.TemporaryDirectory() as directory:
         yield _floods(measure_flood(Path(directory)))
 
@@ -286,16 +276,10 @@ def _loads(loads: tuple[Load, Load]) -> Table:
     gone = "not at all" if beside.gone_s is None else f"after {beside.gone_s:.1f} s"
     late = beside.gone_s is None or beside.gone_s > GONE_WITHIN_S
     lost = beside.dropped + beside.missing
-    columns = (
-        "viewers",
-        "of them stuck",
-        Column("for, s", ".0f"),
-        "frames/s, slowest / median",
-        "frames missing",
-        "drops reported",
-        "latency, 50 / 99 / 100 %, ms",
-        Column("daemon's share of one core", ".0%"),
-        Column("daemon's memory, MiB", ".0f"),
+    columns = heads(
+        "viewers | of them stuck | for, s:.0f | frames/s, slowest / median | "
+        "frames missing | drops reported | latency, 50 / 99 / 100 %, ms | "
+        "daemon's share of one core:.0% | daemon's memory, MiB:.0f"
     )
     return Table(
         "Many viewers",
@@ -329,23 +313,19 @@ def _load(load: Load) -> Sequence[Cell]:
     )
 
 
-def _travels(travels: list[Travelled]) -> Table:
-    small_ms = 1e3 * statistics.median(travels[0].latencies_s)
+def _travels(travels: dict[tuple[int, int], tuple[float, list[float]]]) -> Table:
     rows = [
-        (
-            f"{each.width} x {each.height}",
-            each.rate_hz,
-            percentiles([1e3 * latency_s for latency_s in each.latencies_s], (50, 99)),
-        )
-        for each in travels
+        (f"{width} x {height}", rate_hz, percentiles(latencies_ms, (50, 99)))
+        for (width, height), (rate_hz, latencies_ms) in travels.items()
     ]
+    small_ms = statistics.median(travels[SIZES[0]][1])
     return Table(
         "From the last image's arrival to the client",
-        ("pixels", Column("frames/s", ".1f"), "50 / 99 %, ms"),
+        heads("pixels | frames/s:.1f | 50 / 99 %, ms"),
         rows,
         [
-            f"- Half of the frames of {travels[0].width} x {travels[0].height} pixels took at most "
-            f"{small_ms:.1f} ms; bar: 15 ms, {met(small_ms < 15.0)}."
+            f"- Half of the frames of {rows[0][0]} pixels took at most {small_ms:.1f} ms; bar: "
+            f"15 ms, {met(small_ms < 15.0)}."
         ],
         ["One viewer of `range`, by one clock: what reconstruction, encoding and sending take."],
     )

@@ -20,7 +20,7 @@ import httpx
 from benchmarks.common.daemon import VIDEO, Process, running
 from benchmarks.common.machine import commit_of
 from benchmarks.common.records import ROOT
-from benchmarks.common.tables import Column, Table, met
+from benchmarks.common.tables import Table, heads, met
 from benchmarks.service.viewers import Seen, Viewer, cut, watch
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
@@ -187,13 +187,9 @@ def tables(*, against: Path | None = None, seconds: float = 8.0) -> Iterator[Tab
     if against is not None:
         daemons = {"before": Daemon(against)} | daemons
         before = [f"*Before* is the daemon of commit {commit_of(against)}."]
-    columns = (
-        "image",
-        "m",
-        "daemon",
-        Column("processor time, ms/frame", ".2f"),
-        Column("replay alone, ms/frame", ".2f"),
-        Column("frames/s", ".0f"),
+    columns = heads(
+        "image | m | daemon | processor time, ms/frame:.2f | replay alone, ms/frame:.2f | "
+        "frames/s:.0f"
     )
     costs = Table("", columns, text=[f"Each figure is one run of {seconds:g} s.", *before])
     with tempfile.TemporaryDirectory() as name:
@@ -211,7 +207,7 @@ def tables(*, against: Path | None = None, seconds: float = 8.0) -> Iterator[Tab
     yield costs
     yield Table(
         "",
-        ("daemon", Column("p50, ms", ".1f"), Column("p99, ms", ".1f")),
+        heads("daemon | p50, ms:.1f | p99, ms:.1f"),
         [(when, *latency(each, duration_s=3 * seconds)) for when, each in daemons.items()],
         text=[
             "Latency, from the arrival of a frame's last image to a client that reads range and "

@@ -12,8 +12,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.common.tables import Table
-from benchmarks.simulation.reference import COARSE, FINE_MOVING, FINE_STILL, reference_moments
+from benchmarks.common.tables import Table, heads
+from benchmarks.simulation.reference import FINE_MOVING, FINE_STILL, reference_moments
 from benchmarks.simulation.scenes import BUILT_IN, scene_named, unseen
 from transientcam_driver import Sequence
 from transientcam_driver.sequence import ImageLabel
@@ -184,27 +184,11 @@ def _reference(
 
 def tables(*, small: bool = False) -> Iterator[Table]:
     """Compare all scenes with each sequence; ``small``: only with that of video."""
-    columns = (
-        "scene",
-        "sequence",
-        "called for",
-        "automatic - everything",
-        "automatic - nothing",
-        "automatic - rays",
-        "rays - more rays",
+    columns = heads(
+        "scene | sequence | called for | automatic - everything | automatic - nothing | "
+        "automatic - rays | rays - more rays"
     )
-    text = (
-        "Automatic against everything that the scene has anything for, against none of it, and "
-        f"rays into the pixels of every image, {COARSE} in each, and in those at an edge "
-        f"{FINE_STILL}, or {FINE_MOVING} where something moves: differences of the moments of "
-        f"{SIZE[0]} x {SIZE[1]} pixels in units of the noise, as root mean square, largest, and "
-        "share of the lit pixels beyond half the noise. Where something moves, rays are followed "
-        f"into {DRAWN} pixels. Of many takes the first, the middle and the last are compared, with "
-        "the noise of all. The last column is what the rays themselves leave out: their difference "
-        f"from {_FINER_IN} times as many at edges. The more takes, the smaller the noise that "
-        "edges have to be resolved to."
-    )
-    table = Table("What is left out", columns, text=[text])
+    table = Table("", columns)
     for name in (*BUILT_IN, *unseen()):
         for sequence in list(SEQUENCES)[: 1 if small else None]:
             each = measure(name, sequence)

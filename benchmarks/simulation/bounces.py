@@ -128,13 +128,7 @@ def tables() -> Iterator[Table]:
     """Compare corners, anywhere and beside the crease."""
     frequencies = (f"{f_hz / 1e6:g} MHz" for f_hz in FREQUENCIES_HZ)
     known = ("scene", "pixels", "bounces", *frequencies)
-    text = (
-        f"Radiosity against {PATHS} paths in each of {PIXELS} pixels, at the number of bounces "
-        "that the noise of one take at 0.5 ms calls for: root mean square and largest difference "
-        "in units of that noise. The paths' own error at 0 MHz is in the last column. Beside a "
-        "crease the spread of a patch's own times of flight, which radiosity leaves out, shows."
-    )
-    table = Table("Light over several surfaces", [*known, Column("paths", ".2f")], text=[text])
+    table = Table("", [*known, Column("paths", ".2f")])
     for each in (measure(*corner) for corner in CORNERS):
         apart = zip(each.rms, each.largest, strict=True)
         cells = (f"{rms:.2f}, {most:.2f}" for rms, most in apart)

@@ -19,7 +19,6 @@ from transientcam_driver.simulation.scene.scene import Scene
 from transientcam_driver.simulation.world import World
 
 VIDEO = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005)
-VIDEO_HZ = 18.6
 READOUT_S = 3.98e-3
 BARRED = ("wall", "corner", "mirrors", "visitor")
 SCENES = (*BARRED, "ball", "corner-left", "translucent", "calibration")
@@ -133,16 +132,7 @@ def tables(*, small: bool = False) -> Iterator[Table]:
         for size in SIZES[: 1 if small else None]
         for each in measure_scenes(SCENES if size == SIZES[0] else BARRED, size)
     ]
-    text = (
-        "Frames of the paper's video setting (m = 3, 0.5 ms, 12 images); processor time, one core. "
-        f"At {VIDEO_HZ} Hz a frame may take {1e3 / VIDEO_HZ:.0f} ms. In a scene that stands still "
-        "light is computed once, so that leaving effects out saves nothing but their share of the "
-        "opening; what is called for saves time where something moves. Light of what moves is "
-        "computed by compiled lanes, as it is from some seconds after a scene is first opened. "
-        "They draw the noise of still scenes, too, once these have computed 100 million pixels "
-        "without: 27 frames of 640 x 480, of which each takes up to twice as long."
-    )
-    yield Table("What a frame costs", columns, rows, text=[text])
+    yield Table("", columns, rows)
     effects = {name: dict(measure_effects(name, SIZES[0])) for name in ("mirrors", "visitor")}
     yield Table(
         "",

@@ -64,4 +64,4 @@ def tables() -> Iterator[Table]:
         ("correlation of successive images", f"{onwards:.4f}", "the same"),
     ]
     text = f"Of {IMAGES} images of {len(LEVELS_E)} even levels of light, {bright.size} values each."
-    yield Table("Noise", ("what", "measured", "expected"), rows, text=[text])
+    yield Table("", ("what", "measured", "expected"), rows, text=[text])

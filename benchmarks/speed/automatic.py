@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 
 from benchmarks.common.data import CORES, PAPER
-from benchmarks.common.tables import Table, verdict
+from benchmarks.common.tables import Table, heads, verdict
 from benchmarks.common.timing import duration
 from benchmarks.speed.ceiling import measured
 
@@ -67,17 +67,9 @@ def tables() -> Iterator[Table]:
     """Run fresh processes in turn, with lanes from a warm cache and with NumPy alone."""
     table = Table(
         f"Fresh processes that ask for nothing, 163 x 120, float32, {CORES} cores",
-        (
-            "call",
-            "NumPy: first",
-            "second",
-            "later",
-            "lanes: first",
-            "ready after",
-            "second",
-            "later",
-            "gain: second",
-            "later",
+        heads(
+            "call | NumPy: first | second | later | lanes: first | ready after | second | "
+            "later | gain: second | later"
         ),
         notes=[
             f"density: {_FRAMES} times. NumPy: with BLAS, all cores, `TRANSIENTCAM_KERNELS=off`. "

@@ -33,16 +33,6 @@ def tables() -> Iterator[Table]:
     table = Table(
         "Density, 163 x 120, float32, modulus: frames a second",
         ("m, phases, cores, frames", "lane", "NumPy", "gain", "roofline", "share", "paper"),
-        notes=[
-            "NumPy: two matrix products (BLAS, all cores) and a reciprocal. Paper: a GTX 780.",
-            "Any phases need 4 m + 2 fused multiply-adds a value; equidistant ones, in pairs about "
-            "their middle, 2 m + 4. The roofline is the smaller of that rate (division and floor "
-            "of the denominator not counted) and of 4 bytes written.",
-            f"cached: each core evaluates {_CACHED} frames of its own again and again (3.8 MB, as "
-            "much as the ceiling writes), as workers do for several clients. "
-            f"streamed: {_STREAMED} frames (80 MB), which no cache holds, in one call over all "
-            "cores.",
-        ],
     )
     for m in ORDERS:
         rows, notes = _rows(m, ceilings)

@@ -1,7 +1,5 @@
 """The whole reconstruction from raw images, against batched LAPACK, SciPy and JAX."""
 
-import contextlib
-import importlib
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -83,8 +81,7 @@ def _coefficients() -> Table:
         f"Moments to coefficients and returns, 163 x 120, m = {_M}, float32",
         ("", "coefficients", "returns"),
         notes=[
-            f"SciPy and spectrum solve one matrix a call: extrapolated from {_SAMPLE} pixels.",
-            "spectrum (PyPI) takes part where it is installed.",
+            f"SciPy solves one matrix a call: extrapolated from {_SAMPLE} pixels.",
         ],
     )
     b = moments(_M, PAPER).reshape(_M + 1, -1)
@@ -103,8 +100,6 @@ def _coefficients() -> Table:
         )
     )
     table.rows.append(("scipy.linalg.solve_toeplitz", _scipy(b), ""))
-    with contextlib.suppress(ModuleNotFoundError):
-        table.rows.append(("spectrum.LEVINSON", _spectrum(b), ""))
     return table
 
 
@@ -116,11 +111,6 @@ def _scipy(b: Array) -> str:
     unit = np.zeros(len(b), b.dtype)
     unit[0] = 1
     return _one_by_one(b, lambda column: solve_toeplitz((column, column.conj()), unit))
-
-
-def _spectrum(b: Array) -> str:
-    levinson = importlib.import_module("spectrum").LEVINSON
-    return _one_by_one(b, lambda column: levinson(column, len(b) - 1))
 
 
 def _one_by_one(b: Array, solve: Callable[[Array], object]) -> str:
