@@ -9,7 +9,7 @@ from typing import Final
 import httpx
 
 from benchmarks.abuse.measuring import GIVE_UP_S, RANGE, attacked, prepare, served
-from benchmarks.common.tables import Column, Table
+from benchmarks.common.tables import Table, heads
 from benchmarks.service.soak import Samples
 from benchmarks.service.viewers import Viewer, cut, watch
 
@@ -59,8 +59,8 @@ def tables(*, minutes: float = 10.0) -> Iterator[Table]:
     """Mix all attacks for so many minutes."""
     result = soak(minutes)
     minute = max(1, round(60.0 / SAMPLE_S))
-    names = ("before", "first minute", "last minute", "most", "after")
-    table = Table("", ("", *(Column(name, ".0f") for name in names)))
+    columns = heads(" | before:.0f | first minute:.0f | last minute:.0f | most:.0f | after:.0f")
+    table = Table("", columns)
     table.text.append(
         f"Frames of a viewer, of those due: {result.frames} of {result.expected:.0f}."
     )

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
-from benchmarks.common.tables import Column, Table, heads
+from benchmarks.common.tables import Table, heads
 from benchmarks.likelihood.errors import COLUMNS, Array, ranges, turn_m
 
 BASE_HZ: Final = 23e6
@@ -18,6 +18,7 @@ SPLIT_PIXELS: Final = 100_000
 APART: Final = 4.4
 """Over m: distance of neighbouring returns in radians; closer ones cannot be resolved."""
 SEED: Final = 1
+_NUMBERS: Final = [f"{each}:.2f" for each in ("bound", *COLUMNS, "likelihood over bound")]
 
 
 def tables() -> Iterator[Table]:
@@ -41,10 +42,7 @@ def _bound() -> Table:
     random = np.random.default_rng(SEED)
     table = Table(
         "Sharp returns: RMSE of the first one's range, and the Cramer-Rao bound, mm",
-        (
-            "returns, m",
-            *(Column(each, ".2f") for each in ("bound", *COLUMNS, "likelihood over bound")),
-        ),
+        heads(" | ".join(["returns, m", *_NUMBERS])),
         notes=[
             f"{PIXELS} random responses each: returns at least {APART:g}/m radians apart, of 0.4 "
             "to 1.0 before they are made 1 in all; f = 23 MHz; every part of a moment has a "

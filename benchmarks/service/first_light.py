@@ -127,12 +127,9 @@ def tables(*, stream_s: float = 60.0, starts: int = 3) -> Iterator[Table]:
 
 
 def _row(name: str, starts: list[Start]) -> list[str]:
-    def spread(values: list[float]) -> str:
-        return f"{statistics.median(values):.2f} s ({min(values):.2f} to {max(values):.2f})"
-
-    columns = (
-        [start.address_s for start in starts],
-        [start.range_map_s for start in starts],
-        [start.on_screen_s for start in starts],
-    )
-    return [name, *map(spread, columns)]
+    cells = [name]
+    for step in ("address_s", "range_map_s", "on_screen_s"):
+        values = [getattr(start, step) for start in starts]
+        median = statistics.median(values)
+        cells.append(f"{median:.2f} s ({min(values):.2f} to {max(values):.2f})")
+    return cells

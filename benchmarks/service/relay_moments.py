@@ -16,7 +16,7 @@ from websockets.typing import Subprotocol
 
 import transientcam
 from benchmarks.common.daemon import Process, daemon
-from benchmarks.common.tables import Cell, Column, Table
+from benchmarks.common.tables import Cell, Table, heads
 from transientcam import wire
 from transientcam_server.relay.frames import MOMENTS, RAW, SUBSCRIBED
 
@@ -117,13 +117,9 @@ def tables() -> Iterator[Table]:
     """Relay a scene with several numbers of takes."""
     with daemon("--camera", SCENE) as origin:
         rows = [_row(relayed(origin, takes)) for takes in TAKES]
-    columns = (
-        "takes",
-        "images",
-        *(Column(f"`{each}`, bytes a frame", ",.0f") for each in (RAW, MOMENTS)),
-        Column("share", ".0%"),
-        *(Column(f"`{each}`, MB/s", ".2f") for each in (RAW, MOMENTS)),
-        "range at the relay",
+    columns = heads(
+        f"takes | images | `{RAW}`, bytes a frame:,.0f | `{MOMENTS}`, bytes a frame:,.0f | "
+        f"share:.0% | `{RAW}`, MB/s:.2f | `{MOMENTS}`, MB/s:.2f | range at the relay"
     )
     text = (
         f"What travels to a relay of `{SCENE}`, m = {HARMONICS}, with a zeroth moment of "

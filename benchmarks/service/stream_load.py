@@ -23,7 +23,7 @@ from websockets.exceptions import ConnectionClosed
 
 import transientcam
 from benchmarks.common.daemon import VIDEO, Process, daemon, running
-from benchmarks.common.tables import Cell, Column, Table, heads, met, percentiles
+from benchmarks.common.tables import Cell, Table, heads, met, percentiles
 from benchmarks.service.viewers import Viewer, cut, stuck, watch
 from transientcam import wire
 from transientcam_driver import open_camera
@@ -338,14 +338,11 @@ def _floods(floods: dict[int, tuple[Flood, Flood]]) -> Table:
         share = statistics.median(stream.bytes_s) / statistics.median(bare.bytes_s)
         shares.append(share)
         rows.append((viewers, *_flood(stream), *_flood(bare), share))
-    numbers = "MB/s", "processor time a message, µs"
+    numbers = ("MB/s:.0f", "processor time a message, µs:.0f")
+    both = " | ".join(f"{of}: {what}" for of in ("the stream", "bare") for what in numbers)
     return Table(
         "Beside a bare server",
-        (
-            "viewers",
-            *(Column(f"{of}: {what}", ".0f") for of in ("the stream", "bare") for what in numbers),
-            Column("share", ".0%"),
-        ),
+        heads(f"viewers | {both} | share:.0%"),
         rows,
         [
             f"- The stream carries at least {min(shares):.0%} of what the bare server does; bar: "

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from benchmarks.common.tables import Cell, Column, Table
+from benchmarks.common.tables import Cell, Column, Table, heads
 from benchmarks.simulation.scenes import scene_named
 from transientcam_driver import Sequence
 from transientcam_driver.simulation.build import world_of
@@ -118,14 +118,10 @@ def tables(*, small: bool = False) -> Iterator[Table]:
     Run it with OMP_NUM_THREADS=1: times are those of one core.
     """
     LANES.compile_now()  # rather than beside what is measured
-    columns = (
-        "scene",
-        "pixels",
-        *(Column(f"{each}, ms", ".1f") for each in ("none", "called for", "everything")),
-        Column("everything / called for", ".1f"),
-        Column("frames/s, called for", ".0f"),
-        Column("opening, called for, s", ".2f"),
-        "what is called for",
+    columns = heads(
+        "scene | pixels | none, ms:.1f | called for, ms:.1f | everything, ms:.1f | "
+        "everything / called for:.1f | frames/s, called for:.0f | opening, called for, s:.2f | "
+        "what is called for"
     )
     rows = [
         _row(each)
