@@ -5,11 +5,12 @@ PYTHON ?= python3
 HOST ?= 127.0.0.1
 PORT ?= 8000
 CAMERA ?= sim:mirrors
+PAGE ?= all
 
 BIN := .venv/bin
 # Distributions of their own, which extras name.
 PACKAGES := $(foreach each,$(wildcard packages/*),--editable ./$(each))
-PAGE := server/transientcam_server/static/index.html
+BUILT_PAGE := server/transientcam_server/static/index.html
 DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 2>/dev/null)
 DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace
 
@@ -40,37 +41,9 @@ bench: .venv/test.stamp  ## Measure speed, everything in one run on the same dat
 paper: .venv/test.stamp  ## Make the paper's figures, beside what the paper says of them (docs/paper.md)
 	$(BIN)/transientcam paper -o docs
 
-docs: .venv/test.stamp dashboard  ## Write the generated pages of docs/ anew (more than an hour on a quiet machine)
-	$(BIN)/python -m benchmarks.documents --write
-	$(BIN)/python -m benchmarks.reference --write
-	$(BIN)/python -m benchmarks.examples --write
-	$(BIN)/python -m benchmarks --write
-	$(BIN)/python -m benchmarks.stability
-	$(BIN)/python -m benchmarks.accuracy --write
-	$(BIN)/python -m benchmarks.estimators --write
-	$(BIN)/python -m benchmarks.likelihood --write
-	$(BIN)/python -m benchmarks.simulation --write
-	$(BIN)/python -m benchmarks.recording --write
-	$(BIN)/python -m benchmarks.by_hand --write
-	$(BIN)/python -m benchmarks.cluster --write
-	$(BIN)/python -m benchmarks.cameras --write
-	$(BIN)/python -m benchmarks.first_light --write
-	$(BIN)/python -m benchmarks.first_program --write
-	$(BIN)/python -m benchmarks.stream_load --write
-	$(BIN)/python -m benchmarks.relay --write
-	$(BIN)/python -m benchmarks.relay_moments --write
-	$(BIN)/python -m benchmarks.robustness --write
-	$(BIN)/python -m benchmarks.fuzz_recordings --write
-	$(BIN)/python -m benchmarks.power_cuts --write
-	$(BIN)/python -m benchmarks.soak --write
-	$(BIN)/python -m benchmarks.abuse --write
-	$(BIN)/python -m benchmarks.abuse --minutes 10 --write
-	$(BIN)/python -m benchmarks.throughput --write
-	$(BIN)/python -m benchmarks.dashboard --hours 0.1 --write
-	$(BIN)/python -m benchmarks.pictures
-	$(BIN)/python -m benchmarks.notebooks
-	$(BIN)/python -m benchmarks.mathematics
-	$(BIN)/transientcam paper -o docs
+docs: .venv/test.stamp dashboard  ## Measure anew, and write a page of docs/ (PAGE=plans) or all (hours)
+	$(BIN)/python -m benchmarks $(PAGE) --write
+	@if [ '$(PAGE)' = all ]; then $(BIN)/transientcam paper -o docs; fi
 
 docs-site: .venv/test.stamp  ## Write the documentation as a site: open build/site/index.html
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs build/site
@@ -84,7 +57,7 @@ dist: .venv/test.stamp dashboard  ## Build the sdist and, from it, the wheel (di
 	for each in packages/*; do $(BIN)/python -m build --no-isolation --wheel --outdir dist $$each; done
 
 clean:  ## Remove everything that was built or installed here
-	rm -rf .venv build dist client/dashboard/node_modules $(dir $(PAGE))
+	rm -rf .venv build dist client/dashboard/node_modules $(dir $(BUILT_PAGE))
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # -- what the targets above stand on -----------------------------------------------------------
@@ -151,11 +124,11 @@ check-dashboard:
 
 # The daemon runs without its page where there is no Node; a test run does not.
 dashboard:
-	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory $(PAGE); \
-	elif [ -e $(PAGE) ]; then echo 'npm was not found: serving the dashboard as it was last built.'; \
+	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory $(BUILT_PAGE); \
+	elif [ -e $(BUILT_PAGE) ]; then echo 'npm was not found: serving the dashboard as it was last built.'; \
 	else echo 'npm was not found: the daemon runs without its dashboard. Install Node.js 20 or newer to get it.'; fi
 
-$(PAGE): $(DASHBOARD) client/dashboard/node_modules/.package-lock.json
+$(BUILT_PAGE): $(DASHBOARD) client/dashboard/node_modules/.package-lock.json
 	npm --prefix client/dashboard run build
 	@touch $@
 
