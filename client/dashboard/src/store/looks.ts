@@ -52,12 +52,11 @@ export class Look {
 /** The looks of all maps, and which of them share their limits. */
 export class Looks {
   /** Maps of one unit keep the same limits, so that they can be compared. */
-  readonly locked: Signal<boolean>;
+  readonly locked = signal(false);
   readonly #all: ReadonlyMap<string, Look>;
 
   constructor(frames: Frames, noises: Noises, settings: Settings) {
     this.#all = new Map(MAP_PRODUCTS.map((shown) => [shown.product, new Look(shown, mapFrame(frames, noises, shown), settings)]));
-    this.locked = signal(false);
   }
 
   of(product: string): Look {

@@ -109,9 +109,8 @@ export class Settings {
 
   /** The part of an address behind #: of a copied link, or of the page's own address; "" for nothing in particular. */
   hash(whole: boolean): string {
-    const said = this.#parts.filter(({ followed }) => whole || followed).map((part) => part.write());
-    const texts = said.filter((text) => text !== "");
-    return texts.length === 0 ? "" : `#${texts.join("&")}`;
+    const said = this.#parts.filter(({ followed }) => whole || followed).flatMap((part) => part.write() || []);
+    return said.length === 0 ? "" : `#${said.join("&")}`;
   }
 
   /** Takes over what an address says; parts that make no sense are as if they were not there. */
@@ -147,19 +146,10 @@ export function aBoolean(yes = "on", no = "off"): Kind<boolean> {
   };
 }
 
-/** The browser's own shelf, or null where it is refused. */
-export function browserShelf(): Shelf | null {
+/** The browser's own shelf, or that of this tab, which is emptied when it is closed; null where it is refused. */
+export function browserShelf(kind: "localStorage" | "sessionStorage"): Shelf | null {
   try {
-    return window.localStorage;
-  } catch {
-    return null;
-  }
-}
-
-/** The shelf of this tab, which is emptied when it is closed; null where it is refused. */
-export function sessionShelf(): Shelf | null {
-  try {
-    return window.sessionStorage;
+    return window[kind];
   } catch {
     return null;
   }

@@ -26,7 +26,7 @@ import { Reconstruction } from "./reconstruction";
 import { Recordings } from "./recordings";
 import { Replay } from "./replay";
 import { Sequencing } from "./sequencing";
-import { aBoolean, browserShelf, oneOf, Settings, type Shelf, sessionShelf } from "./settings";
+import { aBoolean, browserShelf, oneOf, Settings, type Shelf } from "./settings";
 import { Simulation } from "./simulation";
 import { Status } from "./status";
 import { Theme } from "./theme";
@@ -118,7 +118,7 @@ export class Store {
   /** The one view that is shown alone; null while all are. */
   readonly alone: Signal<string | null>;
 
-  constructor({ api = new Api(undefined, new Credentials(sessionShelf())), shelf = browserShelf() }: { api?: Api; shelf?: Shelf | null } = {}) {
+  constructor({ api = new Api(undefined, new Credentials(browserShelf("sessionStorage"))), shelf = browserShelf("localStorage") }: { api?: Api; shelf?: Shelf | null } = {}) {
     this.api = api;
     const settings = new Settings(shelf);
     this.settings = settings;

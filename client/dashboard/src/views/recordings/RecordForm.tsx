@@ -62,7 +62,7 @@ export function RecordForm({ task }: { task: Task }) {
         />
       </label>
       <fieldset class="record-limits">
-        <legend>Ends after</legend>
+        <legend class="unseen">Ends after</legend>
         {number("Duration", "s", duration_s, "duration_s")}
         {number("Size", "MB", size_mb, "size_mb")}
         {number("Frames", "", frames, "frames")}
