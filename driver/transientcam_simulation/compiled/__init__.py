@@ -1,70 +1,8 @@
-"""Compiling of what the simulated light computes pixel by pixel."""
+"""Compiling of what the simulated light computes pixel by pixel.
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+numba is imported when a name of `_compiling` is asked for: scenes that stand still need none.
+"""
 
-from transientcam_simulation.compiled._compiling import FLAG
-from transientcam_simulation.compiled._lanes import CHUNK, LANES
+import lazy_loader
 
-if TYPE_CHECKING:
-    from transientcam_simulation.compiled._compiling import (
-        AROUND,
-        CODES,
-        DOUBLES,
-        FLAGS,
-        INDICES,
-        LINE,
-        MARKS,
-        NUMBERS,
-        PIXELS,
-        PLACES,
-        PLANE,
-        PLANES,
-        REGION,
-        ROWS,
-        STACK,
-        TILES,
-        WHOLE,
-        float32,
-        float64,
-        inner,
-        int32,
-        int64,
-        lane,
-    )
-
-__all__ = [
-    "AROUND",
-    "CHUNK",
-    "CODES",
-    "DOUBLES",
-    "FLAG",
-    "FLAGS",
-    "INDICES",
-    "LANES",
-    "LINE",
-    "MARKS",
-    "NUMBERS",
-    "PIXELS",
-    "PLACES",
-    "PLANE",
-    "PLANES",
-    "REGION",
-    "ROWS",
-    "STACK",
-    "TILES",
-    "WHOLE",
-    "float32",
-    "float64",
-    "inner",
-    "int32",
-    "int64",
-    "lane",
-]
-
-
-def __getattr__(name: str) -> Any:
-    """Return what only compiled modules need, which imports numba."""
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}._compiling"), name)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
