@@ -26,7 +26,7 @@ SCENES: Final = ("corner", "hall")
 STEP: Final = 12
 """Every so many rows and columns are stored."""
 EVERY: Final = np.s_[STEP // 2 :: STEP, STEP // 2 :: STEP]
-STORED: Final = ROOT / "tests" / "driver" / "kinect2" / "libfreenect2.npz"
+STORED: Final = ROOT / "tests" / "driver" / "cameras" / "kinect2" / "libfreenect2.npz"
 
 
 def spec(scene: str) -> str:
