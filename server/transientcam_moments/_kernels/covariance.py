@@ -8,6 +8,7 @@ from numba import njit
 
 from transientcam_moments._kernels import simd
 from transientcam_moments._kernels.compiled_entry import PIXELS, entry, order_type, real_arrays
+from transientcam_moments._kernels.portable import bank, root, square_bank
 from transientcam_moments._lanes.parallel import Spread, at_once
 
 
@@ -24,16 +25,16 @@ def covariance(
     m, nodes = len(order), len(both) + 1
     one = simd.ones(out, 1)
     step = simd.width(one)
-    x, y = simd.registers(one, order, 0), simd.registers(one, order, 0)
-    scale, slope = simd.registers(one, order, 0), simd.registers(one, order, 0)
-    zero, before = simd.registers(one, order, 0), simd.registers(one, order, 0)
-    std = simd.registers(one, order, 0)
-    values, spectrum = simd.matrix(one, both, 1), simd.matrix(one, both, 1)
+    x, y = bank(one, order, 0), bank(one, order, 0)
+    scale, slope = bank(one, order, 0), bank(one, order, 0)
+    zero, before = bank(one, order, 0), bank(one, order, 0)
+    std = bank(one, order, 0)
+    values, spectrum = square_bank(one, both, 1), square_bank(one, both, 1)
     for left in range(start, stop, step):
         p = min(left, stop - step)
         for k in range(m):
             x[k], y[k] = simd.load(one, turned[k], p), simd.load(one, turned[m + k], p)
-            std[k] = simd.sqrt(simd.load(one, variance[k], p))
+            std[k] = root(simd.load(one, variance[k], p))
         for k in range(m):
             others, total = one, one * 0.0
             for other in range(m):

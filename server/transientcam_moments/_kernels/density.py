@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from transientcam_moments._kernels import simd, toeplitz
+from transientcam_moments._kernels import simd
 from transientcam_moments._kernels.compiled_entry import (
     FLAG,
     PIXELS,
@@ -18,9 +18,11 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.phase_groups import ANY, MIRRORED, TURN, grouping
+from transientcam_moments._kernels.portable import bank, eps, larger
 from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments._lanes.pool import empty
 from transientcam_moments._lanes.registry import LEAST_PIXELS
+from transientcam_moments.moment_problem import toeplitz
 
 _BANK = 240  # pairs of registers of coefficients, which stay in the first cache for all phases
 _PAST_CACHES_BYTES = 1 << 24
@@ -47,8 +49,8 @@ def _any_two(order: Any, q: Any, pitch: int, p: int, c0: Any, s0: Any, c1: Any, 
         x1, y1 = x1 + re * c1[j] + im * s1[j], y1 + re * s1[j] - im * c1[j]
     scale, least = simd.load_within(q, p), simd.load_within(q, pitch + p)
     return (
-        scale / simd.maximum(x0 * x0 + y0 * y0, least),
-        scale / simd.maximum(x1 * x1 + y1 * y1, least),
+        scale / larger(x0 * x0 + y0 * y0, least),
+        scale / larger(x1 * x1 + y1 * y1, least),
     )
 
 
@@ -77,8 +79,8 @@ def _mirrored_two(order: Any, q: Any, pitch: int, p: int, c: Any, s: Any) -> Any
     uc, vs, us, vc = _sums(order, one, zero, q, pitch, p, c, s, 0, 1)
     x0, y0, x1, y1 = uc - vs, vc + us, uc + vs, vc - us
     return (
-        scale / simd.maximum(x0 * x0 + y0 * y0, least),
-        scale / simd.maximum(x1 * x1 + y1 * y1, least),
+        scale / larger(x0 * x0 + y0 * y0, least),
+        scale / larger(x1 * x1 + y1 * y1, least),
     )
 
 
@@ -97,10 +99,10 @@ def _four_of_a_turn(order: Any, q: Any, pitch: int, p: int, c: Any, s: Any) -> A
     x2, y2, x3, y3 = x0 - dx0, y0 - dy0, x1 - dx1, y1 - dy1
     x0, y0, x1, y1 = x0 + dx0, y0 + dy0, x1 + dx1, y1 + dy1
     return (
-        scale / simd.maximum(x0 * x0 + y0 * y0, least),
-        scale / simd.maximum(x1 * x1 + y1 * y1, least),
-        scale / simd.maximum(x2 * x2 + y2 * y2, least),
-        scale / simd.maximum(x3 * x3 + y3 * y3, least),
+        scale / larger(x0 * x0 + y0 * y0, least),
+        scale / larger(x1 * x1 + y1 * y1, least),
+        scale / larger(x2 * x2 + y2 * y2, least),
+        scale / larger(x3 * x3 + y3 * y3, least),
     )
 
 
@@ -145,7 +147,7 @@ def _fill(
         p = min(i, held - step)
         at = p + shift
         simd.store_within(q, at, simd.load(one, error, left + p) * (0.5 / np.pi))
-        least = simd.eps(one)
+        least = eps(one)
         for j in range(m):
             re, im = simd.load_complex(one, polynomial[j + 1], left + p)
             if turned:  # conj(a_j) exp(i j centre)
@@ -191,11 +193,11 @@ def _density(
     # rows that begin at a line of memory reach into the next block or part, which begins at its own
     block = pitch - 2 * step if past_caches else pitch
     pixels = error.shape[0]
-    q = simd.registers(one, (), _LANES)
-    stage = simd.registers(one, (), _LANES)
+    q = bank(one, (), _LANES)
+    stage = bank(one, (), _LANES)
     staged = past_caches and _IN_PARTS
-    c0, s0 = simd.registers(one, order, 0), simd.registers(one, order, 0)
-    c1, s1 = simd.registers(one, order, 0), simd.registers(one, order, 0)
+    c0, s0 = bank(one, order, 0), bank(one, order, 0)
+    c1, s1 = bank(one, order, 0), bank(one, order, 0)
     left = start
     while left < stop:
         left = min(left, stop - step)

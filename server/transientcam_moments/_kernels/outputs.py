@@ -6,6 +6,14 @@ import numpy as np
 from numba import njit
 
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.portable import (
+    eps,
+    larger,
+    magnitude,
+    not_a_number,
+    select,
+    some,
+)
 from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 _INTERLEAVE = 2
@@ -43,24 +51,24 @@ def flag_and_bias(
         if estimated:
             b0, rest = smallest / (epsilon - 1.0), one * 0.0
             smallest = epsilon * b0
-        largest, poison = simd.absolute(b0), b0 * 0.0 + rest * 0.0
+        largest, poison = magnitude(b0), b0 * 0.0 + rest * 0.0
         for j in range(1, m + 1):
             x, y = simd.load_complex(one, b[j], p)
-            largest = simd.maximum(largest, simd.maximum(simd.absolute(x), simd.absolute(y)))
+            largest = larger(largest, larger(magnitude(x), magnitude(y)))
             poison = poison + x * 0.0 + y * 0.0
         # so large a density would overflow
-        limit = simd.overflowing(b0) * (6.0 / (2.0 * m + 1.0))
+        limit = (largest(b0) * eps(b0)) * (6.0 / (2.0 * m + 1.0))
         finite = (poison >= 0.0) & (largest < limit)
         dark = finite & ~(b0 > least)
         # less by rounding doesn't count, see `transientcam_moments.biasing.ROUNDING`
-        biased = smallest < (epsilon - 4.0 * (m + 1.0) * simd.eps(b0)) * b0
-        raised = simd.select(biased, (b0 - smallest) / (1.0 - epsilon), b0)
+        biased = smallest < (epsilon - 4.0 * (m + 1.0) * eps(b0)) * b0
+        raised = select(biased, (b0 - smallest) / (1.0 - epsilon), b0)
         flag = simd.load(one, saturated, p)
-        flag = flag + simd.select(finite, one * 0.0, _NON_FINITE)
-        flag = flag + simd.select(dark, _NO_SIGNAL * one, 0.0)
-        flag = flag + simd.select(biased, _BIASED * one, 0.0)
+        flag = flag + select(finite, one * 0.0, _NON_FINITE)
+        flag = flag + select(dark, _NO_SIGNAL * one, 0.0)
+        flag = flag + select(biased, _BIASED * one, 0.0)
         simd.store(flags, p, flag)
-        simd.store(validity, p, simd.select(b0 > 0.0, smallest / b0, simd.nan(one)))
+        simd.store(validity, p, select(b0 > 0.0, smallest / b0, not_a_number(one)))
         simd.store(brightness, p, raised)
         simd.store(uniform, p, smallest + (raised - b0))
 
@@ -87,20 +95,20 @@ def separate(
         strongest, total = one * 0.0, one * 0.0
         for i in range(len(order)):
             w = simd.load(one, weight[i], p)
-            strongest, total = simd.maximum(w, strongest), total + w
-        first, angle = one * 0.0, simd.nan(one)
+            strongest, total = larger(w, strongest), total + w
+        first, angle = one * 0.0, not_a_number(one)
         for i in range(len(order) - 1, -1, -1):
             w = simd.load(one, weight[i], p)
             enough = (w >= threshold * strongest) & (w > 0.0)
-            first = simd.select(enough, w, first)
-            angle = simd.select(enough, simd.load(one, phase[i], p), angle)
+            first = select(enough, w, first)
+            angle = select(enough, simd.load(one, phase[i], p), angle)
         flag = simd.load(one, flags, p)
         invalid = flag >= _NON_FINITE
-        flag = simd.select(flag >= _SATURATED, flag - _SATURATED, flag)
+        flag = select(flag >= _SATURATED, flag - _SATURATED, flag)
         invalid = invalid | (flag >= _NO_SIGNAL)
         simd.store(direct, p, first)
-        simd.store(indirect, p, simd.maximum(total - first, 0.0))
-        simd.store(range_m, p, simd.select(invalid, simd.nan(one), angle * metres))
+        simd.store(indirect, p, larger(total - first, 0.0))
+        simd.store(range_m, p, select(invalid, not_a_number(one), angle * metres))
 
 
 @njit(nogil=True, error_model="numpy")
@@ -121,7 +129,7 @@ def gather(
     left = begin
     while left + step <= pixels and found + step <= room:
         chosen = simd.load(one, residual, left) > limit
-        if simd.some(chosen):
+        if some(chosen):
             for i in range(simd.pack(packed, 0, chosen, simd.load(one, ramp, 0))):
                 where[found] = left + int(packed[i])
                 found += 1

@@ -13,7 +13,6 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from llvmlite import binding, ir  # type: ignore[import-untyped]  # it has no annotations
 from numba import extending as numba_extending
 from numba import types as numba_types
@@ -29,7 +28,7 @@ types: Any = numba_types
 intrinsic = extending.intrinsic
 
 _INDEX = ir.IntType(32)
-_FUSE = ("contract",)
+FUSE = ("contract",)
 
 
 _FEATURES = binding.get_host_cpu_features()
@@ -140,9 +139,9 @@ def _compare(code: str) -> Callable[..., Any]:
     return lambda builder, x, y: builder.fcmp_ordered(code, x, y)
 
 
-define(operator.add, Lanes, 2, lambda b, x, y: b.fadd(x, y, flags=_FUSE), _same)
-define(operator.sub, Lanes, 2, lambda b, x, y: b.fsub(x, y, flags=_FUSE), _same)
-define(operator.mul, Lanes, 2, lambda b, x, y: b.fmul(x, y, flags=_FUSE), _same)
+define(operator.add, Lanes, 2, lambda b, x, y: b.fadd(x, y, flags=FUSE), _same)
+define(operator.sub, Lanes, 2, lambda b, x, y: b.fsub(x, y, flags=FUSE), _same)
+define(operator.mul, Lanes, 2, lambda b, x, y: b.fmul(x, y, flags=FUSE), _same)
 define(operator.truediv, Lanes, 2, lambda b, x, y: b.fdiv(x, y), _same)
 define(operator.neg, Lanes, 1, lambda b, x: b.fneg(x), _same)
 define(operator.lt, Lanes, 2, _compare("<"), _truth)
@@ -180,29 +179,6 @@ def _getitem(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 def _setitem(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     builder.store(args[2], builder.gep(args[0], [args[1]]))
     return context.get_dummy_value()
-
-
-def _room(size: Callable[[int, int], int]) -> Any:
-    """Return an intrinsic ``(like, order, extra)`` that makes room for ``size(m, extra)`` lanes."""
-
-    @intrinsic
-    def function(typingctx: Any, like: Any, order: Any, extra: Any) -> Any:
-        if not isinstance(extra, types.IntegerLiteral):
-            return None
-        bank = Registers(like, size(len(order), extra.literal_value))
-
-        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            return cgutils.alloca_once(builder, context.get_value_type(like), size=bank.size)
-
-        return bank(like, order, extra), codegen
-
-    return function
-
-
-# Room for lanes of the type of ``like``; ``order`` is a tuple of length m and ``extra`` a literal,
-# so that all sizes are known when compiled.
-registers = _room(lambda m, extra: m + extra)
-matrix = _room(lambda m, extra: (m + extra) * (m + extra))
 
 
 @intrinsic
@@ -453,68 +429,6 @@ def store_complex(typingctx: Any, array: Any, index: Any, re: Any, im: Any) -> A
     return types.void(array, types.intp, re, re), codegen
 
 
-def _llvm(name: str, operands: int) -> Any:
-    """Return LLVM's vector intrinsic ``name``."""
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        vector = args[0].type
-        kind = ir.FunctionType(vector, [vector] * operands)
-        full = f"llvm.{name}.v{vector.count}f{sig.args[0].element.bitwidth}"
-        callee = cgutils.get_or_insert_function(builder.module, kind, full)
-        return builder.call(callee, args)
-
-    if operands == 1:
-        return intrinsic(lambda typingctx, x: (x(x), codegen))
-    return intrinsic(lambda typingctx, x, y, z: (x(x, x, x), codegen))
-
-
-sqrt = _llvm("sqrt", 1)
-absolute = _llvm("fabs", 1)
-fma = _llvm("fma", 3)  # x y + z, rounded once
-
-
-@intrinsic
-def select(typingctx: Any, mask: Any, x: Any, y: Any) -> Any:
-    """Return ``x`` where the mask is true, else ``y``."""
-    lanes = x if isinstance(x, Lanes) else y
-    if not isinstance(lanes, Lanes):
-        return None
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.select(*args)
-
-    return lanes(mask, lanes, lanes), codegen
-
-
-def _smaller(code: str) -> Any:
-    @intrinsic
-    def function(typingctx: Any, x: Any, y: Any) -> Any:
-        lanes = x if isinstance(x, Lanes) else y
-
-        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            return builder.select(builder.fcmp_ordered(code, *args), *args)
-
-        return lanes(lanes, lanes), codegen
-
-    return function
-
-
-# Of a NaN and a number both return their second argument.
-minimum = _smaller("<")
-maximum = _smaller(">")
-
-
-@intrinsic
-def some(typingctx: Any, mask: Any) -> Any:
-    """Return whether the mask is true for at least one pixel."""
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        bits = ir.IntType(mask.count)
-        return builder.icmp_unsigned("!=", builder.bitcast(args[0], bits), bits(0))
-
-    return types.boolean(mask), codegen
-
-
 @intrinsic
 def count(typingctx: Any, mask: Any) -> Any:
     """Return for how many pixels the mask is true."""
@@ -524,52 +438,3 @@ def count(typingctx: Any, mask: Any) -> Any:
         return builder.zext(builder.ctpop(packed), ir.IntType(64))
 
     return types.int64(mask), codegen
-
-
-def _constant(value: Callable[[Any], float]) -> Any:
-    """Return an intrinsic that gives a number depending on the precision of its argument."""
-
-    @intrinsic
-    def function(typingctx: Any, like: Any) -> Any:
-        limits = np.finfo(np.float32 if like.element.bitwidth == 32 else np.float64)
-
-        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            vector = context.get_value_type(like)
-            return ir.Constant(vector, [float(value(limits))] * like.count)
-
-        return like(like), codegen
-
-    return function
-
-
-eps = _constant(lambda limits: limits.eps)
-tiny = _constant(lambda limits: limits.tiny)
-overflowing = _constant(lambda limits: limits.max * limits.eps)
-nan = _constant(lambda limits: np.nan)
-infinity = _constant(lambda limits: np.inf)
-# A step this small leaves an error of rounding where it converges with the third power.
-nearly = _constant(lambda limits: limits.eps**0.5)
-# A step this small that shrinks no more is what close roots are known to.
-close = _constant(lambda limits: float(limits.eps) ** (2 / 3))
-largest = _constant(lambda limits: limits.max)
-# The powers of two between which a number and its reciprocal are far from the ends of the range.
-large = _constant(lambda limits: 2.0 ** (limits.maxexp * 3 // 4))
-small = _constant(lambda limits: 2.0 ** -(limits.maxexp * 3 // 4))
-
-
-@intrinsic
-def arctangent_ratio(typingctx: Any, square: Any) -> Any:
-    """Return arctan(t) / t of ``square`` = t^2, for 0 <= t <= tan(pi / 8), by its power series."""
-    terms = 9 if square.element.bitwidth == 32 else 21  # tan(pi / 8)^(2 terms) below rounding
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        vector = args[0].type
-        total = None
-        for k in reversed(range(terms)):
-            term = ir.Constant(vector, [(-1.0) ** k / (2 * k + 1)] * vector.count)
-            if total is not None:
-                term = builder.fadd(builder.fmul(total, args[0], flags=_FUSE), term, flags=_FUSE)
-            total = term
-        return total
-
-    return square(square), codegen

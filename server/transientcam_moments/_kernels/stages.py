@@ -15,8 +15,8 @@ from transientcam_moments._kernels.fits import (
     write,
 )
 from transientcam_moments._kernels.packing import ROW, pack, put, take, unpack
+from transientcam_moments._kernels.portable import bank, infinity, product_bank, select, some
 from transientcam_moments.likelihood import choice, sharp
-from transientcam_moments.likelihood.arithmetic import product_bank
 from transientcam_moments.likelihood.choice import FITTED, PLANES, PRIOR, SCORE, STEPS, TAIL_STEPS
 
 TAIL_ROUNDS: Final = (3, 3, TAIL_STEPS - 6)
@@ -80,12 +80,12 @@ def fit_first(
     """
     one = simd.ones(variance, 1)
     step = simd.width(one)
-    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    pr, pi = simd.registers(one, order, 0), simd.registers(one, order, 0)
-    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
-    points = simd.registers(one, (), 6)
-    x, y, w = simd.registers(one, (), 1), simd.registers(one, (), 1), simd.registers(one, (), 1)
+    data_r, data_i = bank(one, order, 1), bank(one, order, 1)
+    rr, ri = bank(one, order, 1), bank(one, order, 1)
+    pr, pi = bank(one, order, 0), bank(one, order, 0)
+    weight, found = bank(one, order, 1), bank(one, (), 22)
+    points = bank(one, (), 6)
+    x, y, w = bank(one, (), 1), bank(one, (), 1), bank(one, (), 1)
     count = 0
     for left in range(first, last, step):
         scale, numbers, usable, penalty = fit_one(
@@ -98,9 +98,9 @@ def fit_first(
         simd.store(all_rooms, _SCALE * ROW + at, scale)
         simd.store(all_rooms, _NUMBERS * ROW + at, numbers)
         simd.store(all_rooms, _PENALTY * ROW + at, penalty)
-        simd.store(all_rooms, _USABLE * ROW + at, simd.select(usable, one, 0.0))
+        simd.store(all_rooms, _USABLE * ROW + at, select(usable, one, 0.0))
         more = found[SCORE] > 4.0 * penalty
-        if simd.some(more):
+        if some(more):
             points[0], points[1], points[2] = x[0], y[0], w[0]
             pack(more, points, (0, 0, 0), rooms, _POINTS, count)
             pack(more, found, _FOUND, rooms, 0, count)
@@ -115,12 +115,12 @@ def fit_first(
 def fit_second(order: Any, turns: Any, rooms: Any, count: int, late: Any) -> int:
     """Fit two returns, and first steps of a tail; pack and count the pixels that need more."""
     one = simd.ones(rooms, 1)
-    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    data_r, data_i = bank(one, order, 1), bank(one, order, 1)
+    rr, ri = bank(one, order, 1), bank(one, order, 1)
     pr, pi = product_bank(one, order, (0, 0)), product_bank(one, order, (0, 0))
-    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
-    points, state = simd.registers(one, (), 6), simd.registers(one, (), 8)
-    x, y, w = simd.registers(one, (), 2), simd.registers(one, (), 2), simd.registers(one, (), 2)
+    weight, found = bank(one, order, 1), bank(one, (), 22)
+    points, state = bank(one, (), 6), bank(one, (), 8)
+    x, y, w = bank(one, (), 2), bank(one, (), 2), bank(one, (), 2)
     moving = 0
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
@@ -132,7 +132,7 @@ def fit_second(order: Any, turns: Any, rooms: Any, count: int, late: Any) -> int
         x[0], y[0], w[0] = points[0], points[1], points[2]
         cost = fit(
             order, (0, 0), (0, 0, 0, 0), STEPS[1], turns, data_r, data_i, weight, x, y, w, pr, pi,
-            rr, ri, active, simd.infinity(one),
+            rr, ri, active, infinity(one),
         )  # fmt: skip
         allowed = active & (numbers >= 4.0)
         choice.offer_returns((0, 0), x, y, w, cost, penalty, allowed, found)
@@ -158,7 +158,7 @@ def _pack_moving(
 ) -> Any:  # fmt: skip
     """Pack and count the pixels whose tail has not settled."""
     more = state[DAMPING] < sharp.SETTLED
-    if not simd.some(more):
+    if not some(more):
         return 0
     pack(more, state, _STATE, late, _TAIL, at)
     _pack_data(order, more, data_r, data_i, weight, late, at)
@@ -169,8 +169,8 @@ def _pack_moving(
 def step_late(order: Any, steps: int, rooms: Any, count: int, late: Any) -> int:
     """Take further steps of tails; pack and count the pixels that need more."""
     one = simd.ones(rooms, 1)
-    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    weight, state = simd.registers(one, order, 1), simd.registers(one, (), 8)
+    data_r, data_i = bank(one, order, 1), bank(one, order, 1)
+    weight, state = bank(one, order, 1), bank(one, (), 8)
     moving = 0
     for at in range(0, count, simd.width(one)):
         take(state, _STATE, one, rooms, _TAIL, at)
@@ -187,7 +187,7 @@ def step_late(order: Any, steps: int, rooms: Any, count: int, late: Any) -> int:
 def bring_back(rooms: Any, count: int, late: Any) -> None:
     """Put the states of the tails that went on in `late` back among all."""
     one = simd.ones(rooms, 1)
-    state = simd.registers(one, (), 8)
+    state = bank(one, (), 8)
     done = 0
     for at in range(0, count, simd.width(one)):
         take(state, _STATE, one, rooms, _TAIL, at)
@@ -201,9 +201,9 @@ def bring_back(rooms: Any, count: int, late: Any) -> None:
 def offer_tails(order: Any, rooms: Any, count: int, third: Any) -> int:
     """Choose tails where they are better; pack and count the pixels that leave something then."""
     one = simd.ones(rooms, 1)
-    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
-    points, state = simd.registers(one, (), 6), simd.registers(one, (), 8)
+    data_r, data_i = bank(one, order, 1), bank(one, order, 1)
+    weight, found = bank(one, order, 1), bank(one, (), 22)
+    points, state = bank(one, (), 6), bank(one, (), 8)
     packed = 0
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
@@ -217,7 +217,7 @@ def offer_tails(order: Any, rooms: Any, count: int, third: Any) -> int:
         )  # fmt: skip
         put(found, _FOUND, rooms, 0, at)
         more = _needs_three(found, penalty, numbers)
-        if len(order) >= 3 and simd.some(more):
+        if len(order) >= 3 and some(more):
             take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
             _take_data(order, one, data_r, data_i, weight, rooms, at)
             pack(more, points, (0, 0, 0, 0, 0, 0), third, _POINTS, packed)
@@ -237,12 +237,12 @@ def _needs_three(found: Any, penalty: Any, numbers: Any) -> Any:
 def fit_third(order: Any, turns: Any, rooms: Any, count: int) -> None:
     """Fit three returns, and choose them where they are better."""
     one = simd.ones(rooms, 1)
-    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    data_r, data_i = bank(one, order, 1), bank(one, order, 1)
+    rr, ri = bank(one, order, 1), bank(one, order, 1)
     pr, pi = product_bank(one, order, (0, 0, 0)), product_bank(one, order, (0, 0, 0))
-    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
-    points = simd.registers(one, (), 6)
-    x, y, w = simd.registers(one, (), 3), simd.registers(one, (), 3), simd.registers(one, (), 3)
+    weight, found = bank(one, order, 1), bank(one, (), 22)
+    points = bank(one, (), 6)
+    x, y, w = bank(one, (), 3), bank(one, (), 3), bank(one, (), 3)
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
         take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
@@ -263,7 +263,7 @@ def fit_third(order: Any, turns: Any, rooms: Any, count: int) -> None:
 def take_three(rooms: Any, count: int, third: Any) -> None:
     """Put what was found with three returns back among all that were fitted with two."""
     one = simd.ones(rooms, 1)
-    found = simd.registers(one, (), 22)
+    found = bank(one, (), 22)
     done = 0
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
@@ -286,7 +286,7 @@ def finish(
     """
     one = simd.ones(planes, 1)
     step = simd.width(one)
-    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
+    weight, found = bank(one, order, 1), bank(one, (), 22)
     size = len(order) + 1
     done = 0
     for left in range(first, last, step):
@@ -296,7 +296,7 @@ def finish(
             found[i] = 0.0 * one
         penalty = simd.load(one, all_rooms, _PENALTY * ROW + at)
         more = found[SCORE] > 4.0 * penalty
-        if len(order) >= 2 and simd.some(more):
+        if len(order) >= 2 and some(more):
             unpack(more, found, _FOUND, rooms, 0, done)
             done += simd.count(more)
         for j in range(size):

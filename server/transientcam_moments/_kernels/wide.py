@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from transientcam_moments._kernels import outputs
-from transientcam_moments._kernels.circle import half_turns
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -21,6 +20,7 @@ from transientcam_moments._kernels.padding import RAMP
 from transientcam_moments._kernels.refine import Found, redo
 from transientcam_moments._kernels.returns import MOST_STEPS, returns_entry
 from transientcam_moments._lanes.registry import LEAST_PIXELS
+from transientcam_moments.moment_problem.circle import half_turns
 
 _EPS = float(np.finfo(np.float32).eps)
 

@@ -8,9 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_moments._arrays import Array
-from transientcam_moments.likelihood import sharp, tail
-from transientcam_moments.likelihood.arithmetic import (
+from transientcam_moments._arithmetic import (
     Bank,
     Length,
     bank,
@@ -20,6 +18,8 @@ from transientcam_moments.likelihood.arithmetic import (
     select,
     smaller,
 )
+from transientcam_moments._arrays import Array
+from transientcam_moments.likelihood import sharp, tail
 
 MOST_RETURNS: Final = 3
 X, Y, WEIGHT = 0, 3, 6

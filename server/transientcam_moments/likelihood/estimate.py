@@ -5,6 +5,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from transientcam_moments._arithmetic import logarithm
 from transientcam_moments._arrays import (
     MAX_HARMONICS,
     Array,
@@ -20,7 +21,6 @@ from transientcam_moments._lanes.parallel import Spread, on_threads
 from transientcam_moments._shown import summary
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.likelihood import choice
-from transientcam_moments.likelihood.arithmetic import logarithm
 from transientcam_moments.likelihood.chi_square import SIGNIFICANCE, ambiguous, explained, reduced
 from transientcam_moments.likelihood.choice import MARGIN, MOST_RETURNS, TAIL_SHAPE
 from transientcam_moments.likelihood.planar import Data, fit

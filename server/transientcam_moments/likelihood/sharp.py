@@ -13,8 +13,7 @@ moments. Sums are written so that each product fuses with the sum so far.
 
 from typing import Any
 
-from transientcam_moments._arrays import Array
-from transientcam_moments.likelihood.arithmetic import (
+from transientcam_moments._arithmetic import (
     Bank,
     Length,
     bank,
@@ -26,6 +25,7 @@ from transientcam_moments.likelihood.arithmetic import (
     smaller,
     square_bank,
 )
+from transientcam_moments._arrays import Array
 from transientcam_moments.likelihood.linear import decompose, solve, variances
 
 FIRST_DAMPING = 1e-2

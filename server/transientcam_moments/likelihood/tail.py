@@ -10,8 +10,7 @@ exp(-i j phi), in ``ur`` and ``ui``, which changes no weighted sum of squares; t
 tail are then in ``qr`` and ``qi``, and 1 / (1 + (j d)^2) in ``lag``.
 """
 
-from transientcam_moments._arrays import Array
-from transientcam_moments.likelihood.arithmetic import (
+from transientcam_moments._arithmetic import (
     Bank,
     Length,
     bank,
@@ -21,6 +20,7 @@ from transientcam_moments.likelihood.arithmetic import (
     smaller,
     square_bank,
 )
+from transientcam_moments._arrays import Array
 from transientcam_moments.likelihood.linear import decompose, solve, variances
 from transientcam_moments.likelihood.sharp import REACH, chi_square, judge
 
