@@ -49,6 +49,7 @@ class Plane(Protocol):
     def __le__(self, other: "Plane | float", /) -> Mask: ...
     def __gt__(self, other: "Plane | float", /) -> Mask: ...
     def __ge__(self, other: "Plane | float", /) -> Mask: ...
+    def __eq__(self, other: object, /) -> Mask: ...  # type: ignore[override]  # as in NumPy
 
 
 class Bank(Protocol):
@@ -67,8 +68,8 @@ class _Space(Protocol):
     """What is asked of NumPy, and of what stands in for it."""
 
     def where(self, mask: Mask, yes: Plane | float, no: Plane | float, /) -> Plane: ...
-    def maximum(self, x: Plane, y: Plane, /) -> Plane: ...
-    def minimum(self, x: Plane, y: Plane, /) -> Plane: ...
+    def maximum(self, x: Plane, y: Plane | float, /) -> Plane: ...
+    def minimum(self, x: Plane, y: Plane | float, /) -> Plane: ...
     def sqrt(self, x: Plane, /) -> Plane: ...
 
 
@@ -101,12 +102,12 @@ def some(mask: Mask) -> bool:
     return _arrays.some(mask)
 
 
-def larger(x: Plane, y: Plane) -> Plane:
+def larger(x: Plane, y: Plane | float) -> Plane:
     """Return the larger of two."""
     return _space(x).maximum(x, y)
 
 
-def smaller(x: Plane, y: Plane) -> Plane:
+def smaller(x: Plane, y: Plane | float) -> Plane:
     """Return the smaller of two."""
     return _space(x).minimum(x, y)
 

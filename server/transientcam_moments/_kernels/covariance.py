@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_moments._arithmetic import Length
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Reals
 from transientcam_moments._kernels.compiled_entry import PIXELS, entry, order_type, real_arrays
 from transientcam_moments._kernels.portable import bank, root, square_bank
 from transientcam_moments._lanes.parallel import Spread, at_once
@@ -14,7 +16,14 @@ from transientcam_moments._lanes.parallel import Spread, at_once
 
 @njit(nogil=True, error_model="numpy")
 def covariance(
-    order: Any, both: Any, basis: Any, turned: Any, variance: Any, out: Any, start: int, stop: int
+    order: Length,
+    both: Length,
+    basis: Reals,
+    turned: Reals,
+    variance: Reals,
+    out: Reals,
+    start: int,
+    stop: int,
 ) -> None:
     """Write (4 m^2, P) of the pixels start..stop; ``both`` is a tuple of length 2m.
 
@@ -100,7 +109,7 @@ def interpolation(m: int) -> Any:
     return np.column_stack([polynomial * (2 / len(node)), np.cos(node), np.sin(node)])
 
 
-def half_turned(phase: Any) -> Any:
+def half_turned(phase: Reals) -> Any:
     """Return cos and sin (2m, P) of half the phases (m, P)."""
     half = 0.5 * phase
     return np.concatenate([np.cos(half), np.sin(half)])
@@ -111,7 +120,7 @@ def covariance_lane(m: int, precision: str) -> Callable[..., Any]:
     order, both = (0,) * m, (0,) * (2 * m)
     run, basis = covariance_entry(m), interpolation(m)
 
-    def lane(phase: Any, variance: Any, *, spread: Spread = at_once) -> Any:
+    def lane(phase: Reals, variance: Reals, *, spread: Spread = at_once) -> Any:
         turned, planes = half_turned(phase), np.ascontiguousarray(variance)
         out = np.empty((4 * m * m, phase.shape[1]))
         spread(

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_moments._arithmetic import Bank, Length, Plane
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Places, Reals
 from transientcam_moments._kernels.compiled_entry import (
     FLAG,
     PIXELS,
@@ -36,7 +38,9 @@ _PARTS_EACH = 4  # of a film for each thread: the other may be late
 
 
 @njit(forceinline=True, error_model="numpy")
-def _any_two(order: Any, q: Any, pitch: int, p: int, c0: Any, s0: Any, c1: Any, s1: Any) -> Any:
+def _any_two(
+    order: Length, q: Bank, pitch: int, p: int, c0: Bank, s0: Bank, c1: Bank, s1: Bank
+) -> Any:
     """Evaluate Eq. (2) for the pixels from ``p`` on at two phases, which share the loads."""
     # sum_j conj(a_j) exp(i j phi), a_0 = 1
     re, im = simd.load_within(q, 2 * pitch + p), simd.load_within(q, 3 * pitch + p)
@@ -56,7 +60,16 @@ def _any_two(order: Any, q: Any, pitch: int, p: int, c0: Any, s0: Any, c1: Any, 
 
 @njit(forceinline=True, error_model="numpy")
 def _sums(
-    order: Any, uc: Any, zero: Any, q: Any, pitch: int, p: int, c: Any, s: Any, j0: int, every: int
+    order: Length,
+    uc: Plane,
+    zero: Plane,
+    q: Bank,
+    pitch: int,
+    p: int,
+    c: Bank,
+    s: Bank,
+    j0: int,
+    every: int,
 ) -> Any:
     """Sum u c, v s, u s and v c of every so many j from ``j0`` on; ``uc`` is what to add to."""
     vs = us = vc = zero
@@ -68,7 +81,7 @@ def _sums(
 
 
 @njit(forceinline=True, error_model="numpy")
-def _mirrored_two(order: Any, q: Any, pitch: int, p: int, c: Any, s: Any) -> Any:
+def _mirrored_two(order: Length, q: Bank, pitch: int, p: int, c: Bank, s: Bank) -> Any:
     """Evaluate Eq. (2) at two phases as far before as behind the one to which q is turned.
 
     With conj(a_j) turned to u + i v it is sum_j (u c - v s) + i (u s + v c), and s changes sign:
@@ -85,7 +98,7 @@ def _mirrored_two(order: Any, q: Any, pitch: int, p: int, c: Any, s: Any) -> Any
 
 
 @njit(forceinline=True, error_model="numpy")
-def _four_of_a_turn(order: Any, q: Any, pitch: int, p: int, c: Any, s: Any) -> Any:
+def _four_of_a_turn(order: Length, q: Bank, pitch: int, p: int, c: Bank, s: Bank) -> Any:
     """Evaluate Eq. (2) at the two phases of `_mirrored_two` and half a turn from each of them.
 
     There the terms of odd j change sign: the same eight sums serve all four.
@@ -107,7 +120,7 @@ def _four_of_a_turn(order: Any, q: Any, pitch: int, p: int, c: Any, s: Any) -> A
 
 
 @njit(forceinline=True, error_model="numpy")
-def _write(out: Any, place: int, value: Any, past_caches: bool) -> None:
+def _write(out: Reals, place: int, value: Plane, past_caches: bool) -> None:
     if past_caches:
         simd.stream(out, place, value)
     else:
@@ -115,7 +128,9 @@ def _write(out: Any, place: int, value: Any, past_caches: bool) -> None:
 
 
 @njit(forceinline=True, error_model="numpy")
-def _put(out: Any, place: int, stage: Any, at: int, value: Any, how: tuple[bool, bool]) -> None:
+def _put(
+    out: Reals, place: int, stage: Bank, at: int, value: Plane, how: tuple[bool, bool]
+) -> None:
     """Write to ``at`` of the stage, if there is one, or else to ``place`` of the results."""
     staged, past_caches = how
     if staged:
@@ -126,7 +141,7 @@ def _put(out: Any, place: int, stage: Any, at: int, value: Any, how: tuple[bool,
 
 @njit(forceinline=True, error_model="numpy")
 def _write_row(
-    out: Any, row: int, stage: Any, at: int, first: int, end: int, one: Any, step: int
+    out: Reals, row: int, stage: Bank, at: int, first: int, end: int, one: Plane, step: int
 ) -> None:
     """Write what the stage holds from ``at`` on to the pixels first..end of a row, at once."""
     for i in range(first, end, step):
@@ -138,8 +153,8 @@ def _write_row(
 
 @njit(forceinline=True, error_model="numpy")
 def _fill(
-    order: Any, polynomial: Any, reflection: Any, error: Any, centre: Any, turned: bool,
-    one: Any, q: Any, pitch: int, shift: int, left: int, held: int,
+    order: Length, polynomial: Complexes, reflection: Complexes, error: Reals, centre: Reals,
+    turned: bool, one: Plane, q: Bank, pitch: int, shift: int, left: int, held: int,
 ) -> None:  # fmt: skip
     """Put what Eq. (2) needs of pixels from ``left`` on into a bank, from ``shift`` on."""
     m, step = len(order), simd.width(one)
@@ -162,14 +177,14 @@ def _fill(
 
 @njit(nogil=True, error_model="numpy")
 def _density(
-    order: Any,
-    polynomial: Any,
-    reflection: Any,
-    error: Any,
-    rows: Any,
-    waves: Any,
-    centre: Any,
-    out: Any,
+    order: Length,
+    polynomial: Complexes,
+    reflection: Complexes,
+    error: Reals,
+    rows: Places,
+    waves: Reals,
+    centre: Reals,
+    out: Reals,
     start: int,
     stop: int,
     together: int,
@@ -261,11 +276,11 @@ def density_lane(m: int, precision: str) -> Callable[..., Any]:
     grouped = grouping(m, precision)
 
     def lane(
-        polynomial: Any,
-        reflection: Any,
-        error: Any,
-        phase_rad: Any,
-        out: Any = None,
+        polynomial: Complexes,
+        reflection: Complexes,
+        error: Reals,
+        phase_rad: Reals,
+        out: Reals | None = None,
         *,
         spread: Spread = at_once,
     ) -> Any:
@@ -291,5 +306,5 @@ def density_lane(m: int, precision: str) -> Callable[..., Any]:
 
     # the first call reads machine code and NumPy's tables, which takes as long as a whole film
     nothing = np.zeros((m + 1, LEAST_PIXELS), f"c{2 * np.dtype(precision).itemsize}")
-    lane(nothing, nothing[1:], nothing[0].real, np.arange(8))
+    lane(nothing, nothing[1:], nothing[0].real, np.arange(8.0))
     return lane

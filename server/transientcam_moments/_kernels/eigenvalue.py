@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_moments._arithmetic import Length
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Reals
 from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
     complex_arrays,
@@ -24,7 +26,9 @@ _INTERLEAVE = 4
 
 
 @njit(nogil=True, error_model="numpy")
-def smallest_eigenvalue(order: Any, b: Any, without: bool, out: Any, start: int, stop: int) -> None:
+def smallest_eigenvalue(
+    order: Length, b: Complexes, without: bool, out: Reals, start: int, stop: int
+) -> None:
     """Write the smallest eigenvalues of the pixels start..stop, with or ``without`` b_0."""
     one = simd.ones(out, _INTERLEAVE)
     step = simd.width(one)
@@ -50,7 +54,7 @@ def smallest_eigenvalue_lane(m: int, precision: str) -> Callable[..., Any]:
     order = (0,) * m
     run = eigenvalue_entry(m, precision)
 
-    def lane(b: Any, *, spread: Spread = at_once) -> Any:
+    def lane(b: Complexes, *, spread: Spread = at_once) -> Any:
         pixels = b[0].size
         planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
         out = empty(pixels, precision)

@@ -4,7 +4,9 @@ from typing import Any
 
 from numba import njit
 
+from transientcam_moments._arithmetic import Bank, Length, Mask, Plane
 from transientcam_moments._kernels import portable, simd
+from transientcam_moments._kernels.arrays import Complexes, Counts, Reals
 from transientcam_moments._kernels.portable import (
     bank,
     eps,
@@ -51,8 +53,8 @@ DAMPING = 6
 
 @njit(forceinline=True, error_model="numpy")
 def _prepare(
-    order: Any, b: Any, variance: Any, error: float, p: int, one: Any, data_r: Any, data_i: Any,
-    weight: Any,
+    order: Length, b: Complexes, variance: Reals, error: float, p: int, one: Plane, data_r: Bank,
+    data_i: Bank, weight: Bank,
 ) -> Any:  # fmt: skip
     """Load pixels, their largest moment made 1; return that, how many numbers, and their use."""
     m = len(order)
@@ -88,8 +90,8 @@ def _prepare(
 
 @njit(error_model="numpy")
 def _new(
-    order: Any, returns: Any, turns: Any, data_r: Any, data_i: Any, weight: Any, x: Any, y: Any,
-    w: Any, pr: Any, pi: Any, rr: Any, ri: Any,
+    order: Length, returns: Length, turns: Reals, data_r: Bank, data_i: Bank, weight: Bank,
+    x: Bank, y: Bank, w: Bank, pr: Bank, pi: Bank, rr: Bank, ri: Bank,
 ) -> Any:  # fmt: skip
     """Add the best return for what the others leave; return what all of them leave."""
     m, last = len(order), len(returns) - 1
@@ -117,8 +119,9 @@ def _new(
 
 @njit(error_model="numpy")
 def fit(
-    order: Any, returns: Any, unknowns: Any, steps: int, turns: Any, data_r: Any, data_i: Any,
-    weight: Any, x: Any, y: Any, w: Any, pr: Any, pi: Any, rr: Any, ri: Any, active: Any, bar: Any,
+    order: Length, returns: Length, unknowns: Length, steps: int, turns: Reals, data_r: Bank,
+    data_i: Bank, weight: Bank, x: Bank, y: Bank, w: Bank, pr: Bank, pi: Bank, rr: Bank, ri: Bank,
+    active: Mask, bar: Plane,
 ) -> Any:  # fmt: skip
     """Add a return and fit all of them, until `active` pixels have settled; return chi-square."""
     m = len(order)
@@ -136,7 +139,7 @@ def fit(
 
 
 @njit(error_model="numpy")
-def start_tail(x2: Any, y2: Any, w2: Any, active: Any, state: Any) -> None:
+def start_tail(x2: Bank, y2: Bank, w2: Bank, active: Mask, state: Bank) -> None:
     """Put the state that the fit of a tail begins with in `state`, from two returns."""
     x, y, w, v, ratio, t = choice.start_of_tail(x2, y2, w2, DELAY_RAD)
     state[0], state[1], state[2], state[3], state[4], state[5] = x, y, w, v, ratio * _MEAN, t
@@ -146,8 +149,8 @@ def start_tail(x2: Any, y2: Any, w2: Any, active: Any, state: Any) -> None:
 
 @njit(error_model="numpy")
 def step_tail(
-    order: Any, powers: Any, unknowns: Any, steps: int, data_r: Any, data_i: Any, weight: Any,
-    state: Any, bar: Any,
+    order: Length, powers: Length, unknowns: Length, steps: int, data_r: Bank, data_i: Bank,
+    weight: Bank, state: Bank, bar: Plane,
 ) -> None:  # fmt: skip
     """Take at most so many steps of a return with a tail, until all pixels have settled."""
     like = data_r[0]
@@ -174,8 +177,8 @@ def step_tail(
 
 @njit(forceinline=True, error_model="numpy")
 def write(
-    slots: Any, found: Any, scale: Any, numbers: Any, usable: Any, p: int, planes: Any, free: Any,
-    count: Any,
+    slots: Length, found: Bank, scale: Plane, numbers: Plane, usable: Mask, p: int, planes: Reals,
+    free: Counts, count: Counts,
 ) -> None:  # fmt: skip
     """Write the attributes of `Likelihood`, its returns sorted by phase."""
     one = scale / scale
@@ -234,9 +237,9 @@ def write(
 
 @njit(forceinline=True, error_model="numpy")
 def fit_one(
-    order: Any, turns: Any, b: Any, variance: Any, error: float, p: int, one: Any, data_r: Any,
-    data_i: Any, weight: Any, x: Any, y: Any, w: Any, pr: Any, pi: Any, rr: Any, ri: Any,
-    found: Any,
+    order: Length, turns: Reals, b: Complexes, variance: Reals, error: float, p: int, one: Plane,
+    data_r: Bank, data_i: Bank, weight: Bank, x: Bank, y: Bank, w: Bank, pr: Bank, pi: Bank,
+    rr: Bank, ri: Bank, found: Bank,
 ) -> Any:  # fmt: skip
     """Load pixels and put one return in `found`; return their scale, numbers, use and penalty."""
     far = infinity(one)
@@ -252,7 +255,7 @@ def fit_one(
 
 
 @njit(error_model="numpy")
-def vary(order: Any, weight: Any, found: Any) -> None:
+def vary(order: Length, weight: Bank, found: Bank) -> None:
     """Put the variances of what was chosen in `found`."""
     if some(choice.chosen((0,), found)):
         choice.vary_returns(order, (0,), (0, 0), weight, found)

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_moments._arithmetic import Length
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Places, Reals
 from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
     PLACES,
@@ -25,15 +27,15 @@ MOST_ODD = 31
 
 @njit(nogil=True, error_model="numpy")
 def _without_harmonics(
-    order: Any,
-    odd: Any,
-    given: Any,
-    current: Any,
-    polynomial: Any,
-    mixed: Any,
-    inverse: Any,
-    following: Any,
-    misfit: Any,
+    order: Length,
+    odd: Places,
+    given: Complexes,
+    current: Complexes,
+    polynomial: Complexes,
+    mixed: Complexes,
+    inverse: Complexes,
+    following: Complexes,
+    misfit: Reals,
     start: int,
     stop: int,
 ) -> None:
@@ -73,11 +75,11 @@ def harmonics_lane(m: int, precision: str) -> Callable[..., Any]:
     run = entry(_without_harmonics, order_type(m), PLACES, *planes, real[1], PIXELS, PIXELS)
 
     def lane(
-        given: Any,
-        current: Any,
-        polynomial: Any,
-        mixed: Any,
-        inverse: Any,
+        given: Complexes,
+        current: Complexes,
+        polynomial: Complexes,
+        mixed: Complexes,
+        inverse: Complexes,
         orders: tuple[int, ...],
         *,
         spread: Spread = at_once,

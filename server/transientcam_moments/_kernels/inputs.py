@@ -4,7 +4,9 @@ from typing import Any
 
 from numba import njit
 
+from transientcam_moments._arithmetic import Length, Plane
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Flags, Images, Reals
 from transientcam_moments._kernels.portable import larger, root, select, some
 
 LOW_FREQUENCY, ON_OFF, ESTIMATED = 0, 1, 2
@@ -12,7 +14,7 @@ _ROWS = 8  # that are smoothed before they leave the caches
 
 
 @njit(forceinline=True, error_model="numpy")
-def _bucket(one: Any, images: Any, first: int, p: int) -> Any:
+def _bucket(one: Plane, images: Images, first: int, p: int) -> Any:
     """Return (I_0 - I_180) + i (I_90 - I_270) and the largest of the four."""
     i0, i90 = simd.load(one, images[first], p), simd.load(one, images[first + 1], p)
     i180, i270 = simd.load(one, images[first + 2], p), simd.load(one, images[first + 3], p)
@@ -22,14 +24,14 @@ def _bucket(one: Any, images: Any, first: int, p: int) -> Any:
 
 @njit(nogil=True, error_model="numpy")
 def measure(
-    order: Any,
-    images: Any,
+    order: Length,
+    images: Images,
     zeroth: int,
-    inverse: Any,
+    inverse: Complexes,
     stride: int,
     full_scale: float,
-    moments: Any,
-    flags: Any,
+    moments: Complexes,
+    flags: Flags,
     start: int,
     stop: int,
 ) -> None:
@@ -65,7 +67,14 @@ def measure(
 
 @njit(nogil=True, error_model="numpy")
 def smooth(
-    moments: Any, taps: Any, weight: Any, rows: Any, out: Any, width: int, start: int, stop: int
+    moments: Reals,
+    taps: Reals,
+    weight: Reals,
+    rows: Reals,
+    out: Reals,
+    width: int,
+    start: int,
+    stop: int,
 ) -> bool:
     """Smooth rows start..stop of all planes (n, H * 2 W), real and imaginary parts interleaved.
 
@@ -103,9 +112,9 @@ def smooth(
 
 @njit(nogil=True, error_model="numpy")
 def measure_and_smooth(
-    order: Any, images: Any, zeroth: int, inverse: Any, stride: int, full_scale: float,
-    moments: Any, flags: Any, taps: Any, weight: Any, rows: Any, planes: Any, out: Any, width: int,
-    start: int, stop: int,
+    order: Length, images: Images, zeroth: int, inverse: Complexes, stride: int, full_scale: float,
+    moments: Complexes, flags: Flags, taps: Reals, weight: Reals, rows: Reals, planes: Reals,
+    out: Reals, width: int, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the smoothed moments of rows, each few of them as soon as they are measured.
 

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_moments._arithmetic import Length
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Reals
 from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
     complex_arrays,
@@ -25,13 +27,13 @@ _INTERLEAVE = 2
 
 @njit(nogil=True, error_model="numpy")
 def _levinson(
-    order: Any,
-    b: Any,
-    zeroth: Any,
+    order: Length,
+    b: Complexes,
+    zeroth: Reals,
     apart: bool,
-    error: Any,
-    polynomial: Any,
-    reflection: Any,
+    error: Reals,
+    polynomial: Complexes,
+    reflection: Complexes,
     start: int,
     stop: int,
 ) -> None:
@@ -78,7 +80,9 @@ def levinson_lane(m: int, precision: str) -> Callable[..., Any]:
     order = (0,) * m
     run = levinson_entry(m, precision)
 
-    def lane(b: Any, brightness: Any = None, *, spread: Spread = at_once) -> tuple[Any, Any, Any]:
+    def lane(
+        b: Complexes, brightness: Reals | None = None, *, spread: Spread = at_once
+    ) -> tuple[Any, Any, Any]:
         shape, pixels = b.shape[1:], b[0].size
         planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
         error = empty(pixels, precision)

@@ -1,14 +1,15 @@
 """What a frame's pixels need besides coefficients and returns: flags, biasing, direct light."""
 
-from typing import Any
-
 import numpy as np
 from numba import njit
 
+from transientcam_moments._arithmetic import Length
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Counts, Flags, Places, Reals
 from transientcam_moments._kernels.portable import (
     eps,
     larger,
+    largest,
     magnitude,
     not_a_number,
     select,
@@ -23,15 +24,15 @@ _BIASED, _NO_SIGNAL, _SATURATED, _NON_FINITE = 1.0, 2.0, 4.0, 8.0
 
 @njit(nogil=True, error_model="numpy")
 def flag_and_bias(
-    order: Any,
+    order: Length,
     estimated: bool,
-    b: Any,
-    saturated: Any,
-    eigenvalue: Any,
-    brightness: Any,
-    uniform: Any,
-    validity: Any,
-    flags: Any,
+    b: Complexes,
+    saturated: Flags,
+    eigenvalue: Reals,
+    brightness: Reals,
+    uniform: Reals,
+    validity: Reals,
+    flags: Flags,
     epsilon: float,
     least: float,
     start: int,
@@ -51,14 +52,14 @@ def flag_and_bias(
         if estimated:
             b0, rest = smallest / (epsilon - 1.0), one * 0.0
             smallest = epsilon * b0
-        largest, poison = magnitude(b0), b0 * 0.0 + rest * 0.0
+        most, poison = magnitude(b0), b0 * 0.0 + rest * 0.0
         for j in range(1, m + 1):
             x, y = simd.load_complex(one, b[j], p)
-            largest = larger(largest, larger(magnitude(x), magnitude(y)))
+            most = larger(most, larger(magnitude(x), magnitude(y)))
             poison = poison + x * 0.0 + y * 0.0
         # so large a density would overflow
         limit = (largest(b0) * eps(b0)) * (6.0 / (2.0 * m + 1.0))
-        finite = (poison >= 0.0) & (largest < limit)
+        finite = (poison >= 0.0) & (most < limit)
         dark = finite & ~(b0 > least)
         # less by rounding doesn't count, see `transientcam_moments.biasing.ROUNDING`
         biased = smallest < (epsilon - 4.0 * (m + 1.0) * eps(b0)) * b0
@@ -75,13 +76,13 @@ def flag_and_bias(
 
 @njit(nogil=True, error_model="numpy")
 def separate(
-    order: Any,
-    phase: Any,
-    weight: Any,
-    flags: Any,
-    direct: Any,
-    indirect: Any,
-    range_m: Any,
+    order: Length,
+    phase: Reals,
+    weight: Reals,
+    flags: Flags,
+    direct: Reals,
+    indirect: Reals,
+    range_m: Reals,
     threshold: float,
     metres: float,
     start: int,
@@ -113,8 +114,8 @@ def separate(
 
 @njit(nogil=True, error_model="numpy")
 def gather(
-    order: Any, b: Any, brightness: Any, residual: Any, tolerance: float, ramp: Any, packed: Any,
-    wide: Any, where: Any, begin: int,
+    order: Length, b: Complexes, brightness: Reals, residual: Reals, tolerance: float, ramp: Reals,
+    packed: Reals, wide: Complexes, where: Places, begin: int,
 ) -> int:  # fmt: skip
     """Collect pixels from ``begin`` on whose residual is above the tolerance, until room ends.
 
@@ -150,8 +151,9 @@ def gather(
 
 @njit(nogil=True, error_model="numpy")
 def scatter(
-    order: Any, where: Any, found: int, wide_phase: Any, wide_weight: Any, wide_count: Any,
-    wide_residual: Any, phase: Any, weight: Any, count: Any, residual: Any,
+    order: Length, where: Places, found: int, wide_phase: Reals, wide_weight: Reals,
+    wide_count: Counts, wide_residual: Reals, phase: Reals, weight: Reals, count: Counts,
+    residual: Reals,
 ) -> None:  # fmt: skip
     """Put redone returns back where they came from."""
     for i in range(found):

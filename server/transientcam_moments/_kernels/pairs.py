@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_moments._arithmetic import Bank, Length, Mask, Plane
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Counts, Places, Reals
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -40,7 +42,7 @@ __all__ = ["pairs_lane", "portable"]  # which gives the fits' arithmetic its mea
 
 @njit(error_model="numpy")
 def _project(
-    places: Any, turns: Any, data_r: Any, data_i: Any, share: Any, along: Any, alike: Any
+    places: Places, turns: Reals, data_r: Bank, data_i: Bank, share: Bank, along: Bank, alike: Bank
 ) -> Any:
     """Put the moments' projections on returns at the phases of the grid in `along`, twice over.
 
@@ -67,7 +69,7 @@ def _project(
 
 
 @njit(forceinline=True, error_model="numpy")
-def _fill_row(count: int, apart: int, along: Any, alike: Any, rows: Any) -> None:
+def _fill_row(count: int, apart: int, along: Bank, alike: Bank, rows: Bank) -> None:
     """Put what pairs so many steps apart explain in their row, by the first one's phase."""
     row = (apart % 3) * (count + 2) + 1
     s = alike[apart]
@@ -81,7 +83,7 @@ def _fill_row(count: int, apart: int, along: Any, alike: Any, rows: Any) -> None
 
 
 @njit(forceinline=True, error_model="numpy")
-def _insert(gain: Any, pair: Any, gains: Any, pairs: Any, size: int) -> None:
+def _insert(gain: Plane, pair: Plane, gains: Bank, pairs: Bank, size: int) -> None:
     """Insert pairs in lists of the best ones, of so many each."""
     for k in range(size):
         better = gain > gains[k]
@@ -91,7 +93,7 @@ def _insert(gain: Any, pair: Any, gains: Any, pairs: Any, size: int) -> None:
 
 @njit(forceinline=True, error_model="numpy")
 def _keep_peaks(
-    count: int, apart: int, rows: Any, row_gains: Any, row_pairs: Any, gains: Any, pairs: Any
+    count: int, apart: int, rows: Bank, row_gains: Bank, row_pairs: Bank, gains: Bank, pairs: Bank
 ) -> None:
     """Insert the best pairs of a row that explain more than those beside them.
 
@@ -122,8 +124,8 @@ def _keep_peaks(
 
 @njit(error_model="numpy")
 def _search(
-    places: Any, turns: Any, data_r: Any, data_i: Any, share: Any, along: Any, alike: Any,
-    rows: Any, row_gains: Any, row_pairs: Any, gains: Any, pairs: Any,
+    places: Places, turns: Reals, data_r: Bank, data_i: Bank, share: Bank, along: Bank, alike: Bank,
+    rows: Bank, row_gains: Bank, row_pairs: Bank, gains: Bank, pairs: Bank,
 ) -> None:  # fmt: skip
     """Put the pairs on the grid that explain most in `pairs`."""
     count = turns.shape[1]
@@ -139,7 +141,7 @@ def _search(
 
 
 @njit(forceinline=True, error_model="numpy")
-def _points(turns: Any, pair: Any, room: Any, x: Any, y: Any) -> None:
+def _points(turns: Reals, pair: Plane, room: Reals, x: Bank, y: Bank) -> None:
     """Put the points of the unit circle of a pair on the grid in `x` and `y`."""
     count = turns.shape[1]
     simd.store(room[0], 0, pair)
@@ -154,8 +156,8 @@ def _points(turns: Any, pair: Any, room: Any, x: Any, y: Any) -> None:
 
 @njit(error_model="numpy")
 def _polish(
-    places: Any, steps: int, data_r: Any, data_i: Any, weight: Any, share: Any, x: Any, y: Any,
-    w: Any, room: Any, active: Any,
+    places: Places, steps: int, data_r: Bank, data_i: Bank, weight: Bank, share: Bank, x: Bank,
+    y: Bank, w: Bank, room: tuple[Bank, ...], active: Mask,
 ) -> Any:  # fmt: skip
     """Take at most so many steps from two returns on; return chi-square."""
     pr, pi, tx, ty, tw, tr, ti = room
@@ -173,7 +175,7 @@ def _polish(
 
 
 @njit(forceinline=True, error_model="numpy")
-def _keep_finalist(cost: Any, x: Any, y: Any, costs: Any, points: Any) -> None:
+def _keep_finalist(cost: Plane, x: Bank, y: Bank, costs: Bank, points: Bank) -> None:
     """Insert a fit in the list of the best ones; each has four coordinates in `points`."""
     a, b, c, d = x[0], y[0], x[1], y[1]
     for k in range(FINALISTS):
@@ -191,9 +193,9 @@ def _keep_finalist(cost: Any, x: Any, y: Any, costs: Any, points: Any) -> None:
 
 @njit(error_model="numpy")
 def _choose(
-    places: Any, same: float, data_r: Any, data_i: Any, weight: Any, share: Any, costs: Any,
-    points: Any, x: Any, y: Any, w: Any, bx: Any, by: Any, bw: Any, directs: Any, room: Any,
-    active: Any,
+    places: Places, same: float, data_r: Bank, data_i: Bank, weight: Bank, share: Bank,
+    costs: Bank, points: Bank, x: Bank, y: Bank, w: Bank, bx: Bank, by: Bank, bw: Bank,
+    directs: Bank, room: tuple[Bank, ...], active: Mask,
 ) -> Any:  # fmt: skip
     """Polish the finalists, put the best one in `bx`, `by`, `bw`; return its cost and lead."""
     far = infinity(weight[0])
@@ -225,8 +227,9 @@ def _choose(
 
 @njit(nogil=True, error_model="numpy")
 def fit_pairs(
-    order: Any, lists: Any, places: Any, first_turns: Any, same: float, turns: Any, b: Any,
-    variance: Any, error: float, planes: Any, free: Any, count: Any, start: int, stop: int,
+    order: Length, lists: tuple[Length, ...], places: Places, first_turns: Reals, same: float,
+    turns: Reals, b: Complexes, variance: Reals, error: float, planes: Reals, free: Counts,
+    count: Counts, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; two returns where one leaves enough.
 
@@ -308,7 +311,9 @@ def pairs_lane(m: int, precision: str) -> Callable[..., Any]:
     phase, same = grid(m), least_alike(m)
     turns = np.stack([np.cos(phase), np.sin(phase)]).astype(precision)
 
-    def lane(b: Any, variance: Any, error: float, *, spread: Spread = at_once) -> tuple[Any, ...]:
+    def lane(
+        b: Complexes, variance: Reals, error: float, *, spread: Spread = at_once
+    ) -> tuple[Any, ...]:
         pixels = b.shape[1]
         moments, noise = np.ascontiguousarray(b), np.ascontiguousarray(variance)
         places = np.array([j for j, plane in enumerate(noise) if plane.any()], np.int64)

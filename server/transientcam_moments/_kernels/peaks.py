@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_moments._arithmetic import Length
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Reals
 from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
     REAL,
@@ -29,16 +31,16 @@ _INTERLEAVE = 2
 
 @njit(nogil=True, error_model="numpy")
 def _peaks(
-    order: Any,
-    polynomial: Any,
-    reflection: Any,
-    error: Any,
-    starts: Any,
+    order: Length,
+    polynomial: Complexes,
+    reflection: Complexes,
+    error: Reals,
+    starts: Reals,
     threshold: float,
-    first: Any,
-    strongest: Any,
-    phase: Any,
-    height: Any,
+    first: Reals,
+    strongest: Reals,
+    phase: Reals,
+    height: Reals,
     start: int,
     stop: int,
 ) -> None:
@@ -78,9 +80,9 @@ def peaks_lane(m: int, precision: str) -> Callable[..., Any]:
     starts = maxima.start_angles(m, precision)
 
     def lane(
-        polynomial: Any,
-        reflection: Any,
-        error: Any,
+        polynomial: Complexes,
+        reflection: Complexes,
+        error: Reals,
         threshold: float,
         *,
         spread: Spread = at_once,

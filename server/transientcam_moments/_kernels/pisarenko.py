@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from transientcam_moments._kernels.arrays import Complexes, Reals
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.refine import Found, redo
 from transientcam_moments._kernels.returns import returns_entry, usual_steps
@@ -24,8 +25,8 @@ def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
     wide = WideReturns(m) if precision == "f" else None
 
     def lane(
-        b: Any,
-        eigenvalue: Any = None,
+        b: Complexes,
+        eigenvalue: Reals | None = None,
         *,
         noise: float | None = None,
         spread: Spread = at_once,

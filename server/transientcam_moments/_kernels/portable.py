@@ -42,7 +42,14 @@ from transientcam_moments._arithmetic import (
     tiny,
 )
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.simd import Lanes, Mask, Registers, extending, templates
+from transientcam_moments._kernels.simd import (
+    Lanes,
+    Mask,
+    Operands,
+    Registers,
+    extending,
+    templates,
+)
 from transientcam_moments.likelihood import choice, linear, pair_fit, sharp, tail
 from transientcam_moments.moment_problem import (
     circle,
@@ -95,7 +102,7 @@ def _room(function: Callable[..., Any], size: Callable[[int, Any], int | None]) 
             return templates.signature(Registers(like, count), like, length, further)
 
     @extending.lower_builtin(function, Lanes, types.Any, types.Any)
-    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def _lower(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         item = context.get_value_type(sig.return_type.item)
         return cgutils.alloca_once(builder, item, size=sig.return_type.size)
 
@@ -191,7 +198,7 @@ class _Select(templates.AbstractTemplate):  # type: ignore[misc]  # numba is unt
 
 
 @extending.lower_builtin(select, Mask, Lanes, Lanes)
-def _select(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+def _select(context: Any, builder: ir.IRBuilder, sig: Any, args: Any) -> Any:
     return builder.select(*args)
 
 

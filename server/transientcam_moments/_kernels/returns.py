@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_moments._arithmetic import Length
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Counts, Reals
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -43,16 +45,16 @@ MOST_STEPS = 24
 
 @njit(nogil=True, error_model="numpy")
 def _returns(
-    order: Any,
-    turns: Any,
-    b: Any,
-    zeroth: Any,
+    order: Length,
+    turns: Reals,
+    b: Complexes,
+    zeroth: Reals,
     apart: int,
-    uniform: Any,
-    phase: Any,
-    weight: Any,
-    count: Any,
-    residual: Any,
+    uniform: Reals,
+    phase: Reals,
+    weight: Reals,
+    count: Counts,
+    residual: Reals,
     noise: float,
     steps: int,
     start: int,
@@ -127,16 +129,16 @@ def _returns(
 
 @njit(nogil=True, error_model="numpy")
 def find_returns(
-    order: Any,
-    turns: Any,
-    b: Any,
-    zeroth: Any,
+    order: Length,
+    turns: Reals,
+    b: Complexes,
+    zeroth: Reals,
     apart: int,
-    uniform: Any,
-    phase: Any,
-    weight: Any,
-    count: Any,
-    residual: Any,
+    uniform: Reals,
+    phase: Reals,
+    weight: Reals,
+    count: Counts,
+    residual: Reals,
     noise: float,
     steps: int,
     start: int,

@@ -10,7 +10,7 @@ sum into one rounding, so NaN and infinities behave as in NumPy. Comparisons wit
 """
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from llvmlite import binding, ir  # type: ignore[import-untyped]  # it has no annotations
@@ -29,6 +29,7 @@ intrinsic = extending.intrinsic
 
 _INDEX = ir.IntType(32)
 FUSE = ("contract",)
+Operands = Sequence[ir.Value]
 
 
 _FEATURES = binding.get_host_cpu_features()
@@ -93,7 +94,7 @@ class _RegistersModel(extending.models.PrimitiveModel):  # type: ignore[misc]  #
         super().__init__(dmm, fe_type, item.as_pointer())
 
 
-def _spread(builder: Any, vector: Any, scalar: Any) -> Any:
+def _spread(builder: ir.IRBuilder, vector: Any, scalar: Any) -> Any:
     first = builder.insert_element(ir.Constant(vector, ir.Undefined), scalar, _INDEX(0))
     zeros = ir.Constant(ir.VectorType(_INDEX, vector.count), [0] * vector.count)
     return builder.shuffle_vector(first, ir.Constant(vector, ir.Undefined), zeros)
@@ -101,7 +102,7 @@ def _spread(builder: Any, vector: Any, scalar: Any) -> Any:
 
 @extending.lower_cast(types.Float, Lanes)
 @extending.lower_cast(types.Integer, Lanes)
-def _cast(context: Any, builder: Any, fromty: Any, toty: Any, val: Any) -> Any:
+def _cast(context: Any, builder: ir.IRBuilder, fromty: Any, toty: Any, val: Any) -> Any:
     scalar = context.cast(builder, val, fromty, toty.element)
     return _spread(builder, context.get_value_type(toty), scalar)
 
@@ -123,7 +124,7 @@ def define(op: Any, kind: type, count: int, emit: Callable[..., Any], result: An
             return templates.signature(result(vector), *(vector,) * count)
 
     @extending.lower_builtin(op, *(kind,) * count)
-    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def _lower(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         return emit(builder, *args)
 
 
@@ -171,12 +172,12 @@ class _Set(templates.AbstractTemplate):  # type: ignore[misc]  # numba is untype
 
 
 @extending.lower_builtin(operator.getitem, Registers, types.Integer)
-def _getitem(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+def _getitem(context: Any, builder: ir.IRBuilder, sig: Any, args: Any) -> Any:
     return builder.load(builder.gep(args[0], [args[1]]))
 
 
 @extending.lower_builtin(operator.setitem, Registers, types.Integer, types.Any)
-def _setitem(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+def _setitem(context: Any, builder: ir.IRBuilder, sig: Any, args: Any) -> Any:
     builder.store(args[2], builder.gep(args[0], [args[1]]))
     return context.get_dummy_value()
 
@@ -192,7 +193,7 @@ def ones(typingctx: Any, array: Any, interleave: Any) -> Any:
     real = getattr(array.dtype, "underlying_float", array.dtype)
     lanes = Lanes(real, interleave.literal_value * REGISTER_BYTES // (real.bitwidth // 8))
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         return ir.Constant(context.get_value_type(lanes), [1.0] * lanes.count)
 
     return lanes(array, interleave), codegen
@@ -202,7 +203,7 @@ def ones(typingctx: Any, array: Any, interleave: Any) -> Any:
 def width(typingctx: Any, like: Any) -> Any:
     """Return how many pixels there are in lanes of the type of ``like``."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         return context.get_constant(types.intp, like.count)
 
     return types.intp(like), codegen
@@ -212,14 +213,14 @@ def width(typingctx: Any, like: Any) -> Any:
 def spread(typingctx: Any, like: Any, value: Any) -> Any:
     """Return a number in every lane."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         return args[1]
 
     return like(like, like), codegen
 
 
 def _pointer(
-    context: Any, builder: Any, array_type: Any, array: Any, index: Any, vector: Any
+    context: Any, builder: ir.IRBuilder, array_type: Any, array: Any, index: Any, vector: Any
 ) -> Any:
     """Address of element ``index`` of the contiguous array ``array``, as vectors."""
     struct = cgutils.create_struct_proxy(array_type)(context, builder, array)
@@ -230,7 +231,7 @@ def _pointer(
 def load(typingctx: Any, like: Any, array: Any, index: Any) -> Any:
     """Return the pixels from ``index`` on, converted to the type of ``like``."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         stored = context.get_value_type(array.dtype)
         vector = ir.VectorType(stored, like.count)
         pointer = _pointer(context, builder, array, args[1], args[2], vector)
@@ -246,7 +247,7 @@ def load(typingctx: Any, like: Any, array: Any, index: Any) -> Any:
 def store(typingctx: Any, array: Any, index: Any, value: Any) -> Any:
     """Write the pixels from ``index`` on; into an array of integers, truncated."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         stored = context.get_value_type(array.dtype)
         vector = ir.VectorType(stored, value.count)
         pointer = _pointer(context, builder, array, args[0], args[1], vector)
@@ -266,7 +267,7 @@ def pack(typingctx: Any, array: Any, index: Any, mask: Any, value: Any) -> Any:
     What lies behind them, as far as all pixels would have reached, may be overwritten.
     """
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         element = context.get_value_type(value.element)
         pointer = _pointer(context, builder, array, args[0], args[1], args[3].type)
         pointer = builder.bitcast(pointer, element.as_pointer())
@@ -288,7 +289,7 @@ def pack(typingctx: Any, array: Any, index: Any, mask: Any, value: Any) -> Any:
     return types.int64(array, types.intp, mask, value), codegen
 
 
-def _pack_register(builder: Any, part: Any, chosen: Any, target: Any) -> None:
+def _pack_register(builder: ir.IRBuilder, part: Any, chosen: Any, target: Any) -> None:
     name = f"llvm.x86.avx512.mask.compress.{_suffix(part.type)}"
     kind = ir.FunctionType(part.type, [part.type, part.type, chosen.type])
     callee = cgutils.get_or_insert_function(builder.module, kind, name)
@@ -297,7 +298,7 @@ def _pack_register(builder: Any, part: Any, chosen: Any, target: Any) -> None:
     builder.store(packed, where, align=64 // part.type.count)
 
 
-def _pack_in_memory(builder: Any, part: Any, chosen: Any, target: Any) -> None:
+def _pack_in_memory(builder: ir.IRBuilder, part: Any, chosen: Any, target: Any) -> None:
     name = f"llvm.masked.compressstore.{_suffix(part.type)}"
     kind = ir.FunctionType(ir.VoidType(), [part.type, target.type, chosen.type])
     builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [part, target, chosen])
@@ -311,7 +312,7 @@ def _suffix(vector: Any) -> str:
 def unpack(typingctx: Any, array: Any, index: Any, mask: Any, value: Any) -> Any:
     """Return lanes whose pixels of a mask are those that `pack` wrote; the others are as before."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         vector = args[3].type
         pointer = _pointer(context, builder, array, args[0], args[1], vector)
         pointer = builder.bitcast(pointer, vector.element.as_pointer())
@@ -327,7 +328,7 @@ def unpack(typingctx: Any, array: Any, index: Any, mask: Any, value: Any) -> Any
 def stream(typingctx: Any, array: Any, index: Any, value: Any) -> Any:
     """Write pixels past the caches, for results larger than these; aligned to a register."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         vector = context.get_value_type(value)
         pointer = _pointer(context, builder, array, args[0], args[1], vector)
         instruction = builder.store(args[2], pointer, align=REGISTER_BYTES)
@@ -341,7 +342,7 @@ def stream(typingctx: Any, array: Any, index: Any, value: Any) -> Any:
 def load_within(typingctx: Any, bank: Any, index: Any) -> Any:
     """Return the lanes from element ``index`` of a bank of registers on."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         vector = context.get_value_type(bank.item)
         elements = builder.bitcast(args[0], vector.element.as_pointer())
         pointer = builder.bitcast(builder.gep(elements, [args[1]]), vector.as_pointer())
@@ -354,7 +355,7 @@ def load_within(typingctx: Any, bank: Any, index: Any) -> Any:
 def store_within(typingctx: Any, bank: Any, index: Any, value: Any) -> Any:
     """Write lanes from element ``index`` of a bank of registers on."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         vector = context.get_value_type(bank.item)
         elements = builder.bitcast(args[0], vector.element.as_pointer())
         pointer = builder.bitcast(builder.gep(elements, [args[1]]), vector.as_pointer())
@@ -368,7 +369,7 @@ def store_within(typingctx: Any, bank: Any, index: Any, value: Any) -> Any:
 def before_boundary(typingctx: Any, array: Any, index: Any) -> Any:
     """Return how many elements from ``index`` on lie before the next line of memory."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         size = array.dtype.bitwidth // 8
         struct = cgutils.create_struct_proxy(array)(context, builder, args[0])
         word = ir.IntType(64)
@@ -383,14 +384,14 @@ def before_boundary(typingctx: Any, array: Any, index: Any) -> Any:
 def fence(typingctx: Any) -> Any:
     """Wait until what was written past the caches is seen by other threads."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         builder.fence("seq_cst")
         return context.get_dummy_value()
 
     return types.void(), codegen
 
 
-def _shuffle(builder: Any, x: Any, y: Any, order: list[int]) -> Any:
+def _shuffle(builder: ir.IRBuilder, x: Any, y: Any, order: list[int]) -> Any:
     return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(_INDEX, len(order)), order))
 
 
@@ -399,7 +400,7 @@ def load_complex(typingctx: Any, like: Any, array: Any, index: Any) -> Any:
     """Return real and imaginary lanes of the complex pixels from ``index`` on."""
     pair = types.UniTuple(like, 2)
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         vector = context.get_value_type(like)
         pointer = _pointer(context, builder, array, args[1], args[2], vector)
         align = like.element.bitwidth // 8
@@ -416,7 +417,7 @@ def load_complex(typingctx: Any, like: Any, array: Any, index: Any) -> Any:
 def store_complex(typingctx: Any, array: Any, index: Any, re: Any, im: Any) -> Any:
     """Write complex pixels from ``index`` on."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         count = re.count
         zipped = [part for lane in range(count) for part in (lane, count + lane)]
         pointer = _pointer(context, builder, array, args[0], args[1], args[2].type)
@@ -433,7 +434,7 @@ def store_complex(typingctx: Any, array: Any, index: Any, re: Any, im: Any) -> A
 def count(typingctx: Any, mask: Any) -> Any:
     """Return for how many pixels the mask is true."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         packed = builder.bitcast(args[0], ir.IntType(mask.count))
         return builder.zext(builder.ctpop(packed), ir.IntType(64))
 

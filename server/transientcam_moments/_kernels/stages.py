@@ -4,7 +4,9 @@ from typing import Any, Final
 
 from numba import njit
 
+from transientcam_moments._arithmetic import Bank, Length, Mask, Plane
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Counts, Reals
 from transientcam_moments._kernels.fits import (
     DAMPING,
     fit,
@@ -33,13 +35,15 @@ _DATA: Final = _PENALTY + 4
 
 
 @njit(forceinline=True, error_model="numpy")
-def rows_of(order: Any) -> int:
+def rows_of(order: Length) -> int:
     """Return how many rows a room has; the last ones hold the data, then their weights."""
     return _DATA + 3 * (len(order) + 1)
 
 
 @njit(forceinline=True, error_model="numpy")
-def _put_data(order: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: int) -> None:
+def _put_data(
+    order: Length, data_r: Bank, data_i: Bank, weight: Bank, room: Reals, at: int
+) -> None:
     size = len(order) + 1
     for j in range(size):
         simd.store(room, (_DATA + j) * ROW + at, data_r[j])
@@ -49,7 +53,7 @@ def _put_data(order: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: 
 
 @njit(forceinline=True, error_model="numpy")
 def _take_data(
-    order: Any, like: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: int
+    order: Length, like: Plane, data_r: Bank, data_i: Bank, weight: Bank, room: Reals, at: int
 ) -> None:
     size = len(order) + 1
     for j in range(size):
@@ -60,7 +64,7 @@ def _take_data(
 
 @njit(forceinline=True, error_model="numpy")
 def _pack_data(
-    order: Any, mask: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: int
+    order: Length, mask: Mask, data_r: Bank, data_i: Bank, weight: Bank, room: Reals, at: int
 ) -> None:
     size = len(order) + 1
     for j in range(size):
@@ -71,8 +75,8 @@ def _pack_data(
 
 @njit(error_model="numpy")
 def fit_first(
-    order: Any, turns: Any, b: Any, variance: Any, error: float, first: int, last: int, end: int,
-    all_rooms: Any, rooms: Any,
+    order: Length, turns: Reals, b: Complexes, variance: Reals, error: float, first: int, last: int,
+    end: int, all_rooms: Reals, rooms: Reals,
 ) -> int:  # fmt: skip
     """Fit one return to the pixels first..last; pack and count those that it leaves something of.
 
@@ -112,7 +116,7 @@ def fit_first(
 
 
 @njit(error_model="numpy")
-def fit_second(order: Any, turns: Any, rooms: Any, count: int, late: Any) -> int:
+def fit_second(order: Length, turns: Reals, rooms: Reals, count: int, late: Reals) -> int:
     """Fit two returns, and first steps of a tail; pack and count the pixels that need more."""
     one = simd.ones(rooms, 1)
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
@@ -153,8 +157,8 @@ def fit_second(order: Any, turns: Any, rooms: Any, count: int, late: Any) -> int
 
 @njit(forceinline=True, error_model="numpy")
 def _pack_moving(
-    order: Any, one: Any, data_r: Any, data_i: Any, weight: Any, state: Any, bar: Any, late: Any,
-    at: int,
+    order: Length, one: Plane, data_r: Bank, data_i: Bank, weight: Bank, state: Bank, bar: Plane,
+    late: Reals, at: int,
 ) -> Any:  # fmt: skip
     """Pack and count the pixels whose tail has not settled."""
     more = state[DAMPING] < sharp.SETTLED
@@ -166,7 +170,7 @@ def _pack_moving(
 
 
 @njit(error_model="numpy")
-def step_late(order: Any, steps: int, rooms: Any, count: int, late: Any) -> int:
+def step_late(order: Length, steps: int, rooms: Reals, count: int, late: Reals) -> int:
     """Take further steps of tails; pack and count the pixels that need more."""
     one = simd.ones(rooms, 1)
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
@@ -184,7 +188,7 @@ def step_late(order: Any, steps: int, rooms: Any, count: int, late: Any) -> int:
 
 
 @njit(error_model="numpy")
-def bring_back(rooms: Any, count: int, late: Any) -> None:
+def bring_back(rooms: Reals, count: int, late: Reals) -> None:
     """Put the states of the tails that went on in `late` back among all."""
     one = simd.ones(rooms, 1)
     state = bank(one, (), 8)
@@ -198,7 +202,7 @@ def bring_back(rooms: Any, count: int, late: Any) -> None:
 
 
 @njit(error_model="numpy")
-def offer_tails(order: Any, rooms: Any, count: int, third: Any) -> int:
+def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
     """Choose tails where they are better; pack and count the pixels that leave something then."""
     one = simd.ones(rooms, 1)
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
@@ -229,12 +233,12 @@ def offer_tails(order: Any, rooms: Any, count: int, third: Any) -> int:
 
 
 @njit(forceinline=True, error_model="numpy")
-def _needs_three(found: Any, penalty: Any, numbers: Any) -> Any:
+def _needs_three(found: Bank, penalty: Plane, numbers: Plane) -> Any:
     return (penalty > 0.0) & (found[SCORE] > 6.0 * penalty) & (numbers >= 6.0)
 
 
 @njit(error_model="numpy")
-def fit_third(order: Any, turns: Any, rooms: Any, count: int) -> None:
+def fit_third(order: Length, turns: Reals, rooms: Reals, count: int) -> None:
     """Fit three returns, and choose them where they are better."""
     one = simd.ones(rooms, 1)
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
@@ -260,7 +264,7 @@ def fit_third(order: Any, turns: Any, rooms: Any, count: int) -> None:
 
 
 @njit(error_model="numpy")
-def take_three(rooms: Any, count: int, third: Any) -> None:
+def take_three(rooms: Reals, count: int, third: Reals) -> None:
     """Put what was found with three returns back among all that were fitted with two."""
     one = simd.ones(rooms, 1)
     found = bank(one, (), 22)
@@ -277,8 +281,8 @@ def take_three(rooms: Any, count: int, third: Any) -> None:
 
 @njit(error_model="numpy")
 def finish(
-    order: Any, slots: Any, all_rooms: Any, rooms: Any, first: int, last: int, end: int,
-    planes: Any, free: Any, count: Any,
+    order: Length, slots: Length, all_rooms: Reals, rooms: Reals, first: int, last: int, end: int,
+    planes: Reals, free: Counts, count: Counts,
 ) -> None:  # fmt: skip
     """Write what was found of the pixels first..last, with its deviations.
 

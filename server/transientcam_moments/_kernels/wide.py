@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from transientcam_moments._kernels import outputs
+from transientcam_moments._kernels.arrays import Complexes, Reals
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -63,7 +64,13 @@ class WideReturns:
         )
 
     def __call__(
-        self, b: Any, brightness: Any, found: Found, room: tuple[Any, ...], start: int, stop: int
+        self,
+        b: Complexes,
+        brightness: Reals,
+        found: Found,
+        room: tuple[Any, ...],
+        start: int,
+        stop: int,
     ) -> int:
         """Redo what is wrong among the pixels start..stop; return how many were.
 

@@ -43,8 +43,8 @@ def smallest_eigenvalue(order: Length, re: Bank, im: Bank) -> Plane:
         e[i] = e[i] * e[i]
     x = _nearer(order, d, e, x)
     state = (x <= x, x, x * 0.0)  # NaN does not move
-    x = repeat(climb, STEPS, (order,), (d, e), state)[1]
-    return x
+    found: Plane = repeat(climb, STEPS, (order,), (d, e), state)[1]
+    return found
 
 
 def _fill(order: Length, re: Bank, im: Bank, h: Bank) -> None:
