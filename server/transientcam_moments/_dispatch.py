@@ -121,7 +121,11 @@ class Key(NamedTuple):
 
 CACHE: Final = Cache(
     "transientcam_moments._kernels",
+    "transientcam_moments.arrays",
+    "transientcam_moments.images",
     "transientcam_moments.likelihood",
+    "transientcam_moments.moment_problem",
+    "transientcam_moments.noise",
     "transientcam_moments._dispatch",
 )
 """Kernels are compiled of functions of these."""
