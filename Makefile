@@ -116,7 +116,7 @@ check-style:
 
 # Of OpenAPI and AsyncAPI the types of both clients follow; biome formats those of the page.
 check-documents:
-	$(BIN)/python -m benchmarks.documents
+	$(BIN)/python tools/documents.py
 
 check-dashboard:
 	npm --prefix client/dashboard run check

@@ -1,6 +1,6 @@
 """What the service says of a frame, in JSON and in messages.
 
-`python -m benchmarks.documents --write` writes this file.
+`python tools/documents.py --write` writes this file.
 """
 
 from typing import TypedDict

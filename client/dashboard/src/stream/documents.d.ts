@@ -1,4 +1,4 @@
-/** The documents; `python -m benchmarks.documents --write` writes this file. */
+/** The documents; `python tools/documents.py --write` writes this file. */
 
 /** A product that frames of this camera do not have. */
 export interface AbsentDocument {

@@ -2,7 +2,7 @@
 
 The models of `transientcam_server.api._documents` state each document once. OpenAPI and AsyncAPI
 documents follow from them, and of these the types of the Python client and of the dashboard: run
-``python -m benchmarks.documents --write``. Without ``--write`` it says which file is not as it
+``python tools/documents.py --write``. Without ``--write`` it says which file is not as it
 would be written, and fails where one is.
 
 No published generator serves: openapi-typescript needs the compiler of TypeScript 5, and
@@ -27,7 +27,7 @@ _ROOT = Path(__file__).parents[1]
 _DASHBOARD = _ROOT / "client/dashboard"
 PYTHON = _ROOT / "client/transientcam/documents.py"
 TYPESCRIPT = _DASHBOARD / "src/stream/documents.d.ts"
-_WRITTEN = "`python -m benchmarks.documents --write` writes this file"
+_WRITTEN = "`python tools/documents.py --write` writes this file"
 _OF_A_FRAME = (
     "PixelCountsDocument",
     "PredictedStdDocument",
