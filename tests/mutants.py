@@ -6,7 +6,6 @@ every mutant of a module; this draws a place, a module of it, a position and a c
 uniformly. Only a copy of the tree is changed.
 """
 
-import argparse
 import difflib
 import importlib
 import multiprocessing
@@ -37,145 +36,115 @@ PLACES = {
     "planning": "server/transientcam_server/planning",
     "moments": "server/transientcam_moments",
 }
-COMPILED = {"_kernels", "_lanes"}
-"""Rooms of the mathematics whose tests compile for minutes."""
-PACKAGES = {
-    "client/transientcam": "tests/client",
-    "driver/transientcam_driver": "tests/driver",
-    "server/transientcam_server": "tests/server",
-    "server/transientcam_moments": "tests/moments",
-}
-ROOT = Path(__file__).parents[1]
-CPU_S, TIMEOUT_S = 60, 600.0
-"""Of the tests of one mutant: what a busy machine does not stretch, and for those that wait."""
-LARGE = ("crc32c", "fastapi", "h5py", "httpx", "hypothesis", "numba", "numpy", "scipy.optimize")
+COMPILED = {"_kernels", "_lanes"}  # rooms whose tests compile for minutes
 OPERATORS = re.compile(
     r"core/(ReplaceComparisonOperator_((?!.*Is)|Is_IsNot|IsNot_Is)"
     r"|ReplaceBinaryOperator_(?!.*(Bit|Shift))|ReplaceUnaryOperator|Replace(True|False|And|Or)"
     r"|AddNot|NumberReplacer|ExceptionReplacer|ZeroIteration)"
 )
-"""Without ``|``, which types have, and without ``is`` in place of ``==``."""
+"""Without ``|``, which types have, and ``is`` in place of ``==``."""
+UNPACKING = {"argument", "dictorsetmaker", "param", "parameters", "star_expr"}
+CPU_S, TIMEOUT_S = 60, 600.0
+"""Of the tests of one mutant: what a busy machine does not stretch, and for those that wait."""
+LARGE = ("crc32c", "fastapi", "h5py", "httpx", "hypothesis", "numba", "numpy", "scipy.optimize")
+NOTICED = {1, 2, 4}  # of pytest: a test fails; a module or a conftest cannot be imported
 
 
 def mirroring(module: Path) -> list[Path]:
     """Return the tests of a module: the file named after it, if there is one, then its room."""
-    package, tests = next(each for each in PACKAGES.items() if module.is_relative_to(each[0]))
-    parts = [part.lstrip("_") for part in module.relative_to(package).with_suffix("").parts]
-    room = Path(tests, *parts[:-1])
-    return [each for each in (room / f"test_{parts[-1]}.py", room) if (ROOT / each).exists()]
+    floor, package, *parts = (part.lstrip("_") for part in module.with_suffix("").parts)
+    tests = "moments" if package == "transientcam_moments" else floor
+    room = Path("tests", tests, *parts[:-1])
+    return [each for each in (room / f"test_{parts[-1]}.py", room) if each.exists()]
 
 
 def modules(place: str) -> list[Path]:
-    """Return the modules of a place, relative to the root, but for those without code to change."""
-    inside = sorted((ROOT / place).rglob("*.py")) or [ROOT / place]
-    found = (each.relative_to(ROOT) for each in inside if each.name != "__init__.py")
-    return [each for each in found if not COMPILED.intersection(each.parts)]
+    """Return the modules of a place whose tests do not compile."""
+    inside = sorted(Path(place).rglob("*.py")) or [Path(place)]
+    return [each for each in inside if not COMPILED.intersection(each.parts)]
 
 
 def draw(code: str, rng: random.Random) -> str | None:
-    """Return code with one change, None where there is nothing to change.
+    """Return code with one change; None where there is nothing to change.
 
-    A decorator stays: that a dataclass is frozen or has slots is what mypy checks.
+    Decorators stay, as mypy checks that a dataclass is frozen, and stars that unpack.
     """
     nodes = list(ast_nodes(get_ast(code)))
-    decorators = [(each.start_pos, each.end_pos) for each in nodes if each.type == "decorator"]
+    kept = [each for each in nodes if each.type == "decorator"]
+    kept += [each for each in nodes if each.type == "operator" and each.parent.type in UNPACKING]
     changes = defaultdict(list)
     for name in filter(OPERATORS.match, operator_names()):
         operator = get_operator(name)()
         places = (start for node in nodes for start, _ in operator.mutation_positions(node))
         for occurrence, start in enumerate(places):
-            if not any(first <= start < last for first, last in decorators):
+            if not any(each.start_pos <= start < each.end_pos for each in kept):
                 changes[start].append((operator, occurrence))
-    if not changes:
-        return None
-    changed: str | None = mutate_code(code, *rng.choice(changes[rng.choice(sorted(changes))]))
-    return changed
+    return mutate_code(code, *rng.choice(changes[rng.choice(sorted(changes))])) if changes else None
 
 
 def _test(tests: Path) -> None:
     os.setsid()
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
-    silence = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(silence, 1)
-    os.dup2(silence, 2)
-    options = ("-x", "-n0", "-p", "no:cacheprovider", "--assert=plain")
-    os._exit(pytest.main([*options, str(tests)]))
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    os.dup2(1, 2)
+    os._exit(pytest.main(["-xn0", "-pno:cacheprovider", "--assert=plain", str(tests)]))
 
 
 def outcome(tests: Path) -> str:
-    """Return how tests end in the working directory: survived, noticed or timeout.
-
-    They run in a fork, which has the large packages that it imports.
-    """
+    """Return how tests end here; in a fork, which has the large packages that it imports."""
     process = multiprocessing.get_context("fork").Process(target=_test, args=(tests,))
     process.start()
     process.join(TIMEOUT_S)
     if process.exitcode is None and process.pid is not None:
         os.killpg(process.pid, signal.SIGKILL)
         process.join()
-        return "timeout"
-    ended: dict[int | None, str] = {0: "survived", 1: "noticed", 2: "noticed"}
-    return ended.get(process.exitcode, f"ended by {process.exitcode}")
-
-
-@cache
-def outcome_of_none(tests: Path) -> str:
-    """Return how tests end without a mutant."""
-    return outcome(tests)
-
-
-def held(copy: Path, module: Path, code: str) -> str:
-    """Return how the tests of a module end with other code in its place, in a copy."""
-    for tests in mirroring(module)[:1]:
-        if outcome_of_none(tests) != "survived":
-            raise SystemExit(f"{tests} fails as it is")
-    file = copy / module
-    before, times = file.read_bytes(), file.stat()
-    file.write_text(code, "utf-8")
-    try:
-        for tests in mirroring(module):
-            ended = outcome(tests)
-            if ended != "survived":
-                return ended
+    if process.exitcode == 0:
         return "survived"
-    finally:
-        file.write_bytes(before)
-        os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))
+    return "noticed" if process.exitcode in NOTICED else f"ended by {process.exitcode}"
 
 
-def main() -> None:
-    """Draw mutants, hold each against its tests, print those that survive."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("seed", type=int)
-    parser.add_argument("count", type=int)
-    parser.add_argument("places", nargs="*", default=list(PLACES), choices=[*PLACES, []])
-    options = parser.parse_args()
-    rng = random.Random(options.seed)
-    ended: Counter[str] = Counter()
+as_it_is = cache(outcome)
+
+
+def held(module: Path, mutant: str) -> str:
+    """Return how the tests of a module end with a mutant in its place."""
+    before, times = module.read_bytes(), module.stat()
+    for tests in mirroring(module):
+        if as_it_is(tests) == "noticed":
+            raise SystemExit(f"{tests} fails without a mutant")
+        if as_it_is(tests) != "survived":
+            break  # a room that takes too long
+        module.write_text(mutant, "utf-8")
+        ended = outcome(tests)
+        module.write_bytes(before)
+        os.utime(module, ns=(times.st_atime_ns, times.st_mtime_ns))  # compiled files stay true
+        if ended != "survived":
+            return ended
+    return "survived"
+
+
+def main(seed: str, count: str, *places: str) -> None:
+    """Draw mutants of some places, or of all; print those that are not noticed."""
+    rng, ended = random.Random(int(seed)), Counter[str]()
     with tempfile.TemporaryDirectory() as directory:
         copy = Path(directory, "tree")
-        ignored = shutil.ignore_patterns(".*", "node_modules", "__pycache__", "build", "dist")
-        shutil.copytree(ROOT, copy, ignore=ignored)
+        ignored = shutil.ignore_patterns(".*", "node_modules", "__pycache__", "build")
+        shutil.copytree(Path(__file__).parents[1], copy, ignore=ignored)
         os.chdir(copy)
         sys.path[:1] = [str(copy / each) for each in ("", "client", "driver", "server")]
         os.environ["PYTHONPATH"] = os.pathsep.join(sys.path[:4])
-        for each in LARGE:
-            importlib.import_module(each)
-        while ended.total() < options.count:
-            module = rng.choice(modules(PLACES[rng.choice(options.places)]))
-            code = (ROOT / module).read_text("utf-8")
-            changed = draw(code, rng)
-            if changed is None:
+        list(map(importlib.import_module, LARGE))
+        while ended.total() < int(count):
+            module = rng.choice(modules(PLACES[rng.choice(places or list(PLACES))]))
+            code = module.read_text("utf-8")
+            if (mutant := draw(code, rng)) is None:
                 continue
-            result = held(copy, module, changed)
-            ended[result] += 1
+            ended[result := held(module, mutant)] += 1
             if result != "noticed":
-                lines = difflib.unified_diff(
-                    code.splitlines(), changed.splitlines(), n=0, lineterm=""
-                )
-                print(result, module, *list(lines)[2:], sep="\n    ", flush=True)
+                _, _, *lines = difflib.unified_diff(code.splitlines(), mutant.splitlines(), n=0)
+                print(result, module, *lines, sep="\n    ", flush=True)
     print(*(f"{number} {each}" for each, number in ended.items()), sep=", ")
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])

@@ -390,6 +390,12 @@ def test_every_product_is_in_the_specification_as_it_is_in_the_code() -> None:
         assert f"| {' | '.join(row)} |" in text
 
 
+def test_limits_are_those_of_the_specification() -> None:
+    text = " ".join(SPECIFICATION.read_text("utf-8").split())
+
+    assert f"The first message, within {wire.FIRST_MESSAGE_WITHIN_S:g} s" in text
+
+
 def test_every_close_code_is_in_the_specification() -> None:
     text = SPECIFICATION.read_text("utf-8")
 
