@@ -6,6 +6,8 @@ HOST ?= 127.0.0.1
 PORT ?= 8000
 CAMERA ?= sim:mirrors
 PAGE ?= all
+SEED ?= 2
+COUNT ?= 20
 
 BIN := .venv/bin
 # Distributions of their own, which extras name.
@@ -15,7 +17,7 @@ DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 
 DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test test-fast check bench paper docs docs-site dist clean dashboard debian-packages \
+.PHONY: help serve test test-fast mutants check bench paper docs docs-site dist clean dashboard debian-packages \
 	check-pyright check-mypy check-style check-documents check-dashboard check-newest
 
 help:  ## Say what each target does
@@ -34,6 +36,9 @@ test-fast: .venv/test.stamp  ## Run the tests of mathematics, wire format and pl
 
 check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lint, types, import laws
 	@$(MAKE) --no-print-directory --jobs 2 check-pyright check-mypy check-style check-documents check-dashboard
+
+mutants: .venv/mutants.stamp  ## Draw random mutants that no test notices (SEED=2 COUNT=20 WHERE='wire lease')
+	$(BIN)/python -m tests.mutants $(SEED) $(COUNT) $(WHERE)
 
 bench: .venv/test.stamp  ## Measure speed, everything in one run on the same data
 	$(BIN)/python -m benchmarks
@@ -77,6 +82,11 @@ clean:  ## Remove everything that was built or installed here
 	$(BIN)/python -m pip install --quiet --editable '.[test]' $(PACKAGES)
 	$(BIN)/python -m pip install --quiet --no-deps 'epc-tofcam-toolkit==0.13.0'
 	@touch $@ .venv/serve.stamp
+
+# For nothing else, and with much that nothing else needs.
+.venv/mutants.stamp: .venv/test.stamp
+	$(BIN)/python -m pip install --quiet 'cosmic-ray>=8.7'
+	@touch $@
 
 # What is installed here states the commit that it is of.
 .venv/version.stamp: $(wildcard .git/logs/HEAD) | .venv/serve.stamp

@@ -211,6 +211,26 @@ _FRAME = {
 }
 
 
+@pytest.mark.parametrize("frame", [0, 2**53 - 1])
+def test_a_frame_may_have_any_number_that_a_browser_counts_exactly(frame: int) -> None:
+    assert wire.parse_client_message(wire.encode(wire.Ack(frame))) == wire.Ack(frame)
+
+
+@pytest.mark.parametrize("decimation", [1, 64])
+def test_the_limits_of_a_decimation_are_part_of_it(decimation: int) -> None:
+    item = {"product": "range", "decimation": decimation}
+
+    parsed = wire.parse_client_message(wire.pack(_SUBSCRIBE | {"subscriptions": [item]}))
+
+    assert parsed == wire.Subscribe((wire.Subscription("range", decimation=decimation),), credits=2)
+
+
+def test_a_frame_that_states_no_time_of_encoding_took_none() -> None:
+    document = wire.frame_document(product="range", unit="m", axes=("x",), meta={"frame": 1})
+
+    assert document["encode_s"] == 0.0
+
+
 @pytest.mark.parametrize(
     ("change", "field"),
     [
@@ -240,6 +260,22 @@ _FRAME = {
         (
             {"subscriptions": [{"product": "range", "max_rate_hz": True}]},
             "subscriptions[0].max_rate_hz",
+        ),
+        (
+            {"subscriptions": [{"product": "range", "decimation": 0}]},
+            "subscriptions[0].decimation",
+        ),
+        (
+            {"subscriptions": [{"product": "range", "decimation": 65}]},
+            "subscriptions[0].decimation",
+        ),
+        (
+            {"subscriptions": [{"product": "range", "region": [0, 0, 8]}]},
+            "subscriptions[0].region",
+        ),
+        (
+            {"subscriptions": [{"product": "range", "region": [0, 0, 8, 8, 8]}]},
+            "subscriptions[0].region",
         ),
         ({"token": 5}, "token"),
         ({"token": "x" * 5000}, "token"),
@@ -352,6 +388,12 @@ def test_every_product_is_in_the_specification_as_it_is_in_the_code() -> None:
         axes = ", ".join(product.axes)
         row = (f"`{product.name}`", axes, f"`{product.dtype}`", product.unit, product.summary)
         assert f"| {' | '.join(row)} |" in text
+
+
+def test_limits_are_those_of_the_specification() -> None:
+    text = " ".join(SPECIFICATION.read_text("utf-8").split())
+
+    assert f"The first message, within {wire.FIRST_MESSAGE_WITHIN_S:g} s" in text
 
 
 def test_every_close_code_is_in_the_specification() -> None:

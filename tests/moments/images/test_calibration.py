@@ -58,8 +58,16 @@ def test_a_pixel_without_gain_becomes_nan_and_no_other() -> None:
     assert np.isfinite(calibrated[:, [0, 2]]).all()
 
 
-def test_a_dark_calibration_pixel_is_nan() -> None:
-    assert np.isnan(tm.calibration_of(np.zeros((2, 1), complex))).all()
+@pytest.mark.parametrize("dark", [0.0, -1.0])
+def test_a_dark_calibration_pixel_is_nan(dark: float) -> None:
+    assert np.isnan(tm.calibration_of(np.full((2, 1), dark, complex))).all()
+
+
+def test_how_bright_the_source_of_a_calibration_was_is_nothing_to_its_gains() -> None:
+    gain = np.array([[1.0], [0.3 - 0.4j]])
+
+    for brightness in (1e-6, 0.5, 900.0):
+        assert np.allclose(tm.calibration_of(brightness * gain), gain)
 
 
 def test_wrong_shapes_and_arguments_are_refused() -> None:

@@ -63,6 +63,15 @@ def test_equal_takes_are_all_kept() -> None:
     assert np.allclose(average.images, images[0], rtol=1e-15)
 
 
+@pytest.mark.parametrize("level", [1.0, 1e6])
+def test_takes_that_differ_by_rounding_alone_are_all_kept(level: float) -> None:
+    last_places = np.array([0, 1, 2, 2, 6]).reshape(5, 1, 1)
+
+    average = tm.average_takes(level + last_places * np.spacing(level))
+
+    assert average.kept.all()
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e30])
 def test_one_wild_pixel_does_not_throw_its_image_away(bad: float) -> None:
     images, _ = takes()

@@ -1,9 +1,12 @@
 """Flags of pixels."""
 
+import re
+
 import numpy as np
 import pytest
 
 import transientcam_moments as tm
+from tests.client.conftest import SPECIFICATION
 
 
 @pytest.mark.parametrize("dtype", [np.complex64, np.complex128])
@@ -19,6 +22,16 @@ def test_every_pixel_is_judged_by_itself(dtype: type) -> None:
 
     assert found.dtype == np.uint8
     assert found.tolist() == [int(flag) for flag in pixels]
+
+
+def test_every_flag_is_the_bit_that_the_specification_of_the_stream_gives_it() -> None:
+    table = SPECIFICATION.read_text("utf-8").partition("| bit |")[2]
+
+    found = dict(re.findall(r"^\| (\d+) \| `(\w+)` \|", table, re.MULTILINE))
+
+    assert {int(bit): name.upper() for bit, name in found.items()} == {
+        int(each): each.name for each in tm.Flags if each
+    }
 
 
 def test_contradicting_moments_are_degenerate_and_negative_light_is_none() -> None:

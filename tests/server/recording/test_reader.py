@@ -44,6 +44,13 @@ def test_what_was_known_before_the_first_frame_comes_back(tmp_path: Path) -> Non
         assert recording.end["reason"] == "stopped"
 
 
+def test_what_is_written_in_place_has_the_same_room_in_every_file(tmp_path: Path) -> None:
+    # another release replaces these bytes: more of them would reach into what lies behind
+    with h5py.File(record(tmp_path / "a.h5", 1), "r") as file:
+        assert file["annotations"].dtype.itemsize == 16384
+        assert file["end"].dtype.itemsize == 4096
+
+
 def test_a_calibration_of_every_pixel_travels_along(tmp_path: Path) -> None:
     planes = np.exp(1j * np.arange(3 * HEIGHT * WIDTH)).reshape(3, HEIGHT, WIDTH)
     path = record(tmp_path / "a.h5", 1, calibration_planes=planes.astype(np.complex64))

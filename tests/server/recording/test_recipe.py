@@ -1,12 +1,12 @@
 """Recorded frames are computed with what was recorded beside them."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import pytest
 
 import transientcam_moments as tm
-from tests.server.recording.made import header
+from tests.server.recording.made import CAPABILITIES, header
 from transientcam_server.imaging import SettingsVersion
 from transientcam_server.recording import recorded_recipe
 from transientcam_server.recording._recipe import recorded_sensor
@@ -19,6 +19,14 @@ def test_the_noise_is_that_of_the_recorded_sensor() -> None:
     recorded = header(camera={"sensor": asdict(SENSOR)})
     recipe = recorded_recipe(recorded, SettingsVersion(0, ReconstructionSettings()))
     assert recipe.sensor == SENSOR
+
+
+def test_the_end_of_the_scale_is_the_highest_code_of_the_converter() -> None:
+    recorded = header(capabilities=replace(CAPABILITIES, bits=10))
+
+    recipe = recorded_recipe(recorded, SettingsVersion(0, ReconstructionSettings()))
+
+    assert recipe.full_scale == 1023.0
 
 
 @pytest.mark.parametrize(

@@ -250,7 +250,7 @@ def test_the_rest_of_a_lost_image_is_left_with_its_connection() -> None:
 
         images.expect(200)
         connections[2].close()
-        with pytest.raises(CameraLost, match="closed"):
+        with pytest.raises(CameraLost, match=r"images at 127\.0\.0\.1: the connection was closed"):
             images.receive(1.0)
         images.close()
     for each in connections:

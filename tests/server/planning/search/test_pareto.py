@@ -34,3 +34,10 @@ def test_a_front_is_flat_from_where_bias_rules_and_time_no_longer_halves_the_err
     assert flat_from(falling[:2]) == 1
     assert flat_from(falling) is None
     assert flat_from([]) is None
+
+
+def test_a_front_is_not_flat_while_more_time_leaves_less_than_half_of_the_error() -> None:
+    last = (0.001, 0.01, 0.01)
+
+    assert flat_from([(0.001, 0.019, 0.019), last]) == 0
+    assert flat_from([(0.001, 0.025, 0.025), last]) == 1

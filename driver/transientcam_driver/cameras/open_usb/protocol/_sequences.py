@@ -31,8 +31,8 @@ class SequenceWords:
     low_word: int
     exposure_ns: int
     takes: int
-    take_order: int = 0
-    phase_offset: int = 0
+    take_order: int
+    phase_offset: int
 
     _LAYOUT = struct.Struct("<BBBBBBHIII")
     _OFFSET = struct.Struct("<Hxx")

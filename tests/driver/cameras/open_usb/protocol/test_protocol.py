@@ -1,12 +1,15 @@
 """Bytes against docs/usb-protocol.md: offsets written out by hand, and recorded vectors."""
 
 import math
+import re
 import struct
 from dataclasses import replace
+from enum import IntEnum, IntFlag
 
 import pytest
 from hypothesis import given, strategies as st
 
+from tests.conftest import ROOT
 from transientcam_driver import FirmwareTooOld, ProtocolError, Sequence, SubPhases
 from transientcam_driver.camera import DeviceState, Status, StatusFlag
 from transientcam_driver.cameras.open_usb.protocol import (
@@ -30,6 +33,7 @@ from transientcam_driver.cameras.open_usb.protocol import (
 from transientcam_driver.cameras.open_usb.protocol._capabilities import CAPS_BYTES
 from transientcam_simulation.emulated._open_usb.prototype import prototype
 
+SPECIFICATION = ROOT / "docs" / "usb-protocol.md"
 CAPABILITIES = prototype(serial="T-1", width=163, height=120, bits=12)
 
 u8, u16, u32, u64 = (st.integers(0, 2**bits - 1) for bits in (8, 16, 32, 64))
@@ -71,6 +75,25 @@ HEADER_VECTOR = bytes.fromhex(
     "5443494d 01 40 0300 03000000 11000000 0200000001000000 0400 1000 00cf7b05 00c0 0100"
     "004c1d00 141a99be1c000000 83ff 0000 d0980000 839206e3"
 )
+
+
+STATED = {
+    Request: r"^\| (0x\w\w) \| ([A-Z_]+) \| (?:in|out) \|",
+    ErrorCode: r"^\| (\d) \| ([A-Z_]+) \|",
+    DeviceState: r"^\| 1 \| uint8 \| (state: 0 .*) \|$",
+    StatusFlag: r"^\| 2 \| uint16 \| (flags: .*) \|$",
+    ImageFlag: r"^\| 6 \| uint16 \| (flags: .*) \|$",
+}
+"""Where the specification has the codes: in rows of a table, or all in one."""
+
+
+@pytest.mark.parametrize("codes", STATED)
+def test_codes_are_those_of_the_specification(codes: type[IntEnum] | type[IntFlag]) -> None:
+    found = re.findall(STATED[codes], SPECIFICATION.read_text("utf-8"), re.MULTILINE)
+    if len(found) == 1:
+        found = re.findall(r"(\d) ([A-Z_]{3,})", found[0])
+
+    assert {int(code, 0): name for code, name in found} == {int(each): each.name for each in codes}
 
 
 def test_the_checksum_is_the_castagnoli_one() -> None:
