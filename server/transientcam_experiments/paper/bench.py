@@ -140,7 +140,7 @@ class Bench:
             return images, camera.simulation.truth()
 
     def calibration(self, sequence: Sequence, *, options: Options = NO_OPTIONS) -> Calibration:
-        """Return the calibration of a sequence: filter and diffusor before the lens (Fig. 4)."""
+        """Return the calibration of a sequence: filter and diffuser before the lens (Fig. 4)."""
         single = replace(sequence, takes=1)
         key = (single, *sorted(options.items()))
         if key not in self._calibrations:

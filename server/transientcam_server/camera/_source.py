@@ -56,7 +56,7 @@ class Twin:
         What the first one was opened with.
     age_s
         Device time of the first one.
-    scene, definition, effects, diffusor
+    scene, definition, effects, diffuser
         What it simulates at present.
     """
 
@@ -65,7 +65,7 @@ class Twin:
     scene: str
     definition: str | None
     effects: dict[str, str]
-    diffusor: bool
+    diffuser: bool
 
     def open(self) -> Camera:
         """Open it, in virtual time.
@@ -80,17 +80,17 @@ class Twin:
         clock.sleep(self.age_s)
         there = camera.simulation
         assert there is not None  # noqa: S101 - of the same spec
-        if (there.scene, there.definition, there.effects, there.diffusor) != (
+        if (there.scene, there.definition, there.effects, there.diffuser) != (
             self.scene,
             self.definition,
             self.effects,
-            self.diffusor,
+            self.diffuser,
         ):
             there.change(
                 scene=self.scene,
                 definition=self.definition,
                 effects=self.effects,
-                diffusor=self.diffusor,
+                diffuser=self.diffuser,
             )
         return camera
 
@@ -102,4 +102,4 @@ def twin_of(camera: Camera, spec: str) -> Twin:
     age_s = 0.0
     with contextlib.suppress(CameraError):  # an unplugged one is as new as the twin
         age_s = camera.status().device_time_s
-    return Twin(spec, age_s, own.scene, own.definition, own.effects, own.diffusor)
+    return Twin(spec, age_s, own.scene, own.definition, own.effects, own.diffuser)

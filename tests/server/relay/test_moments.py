@@ -145,10 +145,10 @@ def test_pixels_that_were_saturated_are_flagged_at_the_relay_too(
 def test_a_calibration_of_the_origin_comes_with_the_first_frame_of_it(
     at_origin: transientcam.Camera, at_relay: transientcam.Camera, origin: Served, relay: Served
 ) -> None:
-    at_origin.simulate(diffusor=True)
+    at_origin.simulate(diffuser=True)
     job = at_origin.calibrations.measure(frames=4, activate=True, harmonics=False)
     active = at_origin.wait_for(job["id"])["result"]["calibration"]
-    at_origin.simulate(diffusor=False)
+    at_origin.simulate(diffuser=False)
     number, theirs = frame_of(relay, lambda meta: meta["calibration_id"] == active)
     for product in ("range", "flags"):
         ours = at_relay.frame(product, number=number).array

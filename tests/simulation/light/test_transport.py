@@ -243,7 +243,8 @@ def test_a_composed_scene_is_seen_where_it_is_at_that_time(tmp_path: Path) -> No
             "0",
         ),
         ("[light]", "[transport]\npatches = 1\n[light]", "transport.patches", "from 2 to 64"),
-        ("[light]", "[diffusor]\n[light]", "surface", "only one of them"),
+        ("[light]", "[diffuser]\n[light]", "surface", "only one of them"),
+        ("[light]", "[diffuser]\n[diffusor]\n[light]", "diffusor", "absent beside [diffuser]"),
     ],
 )
 def test_an_error_in_a_composition_is_named(
