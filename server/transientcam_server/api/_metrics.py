@@ -60,7 +60,7 @@ class Metrics:
         self._last: Captured | None = None
         # every series from the start, so that its rate can be queried
         self.pixels: Mapping[str, int] = {"total": 1} | dict.fromkeys(_FLAGS, 0)
-        self.spoilt = dict.fromkeys(("rejected", "repaired", "filled", "unrepaired"), 0)
+        self.corrupt = dict.fromkeys(("rejected", "repaired", "filled", "unrepaired"), 0)
         self.losses = 0
         self.reconnects = 0
         self.registry.register(_ServiceCollector(service, self))
@@ -93,9 +93,9 @@ class Metrics:
         if meta["reconstruct_s"] is not None:
             self._reconstruction.observe(meta["reconstruct_s"])
         self.pixels = meta["pixels"] or self.pixels
-        for result in self.spoilt:
+        for result in self.corrupt:
             images = meta[f"{result}_images"] or 0
-            self.spoilt[result] += len(images) if isinstance(images, list) else images
+            self.corrupt[result] += len(images) if isinstance(images, list) else images
 
     def answered(self, status: int) -> None:
         """Count an answer."""
@@ -171,14 +171,14 @@ class _ServiceCollector(Collector):
         ):
             images.add_metric((result,), count)
         yield images
-        spoilt = CounterMetricFamily(
+        corrupt = CounterMetricFamily(
             "transientcam_spoilt_images",
             "Images unlike the others, of frames that were computed, by what became of them.",
             labels=("result",),
         )
-        for result, count in self._metrics.spoilt.items():
-            spoilt.add_metric((result,), count)
-        yield spoilt
+        for result, count in self._metrics.corrupt.items():
+            corrupt.add_metric((result,), count)
+        yield corrupt
         yield CounterMetricFamily(
             "transientcam_usb_resynchronisations",
             "How often the beginning of an image had to be searched for.",

@@ -238,7 +238,7 @@ class Recipe:
     ) -> tm.Reconstruction:
         """Return the reconstruction of a capture; it computes what is read of it.
 
-        ``previous``, where it has the same sequence, is what spoilt images are filled in from;
+        ``previous``, where it has the same sequence, is what corrupt images are filled in from;
         ``spread`` is how compiled lanes use several threads.
         """
         if isinstance(raw, MomentFrame):

@@ -55,9 +55,9 @@ def test_a_frame_is_handed_over_with_the_time_at_which_it_was_complete(
 def test_a_packet_that_is_lost_or_torn_costs_one_image(
     intake: Intake, counters: Counters, torn: bool
 ) -> None:
-    spoilt = frame(0)
-    spoilt[3:4] = [spoilt[3][:100]] if torn else []
-    push(intake, spoilt)
+    corrupt = frame(0)
+    corrupt[3:4] = [corrupt[3][:100]] if torn else []
+    push(intake, corrupt)
     push(intake, frame(1))
     arrival = intake.take(0.0)
 
@@ -147,11 +147,11 @@ def test_a_fault_of_the_emulated_cable_spoils_a_packet_of_as_many_images(fault: 
     whole = [len(packet) for packet in device.frame()]
     device.inject(fault, 2)
 
-    spoilt, after = ([len(packet) for packet in device.frame()] for _ in range(2))
+    corrupt, after = ([len(packet) for packet in device.frame()] for _ in range(2))
 
-    missing = sum(whole) - sum(spoilt)
+    missing = sum(whole) - sum(corrupt)
     assert missing == 2 * 33_792 // (1 if fault is Fault.DROP else 2)
-    assert spoilt.count(0) == 10
+    assert corrupt.count(0) == 10
     assert after == whole
 
 

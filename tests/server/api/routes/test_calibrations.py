@@ -84,7 +84,7 @@ def test_harmonics_are_measured_by_a_phase_sweep_and_taken_out(tmp_path: Path) -
         client_of(daemon) as http,
     ):
         sub_phases = {"scheme": "arccos", "n": 4}
-        # two frequencies have four sums of opposite images, which find spoilt ones in each take
+        # two frequencies have four sums of opposite images, which find corrupt ones in each take
         sequence = QUICK | {"harmonics": 2, "sub_phases": sub_phases}
         http.put("/api/v1/sequence", json=sequence)
         result = measured(http, frames=30, activate=True, force=True)["result"]
