@@ -1,7 +1,7 @@
 """Plans held to what they promise: predicted against measured noise, bias and error.
 
 Every scene is looked at once; every goal is planned, and what is recommended is captured by another
-specimen of noise and compared with the truth of the simulation.
+sample of noise and compared with the truth of the simulation.
 """
 
 import os

@@ -168,7 +168,7 @@ class Simulation(Protocol):
         """Put the camera in front of another scene, or choose other effects; images go on.
 
         Returns once the scene is prepared, which may take seconds. The camera stays the same
-        specimen: its sensor and its imperfections are those of the scene it was built with. The
+        unit: its sensor and its imperfections are those of the scene it was built with. The
         frame that is captured meanwhile may hold images of both.
 
         Parameters

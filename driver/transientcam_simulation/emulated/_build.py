@@ -131,7 +131,7 @@ def build(
 ) -> tuple[EmulatedDevice, SimulationHandle]:
     """Build a simulated camera in front of a scene: the device, and the handle on both."""
     capabilities = prototype(
-        # the same specimen in front of every scene
+        # the same unit in front of every scene
         serial=f"SIM-{scene.device.name}-{scene.device.seed}"[:32],
         width=width,
         height=height,
@@ -157,7 +157,7 @@ def build(
 def world_before(
     scene: Scene, *, width: int, height: int, seed: int | None, readout_s: float
 ) -> tuple[SwitchableWorld, PrepareScene]:
-    """Build the world in front of a specimen of a camera, and what prepares another one for it.
+    """Build the world in front of a unit of a camera, and what prepares another one for it.
 
     Sensor, imperfections and what is off of its noise stay those of the scene given.
 

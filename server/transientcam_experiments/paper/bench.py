@@ -31,7 +31,7 @@ NO_OPTIONS: Final[Options] = MappingProxyType({})
 WITHOUT_OUTLIERS: Final[Options] = MappingProxyType({"outliers": "off"})
 """For data "without outliers" (Fig. 12), and for comparison."""
 DEVICE: Final = "prototype"
-"""The make of camera: the paper's, as far as its figures are known."""
+"""The model of camera: the paper's, as far as its figures are known."""
 WARM_UP_S: Final = 1800.0
 """"After some warm-up time" (Sec. 6.4): thermal drift has ended, and moving scenes begin anew."""
 _QUICK_TAKES = 3  # the fewest in which an outlier is found

@@ -300,7 +300,7 @@ FIGURE: Final = PaperFigure(
     "Column x of the sensor sees a return x / 163 of a period late, so that one difference of two "
     "opposite images is the effective modulation over a whole period. It is measured over USB for "
     "a triangular waveform and for one with the third harmonic that was measured on the paper's "
-    "make of camera, without noise, with arccos sampling and with harmonic cancellation. The "
+    "model of camera, without noise, with arccos sampling and with harmonic cancellation. The "
     "simulated device takes the first nine harmonics of a waveform.",
     make,
 )

@@ -251,7 +251,7 @@ def _remarks(ranged: list[Ranged]) -> list[str]:
             f"{coded_corner.HARMONICS} harmonics of the code as its waveform and repeats it at "
             f"{coded.entry.m} frequencies, {coded_corner.SEQUENCE.images_per_take} images a take. "
             f"That device is ideal and modulates up to {highest_mhz:g} MHz, where the paper's "
-            "make of camera reaches about 100 MHz and errs as everywhere else on this page."
+            "model of camera reaches about 100 MHz and errs as everywhere else on this page."
         )
     more = [each for each in ranged if each.entry.base_frequency_hz == _HALF]
     title = f"With f = {_HALF / 1e6:g} MHz, m up to 8"

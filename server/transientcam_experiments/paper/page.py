@@ -89,7 +89,7 @@ def _head(figures: list[dict[str, Any]]) -> Iterator[str]:
     yield (
         f"The figures of [Peters et al. 2015]({_PAPER}), made by this software. Every capture "
         "comes from the simulated camera over its emulated USB, with the errors of the paper's "
-        "make of device, after warm-up and with a calibration measured as in Sec. 4.2; figures 5, "
+        "model of device, after warm-up and with a calibration measured as in Sec. 4.2; figures 5, "
         "7 and 11 are synthetic, as in the paper. Figures 1 and 4 of the paper show its set-up."
     )
     yield ""

@@ -49,7 +49,7 @@ def test_truth_name_and_explanation_follow_the_scene(open_virtual: OpenCamera) -
     assert simulation.scene == simulation.explain().scene == "wall"
 
 
-def test_the_camera_stays_the_same_specimen_before_every_scene(open_virtual: OpenCamera) -> None:
+def test_the_camera_stays_the_same_unit_before_every_scene(open_virtual: OpenCamera) -> None:
     camera = open_virtual("sim:wall?device=prototype&noise=off")
     simulation = _simulation(camera)
     sensor, serial = simulation.sensor, camera.capabilities.serial
