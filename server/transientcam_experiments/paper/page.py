@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from transientcam_experiments.paper.figure import Made, PaperFigure
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure
 
 PAGE: Final = "paper.md"
 FOLDER: Final = Path("figures") / "paper"
@@ -21,7 +21,7 @@ def picture_name(number: int) -> str:
 
 
 def document_of(
-    figure: PaperFigure, made: Made, *, seconds: float, quick: bool, seed: int
+    figure: PaperFigure, made: FigureResult, *, seconds: float, quick: bool, seed: int
 ) -> dict[str, Any]:
     """Return everything about a figure but its picture, for JSON."""
     return {

@@ -14,7 +14,7 @@ from prometheus_client.registry import Collector
 
 import transientcam_moments as tm
 from transientcam_server.api._relay_metrics import RelayCollector
-from transientcam_server.camera import Back, Captured, Event, Lost
+from transientcam_server.camera import CameraLostEvent, CameraRecoveredEvent, Captured, Event
 from transientcam_server.imaging import NOMINAL_ID
 from transientcam_server.recording import Library
 from transientcam_server.service import Service
@@ -78,10 +78,10 @@ class Metrics:
                     interval_s = raw.device_time_s - self._last.raw.device_time_s
                     self._frame_interval.observe(interval_s)
                 self._last = event
-            case Lost():
+            case CameraLostEvent():
                 self.losses += 1
                 self._last = None
-            case Back():
+            case CameraRecoveredEvent():
                 self.reconnects += 1
 
     def sent(self, latency_s: float) -> None:

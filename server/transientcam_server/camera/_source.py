@@ -47,7 +47,7 @@ def start_with(camera: Camera, settings: SequenceSettings) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Twin:
+class SimulationSnapshot:
     """What another simulated camera is opened by, before the same scene, as old as the first.
 
     Attributes
@@ -95,11 +95,11 @@ class Twin:
         return camera
 
 
-def twin_of(camera: Camera, spec: str) -> Twin:
+def snapshot_of(camera: Camera, spec: str) -> SimulationSnapshot:
     """Return the twin of a simulated camera, which was opened with ``spec``."""
     own = camera.simulation
     assert own is not None  # noqa: S101 - callers look
     age_s = 0.0
     with contextlib.suppress(CameraError):  # an unplugged one is as new as the twin
         age_s = camera.status().device_time_s
-    return Twin(spec, age_s, own.scene, own.definition, own.effects, own.diffuser)
+    return SimulationSnapshot(spec, age_s, own.scene, own.definition, own.effects, own.diffuser)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class ReconstructionChoices:
     """Names of products, if any were given; settings in place of the recorded ones."""
 
     products: Sequence[str]
@@ -53,7 +53,7 @@ def settings_of(values: Mapping[str, Any]) -> "ReconstructionSettings":
 
 
 def reconstruct_recording(
-    place: str, output: Path, wanted: Wanted, token: str | None, *, as_json: bool
+    place: str, output: Path, wanted: ReconstructionChoices, token: str | None, *, as_json: bool
 ) -> None:
     """Reconstruct every frame of a recording, continuing an interrupted run.
 
@@ -73,7 +73,7 @@ def reconstruct_recording(
 def reconstruct_on_cluster(
     place: str,
     output: str,
-    wanted: Wanted,
+    wanted: ReconstructionChoices,
     workers: int | None,
     dask: str | None,
     token: str | None,
