@@ -4,7 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from transientcam_simulation.compiled._compiling import FLAG
-from transientcam_simulation.compiled._lanes import CHUNK, LANES
+from transientcam_simulation.compiled._image_kernels import CHUNK, IMAGE_KERNELS
 
 if TYPE_CHECKING:
     from transientcam_simulation.compiled._compiling import (
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         inner,
         int32,
         int64,
-        lane,
+        kernel,
     )
 
 __all__ = [
@@ -40,8 +40,8 @@ __all__ = [
     "DOUBLES",
     "FLAG",
     "FLAGS",
+    "IMAGE_KERNELS",
     "INDICES",
-    "LANES",
     "LINE",
     "MARKS",
     "NUMBERS",
@@ -59,7 +59,7 @@ __all__ = [
     "inner",
     "int32",
     "int64",
-    "lane",
+    "kernel",
 ]
 
 

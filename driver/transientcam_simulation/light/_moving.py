@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_simulation.compiled import LANES
+from transientcam_simulation.compiled import IMAGE_KERNELS
 from transientcam_simulation.light import (
     _compiled_chunks as compiled_chunks,
     _compiled_overlaps as compiled_overlaps,
@@ -87,7 +87,7 @@ class MovingLight:
         self.scene = scene
         self.still = still
         self._soft = soft
-        LANES.want()
+        IMAGE_KERNELS.want()
         self._movers = tuple(k for k, each in enumerate(scene.surfaces) if each.motions)
         self._lights = tuple(image_lights(scene))
         self._sights = still.lines_of_sight(soft=soft)

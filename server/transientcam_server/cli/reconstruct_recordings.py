@@ -60,11 +60,11 @@ def reconstruct_recording(
     Kernels are compiled first, as on a cluster, so that each run gives the same bits.
     """
     from transientcam_server import offline
-    from transientcam_server.offline import BatchReconstructor, load_lanes, recording_at
+    from transientcam_server.offline import BatchReconstructor, load_kernels, recording_at
 
     with recording_at(place, token=token) as opened:
         options = wanted.options(opened.header)
-        load_lanes(BatchReconstructor(opened, options).recipe)
+        load_kernels(BatchReconstructor(opened, options).recipe)
         with progress_bar("reconstructing") as advance:
             before = offline.reconstruct_recording(opened, output, options, progress=advance)
         _report(str(output), options.products, opened.frames, before, as_json=as_json)
