@@ -334,7 +334,7 @@ class Service:
         """
         require_estimator(settings, self.applied.sequence, field="estimator")
         if settings != self._of_origin(settings):
-            self.require_images("What becomes of corrupt images is set")
+            self.require_images("The repair of corrupt images is set")
         return self._reconstruct_with(settings)
 
     def _reconstruct_with(self, settings: ReconstructionSettings) -> SettingsVersion:

@@ -68,7 +68,7 @@ class Bench:
     Parameters
     ----------
     seed
-        Of all chance.
+        Seed of all random numbers.
     quick
         Average fewer takes, and look at fewer points: for a first look, and for tests.
     waveform

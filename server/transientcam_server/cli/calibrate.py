@@ -23,19 +23,17 @@ if TYPE_CHECKING:
 def calibrate(
     url: Annotated[
         str | None,
-        typer.Argument(metavar="[URL]", help="A daemon, whose camera is measured and calibrated."),
+        typer.Argument(metavar="[URL]", help="Daemon whose camera is calibrated."),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="The .npz to write; a daemon keeps its own as well."),
+        typer.Option("--output", "-o", help="The .npz to write; a daemon also keeps a copy."),
     ] = None,
     camera: Annotated[
         str | None,
         typer.Option(help="Without a daemon: usb[:SERIAL] or sim:SCENE  [default: usb]"),
     ] = None,
-    takes: Annotated[
-        int, typer.Option(min=2, max=10_000, help="How often each image is captured.")
-    ] = 40,
+    takes: Annotated[int, typer.Option(min=2, max=10_000, help="Captures of each image.")] = 40,
     sequence: Annotated[
         str | None,
         typer.Option(
@@ -49,14 +47,14 @@ def calibrate(
     ] = False,
     force: Annotated[
         bool,
-        typer.Option("--force", help="Let it be used even if it was not measured on a diffuser."),
+        typer.Option("--force", help="Use it even if it was not measured on a diffuser."),
     ] = False,
     diffuser: Annotated[
         bool,
         typer.Option(
             "--diffuser",
             "--diffusor",
-            help="Put it before the lens of a simulated camera, and take it away.",
+            help="Put the diffuser before a simulated lens while measuring.",
         ),
     ] = False,
     harmonics: Annotated[
@@ -65,7 +63,9 @@ def calibrate(
     ] = True,
     undo: Annotated[
         bool,
-        typer.Option("--undo", help="Measure nothing: let the daemon use the former one again."),
+        typer.Option(
+            "--undo", help="Measure nothing; the daemon returns to the previous calibration."
+        ),
     ] = False,
     token: TokenOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,

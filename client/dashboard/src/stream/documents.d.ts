@@ -1230,7 +1230,7 @@ export interface TargetDocument {
   readonly range_std_m?: number | null;
   /** Distance at which two equal returns are both found. */
   readonly separation_m?: number | null;
-  /** In what share of all captures they are. */
+  /** Share of captures in which both are found. */
   readonly separation_share?: number;
   /** Width of the bounds on the density over the mean density, at most. */
   readonly bound_width?: number | null;

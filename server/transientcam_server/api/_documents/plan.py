@@ -23,7 +23,7 @@ class TargetDocument(_StrictDocument):
     separation_m: float | None = Field(default=None, gt=0)
     """Distance at which two equal returns are both found."""
     separation_share: float = Field(default=0.9, gt=0, lt=1)
-    """In what share of all captures they are."""
+    """Share of captures in which both are found."""
     bound_width: float | None = Field(default=None, gt=0)
     """Width of the bounds on the density over the mean density, at most."""
 
