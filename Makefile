@@ -110,7 +110,7 @@ check-newest:  ## Test what uses internals of numba and uvicorn with the newest 
 	build/newest/bin/python -m pip install --quiet --upgrade numba 'uvicorn[standard]'
 	build/newest/bin/python -m pip list | grep -E '^(numba|uvicorn) '
 	build/newest/bin/python -m pytest --numprocesses auto --dist loadfile tests/compiled tests/moments/test_kernels*.py \
-		tests/simulation/light/test_lanes.py tests/server/daemon tests/server/api/stream
+		tests/simulation/light/test_image_kernels.py tests/server/daemon tests/server/api/stream
 
 # Side by side, the slowest first.
 check-pyright:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from benchmarks.abuse.attacks import ATTACKS
-from benchmarks.abuse.measuring import COMES_BACK_S, GIVE_UP_S, Seen, measure
+from benchmarks.abuse.measuring import COMES_BACK_S, GIVE_UP_S, AttackOutcome, measure
 from benchmarks.common.machine import commit_of
 from benchmarks.common.tables import Cell, Table, heads
 
@@ -24,7 +24,7 @@ _COLUMNS: Final = heads(
 )
 
 
-def missed(seen: Seen) -> list[str]:
+def missed(seen: AttackOutcome) -> list[str]:
     """Return the bars that are missed."""
     limits = {
         "frames": seen.frames >= FRAMES_BAR,
@@ -96,7 +96,7 @@ def _table(
     return table
 
 
-def _row(name: str, connections: int, seen: Seen) -> tuple[Cell, ...]:
+def _row(name: str, connections: int, seen: AttackOutcome) -> tuple[Cell, ...]:
     below = missed(seen)
     return (
         name,

@@ -33,7 +33,7 @@ _HISTORY_S: Final = 2.0
 
 
 @dataclass
-class Seen:
+class AttackOutcome:
     """What healthy clients had during one attack; times in s, None for never.
 
     Attributes
@@ -123,10 +123,10 @@ def attacked(name: str, url: str, connections: int) -> Iterator[None]:
 
 def measure(
     name: str, connections: int, *, duration_s: float, checkout: Path | None = None
-) -> Seen:
+) -> AttackOutcome:
     """Attack a fresh daemon, and look what healthy clients have of it meanwhile."""
     tls = name == "silent TLS handshakes"
-    seen = Seen()
+    seen = AttackOutcome()
     with (
         served(checkout, tls=tls) as process,
         httpx.Client(base_url=process.url, timeout=GIVE_UP_S, verify=False) as client,

@@ -8,7 +8,7 @@ from benchmarks.common.tables import Cell, Table, heads
 
 
 @dataclass(frozen=True)
-class Kept:
+class PlanOutcome:
     """A plan and what was measured of it; errors in m, None where a goal was refused."""
 
     scene: str
@@ -85,7 +85,7 @@ class Refused:
     why: str
 
 
-def expectations(rows: list[Kept]) -> list[str]:
+def expectations(rows: list[PlanOutcome]) -> list[str]:
     """State in plain words what to expect of a plan: coverage, targets met, ratios."""
     targets = [row.met for row in rows if row.met is not None]
     above = [row for row in rows if row.above]
@@ -116,7 +116,7 @@ def expectations(rows: list[Kept]) -> list[str]:
     ]
 
 
-def by_mark(rows: list[Kept]) -> str:
+def by_mark(rows: list[PlanOutcome]) -> str:
     """State how many intervals hold and targets are met, with a known bias and without."""
     words = []
     for known, name in ((True, "known"), (False, "unknown")):
@@ -130,13 +130,13 @@ def by_mark(rows: list[Kept]) -> str:
     return ("; ".join(words) + ".").capitalize()
 
 
-def _of(rows: list[Kept]) -> str:
+def _of(rows: list[PlanOutcome]) -> str:
     """Name the scenes of some plans."""
     names = sorted({row.scene for row in rows})
     return f" ({', '.join(names)})" if names else ""
 
 
-def table(rows: list[Kept], refused: list[Refused]) -> Table:
+def table(rows: list[PlanOutcome], refused: list[Refused]) -> Table:
     """Return all plans, and what was refused."""
     columns = heads(
         "scene | goal | recommended | ms:.0f | noise:.3g | bias:.3g | error (90 %) mm | "

@@ -1,7 +1,7 @@
 """Plans held to what they promise: predicted against measured noise, bias and error.
 
 Every scene is looked at once; every goal is planned, and what is recommended is captured by another
-specimen of noise and compared with the truth of the simulation.
+sample of noise and compared with the truth of the simulation.
 """
 
 import os
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from benchmarks.accuracy.capturing import dimmest_dn_per_s, looked, measured
-from benchmarks.accuracy.kept import Kept, Refused, expectations, table
+from benchmarks.accuracy.kept import PlanOutcome, Refused, expectations, table
 from benchmarks.accuracy.prices import SCENES as BUILT_IN
 from benchmarks.common.measured_scenes import data_folder
 from benchmarks.common.tables import Table
@@ -52,7 +52,7 @@ def tables(
     yield table(rows, refused)
 
 
-def kept(scene: str, goals: dict[str, Goal], captures: int) -> Iterator[Kept | Refused]:
+def kept(scene: str, goals: dict[str, Goal], captures: int) -> Iterator[PlanOutcome | Refused]:
     """Plan all goals on a scene, and measure what is recommended."""
     name = Path(scene).stem
     try:
@@ -71,7 +71,7 @@ def kept(scene: str, goals: dict[str, Goal], captures: int) -> Iterator[Kept | R
         values, device_s, full = measured(
             scene, best.applied.sequence, best.estimator, captures, dimmest_dn_per_s(statistics)
         )
-        yield Kept(
+        yield PlanOutcome(
             name,
             wanted,
             goal.range_error_m,
@@ -99,15 +99,15 @@ def _predicted(choice: Choice) -> dict[str, float]:
 
 def all_kept(
     names: Iterable[str], goals: dict[str, Goal], captures: int, *, processes: int
-) -> tuple[list[Kept], list[Refused]]:
+) -> tuple[list[PlanOutcome], list[Refused]]:
     """Measure scenes, several at once, and print each plan as soon as its scene is done."""
-    rows: list[Kept] = []
+    rows: list[PlanOutcome] = []
     refused: list[Refused] = []
     of_scene = partial(_listed, goals=goals, captures=captures)
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
         for found in pool.map(of_scene, names):
             for each in found:
-                if isinstance(each, Kept):
+                if isinstance(each, PlanOutcome):
                     rows.append(each)
                     print(*each.row(), f"{each.planned_in_s:.1f} s", flush=True)
                 else:
@@ -116,5 +116,5 @@ def all_kept(
     return rows, refused
 
 
-def _listed(scene: str, goals: dict[str, Goal], captures: int) -> list[Kept | Refused]:
+def _listed(scene: str, goals: dict[str, Goal], captures: int) -> list[PlanOutcome | Refused]:
     return list(kept(scene, goals, captures))

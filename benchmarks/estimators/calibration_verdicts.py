@@ -1,4 +1,4 @@
-"""What the service says of calibrations measured on diffusors and on scenes."""
+"""What the service says of calibrations measured on diffusers and on scenes."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -39,7 +39,7 @@ class Case:
     sequence: Sequence = SEQUENCE
     spoil: Spoil | None = None
     before: Scene | None = None
-    """A diffusor that the camera was calibrated with before."""
+    """A diffuser that the camera was calibrated with before."""
 
 
 def capture(case: Case, scene: Scene) -> CalibrationCapture:
@@ -96,7 +96,7 @@ def vignetting(images: _Array, _: np.random.Generator) -> _Array:
 
 
 def dirt(images: _Array, random: np.random.Generator) -> _Array:
-    """Put 40 grains on the diffusor that let through 3 to 60 % of the light."""
+    """Put 40 grains on the diffuser that let through 3 to 60 % of the light."""
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     passed = np.ones((HEIGHT, WIDTH))
     for _ in range(40):
@@ -135,60 +135,60 @@ def _dimmed(images: _Array, passed: _Array) -> _Array:
     return np.asarray(black + (images - black) * passed)
 
 
-def diffusor_scene(**changes: Any) -> Scene:
+def diffuser_scene(**changes: Any) -> Scene:
     """Return the built-in calibration scene with changes of it."""
     return replace(find_scene("calibration"), **changes)
 
 
-def diffusors(data: Path) -> Iterator[Case]:
-    """Yield what should be trusted, and what a diffusor alone cannot show."""
-    real = diffusor_scene(device=PROTOTYPE)
+def diffusers(data: Path) -> Iterator[Case]:
+    """Yield what should be trusted, and what a diffuser alone cannot show."""
+    real = diffuser_scene(device=PROTOTYPE)
     for zeroth in ("low-frequency", "on-off", "estimated"):
         for m in (1, 3, 4, 8):
             sequence = replace(SEQUENCE, harmonics=m, zeroth=zeroth)
-            yield Case(f"diffusor, m = {m}, {zeroth}", real, True, sequence)
+            yield Case(f"diffuser, m = {m}, {zeroth}", real, True, sequence)
     fast = replace(SEQUENCE, base_frequency_hz=46e6, harmonics=2)
-    yield Case("diffusor, 46 MHz", real, True, fast)
-    yield Case("diffusor, an ideal camera", diffusor_scene(), True)
+    yield Case("diffuser, 46 MHz", real, True, fast)
+    yield Case("diffuser, an ideal camera", diffuser_scene(), True)
     for spoil, words in (
         (vignetting, "a quarter of the light in the corners"),
         (dirt, "40 grains of dirt"),
         (bad_pixels, "5 % bad pixels"),
         (everything, "vignetting, dirt and 5 % bad pixels"),
     ):
-        yield Case(f"diffusor, {words}", real, True, spoil=spoil)
+        yield Case(f"diffuser, {words}", real, True, spoil=spoil)
     dim = replace(real, light=replace(real.light, electrons_per_s=2.5e5))
-    yield Case("diffusor, a fiftieth of the light", dim, True)
+    yield Case("diffuser, a fiftieth of the light", dim, True)
     late = replace(PROTOTYPE.drift, delay_s_per_c=4e-11, time_constant_s=0.2)  # type: ignore[type-var]
-    drifting = diffusor_scene(device=replace(PROTOTYPE, drift=late))
-    yield Case("diffusor, ten times the drift while it is measured", drifting, True)
+    drifting = diffuser_scene(device=replace(PROTOTYPE, drift=late))
+    yield Case("diffuser, ten times the drift while it is measured", drifting, True)
     board = data / "modulation" / "TintinCDKCameraPhaseOffset.bin"
     if board.is_file():
         measured = replace(PROTOTYPE, pattern=Pattern(gain=0.01, file=board))
-        yield Case("diffusor, phases of a real board", diffusor_scene(device=measured), True)
+        yield Case("diffuser, phases of a real board", diffuser_scene(device=measured), True)
         yield Case(
-            "diffusor, phases of a real board, spoiled in every way",
-            diffusor_scene(device=measured),
+            "diffuser, phases of a real board, spoiled in every way",
+            diffuser_scene(device=measured),
             True,
             spoil=everything,
         )
-    delayed = diffusor_scene(device=PROTOTYPE, diffusor=_delayed(3e-9))
-    yield Case("diffusor, electronics 3 ns late, nothing known before", delayed, False)
+    delayed = diffuser_scene(device=PROTOTYPE, diffuser=_delayed(3e-9))
+    yield Case("diffuser, electronics 3 ns late, nothing known before", delayed, False)
     yield Case("the same, its delay known from before", delayed, True, before=delayed)
-    yield Case("diffusor, saturated", real, False, spoil=too_bright)
+    yield Case("diffuser, saturated", real, False, spoil=too_bright)
     none = replace(real, light=replace(real.light, electrons_per_s=1.0))
     yield Case("no light", none, False)
 
 
 def _delayed(delay_s: float) -> Any:
-    diffusor = find_scene("calibration").diffusor
-    assert diffusor is not None
-    return replace(diffusor, delay_s=delay_s)
+    diffuser = find_scene("calibration").diffuser
+    assert diffuser is not None
+    return replace(diffuser, delay_s=delay_s)
 
 
 def scenes(data: Path) -> Iterator[Case]:
     """Yield every scene there is; none should be trusted."""
-    before = diffusor_scene(device=PROTOTYPE)
+    before = diffuser_scene(device=PROTOTYPE)
     for info in list_scenes():
         if info.name in ("calibration", "measured"):
             continue
@@ -215,7 +215,7 @@ def scenes(data: Path) -> Iterator[Case]:
 def tables() -> Iterator[Table]:
     """Judge everything; measured scenes and phases are in the folder TRANSIENTCAM_TEST_DATA."""
     data = data_folder() or Path()
-    yield _table("Diffusors", diffusors(data))
+    yield _table("Diffusers", diffusers(data))
     yield _table("Scenes", scenes(data))
 
 

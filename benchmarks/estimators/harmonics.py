@@ -2,7 +2,7 @@
 
 The simulated camera modulates by a square wave, whose correlation with itself is a triangle, and by
 a measured waveform where a file of one is given: (rows, samples) over one period, opposite rows in
-pairs. Each is calibrated through the diffusor with a phase sweep. The mean of many takes then shows
+pairs. Each is calibrated through the diffuser with a phase sweep. The mean of many takes then shows
 what noise does not explain.
 """
 
@@ -82,7 +82,7 @@ def camera_at(scene: str, waveform: Path, sequence: Capture) -> Iterator[Camera]
 
 
 def calibration(waveform: Path, sequence: Capture) -> tuple[Calibration, str | None]:
-    """Calibrate through the diffusor; also return why no harmonics are known."""
+    """Calibrate through the diffuser; also return why no harmonics are known."""
     with camera_at("calibration", waveform, sequence) as camera:
         sweep = SweepEvaluation(camera.capabilities, takes=DEFAULT_TAKES)
         capture = capture_calibration(camera, average=tm.average_takes, waveform=sweep)

@@ -1,7 +1,7 @@
 """Images that lost their synchronisation: how many are found, and errors of the range with them.
 
 Each scene is captured twice with the simulated camera of the paper's make and the same noise: with
-the share of images that lose their synchronisation, and without any. An image is spoilt where the
+the share of images that lose their synchronisation, and without any. An image is corrupt where the
 two differ.
 """
 
@@ -29,11 +29,11 @@ _STEPS: Final = 4
 
 @dataclass(slots=True)
 class Tally:
-    """Spoilt images of one scene by what became of them, and errors in m by treatment."""
+    """Corrupt images of one scene by what became of them, and errors in m by treatment."""
 
     frames: int = 0
-    spoilt_frames: int = 0
-    spoilt: int = 0
+    corrupt_frames: int = 0
+    corrupt: int = 0
     pairs: int = 0
     repaired: int = 0
     wrong: int = 0
@@ -44,9 +44,9 @@ class Tally:
     def row(self, name: str) -> list[str]:
         """Return what a row of the table says."""
         errors = [_error(self.errors_m[each]) for each in ("clean", *_TREATMENTS)]
-        counts = (self.spoilt, 2 * self.pairs, self.repaired, self.left, self.missed, self.wrong)
-        spoilt = f"{self.spoilt_frames} of {self.frames}"
-        return [name, spoilt, *(str(count) for count in counts), *errors]
+        counts = (self.corrupt, 2 * self.pairs, self.repaired, self.left, self.missed, self.wrong)
+        corrupt = f"{self.corrupt_frames} of {self.frames}"
+        return [name, corrupt, *(str(count) for count in counts), *errors]
 
 
 def _error(errors_m: list[_Array]) -> str:
@@ -93,9 +93,9 @@ def measure(scene: str, sequence: Capture, frames: int, bench: Bench, seed: int)
     tally = Tally(errors_m={each: [] for each in ("clean", *_TREATMENTS)})
     first = 2 if sequence.zeroth == "on-off" else 0
     for index in range(frames):
-        spoilt = (images[index] != clean[index]).any(axis=(1, 2))
+        corrupt = (images[index] != clean[index]).any(axis=(1, 2))
         found = tm.repair(images[index][None], zeroth=sequence.zeroth, calibration=gains)
-        _count(tally, spoilt, found, first)
+        _count(tally, corrupt, found, first)
         before = images[index - 1] if index else None
         results = {"clean": reconstruct["keep"](clean[index])}
         for each in _TREATMENTS:
@@ -107,17 +107,17 @@ def measure(scene: str, sequence: Capture, frames: int, bench: Bench, seed: int)
     return tally
 
 
-def _count(tally: Tally, spoilt: _Array, found: tm.Repair, first: int) -> None:
+def _count(tally: Tally, corrupt: _Array, found: tm.Repair, first: int) -> None:
     """Count the images of a frame by what became of them."""
     tally.frames += 1
-    tally.spoilt_frames += bool(spoilt.any())
-    tally.spoilt += int(spoilt.sum())
-    phased = spoilt[first:].reshape((-1, _STEPS))
+    tally.corrupt_frames += bool(corrupt.any())
+    tally.corrupt += int(corrupt.sum())
+    phased = corrupt[first:].reshape((-1, _STEPS))
     tally.pairs += int((phased[:, :2] & phased[:, 2:]).sum())
-    tally.repaired += int((spoilt & found.repaired[0]).sum())
-    tally.wrong += int((found.repaired[0] & ~spoilt).sum())
-    tally.left += int((spoilt & found.unrepaired[0]).sum())
-    tally.missed += int((spoilt & ~found.repaired[0] & ~found.unrepaired[0]).sum())
+    tally.repaired += int((corrupt & found.repaired[0]).sum())
+    tally.wrong += int((found.repaired[0] & ~corrupt).sum())
+    tally.left += int((corrupt & found.unrepaired[0]).sum())
+    tally.missed += int((corrupt & ~found.repaired[0] & ~found.unrepaired[0]).sum())
 
 
 def tables(*, frames: int = 20) -> Iterator[Table]:
@@ -137,21 +137,21 @@ def tables(*, frames: int = 20) -> Iterator[Table]:
             )
             tally = measure(scene, sequence, frames, bench, seed=len(rows) + 1)
             rows.append(tally.row(f"{scene}, m = {harmonics}, {zeroth}"))
-            for name in ("frames", "spoilt_frames", "spoilt", "repaired", "left", "missed"):
+            for name in ("frames", "corrupt_frames", "corrupt", "repaired", "left", "missed"):
                 setattr(total, name, getattr(total, name) + getattr(tally, name))
             total.wrong += tally.wrong
     notes = [
-        f"In all {total.spoilt_frames} of {total.frames} frames are spoilt, by {total.spoilt} "
+        f"In all {total.corrupt_frames} of {total.frames} frames are corrupt, by {total.corrupt} "
         f"images: {total.repaired} are rebuilt, {total.left} are of pairs that are reported as not "
         f"repaired, {total.missed} are not found (most of them turned by so little that noise "
         f"hides it). {total.wrong} good images are rebuilt, which happens where the opposite "
-        "one is spoilt as well.",
+        "one is corrupt as well.",
         "Errors of the range in mm (maximum entropy): median and 90 % of all lit pixels, and the "
         "median of the worst frame.",
     ]
     columns = heads(
-        "scene | frames spoilt | images spoilt | of these in pairs | rebuilt | reported | "
-        "not found | good ones rebuilt | no image spoilt | as captured | repaired | "
+        "scene | frames corrupt | images corrupt | of these in pairs | rebuilt | reported | "
+        "not found | good ones rebuilt | no image corrupt | as captured | repaired | "
         "repaired and filled"
     )
-    yield Table("What becomes of spoilt images", columns, rows, notes)
+    yield Table("What becomes of corrupt images", columns, rows, notes)

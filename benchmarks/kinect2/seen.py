@@ -35,7 +35,7 @@ def spec(scene: str) -> str:
 
 
 @dataclass(frozen=True)
-class Seen:
+class ObservedFrame:
     """One frame of the emulated camera, every so many pixels (N, M) of it.
 
     Attributes
@@ -56,7 +56,7 @@ class Seen:
     slopes: tuple[Array, Array]
 
     @classmethod
-    def of(cls, scene: str) -> "Seen":
+    def of(cls, scene: str) -> "ObservedFrame":
         """Capture one frame through packets and codes."""
         with PLUGIN.open(CameraName.parse(spec(scene)), VirtualClock()) as camera:
             assert isinstance(camera, Kinect2Camera)
@@ -110,7 +110,7 @@ def tables() -> Iterator[Table]:
     made = Table("Read by libfreenect2", columns)
     apart_mm, same = 0.0, 1.0
     for scene in SCENES:
-        seen, theirs = Seen.of(scene), stored(scene)
+        seen, theirs = ObservedFrame.of(scene), stored(scene)
         two = tm.two_returns(seen.moments, noise(ROUNDING), harmonics=MULTIPLES)
         ours_m = RADIAN_M * np.asarray(two.separate().phase_rad)
         found_m: dict[str, Any] = {

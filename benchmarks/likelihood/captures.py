@@ -58,7 +58,7 @@ class Won:
 
 
 def tables() -> Iterator[Table]:
-    """Capture each scene with the paper's make of device, calibrated, and hold it to the truth.
+    """Capture each scene with the paper's model of device, calibrated, and hold it to the truth.
 
     Last comes how each estimator did over all of them.
     """

@@ -106,8 +106,8 @@ def _answers(http: httpx.Client) -> Iterator[tuple[str, Any]]:
     def post(path: str, body: Any) -> Any:
         return http.post(path, json=body).raise_for_status().json()
 
-    def diffusor(before_lens: bool) -> None:
-        changed = http.put(f"{api}/simulation", json={"diffusor": before_lens})
+    def diffuser(before_lens: bool) -> None:
+        changed = http.put(f"{api}/simulation", json={"diffuser": before_lens})
         changed.raise_for_status()
 
     def until(path: str, states: tuple[str, ...]) -> Any:
@@ -140,11 +140,11 @@ def _answers(http: httpx.Client) -> Iterator[tuple[str, Any]]:
     yield "AppliedDocument", applied
     yield "SequenceDocument", {name: applied[name] for name in SequenceDocument.model_fields}
 
-    diffusor(True)
+    diffuser(True)
     job = post(f"{api}/calibrations", {"name": "after warm-up", "frames": 2, "activate": True})
     yield "JobDocument", until(f"{api}/jobs/{job['id']}", ("done", "failed"))
     yield "JobsDocument", get(f"{api}/jobs")
-    diffusor(False)
+    diffuser(False)
     _computed(http)  # so that the drift is judged
     calibrations = get(f"{api}/calibrations")
     yield "CalibrationsDocument", calibrations

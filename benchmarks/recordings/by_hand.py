@@ -63,7 +63,7 @@ class Ranges:
 
 
 def calibrate(camera: Camera, sequence: dict[str, Any]) -> None:
-    """Measure and activate gains for a sequence, the simulated camera before a diffusor."""
+    """Measure and activate gains for a sequence, the simulated camera before a diffuser."""
     scene = camera.simulation["scene"]
     camera.simulate("calibration")
     camera.sequence = sequence

@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.common.daemon import VIDEO, Process, daemon
 from benchmarks.common.tables import Cell, Table, percentiles
-from benchmarks.service.viewers import Seen, Viewer, cut, watch
+from benchmarks.service.viewers import Viewer, ViewerRecord, cut, watch
 
 RANGE = {"type": "subscribe", "v": 1, "subscriptions": [{"product": "range"}]}
 SAMPLE_S = 5.0
@@ -118,7 +118,7 @@ def soak(*, minutes: float, viewers: int, directory: Path) -> Soak:
         try:
             watch(watching, duration_s=SETTLE_S, every_s=SAMPLE_S, meanwhile=look)
             for each in watching:
-                each.seen = Seen()
+                each.seen = ViewerRecord()
             cpu_s = process.cpu_s()
             begin_s = process.age_s()
             duration_s = watch(

@@ -21,7 +21,7 @@ from benchmarks.common.daemon import VIDEO, Process, running
 from benchmarks.common.machine import commit_of
 from benchmarks.common.records import ROOT
 from benchmarks.common.tables import Table, heads, met
-from benchmarks.service.viewers import Seen, Viewer, cut, watch
+from benchmarks.service.viewers import Viewer, ViewerRecord, cut, watch
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.recording import Header, RecordingWriter
@@ -127,7 +127,7 @@ def _subscribe(*products: str, computed: tuple[str, ...] = ()) -> dict[str, obje
 
 def viewed(
     process: Process, *products: str, computed: tuple[str, ...] = (), duration_s: float
-) -> tuple[Seen, float, float]:
+) -> tuple[ViewerRecord, float, float]:
     """Return what one viewer saw, in which time, and what the daemon spent in it."""
     viewer = Viewer(process.stream_url, _subscribe(*products, computed=computed))
     watch([viewer], duration_s=_SETTLE_S)

@@ -54,7 +54,7 @@ def _masked(opcode: Opcode, data: bytes) -> bytes:
 
 
 @dataclass
-class Seen:
+class ViewerRecord:
     """What one viewer received.
 
     Attributes
@@ -79,7 +79,7 @@ class Viewer:
 
     def __init__(self, url: str, subscribe: dict[str, Any] | None, *, look: bool = True) -> None:
         self.connection = connect(url)
-        self.seen = Seen()
+        self.seen = ViewerRecord()
         self._look = look
         self._head = bytearray()
         self._kept = bytearray()

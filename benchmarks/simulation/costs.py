@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from benchmarks.common.tables import Cell, Column, Table, heads
 from benchmarks.simulation.scenes import scene_named
 from transientcam_driver import Sequence
-from transientcam_simulation.compiled import LANES
+from transientcam_simulation.compiled import IMAGE_KERNELS
 from transientcam_simulation.effects import EFFECTS
 from transientcam_simulation.emulated import world_of
 from transientcam_simulation.imaging import World
@@ -117,7 +117,7 @@ def tables(*, small: bool = False) -> Iterator[Table]:
 
     Run it with OMP_NUM_THREADS=1: times are those of one core.
     """
-    LANES.compile_now()  # rather than beside what is measured
+    IMAGE_KERNELS.compile_now()  # rather than beside what is measured
     columns = heads(
         "scene | pixels | none, ms:.1f | called for, ms:.1f | everything, ms:.1f | "
         "everything / called for:.1f | frames/s, called for:.0f | opening, called for, s:.2f | "

@@ -262,15 +262,21 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         *,
         definition: str | None = None,
         effects: Mapping[str, str] | None = None,
+        diffuser: bool | None = None,
         diffusor: bool | None = None,
     ) -> _Document:
         """Put a simulated camera before another scene; capturing goes on meanwhile.
 
         ``scene`` names a built-in scene; ``definition`` is in its place the text of a scene file.
-        ``effects`` replaces all earlier choices: "auto", "on" or "off" by name. ``diffusor`` puts
-        filter and diffusor before the lens, to measure a calibration, or takes them away.
+        ``effects`` replaces all earlier choices: "auto", "on" or "off" by name. ``diffuser`` puts
+        filter and diffuser before the lens, to measure a calibration, or takes them away; it may
+        also be called ``diffusor``.
         """
-        return self._ask(changes.set_simulation(scene, definition, effects, diffusor))
+        return self._ask(
+            changes.set_simulation(
+                scene, definition, effects, diffuser if diffusor is None else diffusor
+            )
+        )
 
     def cause(self, fault: str) -> _Document:
         """Inject a fault into the simulation: unplug, replug, corrupt-image or drop-image."""

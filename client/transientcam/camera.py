@@ -249,7 +249,7 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
         credits
             How many frames may be on their way at once; None leaves it to the network.
         max_rate_hz
-            No more frames a second than this.
+            Maximum frames per second.
         start
             Number of the first frame; None for the next one. Frames that the daemon still keeps
             come one after the other, and the notice ``gap`` names those that it does not.

@@ -20,7 +20,7 @@ _SOURCES: Final = "a Camera, an open recording, or coefficients with their base_
 _PRODUCT: Final = "coefficients"
 
 
-class Shown(NamedTuple):
+class TransientPlanes(NamedTuple):
     """What is shown: planes float32 (2m + 1, H, W) as `density` takes them."""
 
     planes: NDArray[np.float32]
@@ -76,7 +76,9 @@ class PlayerWidget(anywidget.AnyWidget):
             self.answered = self.wanted
 
 
-def _reader_of(source: Any, base_frequency_hz: float | None) -> tuple[Callable[[int], Shown], int]:
+def _reader_of(
+    source: Any, base_frequency_hz: float | None
+) -> tuple[Callable[[int], TransientPlanes], int]:
     """Return what gives a frame by its index, and how many can be chosen from."""
     if isinstance(source, Camera):
         return lambda index: _of_frame(source.frame(_PRODUCT, wait_s=_WAIT_S)), 0
@@ -92,7 +94,7 @@ def _reader_of(source: Any, base_frequency_hz: float | None) -> tuple[Callable[[
     planes = np.asarray(_planes_of(source), dtype="<f4")
     if planes.ndim != 3 or planes.shape[0] % 2 == 0:
         raise ParameterError("source", planes.shape, "of shape (2m + 1, H, W)")
-    return lambda index: Shown(planes, base_frequency_hz, 0), 0
+    return lambda index: TransientPlanes(planes, base_frequency_hz, 0), 0
 
 
 def _planes_of(coefficients: Any) -> Any:
@@ -104,13 +106,13 @@ def _planes_of(coefficients: Any) -> Any:
     return np.concatenate([coefficients.error[np.newaxis], pairs])
 
 
-def _of_frame(frame: Frame) -> Shown:
+def _of_frame(frame: Frame) -> TransientPlanes:
     if frame.product != _PRODUCT:
         raise ParameterError("product", frame.product, _PRODUCT)
-    return Shown(frame.array, frame.meta["base_frequency_hz"], frame.frame)
+    return TransientPlanes(frame.array, frame.meta["base_frequency_hz"], frame.frame)
 
 
-def _state_of(shown: Shown) -> dict[str, Any]:
+def _state_of(shown: TransientPlanes) -> dict[str, Any]:
     planes, height, width = shown.planes.shape
     return {
         "coefficients": np.ascontiguousarray(shown.planes, dtype="<f4").tobytes(),

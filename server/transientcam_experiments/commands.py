@@ -34,7 +34,7 @@ def paper(
     quick: Annotated[
         bool, typer.Option("--quick", help="Few takes, for a first look: other numbers.")
     ] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Of all chance.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")] = 1,
     waveform: Annotated[
         Path | None,
         typer.Option(
@@ -123,7 +123,9 @@ def _require_matplotlib() -> None:
 def tradeoff(
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", help="Folder for results; what it holds is not redone."),
+        typer.Option(
+            "--output", "-o", help="Folder for results; points already there are skipped."
+        ),
     ],
     scene: Annotated[
         list[str] | None,
@@ -136,7 +138,7 @@ def tradeoff(
         str, typer.Option(help="paper, quick, or a .toml with [[sequence]] tables.")
     ] = "paper",
     repetitions: Annotated[int, typer.Option(min=1, help="Captures a point.")] = 5,
-    seed: Annotated[int, typer.Option(min=0, help="Of all chance.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")] = 1,
     workers: WorkersOption = None,
     dask: DaskOption = None,
     as_json: Annotated[

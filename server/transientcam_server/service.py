@@ -18,28 +18,28 @@ from transientcam_driver.calibration import DEVICE_FIELDS
 from transientcam_server.broadcast import Channel, Hub
 from transientcam_server.camera import (
     Acquisition,
-    Back,
     CalibrationStore,
     Calibrator,
+    CameraLostEvent,
+    CameraRecoveredEvent,
     Captured,
     Change,
     Event,
-    Held,
     Job,
     Jobs,
     Lease,
     LeaseManager,
     LightGuard,
-    Lost,
+    LightHeldEvent,
+    LightReleasedEvent,
     OriginChanged,
     OriginLease,
-    Released,
     SequenceChanged,
     SharedAcquisition,
     Timer,
     load_given,
     sensor_of,
-    twin_of,
+    snapshot_of,
 )
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging import (
@@ -135,7 +135,7 @@ class Service:
             images_known=self.has_images,
         )
         simulated = camera.simulation is not None
-        twin = partial(twin_of, camera, settings.camera) if simulated else None
+        twin = partial(snapshot_of, camera, settings.camera) if simulated else None
         self.looks = Looks(self.planner, self.workers, self.planning, twin)
         self.fronts = FrontCache(
             self.planner, self.workers, self.planning, self.looks, simulated=simulated
@@ -334,7 +334,7 @@ class Service:
         """
         require_estimator(settings, self.applied.sequence, field="estimator")
         if settings != self._of_origin(settings):
-            self.require_images("What becomes of spoilt images is set")
+            self.require_images("The repair of corrupt images is set")
         return self._reconstruct_with(settings)
 
     def _reconstruct_with(self, settings: ReconstructionSettings) -> SettingsVersion:
@@ -378,13 +378,13 @@ class Service:
                 frame = self.pipeline.frame(raw, applied)
                 self.history.append(frame)
                 self.hub.publish(frame)
-            case Lost(reason):
+            case CameraLostEvent(reason):
                 self.hub.notify("camera-lost", {"reason": reason})
-            case Back():
+            case CameraRecoveredEvent():
                 self.hub.notify("camera-back", {})
-            case Held(reason):
+            case LightHeldEvent(reason):
                 self.hub.notify("light-held", {"reason": reason})
-            case Released():
+            case LightReleasedEvent():
                 self.hub.notify("light-released", {})
             case OriginChanged():
                 self._adopt_calibration()

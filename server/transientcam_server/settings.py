@@ -32,7 +32,7 @@ else:
             *(name for name in ESTIMATORS if name not in TECHNIQUES or TECHNIQUES[name].planar),
         )
     ]
-SpoiltImages = Literal["keep", "repair", "fill"]
+CorruptImages = Literal["keep", "repair", "fill"]
 
 
 class SequenceSettings(_Group):
@@ -73,7 +73,7 @@ class ReconstructionSettings(_Group):
     are but two and until the kernel is compiled. The others are there for comparison."""
     minimum_brightness_dn: _Finite = Field(default=0.0, ge=0.0)
     """Pixels with no more light than this have no range."""
-    spoilt_images: SpoiltImages = "repair"
+    spoilt_images: CorruptImages = "repair"
     """Images that lost their synchronisation: rebuilt from the frame's other images, and (`fill`)
     taken from the frame before where that is impossible; or kept."""
     modulation_harmonics: Literal["take-out", "keep"] = "take-out"

@@ -12,7 +12,7 @@ from tests.browser.conftest import Watch, put
 from tests.browser.dashboard import LIVE, choose, choose_from, open_page
 from tests.serving import Served
 
-# a camera before the diffusor, of which many frames are captured
+# a camera before the diffuser, of which many frames are captured
 pytestmark = pytest.mark.shared_daemon("sim:calibration?seed=3", slower=1.0)
 
 # A measurement captures every frame twice, and is evaluated.
@@ -21,7 +21,7 @@ PATIENCE_MS = 60_000
 
 @pytest.fixture(autouse=True)
 def uncalibrated(served: Served) -> Iterator[None]:
-    """The nominal gains and no others, before the diffusor, at the end of each test."""
+    """The nominal gains and no others, before the diffuser, at the end of each test."""
     yield
     put(served, "calibrations/active", {"id": "nominal"})
     for each in httpx.get(f"{served.url}/api/v1/calibrations").json()["calibrations"]:
@@ -72,12 +72,12 @@ def test_one_of_a_scene_is_used_only_on_a_second_click_and_undone(
     outcome = panel.locator("[data-field=calibration-outcome]")
     panel.get_by_label("Frames, with and without light").fill("3")
     panel.get_by_role("button", name="Measure").click()
-    expect(outcome).to_contain_text("a scene, not a diffusor", timeout=PATIENCE_MS)
+    expect(outcome).to_contain_text("a scene, not a diffuser", timeout=PATIENCE_MS)
     row = panel.locator("[data-calibration]").nth(1)
     expect(row.locator("[data-field=verdict]")).to_have_text("of a scene")
     expect(panel.locator("[data-calibration=nominal]")).to_contain_text("in use")
     row.get_by_role("button", name="Use").click()
-    expect(row.locator("[data-field=doubt]")).to_contain_text("unlike a diffusor")
+    expect(row.locator("[data-field=doubt]")).to_contain_text("unlike a diffuser")
     expect(row.get_by_role("img")).to_be_visible()
     expect(panel.locator("[data-calibration=nominal]")).to_contain_text("in use")
     row.get_by_role("button", name="Use anyway").click()
@@ -86,15 +86,15 @@ def test_one_of_a_scene_is_used_only_on_a_second_click_and_undone(
     expect(panel.locator("[data-calibration=nominal]")).to_contain_text("in use")
 
 
-def test_the_diffusor_of_a_simulated_camera_is_put_before_the_lens(
+def test_the_diffuser_of_a_simulated_camera_is_put_before_the_lens(
     page: Page, served: Served
 ) -> None:
     put(served, "simulation", {"scene": "mirrors"})
     open_page(page)
     choose(page, "response", "Calibration")
     panel = page.locator(".panel-calibration")
-    panel.get_by_role("button", name="Put the diffusor before the lens").click()
-    taking = panel.get_by_role("button", name="Take the diffusor away")
+    panel.get_by_role("button", name="Put the diffuser before the lens").click()
+    taking = panel.get_by_role("button", name="Take the diffuser away")
     expect(taking).to_be_visible(timeout=PATIENCE_MS)
     panel.get_by_label("Frames, with and without light").fill("3")
     panel.get_by_role("button", name="Measure").click()
@@ -102,7 +102,7 @@ def test_the_diffusor_of_a_simulated_camera_is_put_before_the_lens(
     expect(outcome).to_contain_text("Measured: ", timeout=PATIENCE_MS)
     expect(panel.locator("[data-calibration]").nth(1)).to_contain_text("in use")
     taking.click()
-    expect(panel.get_by_role("button", name="Put the diffusor before the lens")).to_be_visible()
+    expect(panel.get_by_role("button", name="Put the diffuser before the lens")).to_be_visible()
     assert httpx.get(f"{served.url}/api/v1/simulation").json()["scene"] == "mirrors"
 
 

@@ -243,6 +243,14 @@ def test_both_cameras_send_the_same_requests(name: str, daemon: _Daemon) -> None
     assert name == "set" or repr(result) == repr(async_result)
 
 
+@pytest.mark.parametrize("spelling", ["diffuser", "diffusor"])
+def test_a_diffuser_may_be_spelt_as_it_was_before(spelling: str, daemon: _Daemon) -> None:
+    with Camera(_URL, token="secret", transport=httpx.MockTransport(daemon)) as camera:
+        camera.simulate(**{spelling: True})  # type: ignore[arg-type]
+
+    assert daemon.last == ("PUT", "/api/v1/simulation", "", {"diffusor": True})
+
+
 def test_every_request_carries_token_and_user_agent(daemon: _Daemon) -> None:
     with Camera(_URL, token="secret", transport=httpx.MockTransport(daemon)) as camera:
         camera.info  # noqa: B018 - reading it sends a request

@@ -204,10 +204,10 @@ def test_stepping_up_undoes_stepping_down(harmonics: int) -> None:
 
 def test_pixels_without_a_value_stay_so_and_disturb_no_other() -> None:
     planes = np.stack([_coefficients(_drawn_moments(4, seed)) for seed in range(3)], axis=1)
-    spoilt = planes.copy()
-    spoilt[:, 1] = np.nan
+    corrupt = planes.copy()
+    corrupt[:, 1] = np.nan
 
-    again = step_up(*step_down(spoilt))
+    again = step_up(*step_down(corrupt))
 
     assert np.isnan(again[:, 1]).all()
     np.testing.assert_allclose(again[:, [0, 2]], planes[:, [0, 2]], rtol=1e-9, atol=1e-12)

@@ -1,4 +1,4 @@
-"""A daemon that breaks one promise at a time: whatever passes it by can be spoilt."""
+"""A daemon that breaks one promise at a time: whatever passes it by can be corrupted."""
 
 import json
 from collections.abc import Callable

@@ -23,7 +23,7 @@ _PAGES = (
     "docs/record.md",
     "docs/service.md",
     "docs/start.md",
-    "docs/calibration.md",  # which puts a diffusor before the lens: the last one
+    "docs/calibration.md",  # which puts a diffuser before the lens: the last one
 )
 _ELSEWHERE = {
     "docs/add-a-camera.md": "tests/server/camera/plug_in.py runs its plug-in",
@@ -72,7 +72,7 @@ def test_python_of_a_page_runs(
     monkeypatch.chdir(recording.parent)
     if page == "docs/calibration.md":
         with Camera(served.url, timeout_s=60.0) as before:
-            before.simulate(diffusor=True)
+            before.simulate(diffuser=True)
     moments = np.array([2.0, 1.0 + 0.5j]).reshape(2, 1, 1).astype(np.complex64)
     names: dict[str, Any] = {"moments": moments}
     exec(_FIRST, names)

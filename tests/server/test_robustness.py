@@ -91,7 +91,7 @@ def test_a_client_that_never_reads_does_not_delay_the_shutdown() -> None:
 
 
 @pytest.mark.parametrize("name", ["corrupt-image", "drop-image"])
-def test_a_spoilt_image_costs_its_frame_and_is_reported(
+def test_a_corrupt_image_costs_its_frame_and_is_reported(
     served: Served, http: httpx.Client, name: str
 ) -> None:
     with streaming(served.stream_url) as client:

@@ -21,10 +21,10 @@ def capture(
         typer.Option("--output", "-o", help="File to write; - is standard output."),
     ],
     number: Annotated[
-        int | None, typer.Option(min=1, help="A former frame, instead of the newest.")
+        int | None, typer.Option(min=1, help="Number of the frame; default: the newest.")
     ] = None,
     recording: Annotated[
-        str | None, typer.Option(help="Take it from the recording with this id.")
+        str | None, typer.Option(help="Id of the recording to read instead of the live camera.")
     ] = None,
     region: Annotated[
         str | None, typer.Option(help="Only this part: x,y,width,height in pixels.")

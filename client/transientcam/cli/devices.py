@@ -30,7 +30,7 @@ _PRODUCTS: Final = (
 
 
 def devices(
-    network: Annotated[bool, typer.Option(help="Whether to look on the network, too.")] = True,
+    network: Annotated[bool, typer.Option(help="Also search the network.")] = True,
     timeout_s: Annotated[
         float, typer.Option(min=0.1, max=600.0, help="How long to listen there.")
     ] = 2.0,
@@ -40,7 +40,7 @@ def devices(
     ] = None,
     watch: Annotated[
         bool,
-        typer.Option("--watch", help="Print what comes and goes on the network, until Ctrl-C."),
+        typer.Option("--watch", help="Print services as they appear and disappear, until Ctrl-C."),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:

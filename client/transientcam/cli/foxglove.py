@@ -27,7 +27,7 @@ def foxglove(
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 for any that is free.")] = 8765,
     max_rate_hz: Annotated[
-        float, typer.Option(min=0.01, help="No more frames a second than this are shown.")
+        float, typer.Option(min=0.01, help="Maximum frames per second shown.")
     ] = 10.0,
     control: Annotated[
         bool,

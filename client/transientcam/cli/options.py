@@ -19,7 +19,7 @@ ProductArgument = Annotated[
 ProductsArgument = Annotated[
     list[str] | None,
     typer.Argument(
-        help="What to stream; range, if nothing is named.", autocompletion=lambda: list(PRODUCTS)
+        help="Products to stream; default: range.", autocompletion=lambda: list(PRODUCTS)
     ),
 ]
 TokenOption = Annotated[

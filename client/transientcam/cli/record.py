@@ -17,7 +17,7 @@ _LOOK_S = 0.5
 
 def record(
     url: UrlArgument,
-    name: Annotated[str | None, typer.Option(help="What to call the recording.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the recording.")] = None,
     duration_s: Annotated[
         float | None, typer.Option("--duration", help="Stop after so many seconds.")
     ] = None,

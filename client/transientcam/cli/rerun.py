@@ -20,11 +20,11 @@ def rerun(
     url: UrlArgument,
     products: Annotated[
         list[str] | None,
-        typer.Argument(help=f"What is sent; {', '.join(LOGGED)}, if nothing is named."),
+        typer.Argument(help=f"Products to send; default: {', '.join(LOGGED)}."),
     ] = None,
     spawn: Annotated[
         bool,
-        typer.Option("--spawn", help="Start a viewer here; so it is if no other way is named."),
+        typer.Option("--spawn", help="Start a viewer on this machine (the default)."),
     ] = False,
     connect: Annotated[
         str | None, typer.Option(metavar="URL", help=f"A viewer that runs, such as {_HERE}.")
@@ -35,11 +35,9 @@ def rerun(
     count: Annotated[
         int | None, typer.Option(min=1, help="Stop after so many frames of the first product.")
     ] = None,
-    max_rate_hz: Annotated[
-        float, typer.Option(min=0.01, help="No more frames a second than this.")
-    ] = 10.0,
+    max_rate_hz: Annotated[float, typer.Option(min=0.01, help="Maximum frames per second.")] = 10.0,
     transient_rate_hz: Annotated[
-        float, typer.Option(min=0.01, help="No more transients a second than this; they are large.")
+        float, typer.Option(min=0.01, help="Maximum transients per second; they are large.")
     ] = 1.0,
     bins: Annotated[
         int, typer.Option(min=2, max=1024, help="How many times of flight a transient has.")

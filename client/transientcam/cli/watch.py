@@ -23,9 +23,7 @@ def watch(
     count: Annotated[
         int | None, typer.Option(min=1, help="Stop after so many frames of the first product.")
     ] = None,
-    max_rate_hz: Annotated[
-        float | None, typer.Option(help="No more frames a second than this.")
-    ] = None,
+    max_rate_hz: Annotated[float | None, typer.Option(help="Maximum frames per second.")] = None,
     reconnect: Annotated[bool, typer.Option(help="Reconnect when the connection is lost.")] = True,
     token: TokenOption = None,
     as_json: JsonOption = False,

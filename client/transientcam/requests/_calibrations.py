@@ -52,7 +52,7 @@ class Calibrations(Generic[_Document, _Bytes]):
     ) -> _Document:
         """Start measuring one with the present sequence; returns the job.
 
-        Put filter and diffusor before the lens first, so that the light shines at the sensor. The
+        Put filter and diffuser before the lens first, so that the light shines at the sensor. The
         job's result says in ``verdict`` whether the images look so; what was measured on a scene
         is not used, and ``activated`` false, unless with ``force``. ``harmonics`` sweeps the phase
         as well, with 30 frames or more and a camera that can.
@@ -69,7 +69,7 @@ class Calibrations(Generic[_Document, _Bytes]):
     def activate(self, calibration_id: str, *, force: bool = False) -> _Document:
         """Use one, or ``"nominal"`` for none, from the next frame on.
 
-        One that was not measured on a diffusor is refused (``calibration-doubted``) unless with
+        One that was not measured on a diffuser is refused (``calibration-doubted``) unless with
         ``force``.
         """
         body = {"id": calibration_id, "force": force}

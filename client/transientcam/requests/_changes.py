@@ -38,14 +38,14 @@ def set_simulation(
     scene: str | None,
     definition: str | None,
     effects: Mapping[str, str] | None,
-    diffusor: bool | None,
+    diffuser: bool | None,
 ) -> Request[dict[str, Any]]:
     """Build the request that changes the simulated world; None leaves a part as it is."""
     parts: dict[str, object] = {
         "scene": scene,
         "definition": definition,
         "effects": None if effects is None else dict(effects),
-        "diffusor": diffusor,
+        "diffusor": diffuser,
     }
     body = {key: value for key, value in parts.items() if value is not None}
     return document("simulation", method="PUT", body=body, extra_timeout_s=_SCENE_BUILT_S)

@@ -52,7 +52,7 @@ class RerunBridge:
     products
         Products that are images; ``pointcloud`` (points and depth image), and ``transient``.
     max_rate_hz
-        No more frames a second than this.
+        Maximum frames per second.
     transient_rate_hz
         No more tensors a second than this; they are the largest by far.
     bins

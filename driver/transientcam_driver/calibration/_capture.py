@@ -1,6 +1,6 @@
 """Capture of a calibration measurement with a camera.
 
-The images are taken while the light shines at the sensor through a filter and a diffusor, so that
+The images are taken while the light shines at the sensor through a filter and a diffuser, so that
 every pixel should measure the same at every frequency (Peters et al. 2015, Sec. 4.2).
 """
 

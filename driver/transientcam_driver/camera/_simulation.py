@@ -153,8 +153,8 @@ class Simulation(Protocol):
         ...
 
     @property
-    def diffusor(self) -> bool:
-        """Whether filter and diffusor are before the lens."""
+    def diffuser(self) -> bool:
+        """Whether filter and diffuser are before the lens."""
         ...
 
     def change(
@@ -163,12 +163,12 @@ class Simulation(Protocol):
         scene: str | None = None,
         definition: str | None = None,
         effects: Mapping[str, str] | None = None,
-        diffusor: bool | None = None,
+        diffuser: bool | None = None,
     ) -> None:
         """Put the camera in front of another scene, or choose other effects; images go on.
 
         Returns once the scene is prepared, which may take seconds. The camera stays the same
-        specimen: its sensor and its imperfections are those of the scene it was built with. The
+        unit: its sensor and its imperfections are those of the scene it was built with. The
         frame that is captured meanwhile may hold images of both.
 
         Parameters
@@ -182,8 +182,8 @@ class Simulation(Protocol):
         effects
             "auto", "on" or "off" by an effect's name, in place of all earlier choices; by default
             these stay.
-        diffusor
-            Puts filter and diffusor before the lens, so that the light shines at the sensor as in
+        diffuser
+            Puts filter and diffuser before the lens, so that the light shines at the sensor as in
             a calibration (Sec. 4.2), or takes them away; by default they stay.
 
         Raises

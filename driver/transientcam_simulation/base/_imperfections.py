@@ -1,4 +1,4 @@
-"""Imperfections of a make of camera, and of one specimen of it.
+"""Imperfections of a model of camera, and of one unit of it.
 
 The figures of ``PROTOTYPE`` are those of the CamBoard nano family, on which the paper's camera is
 built, as far as they are known; the rest is chosen, and marked so.
@@ -113,9 +113,9 @@ PINHOLE = Lens()
 
 @dataclass(frozen=True, slots=True)
 class DeviceProfile:
-    """One specimen of a make; None where it is perfect.
+    """One unit of a model; None where it is perfect.
 
-    ``seed`` is that of the specimen: its pattern stays when the scene changes.
+    ``seed`` is that of the unit: its pattern stays when the scene changes.
     """
 
     name: str

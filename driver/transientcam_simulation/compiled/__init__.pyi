@@ -22,9 +22,9 @@ from ._compiling import (
     inner as inner,
     int32 as int32,
     int64 as int64,
-    lane as lane,
+    kernel as kernel,
 )
-from ._lanes import (
+from ._image_kernels import (
     CHUNK as CHUNK,
-    LANES as LANES,
+    IMAGE_KERNELS as IMAGE_KERNELS,
 )

@@ -1,4 +1,4 @@
-"""From functions to lanes: compiled for one signature by numba, or loaded from the cache."""
+"""From functions to kernels: compiled for one signature by numba, or loaded from the cache."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -13,7 +13,7 @@ from numba import (
     uint16 as numba_uint16,
 )
 
-from transientcam_simulation.compiled._lanes import CACHE, FUNCTIONS
+from transientcam_simulation.compiled._image_kernels import CACHE, FUNCTIONS
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -56,7 +56,7 @@ def inner(function: Function) -> Function:
     return compiled
 
 
-def lane(*signature: Any) -> Callable[[Function], Function]:
+def kernel(*signature: Any) -> Callable[[Function], Function]:
     """Compile a function now, and for this signature only: no call starts the compiler."""
 
     def decorate(function: Function) -> Function:

@@ -29,7 +29,7 @@ from transientcam_simulation.light import (
 from transientcam_simulation.scene import (
     BUILT_IN,
     Background,
-    Diffusor,
+    Diffuser,
     Scene,
     TimeZero,
     list_scenes,
@@ -38,7 +38,7 @@ from transientcam_simulation.scene import (
 
 MEASURED = "measured"
 CALIBRATION = "calibration"
-"""The scene that is seen through a diffusor, whatever is behind it."""
+"""The scene that is seen through a diffuser, whatever is behind it."""
 DEFAULT_WIDTH, DEFAULT_HEIGHT = 163, 120
 RESOLUTIONS = ((DEFAULT_WIDTH, DEFAULT_HEIGHT), (320, 240), (640, 480))
 
@@ -81,18 +81,18 @@ def scenery_of(scene: Scene, *, width: int, height: int) -> Scenery:
     """Prepare the light of a scene, or read its impulse responses."""
     if scene.responses:
         return GivenScenery(load_responses(scene, width=width, height=height))
-    if scene.diffusor is not None:
-        return GivenScenery(through_diffusor(scene.diffusor, width=width, height=height))
+    if scene.diffuser is not None:
+        return GivenScenery(through_diffuser(scene.diffuser, width=width, height=height))
     return shared_scenery(scene, width=width, height=height)
 
 
-def through_diffusor(diffusor: Diffusor, *, width: int, height: int) -> SparseResponses:
+def through_diffuser(diffuser: Diffuser, *, width: int, height: int) -> SparseResponses:
     """Return the same return for all pixels, but for the fall-off towards the corners."""
     x = (2 * np.arange(width) + 1) / width - 1
     y = (2 * np.arange(height) + 1) / height - 1
     off_centre = (x[None, :] ** 2 + y[:, None] ** 2) / 2
-    weight = diffusor.brightness * (1 - diffusor.fall_off * off_centre)
-    return SparseResponses(np.full_like(weight, diffusor.delay_s)[None], weight[None])
+    weight = diffuser.brightness * (1 - diffuser.fall_off * off_centre)
+    return SparseResponses(np.full_like(weight, diffuser.delay_s)[None], weight[None])
 
 
 def world_of(
@@ -131,7 +131,7 @@ def build(
 ) -> tuple[EmulatedDevice, SimulationHandle]:
     """Build a simulated camera in front of a scene: the device, and the handle on both."""
     capabilities = prototype(
-        # the same specimen in front of every scene
+        # the same unit in front of every scene
         serial=f"SIM-{scene.device.name}-{scene.device.seed}"[:32],
         width=width,
         height=height,
@@ -157,7 +157,7 @@ def build(
 def world_before(
     scene: Scene, *, width: int, height: int, seed: int | None, readout_s: float
 ) -> tuple[SwitchableWorld, PrepareScene]:
-    """Build the world in front of a specimen of a camera, and what prepares another one for it.
+    """Build the world in front of a unit of a camera, and what prepares another one for it.
 
     Sensor, imperfections and what is off of its noise stay those of the scene given.
 
@@ -184,10 +184,10 @@ def world_before(
         return scene if name == scene.name else find_scene(name)
 
     def prepare(
-        wanted: Scene | str, effects: Mapping[str, str], diffusor: bool
+        wanted: Scene | str, effects: Mapping[str, str], diffuser: bool
     ) -> tuple[Scene, World]:
         found = seen(named(wanted) if isinstance(wanted, str) else wanted, effects)
-        behind = seen(find_scene(CALIBRATION), effects) if diffusor else found
+        behind = seen(find_scene(CALIBRATION), effects) if diffuser else found
         return found, world_of_scene(behind)
 
     return SwitchableWorld(world_of_scene(scene)), prepare

@@ -12,7 +12,7 @@ from transientcam_simulation.imaging import SwitchableWorld, World
 from transientcam_simulation.scene import Scene, parse_scene
 
 PrepareScene = Callable[[Scene | str, Mapping[str, str], bool], tuple[Scene, World]]
-"""Prepares a scene, given or by its name, with choices of effects, and with or without a diffusor
+"""Prepares a scene, given or by its name, with choices of effects, and with or without a diffuser
 before the lens."""
 
 
@@ -69,7 +69,7 @@ class SimulationHandle:
         self._prepare = prepare
         self._set_interlock = set_interlock
         self._effects: dict[str, str] = {}
-        self._diffusor = False
+        self._diffuser = False
         self._changing = threading.Lock()
 
     @property
@@ -93,9 +93,9 @@ class SimulationHandle:
         return dict(self._effects)
 
     @property
-    def diffusor(self) -> bool:
-        """Whether filter and diffusor are before the lens."""
-        return self._diffusor
+    def diffuser(self) -> bool:
+        """Whether filter and diffuser are before the lens."""
+        return self._diffuser
 
     def change(
         self,
@@ -103,9 +103,9 @@ class SimulationHandle:
         scene: str | None = None,
         definition: str | None = None,
         effects: Mapping[str, str] | None = None,
-        diffusor: bool | None = None,
+        diffuser: bool | None = None,
     ) -> None:
-        """Prepare another scene, other effects or the diffusor, and switch to it."""
+        """Prepare another scene, other effects or the diffuser, and switch to it."""
         with self._changing:
             wanted: Scene | str = self._chosen
             if definition is not None:
@@ -115,11 +115,11 @@ class SimulationHandle:
             else:
                 definition = self._definition
             chosen = self.effects if effects is None else dict(effects)
-            before_lens = self._diffusor if diffusor is None else diffusor
+            before_lens = self._diffuser if diffuser is None else diffuser
             found, world = self._prepare(wanted, chosen, before_lens)
             self._world.change(world)
             self._chosen, self._definition, self._scene = wanted, definition, found
-            self._effects, self._diffusor = chosen, before_lens
+            self._effects, self._diffuser = chosen, before_lens
 
     def truth(self, *, device_time_s: float | None = None) -> Truth:
         """Ground truth of the last image, or at a time."""

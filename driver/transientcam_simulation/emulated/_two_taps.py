@@ -80,8 +80,8 @@ class DifferentialPixels:
                 for opposite in (0.0, np.pi)
             ]
             difference = ZERO_DN + (taps[0].astype(np.int32) - taps[1]) / 2
-            spoilt = (taps[0] >= highest) | (taps[1] >= highest)
-            images.append(np.where(spoilt, self._saturated, np.rint(difference)).astype(np.uint16))
+            corrupt = (taps[0] >= highest) | (taps[1] >= highest)
+            images.append(np.where(corrupt, self._saturated, np.rint(difference)).astype(np.uint16))
         return np.stack(images)
 
     def sum(self, exposure_s: float, *, device_time_s: float) -> Images:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_simulation.compiled import CODES, LINE, WHOLE, float32, inner, lane
+from transientcam_simulation.compiled import CODES, LINE, WHOLE, float32, inner, kernel
 
 Plane = NDArray[np.float32]
 Codes = NDArray[np.uint16]
@@ -27,7 +27,7 @@ def _turn(
         electrons[i] = max(light, _ZERO)
 
 
-@lane(WHOLE, WHOLE, WHOLE, float32, float32)
+@kernel(WHOLE, WHOLE, WHOLE, float32, float32)
 def at_phase(
     offset: Plane, in_phase: Plane, quadrature: Plane, cosine: np.float32, sine: np.float32
 ) -> Plane:
@@ -56,7 +56,7 @@ def _code(
     return outermost
 
 
-@lane(LINE, CODES, LINE, float32, float32, float32, float32, float32)
+@kernel(LINE, CODES, LINE, float32, float32, float32, float32, float32)
 def coded(
     signal: Plane, bins: Codes, quantiles: Plane, light: np.float32, variance_e2: np.float32,
     dn_per_e: np.float32, dark_dn: np.float32, highest_dn: np.float32,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_simulation.compiled import LANES
+from transientcam_simulation.compiled import IMAGE_KERNELS
 from transientcam_simulation.effects import LightPlanes
 from transientcam_simulation.light import Region, View, holds
 
@@ -32,10 +32,10 @@ class Quadratures:
         """Electrons of an image, given exp(i k theta) of each harmonic."""
         if not illumination:
             return np.zeros_like(self.offset) + self.constant
-        lane = LANES.find("at_phase")
-        if lane is not None and len(self.terms) == 1:
+        kernel = IMAGE_KERNELS.find("at_phase")
+        if kernel is not None and len(self.terms) == 1:
             ((k, *planes),) = self.terms
-            turned: Plane = lane(
+            turned: Plane = kernel(
                 self.offset, *planes, np.float32(phasors[k].real), np.float32(phasors[k].imag)
             )
             return turned

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.base import drawn_bins, drawn_tails, quantiles
-from transientcam_simulation.compiled import LANES
+from transientcam_simulation.compiled import IMAGE_KERNELS
 from transientcam_simulation.effects import (
     FEW_E,
     Exposure,
@@ -38,16 +38,16 @@ class ReadOut:
 
     def codes(self, exposure: Exposure) -> Codes:
         """Return the codes (H, W) of an image; its signal is lost."""
-        lane = LANES.find("coded")
-        if lane is None and self._last is not None:
-            LANES.want_for_images(exposure.signal.size)
-        if lane is None or self._last is None:
+        kernel = IMAGE_KERNELS.find("coded")
+        if kernel is None and self._last is not None:
+            IMAGE_KERNELS.want_for_images(exposure.signal.size)
+        if kernel is None or self._last is None:
             for stage in self._stages:
                 stage.apply(exposure)
             return exposure.signal.astype(np.uint16)
         for stage in self._before:
             stage.apply(exposure)
-        return self._last.codes(lane, exposure)
+        return self._last.codes(kernel, exposure)
 
 
 class _OnePass:
@@ -59,7 +59,7 @@ class _OnePass:
         self._variance_e2 = sum(read, start=_NONE)
         self._quantisation = quantisation
 
-    def codes(self, lane: Any, exposure: Exposure) -> Codes:
+    def codes(self, kernel: Any, exposure: Exposure) -> Codes:
         """Return the codes (H, W) of an image."""
         flat = exposure.signal.reshape(-1)
         few = np.flatnonzero(flat < FEW_E) if self._of_light else np.zeros(0, np.intp)
@@ -68,7 +68,7 @@ class _OnePass:
         bins, last = drawn_bins(exposure.random, flat.size), self._quantisation
         noise = quantiles(), np.float32(self._of_light), self._variance_e2
         codes: Codes
-        codes, outermost = lane(flat, bins, *noise, last.dn_per_e, last.dark_dn, last.highest_dn)
+        codes, outermost = kernel(flat, bins, *noise, last.dn_per_e, last.dark_dn, last.highest_dn)
         self._correct(exposure, few, (bins, outermost), codes)
         return codes.reshape(exposure.signal.shape)
 

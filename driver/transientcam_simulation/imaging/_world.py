@@ -31,7 +31,7 @@ from transientcam_simulation.effects import (
 )
 from transientcam_simulation.imaging._quadratures import Canvas, Quadratures
 from transientcam_simulation.imaging._readout import ReadOut
-from transientcam_simulation.light import Region, Scenery, View, Views, Wanted
+from transientcam_simulation.light import LightRequirements, Region, Scenery, View, Views
 
 _AMBIENT_C = 25.0
 
@@ -140,7 +140,9 @@ class World:
             conditions,
             partial(
                 self._scenery.view,
-                Wanted(of_light, noise, conditions.highest_hz, lens, conditions.image_period_s),
+                LightRequirements(
+                    of_light, noise, conditions.highest_hz, lens, conditions.image_period_s
+                ),
             ),
             MotionDuringSequence.name in of_light,
             next((each for each in made if isinstance(each, ModulationHarmonics)), None),

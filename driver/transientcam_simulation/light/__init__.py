@@ -11,15 +11,21 @@ from transientcam_simulation.light._bundle import Region, holds
 from transientcam_simulation.light._compiler import load_compiled
 from transientcam_simulation.light._measured import load_responses
 from transientcam_simulation.light._shared import shared_scenery
-from transientcam_simulation.light._transport import GivenScenery, Scenery, View, Views, Wanted
+from transientcam_simulation.light._transport import (
+    GivenScenery,
+    LightRequirements,
+    Scenery,
+    View,
+    Views,
+)
 
 __all__ = [
     "GivenScenery",
+    "LightRequirements",
     "Region",
     "Scenery",
     "View",
     "Views",
-    "Wanted",
     "holds",
     "load_compiled",
     "load_responses",

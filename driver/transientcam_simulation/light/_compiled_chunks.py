@@ -13,7 +13,7 @@ from transientcam_simulation.compiled import (
     WHOLE,
     inner,
     int64,
-    lane,
+    kernel,
 )
 from transientcam_simulation.light._coverage import ZERO, Plane
 
@@ -36,7 +36,7 @@ def _put_run(
         shares[i], t[i] = share[i], at[i]
 
 
-@lane(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, int64, int64, LINE, int64, PIXELS, WHOLE)
+@kernel(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, int64, int64, LINE, int64, PIXELS, WHOLE)
 def points(
     share: Plane, at: Plane, x: Plane, y: Plane, z: Plane, top: int, left: int, apex: Plane,
     start: int, places: Indices, lines: Plane,
@@ -63,7 +63,7 @@ def points(
             k = after
 
 
-@lane(INDICES, INDICES, int64, int64, int64, int64)
+@kernel(INDICES, INDICES, int64, int64, int64, int64)
 def around(
     rows: Indices, columns: Indices, top: int, left: int, height: int, width: int
 ) -> Indices:
@@ -83,7 +83,7 @@ def around(
     return beside
 
 
-@lane(PLACES, AROUND)
+@kernel(PLACES, AROUND)
 def among(on: Places, beside: Indices) -> Indices:
     """Return what is beside some of the points, by their own indices."""
     place = np.empty(beside.shape[1] + 1, np.int32)
@@ -98,7 +98,7 @@ def among(on: Places, beside: Indices) -> Indices:
     return found
 
 
-@lane(AROUND)
+@kernel(AROUND)
 def reach(beside: Indices) -> tuple[Places, NDArray[np.bool_]]:
     """Return chunks of the points beside those of each chunk, and which points lack neighbours.
 
@@ -140,7 +140,7 @@ def _bounds(bits: Indices) -> tuple[np.int32, np.int32]:
     return _ordered(least), _ordered(greatest)
 
 
-@lane(LINE, LINE, LINE)
+@kernel(LINE, LINE, LINE)
 def boxes(x: Plane, y: Plane, z: Plane) -> Plane:
     """Return boxes (6, C) around successive chunks of points: lowest coordinates, then highest."""
     count = len(x)

@@ -19,7 +19,7 @@ from transientcam_simulation.compiled import (
     float64,
     inner,
     int64,
-    lane,
+    kernel,
 )
 from transientcam_simulation.light._bundle import Numbers
 from transientcam_simulation.light._coverage import ONE, ZERO, Plane
@@ -47,7 +47,7 @@ def _receive(
         cosine[i] = -(a * axis[0] + b * axis[1] + c * axis[2]) / length
 
 
-@lane(LINE, LINE, LINE, LINE, LINE, LINE, LINE, LINE, PLACES)
+@kernel(LINE, LINE, LINE, LINE, LINE, LINE, LINE, LINE, PLACES)
 def received(
     lamp: Plane, axis: Plane, x: Plane, y: Plane, z: Plane, across: Plane, along: Plane, up: Plane,
     on: Indices,
@@ -97,7 +97,7 @@ def _leave(moments: Plane, rest: Plane) -> None:
         moments[2 * c + 1] *= rest[c]
 
 
-@lane(WHOLE, STACK, PLACES, NUMBERS, STACK, TILES, WHOLE, REGION)
+@kernel(WHOLE, STACK, PLACES, NUMBERS, STACK, TILES, WHOLE, REGION)
 def remaining(
     total: Plane, each: Plane, chains: Indices, regions: Indices, light: Plane,
     marks: NDArray[np.bool_], uncovered: Plane, of: Numbers,
@@ -126,7 +126,7 @@ def remaining(
     return moments
 
 
-@lane(DOUBLES, float64)
+@kernel(DOUBLES, float64)
 def phases(delay_s: Doubles, angular_hz: float) -> Plane:
     """Return phases of light with some times of flight."""
     phase_rad = np.empty(len(delay_s), np.float32)
@@ -135,7 +135,7 @@ def phases(delay_s: Doubles, angular_hz: float) -> Plane:
     return phase_rad
 
 
-@lane(WHOLE, PLACES, DOUBLES, LINE, LINE)
+@kernel(WHOLE, PLACES, DOUBLES, LINE, LINE)
 def turned(
     of_rays: Plane, on: Indices, weight: Doubles, cosine: Plane, sine: Plane
 ) -> None:  # fmt: skip
@@ -163,7 +163,7 @@ def _upright(
         across[i], along[i], up[i] = a / length, b / length, c / length
 
 
-@lane(LINE, LINE, LINE, WHOLE, NUMBERS)
+@kernel(LINE, LINE, LINE, WHOLE, NUMBERS)
 def upright(x: Plane, y: Plane, z: Plane, balls: Plane, spans: Indices) -> Plane:
     """Return unit normals (3, P) at points on ellipsoids, each with a span (N, 2) of the points.
 
@@ -179,7 +179,7 @@ def upright(x: Plane, y: Plane, z: Plane, balls: Plane, spans: Indices) -> Plane
     return normal
 
 
-@lane(LINE, LINE, LINE, LINE, LINE, LINE, DOUBLES, DOUBLES, INDICES)
+@kernel(LINE, LINE, LINE, LINE, LINE, LINE, DOUBLES, DOUBLES, INDICES)
 def returned(
     across: Plane, along: Plane, up: Plane, x: Plane, y: Plane, z: Plane, throughput: Doubles,
     albedos: Doubles, index: NDArray[np.int32],
@@ -194,7 +194,7 @@ def returned(
     return facing, reflectance
 
 
-@lane(LINE, LINE, LINE, PLACES, DOUBLES, float64)
+@kernel(LINE, LINE, LINE, PLACES, DOUBLES, float64)
 def arrived(
     length_m: Plane, distance_m: Plane, irradiance: Plane, on: Indices, sent: Doubles,
     metres_per_s: float,
@@ -214,7 +214,7 @@ def arrived(
     return delay_s, weight
 
 
-@lane(WHOLE, PIXELS, WHOLE, LINE, int64, int64)
+@kernel(WHOLE, PIXELS, WHOLE, LINE, int64, int64)
 def layered(
     moments: Plane, places: NDArray[np.int32], of_rays: Plane, share: Plane, top: int, left: int
 ) -> None:
@@ -230,7 +230,7 @@ def layered(
         moments[row, column + 1] += of_rays[k, 1] * share[k]
 
 
-@lane(WHOLE, PIXELS, LINE)
+@kernel(WHOLE, PIXELS, LINE)
 def uncover(uncovered: Plane, places: NDArray[np.int32], share: Plane) -> None:
     """Take from pixels what layers cover of them, one after the other; at most all is covered."""
     rows, columns = places[0], places[1]
@@ -241,7 +241,7 @@ def uncover(uncovered: Plane, places: NDArray[np.int32], share: Plane) -> None:
         uncovered[rows[k], columns[k]] = max(left, ZERO)
 
 
-@lane(WHOLE, int64, REGION, float32, WHOLE, REGION, float32, WHOLE, REGION)
+@kernel(WHOLE, int64, REGION, float32, WHOLE, REGION, float32, WHOLE, REGION)
 def blended(
     total: Plane, parts: int, of: Numbers, one: np.float32, first: Plane, of_first: Numbers,
     other: np.float32, second: Plane, of_second: Numbers,

@@ -3,7 +3,16 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_simulation.compiled import AROUND, CHUNK, FLAGS, LINE, NUMBERS, WHOLE, inner, lane
+from transientcam_simulation.compiled import (
+    AROUND,
+    CHUNK,
+    FLAGS,
+    LINE,
+    NUMBERS,
+    WHOLE,
+    inner,
+    kernel,
+)
 from transientcam_simulation.light._compiled_numbers import on_rectangle, rows_of
 from transientcam_simulation.light._compiled_point_shares import (
     any_beside,
@@ -130,7 +139,7 @@ def _lines_to(x: Plane, y: Plane, z: Plane, apex: Corner, lines: Plane) -> None:
         lines[3, k] = (z[k] - c) * t[k] + c
 
 
-@lane(WHOLE, LINE, LINE, LINE, LINE, AROUND, NUMBERS, FLAGS)
+@kernel(WHOLE, LINE, LINE, LINE, LINE, AROUND, NUMBERS, FLAGS)
 def shown(
     plate: Plane, apex: Plane, x: Plane, y: Plane, z: Plane, around: NDArray[np.int32],
     reach: Indices, rim: NDArray[np.bool_],

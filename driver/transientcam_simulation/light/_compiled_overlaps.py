@@ -7,7 +7,7 @@ other they overlap by their product.
 
 import numpy as np
 
-from transientcam_simulation.compiled import FLAG, PLANE, inner, lane
+from transientcam_simulation.compiled import FLAG, PLANE, inner, kernel
 from transientcam_simulation.light._bundle import Numbers
 from transientcam_simulation.light._compiled_edges import beside, part_above
 from transientcam_simulation.light._coverage import LEAST, ONE, ZERO, Plane
@@ -46,7 +46,7 @@ def overlap(
     return across
 
 
-@lane(PLANE, PLANE)
+@kernel(PLANE, PLANE)
 def overlapped(one: Plane, other: Plane) -> Plane:
     """Return the share of each pixel (H, W) that lies in both of two shapes, given each's."""
     both = np.empty(one.shape, np.float32)
@@ -57,7 +57,7 @@ def overlapped(one: Plane, other: Plane) -> Plane:
     return both
 
 
-@lane(PLANE, PLANE, PLANE, PLANE, PLANE, PLANE, FLAG)
+@kernel(PLANE, PLANE, PLANE, PLANE, PLANE, PLANE, FLAG)
 def hide(
     one: Plane, at: Plane, left: Plane, other: Plane, its_at: Plane, its_left: Plane, soft: bool
 ) -> None:

@@ -14,7 +14,7 @@ from transientcam_simulation.compiled import (
     WHOLE,
     inner,
     int64,
-    lane,
+    kernel,
 )
 from transientcam_simulation.light._compiled_numbers import (
     ball_of,
@@ -128,7 +128,7 @@ def _any_other(index: Indices, own: int) -> bool:
     return found
 
 
-@lane(PLANES, DOUBLES, INDICES, LINE, LINE, LINE, LINE, INDICES, AROUND, NUMBERS, WHOLE, LINE)
+@kernel(PLANES, DOUBLES, INDICES, LINE, LINE, LINE, LINE, INDICES, AROUND, NUMBERS, WHOLE, LINE)
 def dim_behind_ellipsoids(
     axes: NDArray[np.float64], apex: NDArray[np.float64], owns: Indices, x: Plane, y: Plane,
     z: Plane, near: Plane, index: Indices, around: Indices, reach: NDArray[np.int64],
@@ -169,7 +169,7 @@ def dim_behind_ellipsoids(
         stale[:] = known[:chunks]
 
 
-@lane(WHOLE, LINE, LINE, LINE, LINE, LINE, INDICES, int64, LINE)
+@kernel(WHOLE, LINE, LINE, LINE, LINE, LINE, INDICES, int64, LINE)
 def dim_behind_rectangle(
     plate: Plane, apex: Plane, x: Plane, y: Plane, z: Plane, near: Plane, index: Indices, own: int,
     clear: Plane,
@@ -182,7 +182,7 @@ def dim_behind_rectangle(
         clear[i] = ZERO if between & (one > ZERO) & (other > ZERO) else clear[i]
 
 
-@lane(WHOLE, LINE, LINE, LINE, LINE, LINE, INDICES, int64, AROUND, LINE)
+@kernel(WHOLE, LINE, LINE, LINE, LINE, LINE, INDICES, int64, AROUND, LINE)
 def dim_softly_behind_rectangle(
     plate: Plane, apex: Plane, x: Plane, y: Plane, z: Plane, near: Plane, index: Indices, own: int,
     around: Indices, clear: Plane,

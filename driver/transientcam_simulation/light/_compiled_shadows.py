@@ -15,7 +15,7 @@ from transientcam_simulation.compiled import (
     WHOLE,
     inner,
     int64,
-    lane,
+    kernel,
 )
 from transientcam_simulation.light._bundle import Numbers
 from transientcam_simulation.light._compiled_edges import mark_borders, row_of, share_and_root
@@ -154,7 +154,7 @@ def _take(
         left[top + border[k, 0], start + border[k, 1]] = kept[k]
 
 
-@lane(PLANES, DOUBLES, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, TILES, int64, NUMBERS, FLAG, WHOLE)
+@kernel(PLANES, DOUBLES, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, TILES, int64, NUMBERS, FLAG, WHOLE)
 def shade(
     axes: NDArray[np.float64], apex: NDArray[np.float64], x: Plane, y: Plane, z: Plane,
     near: Plane, far: Plane, tiles: NDArray[np.bool_], side: int, of: NDArray[np.int64],
@@ -192,7 +192,7 @@ def _leave(left: Plane, shown: Plane, light: Plane) -> None:
         light[i] = left[i] if shown[i] > ZERO else ONE
 
 
-@lane(WHOLE, WHOLE, WHOLE, MARKS, REGION)
+@kernel(WHOLE, WHOLE, WHOLE, MARKS, REGION)
 def dimmed(
     seen: Plane, left: Plane, light: Plane, marks: NDArray[np.bool_], of: Numbers
 ) -> None:  # fmt: skip

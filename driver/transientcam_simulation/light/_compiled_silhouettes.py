@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_simulation.compiled import DOUBLES, FLAG, REGION, ROWS, WHOLE, inner, lane
+from transientcam_simulation.compiled import DOUBLES, FLAG, REGION, ROWS, WHOLE, inner, kernel
 from transientcam_simulation.light._bundle import Numbers
 from transientcam_simulation.light._compiled_edges import mark_borders, row_of, share_and_root
 from transientcam_simulation.light._compiled_numbers import ball_of, near_ellipsoid
@@ -61,7 +61,7 @@ def _show(
         share[i] = fills[i] if shows else ZERO
 
 
-@lane(ROWS, DOUBLES, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, REGION, FLAG)
+@kernel(ROWS, DOUBLES, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, REGION, FLAG)
 def seen(
     axes: NDArray[np.float64], apex: NDArray[np.float64], x: Plane, y: Plane, z: Plane,
     near: Plane, far: Plane, fills: Plane, of: Numbers, soft: bool,

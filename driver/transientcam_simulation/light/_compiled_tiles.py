@@ -11,7 +11,7 @@ from transientcam_simulation.compiled import (
     WHOLE,
     inner,
     int64,
-    lane,
+    kernel,
 )
 from transientcam_simulation.light._coverage import ZERO, Plane
 
@@ -43,7 +43,7 @@ def _tangents(
     return (b - root) / a, (b + root) / a
 
 
-@lane(PLANES, DOUBLES, ROWS)
+@kernel(PLANES, DOUBLES, ROWS)
 def tangents(axes: Doubles, apex: Doubles, frame: Doubles) -> Doubles:
     """Return lowest and highest tangents (N, 2, 2) of ellipsoids' angles at an apex.
 
@@ -76,7 +76,7 @@ def _met_row(
     return first, after
 
 
-@lane(PLANES, PLANES, PLANES, ROWS, ROWS)
+@kernel(PLANES, PLANES, PLANES, ROWS, ROWS)
 def met(
     limits: Doubles, low: Doubles, high: Doubles, lowest: Doubles, highest: Doubles
 ) -> tuple[Tiles, NDArray[np.int64]]:
@@ -108,7 +108,7 @@ def met(
     return tiles, spans
 
 
-@lane(WHOLE, int64)
+@kernel(WHOLE, int64)
 def shown_tiles(shown: Plane, side: int) -> Tiles:
     """Return tiles (R, C) of pixels whose shares are not all 0."""
     height, width = shown.shape
@@ -128,7 +128,7 @@ def shown_tiles(shown: Plane, side: int) -> Tiles:
     return tiles
 
 
-@lane(MARKS, int64)
+@kernel(MARKS, int64)
 def grown(tiles: Tiles, beside: int) -> Tiles:
     """Return tiles that are marked, and those up to so many rows and columns beside one."""
     rows, columns = tiles.shape

@@ -32,7 +32,7 @@ _ROUGH_ERROR = 1.5  # by which that may be too low
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _SampledView:
     """Rays into pixels at one time, one or several a pixel, and the light that they see.
 
     ``sharp``: as if no surface let light in.
@@ -73,7 +73,7 @@ class SceneFacts:
             self._times_s = tuple((k + 0.5) / _TIMES * self._period_s for k in range(_TIMES))
         self._found: Recent[tuple[str, tuple[float, ...], float], tuple[Values, ...]]
         self._found = Recent(_KEPT)
-        self._left_out: dict[str, list[list[_Seen]]] = {}
+        self._left_out: dict[str, list[list[_SampledView]]] = {}
 
     @property
     def glimpses(self) -> tuple[Glimpse, ...]:
@@ -107,7 +107,7 @@ class SceneFacts:
         if effect == "interreflection":
             return self._further_light()
         surfaces, camera, there = self._scene.surfaces, self._camera, self._seen
-        variants: dict[str, tuple[bool, Callable[[], list[list[_Seen]]]]] = {
+        variants: dict[str, tuple[bool, Callable[[], list[list[_SampledView]]]]] = {
             "mirror-paths": (
                 any(each.kind == "mirror" for each in surfaces),
                 lambda: [[self._look(without_mirrors(each.scene), camera) for each in there]],
@@ -155,7 +155,7 @@ class SceneFacts:
             for one, other in zip(apart, swept, strict=True)
         )
 
-    def _later(self, by_s: float) -> list[_Seen]:
+    def _later(self, by_s: float) -> list[_SampledView]:
         return [self._look(self._scene.at(t + by_s), self._camera) for t in self._times_s]
 
     @property
@@ -202,7 +202,7 @@ class SceneFacts:
         return max(speeds)
 
     @cached_property
-    def _seen(self) -> list[_Seen]:
+    def _seen(self) -> list[_SampledView]:
         return [self._look(self._scene.at(time_s), self._camera) for time_s in self._times_s]
 
     def _look(
@@ -210,11 +210,11 @@ class SceneFacts:
         scene: Scene,
         camera: Viewpoint,
         places: tuple[tuple[float, float], ...] = ((0.0, 0.0),),
-    ) -> _Seen:
+    ) -> _SampledView:
         """Follow rays through places in the pixels judged, from their centres."""
         rays = np.concatenate([self._rays(camera, at) for at in places])
         lit, count = light_rays(scene, rays), len(self._rows)
-        return _Seen(
+        return _SampledView(
             scene, tuple(lit.part(slice(k, k + count)) for k in range(0, len(rays), count))
         )
 
@@ -225,7 +225,7 @@ class SceneFacts:
         )
 
     def _apart(
-        self, others: list[list[_Seen]], frequencies_hz: tuple[float, ...]
+        self, others: list[list[_SampledView]], frequencies_hz: tuple[float, ...]
     ) -> tuple[Values, ...]:
         """Return the largest difference of moments from those of several variants."""
         apart = tuple(np.zeros(len(self._rows)) for _ in self._seen)

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_simulation.compiled import LANES
+from transientcam_simulation.compiled import IMAGE_KERNELS
 from transientcam_simulation.light import (
     _compiled_chunks as compiled_chunks,
     _compiled_overlaps as compiled_overlaps,
@@ -43,7 +43,7 @@ from transientcam_simulation.scene import Scene, Shape
 
 
 @dataclass(frozen=True, slots=True)
-class _Seen:
+class _VisibleSurface:
     """A surface that moves, where the camera sees it: shares (h, w) of the pixels of a region."""
 
     index: int
@@ -87,7 +87,7 @@ class MovingLight:
         self.scene = scene
         self.still = still
         self._soft = soft
-        LANES.want()
+        IMAGE_KERNELS.want()
         self._movers = tuple(k for k, each in enumerate(scene.surfaces) if each.motions)
         self._lights = tuple(image_lights(scene))
         self._sights = still.lines_of_sight(soft=soft)
@@ -110,7 +110,7 @@ class MovingLight:
         region = union([*(each.region for each in visible), *(each.region for each in shadows)])
         return MovingResponses(self.still, scene, layers, uncovered, shadows, region)
 
-    def _cover(self, shapes: list[Shape], sight: Sight) -> Iterator[_Seen]:
+    def _cover(self, shapes: list[Shape], sight: Sight) -> Iterator[_VisibleSurface]:
         """Shares of pixels that surfaces cover, where nothing that stands still is before them."""
         bundle = sight.bundle
         _tiles, regions = meeting(shapes, bundle)
@@ -119,9 +119,9 @@ class MovingLight:
                 continue
             share, at_m = seen(shape, bundle, region, sight.fills, soft=self._soft)
             if share.any():
-                yield _Seen(index, sight, region, share, at_m)
+                yield _VisibleSurface(index, sight, region, share, at_m)
 
-    def _visible(self, found: list[_Seen]) -> list[_Seen]:
+    def _visible(self, found: list[_VisibleSurface]) -> list[_VisibleSurface]:
         """Take from each share what nearer surfaces that move cover of it; leave out the hidden."""
         left = [each.share.copy() for each in found]
         for k, one in enumerate(found):
@@ -137,7 +137,7 @@ class MovingLight:
         shown = zip(found, left, strict=True)
         return [replace(each, share=share) for each, share in shown if share.any()]
 
-    def _lit(self, scene: Scene, visible: list[_Seen]) -> Layers:
+    def _lit(self, scene: Scene, visible: list[_VisibleSurface]) -> Layers:
         """Light the parts of surfaces that are seen, all at once."""
         counts = [each.count for each in visible]
         ends = np.cumsum([0, *counts]).tolist()

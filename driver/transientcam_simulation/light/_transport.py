@@ -49,7 +49,7 @@ _FOLLOWED: Final = 2  # for effects that do
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class LightRequirements:
     """What a sequence asks of the light: effects by name, and how exactly.
 
     ``noise`` is that of a moment, ``highest_hz`` the highest frequency that is measured, ``lens``
@@ -146,7 +146,7 @@ class Scenery(Protocol):
         """(H, W): of the angle between the pixels' rays and the lens's axis."""
         ...
 
-    def view(self, wanted: Wanted) -> Views:
+    def view(self, wanted: LightRequirements) -> Views:
         """Prepare its views."""
         ...
 
@@ -178,7 +178,7 @@ class GivenScenery:
         """One, as nothing is known of angles."""
         return np.ones(self.glimpses[0].shape)
 
-    def view(self, wanted: Wanted) -> Views:
+    def view(self, wanted: LightRequirements) -> Views:
         """Return the given view."""
         return Views(lambda _time_s: self._view, lambda _time_s: self._view)
 
@@ -192,7 +192,7 @@ class SurfaceScenery:
         self._camera = scene.camera
         self._size = {"width": width, "height": height}
         small = width * height <= KEPT_PIXELS
-        self._still_views: Recent[Wanted, Views] = Recent(_STILL_VIEWS if small else 1)
+        self._still_views: Recent[LightRequirements, Views] = Recent(_STILL_VIEWS if small else 1)
         self._followed: Recent[tuple[frozenset[str], Lens], FollowedRays]
         self._followed = Recent(_FOLLOWED if small else 0)
 
@@ -230,7 +230,7 @@ class SurfaceScenery:
         shape = self._size["height"], self._size["width"]
         return cosine_to_axis(self._camera, camera_rays(self._camera, **self._size)).reshape(shape)
 
-    def view(self, wanted: Wanted) -> Views:
+    def view(self, wanted: LightRequirements) -> Views:
         """Trace a still scene once; of a moving one what moves, for each time.
 
         Raises
@@ -243,7 +243,7 @@ class SurfaceScenery:
             return self._traced(wanted)
         return self._still_views.get(wanted, lambda: self._traced(wanted))
 
-    def _traced(self, wanted: Wanted) -> Views:
+    def _traced(self, wanted: LightRequirements) -> Views:
         scene = self._with(wanted)
         effects = wanted.effects
         # effects within a pixel change which rays are followed, and not what they see
@@ -302,7 +302,7 @@ class SurfaceScenery:
         reflectance = still.reflectance.reshape(shape)
         return View(responses, lambda: reflectance)
 
-    def _with(self, wanted: Wanted) -> Scene:
+    def _with(self, wanted: LightRequirements) -> Scene:
         """Return the scene with the effects of light that are wanted, and no others."""
         effects, scene = wanted.effects, self._scene
         lens = wanted.lens if Distortion.name in effects else PINHOLE

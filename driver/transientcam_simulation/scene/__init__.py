@@ -19,7 +19,7 @@ from transientcam_simulation.scene._geometry import (
 from transientcam_simulation.scene._motion import Motion
 from transientcam_simulation.scene._scene import (
     Background,
-    Diffusor,
+    Diffuser,
     Light,
     ResponseFile,
     Scene,
@@ -33,7 +33,7 @@ __all__ = [
     "Background",
     "Bilinear",
     "Cells",
-    "Diffusor",
+    "Diffuser",
     "Ellipsoid",
     "Light",
     "Motion",

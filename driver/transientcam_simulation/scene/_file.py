@@ -28,7 +28,7 @@ from transientcam_simulation.scene._limits import require_modest
 from transientcam_simulation.scene._motion import Motion, Repeat
 from transientcam_simulation.scene._scene import (
     Background,
-    Diffusor,
+    Diffuser,
     Kind,
     Light,
     ResponseFile,
@@ -42,6 +42,8 @@ from transientcam_simulation.scene._table import Table
 
 BUILT_IN = Path(__file__).parents[1] / "scenes"
 MOST_BOUNCES = 8
+_FORMER_DIFFUSER = "diffusor"
+"""How the table [diffuser] was spelt."""
 _SHAPES = ("rectangle", "sphere", "ellipsoid")
 
 
@@ -101,9 +103,9 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
     responses = tuple(_response(table, folder) for table in top.tables("response"))
     motions = _motions(top.tables("motion"))
     surfaces = tuple(_surface(table, motions) for table in top.tables("surface"))
-    diffusor = _diffusor(top.table("diffusor")) if "diffusor" in top else None
-    if sum(map(bool, (responses, surfaces, diffusor))) != 1:
-        allowed = "given, or [[response]] or [diffusor] instead, but only one of them"
+    diffuser = _diffuser(top)
+    if sum(map(bool, (responses, surfaces, diffuser))) != 1:
+        allowed = "given, or [[response]] or [diffuser] instead, but only one of them"
         raise top.error("surface", len(surfaces), allowed)
     scene = Scene(
         name=name,
@@ -116,7 +118,7 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
         surfaces=surfaces,
         transport=_transport(top.table("transport")),
         responses=responses,
-        diffusor=diffusor,
+        diffuser=diffuser,
         ambient_electrons_per_s=_ambient(top.table("ambient")),
         effects=_effects(top.table("effects")),
         seed=top.integer("seed", 1, least=0, most=2**63 - 1),
@@ -276,14 +278,19 @@ def _ambient(table: Table) -> float:
     return electrons_per_s
 
 
-def _diffusor(table: Table) -> Diffusor:
-    diffusor = Diffusor(
+def _diffuser(top: Table) -> Diffuser | None:
+    if "diffuser" not in top and _FORMER_DIFFUSER not in top:
+        return None
+    if "diffuser" in top and _FORMER_DIFFUSER in top:
+        raise top.error(_FORMER_DIFFUSER, "a table", "absent beside [diffuser]")
+    table = top.table("diffuser" if "diffuser" in top else _FORMER_DIFFUSER)
+    diffuser = Diffuser(
         brightness=table.number("brightness", 1.0, above=0),
         delay_s=table.number("delay_s", 0.0, least=0),
         fall_off=table.number("fall_off", 0.0, least=0, most=0.9),
     )
     table.done()
-    return diffusor
+    return diffuser
 
 
 def _effects(table: Table) -> dict[str, str]:

@@ -120,8 +120,8 @@ class ResponseFile:
 
 
 @dataclass(frozen=True, slots=True)
-class Diffusor:
-    """The light shines at the sensor through a filter and a diffusor (Fig. 4).
+class Diffuser:
+    """The light shines at the sensor through a filter and a diffuser (Fig. 4).
 
     Every pixel gets one return of the same brightness and delay; ``fall_off`` is the share of the
     brightness that is missing in the corners of the image.
@@ -146,7 +146,7 @@ class Scene:
     surfaces: tuple[Surface, ...] = ()
     transport: Transport = field(default_factory=Transport)
     responses: tuple[ResponseFile, ...] = ()
-    diffusor: Diffusor | None = None
+    diffuser: Diffuser | None = None
     ambient_electrons_per_s: float = 0.0
     effects: dict[str, str] = field(default_factory=dict)
     seed: int = 1

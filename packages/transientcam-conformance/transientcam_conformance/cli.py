@@ -30,11 +30,13 @@ def conformance(
     ] = None,
     quick: Annotated[
         bool,
-        typer.Option("--quick", help=f"Leave out what takes long: {', '.join(SLOW)}."),
+        typer.Option("--quick", help=f"Skip the slow checks: {', '.join(SLOW)}."),
     ] = False,
     timeout_s: Annotated[
         float,
-        typer.Option("--timeout", min=1.0, help="How long what happens by itself may take, in s."),
+        typer.Option(
+            "--timeout", min=1.0, help="Timeout in s for events the camera reports unasked."
+        ),
     ] = 30.0,
     token: TokenOption = None,
 ) -> None:

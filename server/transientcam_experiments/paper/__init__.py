@@ -22,7 +22,7 @@ from transientcam_experiments.paper import (
     figure15,
 )
 from transientcam_experiments.paper.bench import Bench
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table
 
 FIGURES: Final[dict[int, PaperFigure]] = {
     module.FIGURE.number: module.FIGURE
@@ -44,4 +44,4 @@ FIGURES: Final[dict[int, PaperFigure]] = {
 }
 """Every figure by its number."""
 
-__all__ = ["FIGURES", "Bench", "Made", "PaperFigure", "Statement", "Table"]
+__all__ = ["FIGURES", "Bench", "FigureResult", "PaperFigure", "Statement", "Table"]

@@ -31,7 +31,7 @@ NO_OPTIONS: Final[Options] = MappingProxyType({})
 WITHOUT_OUTLIERS: Final[Options] = MappingProxyType({"outliers": "off"})
 """For data "without outliers" (Fig. 12), and for comparison."""
 DEVICE: Final = "prototype"
-"""The make of camera: the paper's, as far as its figures are known."""
+"""The model of camera: the paper's, as far as its figures are known."""
 WARM_UP_S: Final = 1800.0
 """"After some warm-up time" (Sec. 6.4): thermal drift has ended, and moving scenes begin anew."""
 _QUICK_TAKES = 3  # the fewest in which an outlier is found
@@ -68,7 +68,7 @@ class Bench:
     Parameters
     ----------
     seed
-        Of all chance.
+        Seed of all random numbers.
     quick
         Average fewer takes, and look at fewer points: for a first look, and for tests.
     waveform
@@ -140,7 +140,7 @@ class Bench:
             return images, camera.simulation.truth()
 
     def calibration(self, sequence: Sequence, *, options: Options = NO_OPTIONS) -> Calibration:
-        """Return the calibration of a sequence: filter and diffusor before the lens (Fig. 4)."""
+        """Return the calibration of a sequence: filter and diffuser before the lens (Fig. 4)."""
         single = replace(sequence, takes=1)
         key = (single, *sorted(options.items()))
         if key not in self._calibrations:

@@ -111,7 +111,7 @@ class Table:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Made:
+class FigureResult:
     """A figure as made here: its picture, and the numbers beside it."""
 
     picture: "Picture"
@@ -137,4 +137,4 @@ class PaperFigure:
     number: int
     title: str
     caption: str
-    make: Callable[[Bench], Made]
+    make: Callable[[Bench], FigureResult]

@@ -9,7 +9,7 @@ import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Bench, ReconstructedShot
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 
 _Array = NDArray[Any]
 SEQUENCE: Final = Sequence(base_frequency_hz=11.5e6, harmonics=7, takes=20)
@@ -18,7 +18,7 @@ _GRID: Final = 1 << 17
 _ORDER: Final = SEQUENCE.harmonics
 
 
-def make(bench: Bench) -> Made:
+def make(bench: Bench) -> FigureResult:
     """Capture the mirrors at seven frequencies, and follow one pixel."""
     shot = bench.shot("mirrors", SEQUENCE)
     y, x = _pixel(shot)
@@ -28,7 +28,7 @@ def make(bench: Bench) -> Made:
     sampled = tm.bias(sampled.astype(np.complex128)).moments  # rounding took of what biasing gave
     phase = 2 * np.pi * np.arange(_GRID) / _GRID
     density = tm.density(tm.levinson(sampled), phase)
-    return Made(
+    return FigureResult(
         _draw(shot, y, x, phase),
         _statements(sampled, phase, density),
         (_table(sampled, density, phase), _moments(shot, y, x)),

@@ -13,7 +13,7 @@ from transientcam_driver import Sequence, SubPhases
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S, Scheme
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Bench
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_server.errors import InputError
 
 _Array = NDArray[Any]
@@ -49,7 +49,7 @@ class Steps:
         return "as it is" if self.kind == "none" else f"{self.kind.replace('-', ' ')}, n = {self.n}"
 
 
-def make(bench: Bench) -> Made:
+def make(bench: Bench) -> FigureResult:
     """Sweep the delay over one period, a column of pixels each, and capture with phase steps."""
     steps = (1, 8) if bench.quick else (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
     schemes = [Steps("none", 1)]
@@ -60,7 +60,7 @@ def make(bench: Bench) -> Made:
         for name, wave in _waveforms(bench).items()
     }
     tables = [_table(name, each) for name, each in curves.items()]
-    return Made(_draw(curves), _statements(curves), tables, _remarks(curves))
+    return FigureResult(_draw(curves), _statements(curves), tables, _remarks(curves))
 
 
 def _waveforms(bench: Bench) -> dict[str, _Array]:
@@ -300,7 +300,7 @@ FIGURE: Final = PaperFigure(
     "Column x of the sensor sees a return x / 163 of a period late, so that one difference of two "
     "opposite images is the effective modulation over a whole period. It is measured over USB for "
     "a triangular waveform and for one with the third harmonic that was measured on the paper's "
-    "make of camera, without noise, with arccos sampling and with harmonic cancellation. The "
+    "model of camera, without noise, with arccos sampling and with harmonic cancellation. The "
     "simulated device takes the first nine harmonics of a waveform.",
     make,
 )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Bench
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.synthetic import PIXEL
 
 _Array = NDArray[Any]
@@ -22,7 +22,7 @@ _RADIUS: Final = 0.93
 """Of the Poisson kernel that densities are smoothed with before they are compared (Sec. 5.2)."""
 
 
-def make(bench: Bench) -> Made:
+def make(bench: Bench) -> FigureResult:
     """Reconstruct the same b_1 to b_5 with different b_0."""
     phase = 2 * np.pi * np.arange(bench.few(20_000, 4000)) / bench.few(20_000, 4000)
     b = PIXEL.moments(_F_HZ, _M)
@@ -39,7 +39,7 @@ def make(bench: Bench) -> Made:
     densities = {b_0: _density(b, b_0, phase) for b_0 in shown}
     less_near = _density(b, singular + _LESS_NEAR * PIXEL.brightness, phase)
     less_sparse = _concentrated(b, phase, less_near)
-    return Made(
+    return FigureResult(
         _draw(phase, truth, densities, swept, errors),
         _statements(b, phase, densities[sparsest], swept, errors),
         (_table(b, phase, truth, densities),),

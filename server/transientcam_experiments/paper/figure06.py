@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Bench, ReconstructedShot
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.mirrors import shots, thrice
 
 _Array = NDArray[Any]
@@ -19,14 +19,14 @@ _SHOWN: Final = 0.02
 """Returns below this share of a pixel's strongest are not drawn."""
 
 
-def make(bench: Bench) -> Made:
+def make(bench: Bench) -> FigureResult:
     """Capture the mirrors with 30 takes, and rank Pisarenko's returns by strength."""
     shot, again = shots(bench, _SEQUENCE, frames=2)
     time_s, weight = _strongest(shot)
     where = thrice(shot)
     errors = [_errors(shot, k) for k in range(3)]
     noise = [_noise(shot, again, k) for k in range(3)]
-    return Made(
+    return FigureResult(
         _draw(time_s, weight),
         _statements(shot, where, errors, noise),
         (_table(shot, where, errors, noise),),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Bench
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.synthetic import CONTINUOUS, Response
 
 _Array = NDArray[Any]
@@ -20,7 +20,7 @@ _RING: Final = 4096
 _WIDTHS: Final = ("mean width over mean density", "greatest width over highest bound")
 
 
-def make(bench: Bench) -> Made:
+def make(bench: Bench) -> FigureResult:
     """Bound the smoothed density of the continuous response of Fig. 11b."""
     b = CONTINUOUS.moments(_F_HZ, _M)
     phase = 2 * np.pi * np.arange(_RING) / _RING
@@ -30,7 +30,7 @@ def make(bench: Bench) -> Made:
     sharper = [
         (scale, *_width(_sharper(scale), _M, phase)) for scale in (1.0, 0.5, 0.25, 0.125, 0.0625)
     ]
-    return Made(
+    return FigureResult(
         _draw(b, phase, lower, upper, smoothed),
         _statements(phase, lower, upper, smoothed, widths),
         (

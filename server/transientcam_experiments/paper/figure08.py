@@ -14,7 +14,7 @@ from transientcam_experiments.paper.biased_pixels import (
     why_biased,
     with_a_room,
 )
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.mirrors import (
     SEQUENCES,
     SINGLE_TAKE,
@@ -29,11 +29,11 @@ _RATES_HZ: Final = {"a": 11.0, "b": 0.44, "c": 0.12}
 """As the paper prints them."""
 
 
-def make(bench: Bench) -> Made:
+def make(bench: Bench) -> FigureResult:
     """Capture the mirrors three times, and once more as in Figure 1."""
     captures = {name: shots(bench, sequence, frames=2) for name, sequence in SEQUENCES.items()}
     captures["1"] = shots(bench, SINGLE_TAKE, frames=2)
-    return Made(
+    return FigureResult(
         _draw({name: captures[name][0] for name in SEQUENCES}),
         _statements(captures),
         (_table(captures), why_biased(bench), with_a_room(captures)),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Bench, ReconstructedShot
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.mirrors import (
     SEQUENCES,
     TIMES_S,
@@ -23,12 +23,12 @@ _QUADRATURE: Final = 100_000
 _FRONT_S: Final = 0.5e-9
 
 
-def make(bench: Bench) -> Made:
+def make(bench: Bench) -> FigureResult:
     """Integrate the densities of Figure 8."""
     captures = {name: shots(bench, sequence, frames=2) for name, sequence in SEQUENCES.items()}
     times_s = np.arange(9e-9, 36e-9, bench.few(1, 3) * 0.25e-9)
     errors = {name: _Errors(pair[0], times_s) for name, pair in captures.items()}
-    return Made(
+    return FigureResult(
         _draw({name: pair[0] for name, pair in captures.items()}),
         _statements(captures, errors),
         (_table(captures, errors),),

@@ -10,7 +10,7 @@ import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Bench, ReconstructedShot
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.tradeoff.truth import Sample, cumulative
 
 _Array = NDArray[Any]
@@ -20,12 +20,12 @@ _TIMES_S: Final = (21.5e-9, 26.0e-9, 29.5e-9)
 _PHASES: Final = 128
 
 
-def make(bench: Bench) -> Made:
+def make(bench: Bench) -> FigureResult:
     """Capture the corner, with its zeroth moment and as if it had not been measured."""
     shot = bench.shot(str(_SCENE), _SEQUENCE)
     estimated = tm.bias(tm.estimate_zeroth(np.array(shot.found.smoothed))).moments
     walls = {name: _Wall(shot, estimated, where, bench) for name, where in _walls(shot).items()}
-    return Made(_draw(shot, walls), _statements(shot, walls), (_table(walls),))
+    return FigureResult(_draw(shot, walls), _statements(shot, walls), (_table(walls),))
 
 
 def _walls(shot: ReconstructedShot) -> dict[str, _Array]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from transientcam_experiments.paper import random_responses, style
 from transientcam_experiments.paper.bench import Bench
 from transientcam_experiments.paper.contenders import CONTENDERS, OURS, PRINTED, Contender
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.outcome import Outcome, outcome
 from transientcam_experiments.paper.synthetic import CONTINUOUS, SPARSE
 
@@ -21,7 +21,7 @@ _CASES: Final = (SPARSE, CONTINUOUS)
 _Outcomes = dict[tuple[str, str], Outcome]
 
 
-def make(bench: Bench) -> Made:
+def make(bench: Bench) -> FigureResult:
     """Reconstruct both responses by every technique, without noise and at 70 : 1."""
     outcomes = {
         (contender.name, case.name): outcome(
@@ -41,7 +41,7 @@ def make(bench: Bench) -> Made:
         *random_responses.statements(CONTINUOUS, continuous, sparse, others),
     ]
     tables = (_table(outcomes), *random_responses.tables(others, sparse))
-    return Made(_draw(outcomes), statements, tables, _remarks(outcomes))
+    return FigureResult(_draw(outcomes), statements, tables, _remarks(outcomes))
 
 
 def _on_sparse(mine: dict[str, Outcome]) -> list[Statement]:

@@ -11,7 +11,7 @@ from transientcam_driver import Sequence
 from transientcam_experiments.paper import coded_corner, style
 from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
 from transientcam_experiments.paper.contenders import Contender
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 
 _Array = NDArray[Any]
 DATA: Final = Sequence(harmonics=4, base_frequency_hz=23e6, takes=4)
@@ -83,7 +83,7 @@ class Ranged:
         return float(off.mean())
 
 
-def make(bench: Bench) -> Made:
+def make(bench: Bench) -> FigureResult:
     """Capture the corner twice, and find its ranges by every technique."""
     step = bench.few(4, 16)
     shots = {
@@ -98,7 +98,7 @@ def make(bench: Bench) -> Made:
     ]
     shot = shots[_F]
     direction = directions(shot)[:, ::step, ::step]
-    return Made(
+    return FigureResult(
         _draw(ranged, direction), _statements(ranged, shot), (_table(ranged),), _remarks(ranged)
     )
 
@@ -251,7 +251,7 @@ def _remarks(ranged: list[Ranged]) -> list[str]:
             f"{coded_corner.HARMONICS} harmonics of the code as its waveform and repeats it at "
             f"{coded.entry.m} frequencies, {coded_corner.SEQUENCE.images_per_take} images a take. "
             f"That device is ideal and modulates up to {highest_mhz:g} MHz, where the paper's "
-            "make of camera reaches about 100 MHz and errs as everywhere else on this page."
+            "model of camera reaches about 100 MHz and errs as everywhere else on this page."
         )
     more = [each for each in ranged if each.entry.base_frequency_hz == _HALF]
     title = f"With f = {_HALF / 1e6:g} MHz, m up to 8"

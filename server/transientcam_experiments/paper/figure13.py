@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Bench, ReconstructedShot
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.visitor import MOMENTS_S, VIDEO, VIDEO_HZ, parts, video
 
 _Array = NDArray[Any]
@@ -20,12 +20,12 @@ _FOUND: Final = 0.1
 """Returns below this share of a pixel's light need not be found."""
 
 
-def make(bench: Bench) -> Made:
+def make(bench: Bench) -> FigureResult:
     """Capture three moments of the video, and one with the exposure of the other figures."""
     frames = video(bench)
     longer = replace(VIDEO, exposure_s=_LONG_S)
     bright = bench.shots("visitor", longer, frames=2, at_s=MOMENTS_S[0])
-    return Made(
+    return FigureResult(
         _draw({at_s: pair[0] for at_s, pair in frames.items()}),
         _statements(frames, bright),
         (_table(frames),),

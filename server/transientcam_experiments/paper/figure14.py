@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Bench, Options, ReconstructedShot
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.visitor import MOMENTS_S, VIDEO, parts, video
 
 _Array = NDArray[Any]
@@ -18,11 +18,13 @@ _OUTLIER: Final = 0.2
 _AMBIENT: Final[Options] = {"ambient": "on"}
 
 
-def make(bench: Bench) -> Made:
+def make(bench: Bench) -> FigureResult:
     """Separate the frames of Figure 13, and once more by daylight."""
     frames = {at_s: pair[0] for at_s, pair in video(bench).items()}
     daylight = bench.shot("visitor", VIDEO, at_s=MOMENTS_S[0], options=_AMBIENT)
-    return Made(_draw(frames), _statements(list(frames.values()), daylight), (_table(frames),))
+    return FigureResult(
+        _draw(frames), _statements(list(frames.values()), daylight), (_table(frames),)
+    )
 
 
 def _mirrored(shot: ReconstructedShot) -> _Array:

@@ -11,7 +11,7 @@ import transientcam_moments as tm
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_experiments.paper import style
 from transientcam_experiments.paper.bench import Bench, ReconstructedShot
-from transientcam_experiments.paper.figure import Made, PaperFigure, Statement, Table, check
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.mirrors import SEQUENCES, shots, thrice
 
 _Array = NDArray[Any]
@@ -31,7 +31,7 @@ file = "pairs.npz"
 """
 
 
-def make(bench: Bench) -> Made:
+def make(bench: Bench) -> FigureResult:
     """Take one row out of the capture of Figure 8b and 9b."""
     shot = shots(bench, SEQUENCES["b"], frames=2)[0]
     row = _scanline(shot)
@@ -39,7 +39,7 @@ def make(bench: Bench) -> Made:
     streak = 2 * np.pi * shot.base_frequency_hz * tm.density(line, _phase(shot)) * 1e-9
     pairs = _pairs(bench)
     merging = _merging(pairs)
-    return Made(
+    return FigureResult(
         _draw(shot, row, np.asarray(streak), pairs),
         _statements(shot, row, np.asarray(streak), merging),
         (

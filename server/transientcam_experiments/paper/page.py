@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
-from transientcam_experiments.paper.figure import Made, PaperFigure
+from transientcam_experiments.paper.figure import FigureResult, PaperFigure
 
 PAGE: Final = "paper.md"
 FOLDER: Final = Path("figures") / "paper"
@@ -21,7 +21,7 @@ def picture_name(number: int) -> str:
 
 
 def document_of(
-    figure: PaperFigure, made: Made, *, seconds: float, quick: bool, seed: int
+    figure: PaperFigure, made: FigureResult, *, seconds: float, quick: bool, seed: int
 ) -> dict[str, Any]:
     """Return everything about a figure but its picture, for JSON."""
     return {
@@ -89,7 +89,7 @@ def _head(figures: list[dict[str, Any]]) -> Iterator[str]:
     yield (
         f"The figures of [Peters et al. 2015]({_PAPER}), made by this software. Every capture "
         "comes from the simulated camera over its emulated USB, with the errors of the paper's "
-        "make of device, after warm-up and with a calibration measured as in Sec. 4.2; figures 5, "
+        "model of device, after warm-up and with a calibration measured as in Sec. 4.2; figures 5, "
         "7 and 11 are synthetic, as in the paper. Figures 1 and 4 of the paper show its set-up."
     )
     yield ""

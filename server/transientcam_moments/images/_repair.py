@@ -3,7 +3,7 @@
 Light and sensor that fall out of step spoil single images: "5-10 % of all captured images differ
 significantly from other images captured with the same configuration". An image at phase step theta
 is o + Re(b_j exp(-i theta)) with the same o at every frequency and phase, so that two opposite
-images add up to 2 o in every pixel (Sec. 3.1). A sum unlike the others has a spoilt image in it;
+images add up to 2 o in every pixel (Sec. 3.1). A sum unlike the others has a corrupt image in it;
 the other sums less the opposite image rebuild it.
 
 Which of the two it is follows from what a loss of synchronisation does: for a part of the exposure
@@ -44,7 +44,7 @@ _NEAREST = 5  # sums in time that rebuild an image
 _UNPAIRED = {"low-frequency": 0, "on-off": 2, "estimated": 0}  # images without an opposite one
 
 Choice = tuple[int, ...]
-"""Which images of one frequency are called spoilt: one of each suspicious pair."""
+"""Which images of one frequency are called corrupt: one of each suspicious pair."""
 
 
 class Repair(NamedTuple):
@@ -109,14 +109,14 @@ def repair(
 
     Notes
     -----
-    A spoilt image that another take has intact is left out, which costs less noise than rebuilding
+    A corrupt image that another take has intact is left out, which costs less noise than rebuilding
     it. Nothing is found with fewer than three sums (m = 1, unless b_0 is measured at a low
     frequency), with fewer than 64 pixels with light, or where the phase turned by so little that
     the sum is less than half as much off again as its noise.
     """
     takes, count = images.shape[:2]
     first = _UNPAIRED[zeroth]
-    spoilt = np.zeros((takes, count), dtype=bool)
+    corrupt = np.zeros((takes, count), dtype=bool)
     unclear = np.zeros((takes, count), dtype=bool)
     usable = _usable(previous, images.shape, first, full_scale)
     for take, look in _looks(images, first, full_scale):
@@ -125,15 +125,15 @@ def repair(
         if previous is not None and usable[take].all():
             before = _values(previous[take], look)
         for image, is_clear in _Verdict(look, zeroth, gains, before).images():
-            (spoilt if is_clear else unclear)[take, image] = True
-    if not (spoilt | unclear).any():
+            (corrupt if is_clear else unclear)[take, image] = True
+    if not (corrupt | unclear).any():
         nothing = np.zeros((takes, count), dtype=bool)
         return Repair(images, nothing, nothing, nothing, nothing)
-    left_out = (spoilt | unclear) & ~(spoilt | unclear).all(axis=0)
-    repaired, unclear = spoilt & ~left_out, unclear & ~left_out
+    left_out = (corrupt | unclear) & ~(corrupt | unclear).all(axis=0)
+    repaired, unclear = corrupt & ~left_out, unclear & ~left_out
     mended = images.copy()
     for take, image in np.argwhere(repaired):
-        mended[take, image] = _rebuilt(images[take], image, first, spoilt[take] | unclear[take])
+        mended[take, image] = _rebuilt(images[take], image, first, corrupt[take] | unclear[take])
     filled = unclear & usable
     if previous is not None:
         mended[filled] = previous[filled]
@@ -187,7 +187,7 @@ class _Fit(NamedTuple):
 
 
 class _Verdict:
-    """Which images of a take are spoilt, by its suspicious sums."""
+    """Which images of a take are corrupt, by its suspicious sums."""
 
     def __init__(
         self, look: PairSums, zeroth: str, gains: Array | None, before: Array | None
@@ -201,7 +201,7 @@ class _Verdict:
         self._static = np.ptp(good, axis=0) <= _STATIC * self._usual
 
     def images(self) -> Iterator[tuple[int, bool]]:
-        """Return each spoilt image and True; both images of a pair and False where it is unclear.
+        """Return each corrupt image and True; both images of a pair and False where it is unclear.
 
         Nothing of what moves or becomes lighter or darker.
         """
@@ -232,7 +232,7 @@ class _Verdict:
         return list(itertools.product(*self._pairs(each)))
 
     def _fits(self, choice: Choice) -> list[_Fit]:
-        """Return how well each image is explained, were these of one frequency the spoilt ones."""
+        """Return how well each image is explained, were these of one frequency the corrupt ones."""
         first = int(self._look.earlier[0])
         start = choice[0] - (choice[0] - first) % PHASE_STEPS
         values = self._with_rebuilt(choice)[start : start + PHASE_STEPS, self._static]
@@ -276,15 +276,15 @@ class _Verdict:
             return {}
         return dict(zip(several, options[order[0]], strict=True))
 
-    def _contradicts(self, spoilt: Choice) -> bool:
-        """Whether moments disagree with these images rebuilt: both of a pair were spoilt then.
+    def _contradicts(self, corrupt: Choice) -> bool:
+        """Whether moments disagree with these images rebuilt: both of a pair were corrupt then.
 
         The frame before shows how well they agree in this scene; without it b_0 has to be
         measured, and moments may miss each other by their noise.
         """
-        if not spoilt or self._gains is None:
+        if not corrupt or self._gains is None:
             return False
-        found = self._disagreement(spoilt)
+        found = self._disagreement(corrupt)
         if self._before is not None:
             return bool(found - self._disagreement_of(self._before) > _CONTRADICTING)
         if self._zeroth == "estimated":
@@ -294,8 +294,8 @@ class _Verdict:
         noise = _NOISE * self._usual / max(float(np.ptp(steps)), 1e-30)
         return bool(found > _CONTRADICTING + noise)
 
-    def _disagreement(self, spoilt: Choice) -> float:
-        return self._disagreement_of(self._with_rebuilt(spoilt))
+    def _disagreement(self, corrupt: Choice) -> float:
+        return self._disagreement_of(self._with_rebuilt(corrupt))
 
     def _disagreement_of(self, images: Array) -> float:
         """Return by how much the moments of images (N, P) differ from those of few returns.
@@ -315,11 +315,11 @@ class _Verdict:
             return float(np.median(-least / np.abs(b[1:]).mean(axis=0))) - 1
         return float(np.abs(np.median(least / b[0].real)))
 
-    def _with_rebuilt(self, spoilt: Sequence[int]) -> Array:
+    def _with_rebuilt(self, corrupt: Sequence[int]) -> Array:
         """Return the values with these images rebuilt."""
         values = self._look.values.copy()
         first = int(self._look.earlier[0])
-        for image in spoilt:
+        for image in corrupt:
             values[image] = 2 * self._middle - self._look.values[_opposite(image, first)]
         return values
 
@@ -329,11 +329,11 @@ def _opposite(image: int, first: int) -> int:
     return image + 2 if (image - first) % PHASE_STEPS < 2 else image - 2
 
 
-def _rebuilt(images: Array, image: int, first: int, spoilt: Array) -> Array:
+def _rebuilt(images: Array, image: int, first: int, corrupt: Array) -> Array:
     """Return an image as the sums nearest in time less the opposite image give it."""
     earlier = [k for k in range(first, len(images)) if (k - first) % PHASE_STEPS < 2]
     good = sorted(
-        (k for k in earlier if not spoilt[k] and not spoilt[k + 2]), key=lambda k: abs(k - image)
+        (k for k in earlier if not corrupt[k] and not corrupt[k + 2]), key=lambda k: abs(k - image)
     )
     good = good[: min(_NEAREST, len(good) - 1 + len(good) % 2)]  # an odd number of them
     wide = images[good + [k + 2 for k in good]].astype(float)

@@ -48,7 +48,7 @@ def sweep_phasors(images: Array) -> SweepPhasors:
     ----------
     images : array, shape (Q, takes, 4 m, P)
         Of b_1 .. b_m at each of `sweep_offsets_rad(Q)`, NumPy array of real numbers; pixels that
-        see a single return through filter and diffusor, none of them saturated.
+        see a single return through filter and diffuser, none of them saturated.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def waveform_of(phasors: Array, count: int) -> Array:
     ----------
     phasors : array, shape (Q, m, P)
         Four-bucket phasors of b_1 .. b_m at each of `sweep_offsets_rad(Q)`, of pixels that see
-        a single return at phase zero, through filter and diffusor.
+        a single return at phase zero, through filter and diffuser.
     count : int
         How many harmonics; 3, 5, .. 2 count + 1 must be below 2 Q.
 

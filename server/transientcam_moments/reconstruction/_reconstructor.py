@@ -275,7 +275,7 @@ class Reconstructor:
         """Return the images after repair; None for other arrays than NumPy's, or by the settings.
 
         What to do depends on the values, which are not known yet where JAX traces a function.
-        Without opposite phases there are no sums to find spoilt images by.
+        Without opposite phases there are no sums to find corrupt images by.
         """
         if self.settings.spoilt_images == "keep" or not isinstance(takes, np.ndarray):
             return None

@@ -11,7 +11,7 @@ from transientcam_moments.images import FOUR_PHASES_RAD, SIGMA_PX, ZEROTH_IMAGES
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, EPSILON
 from transientcam_moments.noise import Sensor
 
-SPOILT_IMAGES = ("keep", "repair", "fill")
+CORRUPT_IMAGES = ("keep", "repair", "fill")
 """What becomes of images that lost their synchronisation; see `Settings`."""
 
 OF_ANY_MULTIPLES = ("likelihood", "two-returns", "unwrapped-phase")
@@ -124,7 +124,7 @@ class Settings:
         in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
         in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
         chosen("estimator", self.estimator, ESTIMATORS)
-        chosen("spoilt_images", self.spoilt_images, SPOILT_IMAGES)
+        chosen("spoilt_images", self.spoilt_images, CORRUPT_IMAGES)
 
     @property
     def least_harmonics(self) -> int:

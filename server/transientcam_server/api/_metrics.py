@@ -14,7 +14,7 @@ from prometheus_client.registry import Collector
 
 import transientcam_moments as tm
 from transientcam_server.api._relay_metrics import RelayCollector
-from transientcam_server.camera import Back, Captured, Event, Lost
+from transientcam_server.camera import CameraLostEvent, CameraRecoveredEvent, Captured, Event
 from transientcam_server.imaging import NOMINAL_ID
 from transientcam_server.recording import Library
 from transientcam_server.service import Service
@@ -60,7 +60,7 @@ class Metrics:
         self._last: Captured | None = None
         # every series from the start, so that its rate can be queried
         self.pixels: Mapping[str, int] = {"total": 1} | dict.fromkeys(_FLAGS, 0)
-        self.spoilt = dict.fromkeys(("rejected", "repaired", "filled", "unrepaired"), 0)
+        self.corrupt = dict.fromkeys(("rejected", "repaired", "filled", "unrepaired"), 0)
         self.losses = 0
         self.reconnects = 0
         self.registry.register(_ServiceCollector(service, self))
@@ -78,10 +78,10 @@ class Metrics:
                     interval_s = raw.device_time_s - self._last.raw.device_time_s
                     self._frame_interval.observe(interval_s)
                 self._last = event
-            case Lost():
+            case CameraLostEvent():
                 self.losses += 1
                 self._last = None
-            case Back():
+            case CameraRecoveredEvent():
                 self.reconnects += 1
 
     def sent(self, latency_s: float) -> None:
@@ -93,9 +93,9 @@ class Metrics:
         if meta["reconstruct_s"] is not None:
             self._reconstruction.observe(meta["reconstruct_s"])
         self.pixels = meta["pixels"] or self.pixels
-        for result in self.spoilt:
+        for result in self.corrupt:
             images = meta[f"{result}_images"] or 0
-            self.spoilt[result] += len(images) if isinstance(images, list) else images
+            self.corrupt[result] += len(images) if isinstance(images, list) else images
 
     def answered(self, status: int) -> None:
         """Count an answer."""
@@ -171,14 +171,14 @@ class _ServiceCollector(Collector):
         ):
             images.add_metric((result,), count)
         yield images
-        spoilt = CounterMetricFamily(
+        corrupt = CounterMetricFamily(
             "transientcam_spoilt_images",
             "Images unlike the others, of frames that were computed, by what became of them.",
             labels=("result",),
         )
-        for result, count in self._metrics.spoilt.items():
-            spoilt.add_metric((result,), count)
-        yield spoilt
+        for result, count in self._metrics.corrupt.items():
+            corrupt.add_metric((result,), count)
+        yield corrupt
         yield CounterMetricFamily(
             "transientcam_usb_resynchronisations",
             "How often the beginning of an image had to be searched for.",

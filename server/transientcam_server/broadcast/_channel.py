@@ -26,7 +26,7 @@ _LONGEST_PERIOD_S = 1e9
 
 
 @dataclass(frozen=True, slots=True)
-class Lost:
+class DroppedFrames:
     """How many frames of a channel were dropped, and of these for want of an acknowledgement."""
 
     count: int
@@ -65,9 +65,9 @@ class Channel:
             decimation=self.crop.decimation,
         )
 
-    def take_lost(self) -> Lost:
+    def take_lost(self) -> DroppedFrames:
         """Return what was dropped since this was asked last, and count anew."""
-        lost = Lost(self.dropped, self.dropped_unacknowledged)
+        lost = DroppedFrames(self.dropped, self.dropped_unacknowledged)
         self.dropped = self.dropped_unacknowledged = 0
         return lost
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol
 
 from transientcam import wire
-from transientcam_server.broadcast._channel import Channel, Lost
+from transientcam_server.broadcast._channel import Channel, DroppedFrames
 from transientcam_server.imaging import Frame
 
 MAX_WAITING_MESSAGES: Final = 64
@@ -54,7 +54,7 @@ class Delivery:
 
     frame: Frame
     channels: tuple[Channel, ...]
-    lost: tuple[Lost, ...] = ()
+    lost: tuple[DroppedFrames, ...] = ()
 
     def computed(self) -> Coroutine[Any, Any, None]:
         """Return what waits until all is computed that its products follow from, or has failed."""

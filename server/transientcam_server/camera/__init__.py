@@ -13,13 +13,13 @@ from transientcam_server.camera._calibration_store import (
 )
 from transientcam_server.camera._calibrator import CalibrationOptions, Calibrator, Drift
 from transientcam_server.camera._events import (
-    Back,
+    CameraLostEvent,
+    CameraRecoveredEvent,
     Captured,
     Event,
-    Held,
-    Lost,
+    LightHeldEvent,
+    LightReleasedEvent,
     OriginChanged,
-    Released,
     SequenceChanged,
 )
 from transientcam_server.camera._jobs import Job, Jobs
@@ -35,7 +35,7 @@ from transientcam_server.camera._lease import (
 from transientcam_server.camera._light import LightGuard
 from transientcam_server.camera._origin_lease import OriginLease
 from transientcam_server.camera._shared import SharedAcquisition
-from transientcam_server.camera._source import sensor_of, start_with, twin_of
+from transientcam_server.camera._source import sensor_of, snapshot_of, start_with
 from transientcam_server.camera._status import AcquisitionStatus
 
 __all__ = [
@@ -44,24 +44,24 @@ __all__ = [
     "MIN_DURATION_S",
     "Acquisition",
     "AcquisitionStatus",
-    "Back",
     "CalibrationOptions",
     "CalibrationStore",
     "Calibrator",
+    "CameraLostEvent",
+    "CameraRecoveredEvent",
     "Captured",
     "Change",
     "Drift",
     "Event",
-    "Held",
     "Job",
     "Jobs",
     "Lease",
     "LeaseManager",
     "LightGuard",
-    "Lost",
+    "LightHeldEvent",
+    "LightReleasedEvent",
     "OriginChanged",
     "OriginLease",
-    "Released",
     "SequenceChanged",
     "SharedAcquisition",
     "StoredCalibration",
@@ -69,6 +69,6 @@ __all__ = [
     "lease",
     "load_given",
     "sensor_of",
+    "snapshot_of",
     "start_with",
-    "twin_of",
 ]

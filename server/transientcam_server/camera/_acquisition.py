@@ -24,12 +24,12 @@ from transientcam_driver import (
     Status,
 )
 from transientcam_server.camera._events import (
-    Back,
+    CameraLostEvent,
+    CameraRecoveredEvent,
     Captured,
     Event,
-    Held,
-    Lost,
-    Released,
+    LightHeldEvent,
+    LightReleasedEvent,
     SequenceChanged,
 )
 from transientcam_server.camera._light import LightGuard
@@ -260,13 +260,13 @@ class Acquisition:
             if self._held is not None:
                 self._held = None
                 self._moved_s = self._clock()
-                self._report(Released())
+                self._report(LightReleasedEvent())
             return False
         if self._held is None:
             self._held = reason
             _log.error("the light is switched off: %s", reason)
             self._arrivals_s.clear()
-            self._report(Held(reason))
+            self._report(LightHeldEvent(reason))
             if self._started:
                 self._started = False
                 self._camera.stop()
@@ -362,7 +362,7 @@ class Acquisition:
             _log.warning("%s", reason)
             self._attempts = 0
             self._arrivals_s.clear()
-            self._report(Lost(reason))
+            self._report(CameraLostEvent(reason))
         self._lost = reason
 
     def _look_for_camera(self) -> None:
@@ -387,7 +387,7 @@ class Acquisition:
         if self._lost is not None:
             _log.info("the camera is back after %d attempts", self._attempts)
             self._lost = None
-            self._report(Back())
+            self._report(CameraRecoveredEvent())
 
     def _run_commands(self, *, wait_s: float) -> None:
         """Run all queued commands; with none, wait up to ``wait_s`` for one."""

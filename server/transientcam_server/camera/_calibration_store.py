@@ -51,7 +51,7 @@ class StoredCalibration:
     notes
         ``name``, and what else is stored with it.
     verdict
-        Whether it was measured on a diffusor.
+        Whether it was measured on a diffuser.
     waveform
         Harmonics of the modulation (m, K), see `Gains`; None where none are known.
     """
@@ -339,7 +339,7 @@ def _read(path: Path, size_bytes: int) -> StoredCalibration | None:
 
 
 def load_given(path: Path) -> Calibration:
-    """Read and evaluate a file that a request names, unless it was not measured on a diffusor.
+    """Read and evaluate a file that a request names, unless it was not measured on a diffuser.
 
     Raises
     ------
@@ -356,7 +356,7 @@ def load_given(path: Path) -> Calibration:
 
 
 def doubted(verdict: Verdict, named: str = "") -> Problem:
-    """Return the problem of a calibration that was not measured on a diffusor."""
+    """Return the problem of a calibration that was not measured on a diffuser."""
     return Problem(
         kinds.CALIBRATION_DOUBTED,
         f"{named}{verdict.reason}",

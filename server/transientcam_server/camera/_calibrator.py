@@ -63,7 +63,7 @@ _EVALUATING: Final = 0.95  # of the work is done when all is captured
 class CalibrationOptions:
     """What to measure: ``frames`` of each kind; ``activate`` uses the result at once.
 
-    ``force`` uses it even where it was not measured on a diffusor. ``harmonics`` sweeps the phase,
+    ``force`` uses it even where it was not measured on a diffuser. ``harmonics`` sweeps the phase,
     where the camera can.
     """
 
@@ -163,7 +163,7 @@ class Calibrator:
     ) -> None:
         """Use a calibration, or the nominal gains, from the next frame on.
 
-        One that was not measured on a diffusor is used only with ``force``.
+        One that was not measured on a diffuser is used only with ``force``.
 
         Raises
         ------

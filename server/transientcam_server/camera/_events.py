@@ -14,27 +14,27 @@ class Captured:
 
 
 @dataclass(frozen=True, slots=True)
-class Lost:
+class CameraLostEvent:
     """The camera is unplugged or does not respond."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
-class Back:
+class CameraRecoveredEvent:
     """A lost camera works again."""
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class LightHeldEvent:
     """The light was switched off although frames are to be captured."""
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
-class Released:
-    """The light goes on again after `Held`."""
+class LightReleasedEvent:
+    """The light goes on again after `LightHeldEvent`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,4 +49,12 @@ class OriginChanged:
     """The service that is relayed calibrates in another way, or its camera looks elsewhere."""
 
 
-Event = Captured | Lost | Back | Held | Released | SequenceChanged | OriginChanged
+Event = (
+    Captured
+    | CameraLostEvent
+    | CameraRecoveredEvent
+    | LightHeldEvent
+    | LightReleasedEvent
+    | SequenceChanged
+    | OriginChanged
+)

@@ -47,7 +47,7 @@ def start_with(camera: Camera, settings: SequenceSettings) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Twin:
+class SimulationSnapshot:
     """What another simulated camera is opened by, before the same scene, as old as the first.
 
     Attributes
@@ -56,7 +56,7 @@ class Twin:
         What the first one was opened with.
     age_s
         Device time of the first one.
-    scene, definition, effects, diffusor
+    scene, definition, effects, diffuser
         What it simulates at present.
     """
 
@@ -65,7 +65,7 @@ class Twin:
     scene: str
     definition: str | None
     effects: dict[str, str]
-    diffusor: bool
+    diffuser: bool
 
     def open(self) -> Camera:
         """Open it, in virtual time.
@@ -80,26 +80,26 @@ class Twin:
         clock.sleep(self.age_s)
         there = camera.simulation
         assert there is not None  # noqa: S101 - of the same spec
-        if (there.scene, there.definition, there.effects, there.diffusor) != (
+        if (there.scene, there.definition, there.effects, there.diffuser) != (
             self.scene,
             self.definition,
             self.effects,
-            self.diffusor,
+            self.diffuser,
         ):
             there.change(
                 scene=self.scene,
                 definition=self.definition,
                 effects=self.effects,
-                diffusor=self.diffusor,
+                diffuser=self.diffuser,
             )
         return camera
 
 
-def twin_of(camera: Camera, spec: str) -> Twin:
+def snapshot_of(camera: Camera, spec: str) -> SimulationSnapshot:
     """Return the twin of a simulated camera, which was opened with ``spec``."""
     own = camera.simulation
     assert own is not None  # noqa: S101 - callers look
     age_s = 0.0
     with contextlib.suppress(CameraError):  # an unplugged one is as new as the twin
         age_s = camera.status().device_time_s
-    return Twin(spec, age_s, own.scene, own.definition, own.effects, own.diffusor)
+    return SimulationSnapshot(spec, age_s, own.scene, own.definition, own.effects, own.diffuser)

@@ -23,19 +23,17 @@ if TYPE_CHECKING:
 def calibrate(
     url: Annotated[
         str | None,
-        typer.Argument(metavar="[URL]", help="A daemon, whose camera is measured and calibrated."),
+        typer.Argument(metavar="[URL]", help="Daemon whose camera is calibrated."),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="The .npz to write; a daemon keeps its own as well."),
+        typer.Option("--output", "-o", help="The .npz to write; a daemon also keeps a copy."),
     ] = None,
     camera: Annotated[
         str | None,
         typer.Option(help="Without a daemon: usb[:SERIAL] or sim:SCENE  [default: usb]"),
     ] = None,
-    takes: Annotated[
-        int, typer.Option(min=2, max=10_000, help="How often each image is captured.")
-    ] = 40,
+    takes: Annotated[int, typer.Option(min=2, max=10_000, help="Captures of each image.")] = 40,
     sequence: Annotated[
         str | None,
         typer.Option(
@@ -49,12 +47,14 @@ def calibrate(
     ] = False,
     force: Annotated[
         bool,
-        typer.Option("--force", help="Let it be used even if it was not measured on a diffusor."),
+        typer.Option("--force", help="Use it even if it was not measured on a diffuser."),
     ] = False,
-    diffusor: Annotated[
+    diffuser: Annotated[
         bool,
         typer.Option(
-            "--diffusor", help="Put it before the lens of a simulated camera, and take it away."
+            "--diffuser",
+            "--diffusor",
+            help="Put the diffuser before a simulated lens while measuring.",
         ),
     ] = False,
     harmonics: Annotated[
@@ -63,16 +63,18 @@ def calibrate(
     ] = True,
     undo: Annotated[
         bool,
-        typer.Option("--undo", help="Measure nothing: let the daemon use the former one again."),
+        typer.Option(
+            "--undo", help="Measure nothing; the daemon returns to the previous calibration."
+        ),
     ] = False,
     token: TokenOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Measure each pixel's gain and phase, while the light shines at the sensor (Sec. 4.2).
 
-    Put filter and diffusor before the lens first. A daemon measures with its present sequence and
+    Put filter and diffuser before the lens first. A daemon measures with its present sequence and
     stores the result; without one, the file is meant for `serve --calibration FILE`. What does not
-    look like a diffusor is kept, but not used, and the exit code is 1; --force uses it anyway.
+    look like a diffuser is kept, but not used, and the exit code is 1; --force uses it anyway.
     """
     require_suffix(output, ".npz")
     if undo:
@@ -82,8 +84,8 @@ def calibrate(
         raise typer.BadParameter(f"there is no folder {output.parent}", param_hint="--output")
     if url is None:
         _refuse({"--name": name, "--activate": activate}, "needs the URL of a daemon")
-        if diffusor and not (camera or "usb").startswith("sim:"):
-            raise typer.BadParameter("is for simulated cameras", param_hint="--diffusor")
+        if diffuser and not (camera or "usb").startswith("sim:"):
+            raise typer.BadParameter("is for simulated cameras", param_hint="--diffuser")
         if output is None:
             raise typer.BadParameter("names the file to write", param_hint="--output")
         order = _Order(
@@ -92,7 +94,7 @@ def calibrate(
             sequence,
             output,
             force=force,
-            diffusor=diffusor,
+            diffuser=diffuser,
             harmonics=harmonics,
         )
         result = _measured_here(order)
@@ -100,7 +102,7 @@ def calibrate(
         _refuse({"--camera": camera, "--sequence": sequence}, "is the daemon's, if there is one")
         options = {"name": name, "frames": takes, "activate": activate, "force": force}
         options["harmonics"] = harmonics
-        result = _measured_by_daemon(url, options, output, token, diffusor=diffusor)
+        result = _measured_by_daemon(url, options, output, token, diffuser=diffuser)
     if as_json:
         typer.echo(json.dumps(result, indent=2))
     elif url is None:
@@ -121,7 +123,7 @@ class _Order:
     sequence: str | None
     output: Path
     force: bool
-    diffusor: bool
+    diffuser: bool
     harmonics: bool
 
 
@@ -143,7 +145,7 @@ def _refuse(options: dict[str, Any], reason: str) -> None:
 
 
 def _measured_by_daemon(
-    url: str, options: dict[str, Any], output: Path | None, token: str | None, *, diffusor: bool
+    url: str, options: dict[str, Any], output: Path | None, token: str | None, *, diffuser: bool
 ) -> dict[str, Any]:
     """Measure in a daemon and return its result; Ctrl-C cancels the job there, too."""
     from rich.progress import Progress
@@ -156,7 +158,7 @@ def _measured_by_daemon(
         def show(job: Mapping[str, Any]) -> None:
             shown.update(task, description=job["step"], completed=job["progress"])
 
-        with _before_lens(camera.simulate) if diffusor else nullcontext():
+        with _before_lens(camera.simulate) if diffuser else nullcontext():
             job = camera.calibrations.measure(**options)
             try:
                 job = camera.wait_for(job["id"], on_progress=show)
@@ -178,12 +180,12 @@ def _measured_by_daemon(
 
 @contextmanager
 def _before_lens(change: Callable[..., object]) -> Iterator[None]:
-    """Put the diffusor before the lens of a simulated camera inside."""
-    change(diffusor=True)
+    """Put the diffuser before the lens of a simulated camera inside."""
+    change(diffuser=True)
     try:
         yield
     finally:
-        change(diffusor=False)
+        change(diffuser=False)
 
 
 def _measured_here(order: _Order) -> dict[str, Any]:
@@ -200,7 +202,7 @@ def _measured_here(order: _Order) -> dict[str, Any]:
             start_with(opened, SequenceSettings())
         else:
             opened.configure(requested)
-        simulation = opened.simulation if order.diffusor else None
+        simulation = opened.simulation if order.diffuser else None
         with nullcontext() if simulation is None else _before_lens(simulation.change):
             measured, why_not = _measure(opened, order)
         full_scale = 2.0**opened.capabilities.bits - 1.0
@@ -293,13 +295,13 @@ def _harmonics_lines(result: Mapping[str, Any]) -> list[str]:
 
 
 def _verdict_lines(verdict: Mapping[str, Any]) -> list[str]:
-    """Say whether it was measured on a diffusor, and if not, why, where, and what can be done."""
+    """Say whether it was measured on a diffuser, and if not, why, where, and what can be done."""
     if verdict["reason"] is None:
-        return ["  measured on a diffusor"]
-    what = {"scene": "this is a scene, not a diffusor", "in-doubt": "this may be no diffusor"}
+        return ["  measured on a diffuser"]
+    what = {"scene": "this is a scene, not a diffuser", "in-doubt": "this may be no diffuser"}
     lines = [f"  {what[verdict['verdict']]}: {verdict['reason']}"]
     if any("#" in row for row in verdict["blocks"]):
-        lines.append(f"  unlike a diffusor (#), in blocks of {verdict['block_px']} pixels:")
+        lines.append(f"  unlike a diffuser (#), in blocks of {verdict['block_px']} pixels:")
         lines += [f"    {row}" for row in verdict["blocks"]]
     return [*lines, "  it is used only if it is forced (--force)"]
 

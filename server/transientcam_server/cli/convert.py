@@ -23,7 +23,7 @@ def convert(
     product: Annotated[
         list[str] | None,
         typer.Option(
-            help="Of an .mcap: what it holds of each frame, such as range,pointcloud,raw; "
+            help="Products in an .mcap, such as range,pointcloud,raw; "
             "separated by commas, or repeated.  [default: raw]"
         ),
     ] = None,

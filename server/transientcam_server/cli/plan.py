@@ -29,7 +29,7 @@ def plan(
         float | None, typer.Option(help="Distance at which two equal returns are both found.")
     ] = None,
     separation_share: Annotated[
-        float, typer.Option(help="In what share of all captures they are.")
+        float, typer.Option(help="Share of captures in which both are found.")
     ] = 0.9,
     bound_width: Annotated[
         float | None,
@@ -72,9 +72,7 @@ def plan(
     ] = None,
     front: Annotated[
         bool,
-        typer.Option(
-            "--front", help="In the place of one sequence for a goal: all that no other beats."
-        ),
+        typer.Option("--front", help="Return the whole Pareto front instead of one sequence."),
     ] = False,
     real_time: Annotated[
         bool, typer.Option("--real-time", help="Let a simulated camera take its time, too.")

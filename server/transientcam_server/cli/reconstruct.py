@@ -14,7 +14,7 @@ from transientcam.cli.options import JsonOption, TokenOption, require_suffix
 from transientcam_server.cli.cluster import DaskOption, WorkersOption
 from transientcam_server.cli.progress import progress_bars
 from transientcam_server.cli.reconstruct_recordings import (
-    Wanted,
+    ReconstructionChoices,
     reconstruct_on_cluster,
     reconstruct_recording,
     settings_of,
@@ -107,7 +107,7 @@ def reconstruct(
     given = {name: value for name, value in options.items() if value is not None}
     clustered = workers is not None or dask is not None
     if clustered or "://" in input or _is_recording(Path(input)):
-        wanted = Wanted(tuple(product or ()), given, bins)
+        wanted = ReconstructionChoices(tuple(product or ()), given, bins)
         if clustered:
             reconstruct_on_cluster(input, output, wanted, workers, dask, token, as_json=as_json)
         else:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class ReconstructionChoices:
     """Names of products, if any were given; settings in place of the recorded ones."""
 
     products: Sequence[str]
@@ -53,18 +53,18 @@ def settings_of(values: Mapping[str, Any]) -> "ReconstructionSettings":
 
 
 def reconstruct_recording(
-    place: str, output: Path, wanted: Wanted, token: str | None, *, as_json: bool
+    place: str, output: Path, wanted: ReconstructionChoices, token: str | None, *, as_json: bool
 ) -> None:
     """Reconstruct every frame of a recording, continuing an interrupted run.
 
     Kernels are compiled first, as on a cluster, so that each run gives the same bits.
     """
     from transientcam_server import offline
-    from transientcam_server.offline import BatchReconstructor, load_lanes, recording_at
+    from transientcam_server.offline import BatchReconstructor, load_kernels, recording_at
 
     with recording_at(place, token=token) as opened:
         options = wanted.options(opened.header)
-        load_lanes(BatchReconstructor(opened, options).recipe)
+        load_kernels(BatchReconstructor(opened, options).recipe)
         with progress_bar("reconstructing") as advance:
             before = offline.reconstruct_recording(opened, output, options, progress=advance)
         _report(str(output), options.products, opened.frames, before, as_json=as_json)
@@ -73,7 +73,7 @@ def reconstruct_recording(
 def reconstruct_on_cluster(
     place: str,
     output: str,
-    wanted: Wanted,
+    wanted: ReconstructionChoices,
     workers: int | None,
     dask: str | None,
     token: str | None,

@@ -15,7 +15,7 @@ def replay(
     speed: Annotated[
         str, typer.Option(help="original, fast (as fast as it can be read) or a factor.")
     ] = "original",
-    loop: Annotated[bool, typer.Option("--loop", help="Begin anew after the last frame.")] = False,
+    loop: Annotated[bool, typer.Option("--loop", help="Start again after the last frame.")] = False,
     host: Annotated[
         str | None, typer.Option(help="Address to listen on.  [default: 127.0.0.1]")
     ] = None,

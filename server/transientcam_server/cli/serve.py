@@ -54,7 +54,7 @@ def serve(
     log_level: Annotated[str | None, typer.Option(help="debug, info, warning or error.")] = None,
     check: Annotated[
         bool,
-        typer.Option("--check", help="Only print the settings in effect, and where each was set."),
+        typer.Option("--check", help="Print the effective settings and their sources, then exit."),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:

@@ -31,7 +31,7 @@ _File = Annotated[
 
 @app.command()
 def create(
-    name: Annotated[str, typer.Argument(help="Whom or what it is for, such as bench-2.")],
+    name: Annotated[str, typer.Argument(help="Who or what the token is for, such as bench-2.")],
     role: Annotated[
         Literal["viewer", "operator", "admin"],
         typer.Option(help="viewer reads, operator controls, admin also takes over any lease."),

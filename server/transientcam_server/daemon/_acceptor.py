@@ -10,10 +10,10 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Final
 
-from transientcam_server.daemon._fair_queue import Turns
+from transientcam_server.daemon._fair_queue import FairQueue
 from transientcam_server.daemon._metering import metered
 from transientcam_server.daemon._rate_limit import RateLimiter
-from transientcam_server.daemon._read_limiter import PORTION_BYTES, Intake
+from transientcam_server.daemon._read_limiter import PORTION_BYTES, ReadLimiter
 from transientcam_server.daemon._refusals import refusal
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.settings import LimitSettings
@@ -39,9 +39,9 @@ def turns_of_requests(
     watched: Callable[[], bool],
     clock: Callable[[], float] = time.monotonic,
     spent: Callable[[], float] = time.thread_time,
-) -> Turns:
+) -> FairQueue:
     """Return what shares a loop's time between requests: nearly all of it while none watches."""
-    return Turns(
+    return FairQueue(
         loop,
         share=lambda: REQUESTS_SHARE if watched() else UNWATCHED_SHARE,
         share_of_one=lambda: limits.address_share if watched() else UNWATCHED_SHARE,
@@ -136,7 +136,7 @@ class Acceptor:
         self._tls = tls
         self._limits = limits
         self._requests = turns_of_requests(self._loop, limits=limits, watched=watched)
-        self._streams = Turns(
+        self._streams = FairQueue(
             self._loop, share=lambda: STREAMS_SHARE, share_of_one=lambda: STREAMS_SHARE
         )
         self._admission = Admission(limits, clock=self._loop.time)
@@ -203,7 +203,7 @@ class Acceptor:
         counted.callback(self._admission.release, host)
         try:
             await self._loop.connect_accepted_socket(
-                lambda: Intake(
+                lambda: ReadLimiter(
                     self._protocol(),
                     requests=self._requests.account(host),
                     streams=self._streams.account(host),

@@ -98,7 +98,7 @@ def tokens_file_of(file: Path | None, *, environment: Mapping[str, str]) -> Path
 def _load(
     command_line: Mapping[str, Any], *, file: Path | None, environment: Mapping[str, str]
 ) -> Configuration:
-    given = _Given()
+    given = _MergedSettings()
     given.read_file(file)
     given.read_environment(environment)
     given.read_command_line(command_line)
@@ -115,7 +115,7 @@ def _load(
 
 
 @dataclass
-class _Given:
+class _MergedSettings:
     """What was given, each source over those read before it, and where."""
 
     values: dict[str, Any] = field(default_factory=dict)

@@ -28,9 +28,9 @@ _T = TypeVar("_T")
 
 
 class Account:
-    """What one address has of the loop's time; `Turns.account` makes it."""
+    """What one address has of the loop's time; `FairQueue.account` makes it."""
 
-    def __init__(self, turns: "Turns") -> None:
+    def __init__(self, turns: "FairQueue") -> None:
         self.had_s = 0.0
         self.left_s = BURST_OF_ONE_S
         self.counted_s = 0.0
@@ -59,7 +59,7 @@ class Account:
         await come
 
 
-class Turns:
+class FairQueue:
     """Shares a part of the time of an event loop between those who ask for it.
 
     Parameters

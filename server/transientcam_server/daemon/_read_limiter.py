@@ -1,7 +1,7 @@
 """What clients send, in portions: a flood on one connection delays no other one.
 
-Between the transport of a connection and its protocol stands an `Intake`. It reads no more than
-`PORTION_BYTES` at once, and hands them over when `Turns` has time for its address.
+Between the transport of a connection and its protocol stands a `ReadLimiter`. It reads no more
+than `PORTION_BYTES` at once, and hands them over when `FairQueue` has time for its address.
 """
 
 import asyncio
@@ -26,7 +26,7 @@ _portion: Final = _Portion()
 """Of each thread: several services in one process have a loop each."""
 
 
-class Intake(asyncio.BufferedProtocol):
+class ReadLimiter(asyncio.BufferedProtocol):
     """Reads a connection for a protocol, portion by portion.
 
     Parameters
@@ -111,11 +111,11 @@ class Intake(asyncio.BufferedProtocol):
 
 
 class Valve:
-    """The transport that a protocol behind an `Intake` has: the real one, but for reading."""
+    """The transport that a protocol behind a `ReadLimiter` has: the real one, but for reading."""
 
-    def __init__(self, transport: asyncio.Transport, intake: Intake) -> None:
+    def __init__(self, transport: asyncio.Transport, limiter: ReadLimiter) -> None:
         self._transport = transport
-        self._intake = intake
+        self._limiter = limiter
         self._reasons: set[str] = set()
         self._shut = False
         self.write = transport.write
@@ -128,7 +128,7 @@ class Valve:
     @property
     def account(self) -> Account:
         """What the address of the client has of the loop's time."""
-        return self._intake.account
+        return self._limiter.account
 
     @property
     def held(self) -> bool:
@@ -158,15 +158,15 @@ class Valve:
             self._settle()
             self._hand_over()
 
-        self._intake.account.run(go_on)
+        self._limiter.account.run(go_on)
 
     def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
         """Hand everything to another protocol from now on; there is one, that of WebSockets."""
-        self._intake.upgrade(cast("asyncio.Protocol", protocol))
+        self._limiter.upgrade(cast("asyncio.Protocol", protocol))
 
     def get_protocol(self) -> asyncio.Protocol:
         """Return the protocol."""
-        return self._intake.protocol
+        return self._limiter.protocol
 
     def shut(self, reason: str) -> None:
         """Read nothing more while this reason lasts."""
@@ -190,5 +190,5 @@ class Valve:
             self._transport.resume_reading()
 
     def _hand_over(self) -> None:
-        if self._intake.waits and not self.held:
-            self._intake.account.run(self._intake.hand_over)
+        if self._limiter.waits and not self.held:
+            self._limiter.account.run(self._limiter.hand_over)

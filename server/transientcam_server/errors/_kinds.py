@@ -188,8 +188,8 @@ CALIBRATION_MISFIT: Final = ProblemKind(
 CALIBRATION_DOUBTED: Final = ProblemKind(
     "calibration-doubted",
     409,
-    "Calibration was not measured on a diffusor",
-    "Its measurement does not look like a diffusor's: `detail` says what speaks against it, "
+    "Calibration was not measured on a diffuser",
+    "Its measurement does not look like a diffuser's: `detail` says what speaks against it, "
     "`verdict` is `in-doubt` or `scene`, and `tests` has the figures. Used anyway, ranges may be "
     "wrong everywhere; `force` does so. Frames are computed as before.",
 )

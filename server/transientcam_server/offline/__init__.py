@@ -9,7 +9,7 @@ from transientcam_server.offline import _plot as plot
 from transientcam_server.offline._cluster import completed, reconstruct_on
 from transientcam_server.offline._convert import convert_recording
 from transientcam_server.offline._impulse_responses import is_tal
-from transientcam_server.offline._job import installed, load_lanes, require_versions
+from transientcam_server.offline._job import installed, load_kernels, require_versions
 from transientcam_server.offline._kinect2 import import_kinect2, read_lens
 from transientcam_server.offline._mcap import lens_of
 from transientcam_server.offline._measurement import (
@@ -41,7 +41,7 @@ __all__ = [
     "installed",
     "is_tal",
     "lens_of",
-    "load_lanes",
+    "load_kernels",
     "load_measurement",
     "plot",
     "read_lens",

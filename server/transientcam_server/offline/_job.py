@@ -22,7 +22,7 @@ BLOCK_FRAMES: Final = 64
 """Of a task: less, and a cluster of 100 workers would wait for its scheduler."""
 _PACKAGES: Final = ("transientcam", "numpy", "numba", "h5py", "isal")
 """Those that the values depend on."""
-_LANES_OF: Final = {"likelihood": "likelihood", "two-returns": "pairs"}
+_KERNELS_OF: Final = {"likelihood": "likelihood", "two-returns": "pairs"}
 _opening: Final = threading.Lock()
 
 
@@ -123,20 +123,20 @@ def _opened(job: Job) -> tuple[Recording, BatchReconstructor]:
     recording = recording_at(job.place, token=job.token)
     try:
         reconstructor = BatchReconstructor(recording, job.options)
-        load_lanes(reconstructor.recipe)
+        load_kernels(reconstructor.recipe)
     except BaseException:
         recording.close()
         raise
     return recording, reconstructor
 
 
-def load_lanes(recipe: Recipe) -> None:
-    """Make the compiled lanes ready: values of NumPy differ from theirs in the last digits."""
+def load_kernels(recipe: Recipe) -> None:
+    """Make the compiled kernels ready: values of NumPy differ from theirs in the last digits."""
     if not tm.kernels.state()["enabled"]:
         return
     needed = [name for name in tm.kernels.LANES if name not in tm.kernels.WHEN_NEEDED]
-    if recipe.technique in _LANES_OF:
-        needed.append(_LANES_OF[recipe.technique])
+    if recipe.technique in _KERNELS_OF:
+        needed.append(_KERNELS_OF[recipe.technique])
     if recipe.waveform is not None:
         needed.append("harmonics")
     order = recipe.applied.sequence.multiples[-1]

@@ -17,7 +17,7 @@ from transientcam_server.planning._scene.scene import SceneStatistics
 CACHED_S: Final = 10.0
 
 
-class Twin(Protocol):
+class CameraTwin(Protocol):
     """A simulated camera before the same scene, in virtual time; it is pickled."""
 
     def open(self) -> AbstractContextManager[FrameSource]:
@@ -37,7 +37,7 @@ class Looks:
         planner: Planner,
         workers: Workers,
         queue: PlanningQueue,
-        twin: Callable[[], Twin] | None,
+        twin: Callable[[], CameraTwin] | None,
         *,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -106,7 +106,7 @@ class Looks:
 
 def look_through(
     planner: Planner,
-    twin: Twin,
+    twin: CameraTwin,
     base: Sequence,
     ambient_dn_per_s: float | None,
     progress: Progress,

@@ -280,7 +280,7 @@ class RelayCamera(HostCamera):
                 self._gone = f"the origin has lost its camera: {notice.details.get('reason')}"
             case "calibration-changed" | "simulation-changed":
                 self._outdated = True
-            case "reconstruction-changed" if not self.has_images:  # of spoilt ones, it may be
+            case "reconstruction-changed" if not self.has_images:  # of corrupt ones, it may be
                 self._outdated = True
             case "dropped" if notice.details["channel"] == self._counted:
                 self.relayed.dropped_frames += int(notice.details["count"])

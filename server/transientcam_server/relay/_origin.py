@@ -18,10 +18,10 @@ from transientcam_driver import CalibrationError, CameraError, CameraLost, Capab
 from transientcam_server.errors import OriginRefused
 from transientcam_server.imaging import FACTORY_ID, NOMINAL_ID, Calibration, load_calibration
 from transientcam_server.relay._frames import RAW, SUBSCRIBED
-from transientcam_server.settings import SpoiltImages
+from transientcam_server.settings import CorruptImages
 
 _CAPABILITIES: Final = TypeAdapter(Capabilities)
-_SPOILT_IMAGES: Final[TypeAdapter[SpoiltImages]] = TypeAdapter(SpoiltImages)
+_CORRUPT_IMAGES: Final[TypeAdapter[CorruptImages]] = TypeAdapter(CorruptImages)
 _SENSOR: Final = TypeAdapter(tm.noise.Sensor)
 _CREDITS: Final = 2
 """One frame travels while another is taken: more would only make frames older."""
@@ -58,7 +58,7 @@ class Described:
     intrinsics: Mapping[str, Any]
     sequence: Mapping[str, Any]
     calibration: Calibration | None
-    spoilt_images: SpoiltImages
+    spoilt_images: CorruptImages
 
 
 class Origin:
@@ -111,7 +111,7 @@ class Origin:
                     intrinsics=camera["intrinsics"],
                     sequence=self._client.sequence,
                     calibration=self._calibration(),
-                    spoilt_images=_SPOILT_IMAGES.validate_python(
+                    spoilt_images=_CORRUPT_IMAGES.validate_python(
                         info["reconstruction"]["spoilt_images"]
                     ),
                 )

@@ -153,7 +153,7 @@ albedo = 0.5
     assert camera.simulation.truth().range_m[60, 81] == pytest.approx(2.0, abs=1e-4)
 
 
-def test_a_simulated_specimen_keeps_its_serial_number_before_every_scene(
+def test_a_simulated_unit_keeps_its_serial_number_before_every_scene(
     open_virtual: OpenCamera,
 ) -> None:
     serials = [

@@ -6,7 +6,7 @@ import pytest
 
 from transientcam_experiments.paper import FIGURES, Bench, figure11, figure12, style
 from transientcam_experiments.paper.contenders import CONTENDERS, PRINTED
-from transientcam_experiments.paper.figure import Made
+from transientcam_experiments.paper.figure import FigureResult
 from transientcam_experiments.paper.figure12 import ENTRIES
 
 PAPERS = (2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
@@ -37,7 +37,9 @@ def test_every_figure_of_the_paper_that_shows_results_is_there() -> None:
 
 
 @pytest.fixture
-def made(bench: Bench, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Made:
+def made(
+    bench: Bench, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> FigureResult:
     # tables and linear programs of many pixels take their time
     quick = tuple(each for each in CONTENDERS if each.name in PRINTED)
     monkeypatch.setattr(figure11, "CONTENDERS", quick)
@@ -46,7 +48,7 @@ def made(bench: Bench, request: pytest.FixtureRequest, monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize(("made", "number"), [(n, n) for n in PAPERS], indirect=["made"])
-def test_a_figure_has_a_picture_statements_and_a_table(made: Made, number: int) -> None:
+def test_a_figure_has_a_picture_statements_and_a_table(made: FigureResult, number: int) -> None:
     assert style.png(made.picture).startswith(b"\x89PNG")
     assert len(made.statements) >= 2
     for statement in made.statements:

@@ -64,10 +64,10 @@ class Scene:
     def capture(self) -> Images:
         return np.stack([self.noisy(self.mean(k)) for k in range(len(self.labels))])
 
-    def spoil(self, images: Images, *spoilt: int, factor: complex = 0.0) -> Images:
+    def spoil(self, images: Images, *corrupt: int, factor: complex = 0.0) -> Images:
         """Replace images by ones whose light was out of phase during a part of the exposure."""
         out = images.copy()
-        for image in spoilt:
+        for image in corrupt:
             part, phase = self.random.uniform(0.3, 1.0), self.random.uniform(1.0, 5.0)
             f = factor or (1 - part) + part * np.exp(1j * phase)
             out[image] = self.noisy(self.mean(image, f))
@@ -88,7 +88,7 @@ def places(mask: Images) -> list[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("zeroth", ZEROTHS)
-def test_each_spoilt_image_is_found_and_rebuilt(zeroth: str) -> None:
+def test_each_corrupt_image_is_found_and_rebuilt(zeroth: str) -> None:
     scene = Scene(zeroth)
     for image in range(FIRST[zeroth], len(scene.labels)):
         clean = scene.capture()
@@ -108,7 +108,7 @@ def test_each_spoilt_image_is_found_and_rebuilt(zeroth: str) -> None:
 
 
 @pytest.mark.parametrize("zeroth", ZEROTHS)
-def test_several_spoilt_images_of_different_pairs_are_rebuilt(zeroth: str) -> None:
+def test_several_corrupt_images_of_different_pairs_are_rebuilt(zeroth: str) -> None:
     scene = Scene(zeroth, seed=3)
     first = FIRST[zeroth]
     for a, b in ((0, 6), (1, 7), (5, 14), (8, 13)):
@@ -117,7 +117,7 @@ def test_several_spoilt_images_of_different_pairs_are_rebuilt(zeroth: str) -> No
         assert places(found.repaired) == [(0, first + a), (0, first + b)]
 
 
-def test_both_quadratures_of_a_frequency_may_be_spoilt() -> None:
+def test_both_quadratures_of_a_frequency_may_be_corrupt() -> None:
     scene = Scene("on-off", seed=5)
 
     found = scene.repair(scene.spoil(scene.capture(), 8, 7, factor=0.2 - 0.3j))
@@ -231,7 +231,7 @@ def test_saturated_pixels_decide_nothing() -> None:
     assert places(scene.repair(scene.spoil(images, 9)).repaired) == [(0, 9)]
 
 
-def test_an_object_in_the_way_does_not_hide_a_spoilt_image() -> None:
+def test_an_object_in_the_way_does_not_hide_a_corrupt_image() -> None:
     scene = Scene("on-off", seed=19)
     found = scene.repair(moving(scene, 0.4, 1, 2, {6: 0.1 + 0.5j}))
 
@@ -239,7 +239,7 @@ def test_an_object_in_the_way_does_not_hide_a_spoilt_image() -> None:
 
 
 @pytest.mark.parametrize("zeroth", ["low-frequency", "on-off"])
-def test_two_spoilt_images_of_a_pair_are_filled_from_the_frame_before(zeroth: str) -> None:
+def test_two_corrupt_images_of_a_pair_are_filled_from_the_frame_before(zeroth: str) -> None:
     scene = Scene(zeroth, seed=23)
     pair = [FIRST[zeroth] + 5, FIRST[zeroth] + 7]
     clean, before = scene.capture(), scene.capture()
@@ -256,7 +256,7 @@ def test_two_spoilt_images_of_a_pair_are_filled_from_the_frame_before(zeroth: st
     assert not filled.unrepaired.any()
 
 
-def test_nothing_is_filled_from_a_frame_that_is_spoilt_there_itself() -> None:
+def test_nothing_is_filled_from_a_frame_that_is_corrupt_there_itself() -> None:
     scene = Scene("on-off", seed=29)
     images = scene.spoil(scene.spoil(scene.capture(), 7, factor=-0.6), 9, factor=0.3)
     before = scene.spoil(scene.capture(), 7)
@@ -277,7 +277,7 @@ def test_what_can_be_rebuilt_is_not_filled() -> None:
 
 
 @pytest.mark.parametrize("takes", [2, 3])
-def test_a_spoilt_image_is_left_out_where_another_take_has_it(takes: int) -> None:
+def test_a_corrupt_image_is_left_out_where_another_take_has_it(takes: int) -> None:
     scene = Scene("low-frequency", seed=37)
     stack = np.stack([scene.capture() for _ in range(takes)])
     stack[1] = scene.spoil(stack[1], 6)
@@ -365,14 +365,14 @@ def test_a_reconstruction_is_that_of_the_repaired_images_and_counts_them(zeroth:
 
 def test_images_left_out_of_two_takes_count_as_rejected() -> None:
     scene = Scene("on-off", seed=61)
-    good, spoilt = scene.capture(), scene.capture()
-    images = np.concatenate([good, scene.spoil(spoilt, 7)])
+    good, corrupt = scene.capture(), scene.capture()
+    images = np.concatenate([good, scene.spoil(corrupt, 7)])
 
     found = tm.reconstruct(
         images, settings(scene, "repair", 2), calibration=np.ones(scene.harmonics + 1)
     )
 
-    average = (good.astype(np.float32) + spoilt) / 2
+    average = (good.astype(np.float32) + corrupt) / 2
     average[7] = good[7]
     assert (found.rejected_images, found.repaired_images) == (1, 0)
     np.testing.assert_allclose(found.measured, tm.measure(average, zeroth="on-off"), rtol=1e-5)
@@ -392,7 +392,7 @@ def test_a_frame_is_filled_from_the_one_before_only_by_the_settings() -> None:
 
 @pytest.mark.parametrize("zeroth", ZEROTHS)
 @pytest.mark.parametrize("share", [0.0, 1.0])
-def test_whole_numbers_without_noise_are_not_spoilt_by_their_rounding(
+def test_whole_numbers_without_noise_are_not_corrupt_by_their_rounding(
     zeroth: str, share: float
 ) -> None:
     """All pixels alike: nothing but rounding makes their sums differ, and no fit is possible."""
@@ -406,6 +406,6 @@ def test_whole_numbers_without_noise_are_not_spoilt_by_their_rounding(
     assert found.images is images
 
 
-def test_another_treatment_of_spoilt_images_is_refused() -> None:
+def test_another_treatment_of_corrupt_images_is_refused() -> None:
     with pytest.raises(tm.ParameterError, match="spoilt_images"):
         tm.Settings(spoilt_images="ignore")

@@ -1,4 +1,4 @@
-"""The phase sweep of a calibration: its phasors without spoilt images, and its harmonics."""
+"""The phase sweep of a calibration: its phasors without corrupt images, and its harmonics."""
 
 import mpmath
 import numpy as np
@@ -36,7 +36,7 @@ def third(phasors: NDArray[np.complex128]) -> complex:
     return complex(tm.waveform_of(phasors, STEPS - 2)[0, 0])
 
 
-def test_a_sweep_without_spoilt_images_keeps_all_of_them() -> None:
+def test_a_sweep_without_corrupt_images_keeps_all_of_them() -> None:
     found = tm.sweep_phasors(swept())
 
     assert not found.left_out.any()
@@ -44,7 +44,7 @@ def test_a_sweep_without_spoilt_images_keeps_all_of_them() -> None:
 
 
 @pytest.mark.parametrize(
-    "spoilt",
+    "corrupt",
     [
         # step, take, image, by how much
         pytest.param(
@@ -62,21 +62,21 @@ def test_a_sweep_without_spoilt_images_keeps_all_of_them() -> None:
     ],
 )
 def test_images_that_lost_their_synchronisation_are_left_out(
-    spoilt: list[tuple[int, int, int, float]],
+    corrupt: list[tuple[int, int, int, float]],
 ) -> None:
     images = swept()
-    for step, take, image, by_dn in spoilt:
+    for step, take, image, by_dn in corrupt:
         images[step, take, image] += by_dn
 
     found = tm.sweep_phasors(images)
 
     assert sorted(map(tuple, np.argwhere(found.left_out).tolist())) == sorted(
-        (step, take, image) for step, take, image, _ in spoilt
+        (step, take, image) for step, take, image, _ in corrupt
     )
     assert third(found.phasors) == pytest.approx((12.0 - 5.0j) / 400.0, abs=2e-4)
 
 
-def test_an_image_spoilt_in_all_takes_follows_from_the_opposite_one() -> None:
+def test_an_image_corrupt_in_all_takes_follows_from_the_opposite_one() -> None:
     images = swept()
     for take, by_dn in enumerate((70.0, -90.0, 140.0)):
         images[5, take, 2] += by_dn
@@ -87,7 +87,7 @@ def test_an_image_spoilt_in_all_takes_follows_from_the_opposite_one() -> None:
     assert third(found.phasors) == pytest.approx((12.0 - 5.0j) / 400.0, abs=2e-4)
 
 
-def test_a_pair_spoilt_in_all_takes_leaves_no_phasor() -> None:
+def test_a_pair_corrupt_in_all_takes_leaves_no_phasor() -> None:
     images = swept()
     for take, by_dn in enumerate((70.0, -90.0, 140.0)):
         images[5, take, 0] += by_dn

@@ -14,7 +14,7 @@ from tests.waiting import wait_until
 from transientcam import wire
 from transientcam_driver import RawFrame
 from transientcam_server.api._metrics import Metrics
-from transientcam_server.camera import Captured, Lost
+from transientcam_server.camera import CameraLostEvent, Captured
 
 Samples = dict[str, float]
 
@@ -97,7 +97,7 @@ def test_intervals_are_those_of_the_camera_s_clock_within_one_sequence(served: S
     for epoch, time_s in ((1, 0.0), (1, 0.1), (1, 0.3), (2, 9.0), (2, 9.25)):
         raw = cast("RawFrame", SimpleNamespace(epoch=epoch, device_time_s=time_s))
         metrics.happened(Captured(raw, served.service.applied))
-    metrics.happened(Lost("unplugged"))
+    metrics.happened(CameraLostEvent("unplugged"))
     metrics.happened(Captured(raw, served.service.applied))
 
     def sample(name: str) -> float | None:

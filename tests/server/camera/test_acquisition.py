@@ -21,7 +21,14 @@ from transientcam_driver import (
     Sequence,
     SequenceError,
 )
-from transientcam_server.camera import Acquisition, Back, Captured, Event, Lost, SequenceChanged
+from transientcam_server.camera import (
+    Acquisition,
+    CameraLostEvent,
+    CameraRecoveredEvent,
+    Captured,
+    Event,
+    SequenceChanged,
+)
 from transientcam_server.camera._acquisition import STALLED_MIN_S
 from transientcam_server.errors import JobCancelled, Problem, SequenceConflict, kinds
 
@@ -161,9 +168,9 @@ def test_a_lost_camera_is_reported_once_looked_for_and_reported_back_with_its_fi
         one.camera.deliver(7)
         back, captured = one.event(), one.event()
 
-    assert isinstance(lost, Lost)
+    assert isinstance(lost, CameraLostEvent)
     assert "unplugged" in lost.reason
-    assert isinstance(back, Back)
+    assert isinstance(back, CameraRecoveredEvent)
     assert numbers(captured) == [7]
     assert one.camera.calls.count("reconnect") == 3
     # the light is on again only after the camera was found
@@ -178,8 +185,8 @@ def test_a_camera_that_fails_at_once_each_time_is_lost_all_along() -> None:
         one.camera.deliver(1)
         back = one.event()
 
-    assert isinstance(lost, Lost)
-    assert isinstance(back, Back)
+    assert isinstance(lost, CameraLostEvent)
+    assert isinstance(back, CameraRecoveredEvent)
 
 
 def test_what_is_counted_anew_after_a_loss_is_reported_as_another_sequence() -> None:
@@ -190,7 +197,7 @@ def test_what_is_counted_anew_after_a_loss_is_reported_as_another_sequence() -> 
         one.camera.deliver(1, epoch=5)
 
         assert one.event() == SequenceChanged(one.camera.applied)
-        assert isinstance(one.event(), Back)
+        assert isinstance(one.event(), CameraRecoveredEvent)
         assert numbers(one.event()) == [1]
 
 
@@ -215,8 +222,8 @@ def test_a_loss_is_noticed_while_nothing_is_read() -> None:
         one.acquisition.set_running(False).result(PATIENCE_S)
         one.camera.gone = True
 
-        assert isinstance(one.event(), Lost)
-        assert isinstance(one.event(), Back)
+        assert isinstance(one.event(), CameraLostEvent)
+        assert isinstance(one.event(), CameraRecoveredEvent)
 
 
 def test_an_unexpected_error_does_not_end_the_acquisition() -> None:

@@ -6,7 +6,13 @@ from typing import cast
 
 from tests.server.camera.test_acquisition import PATIENCE_S, ScriptedCamera
 from transientcam_driver import Camera
-from transientcam_server.camera import Acquisition, Event, Held, LightGuard, Released
+from transientcam_server.camera import (
+    Acquisition,
+    Event,
+    LightGuard,
+    LightHeldEvent,
+    LightReleasedEvent,
+)
 from transientcam_server.camera._light import LATE_S
 
 
@@ -82,8 +88,8 @@ def test_the_thread_of_the_camera_switches_it_off_and_on_again() -> None:
     finally:
         acquisition.stop()
 
-    assert isinstance(held, Held)
-    assert isinstance(released, Released)
+    assert isinstance(held, LightHeldEvent)
+    assert isinstance(released, LightReleasedEvent)
     assert off == ["start", "stop"]
     assert (status.state, status.running, status.reason) == ("held", True, held.reason)
     assert camera.calls == ["start", "stop", "start", "stop", "safe_off"]

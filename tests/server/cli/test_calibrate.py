@@ -75,23 +75,24 @@ def test_one_of_a_scene_is_kept_but_served_only_if_forced(
     scene = ["calibrate", "--camera", "sim:mirrors?noise=off", "--takes", "2"]
 
     assert run([*scene, "-o", str(kept)]) == 1
-    assert "this is a scene, not a diffusor" in capfd.readouterr().out
+    assert "this is a scene, not a diffuser" in capfd.readouterr().out
     assert run([*scene, "-o", str(forced), "--force"]) == 0
 
     capfd.readouterr()
     serve = ["serve", "--check", "--camera", "sim:mirrors", "--calibration"]
     assert run([*serve, str(kept)]) != 0
-    assert "not measured on a diffusor" in capfd.readouterr().err
+    assert "not measured on a diffuser" in capfd.readouterr().err
     assert run([*serve, str(forced)]) == 0
 
 
-def test_the_diffusor_is_put_before_a_simulated_lens(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("spelling", ["--diffuser", "--diffusor"])
+def test_the_diffuser_is_put_before_a_simulated_lens(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], spelling: str
 ) -> None:
-    out = ["--sequence", QUICK, "--takes", "2", "-o", str(tmp_path / "c.npz"), "--diffusor"]
+    out = ["--sequence", QUICK, "--takes", "2", "-o", str(tmp_path / "c.npz"), spelling]
 
     assert run(["calibrate", "--camera", "sim:mirrors", *out]) == 0
-    assert "measured on a diffusor" in capfd.readouterr().out
+    assert "measured on a diffuser" in capfd.readouterr().out
     assert run(["calibrate", "--camera", "usb", *out]) == 2
 
 
@@ -125,18 +126,18 @@ def test_what_a_daemon_measured_is_printed_as_json(capfd: pytest.CaptureFixture[
     assert not result["calibration"]["active"]
 
 
-def test_in_a_daemon_one_of_a_scene_is_not_used_and_the_diffusor_and_undo_are_at_hand(
+def test_in_a_daemon_one_of_a_scene_is_not_used_and_the_diffuser_and_undo_are_at_hand(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     with serving("sim:wall?noise=off") as daemon:
         measure = ["calibrate", daemon.url, "--takes", "2", "--activate"]
         assert run(measure) == 1
-        assert "this may be no diffusor" in capfd.readouterr().out
+        assert "this may be no diffuser" in capfd.readouterr().out
         assert daemon.service.calibrations.active_id == "nominal"
-        assert run([*measure, "--diffusor"]) == 0
+        assert run([*measure, "--diffuser"]) == 0
         simulation = daemon.service.camera.simulation
         assert simulation is not None
-        assert not simulation.diffusor
+        assert not simulation.diffuser
         measured = daemon.service.calibrations.active_id
         assert measured != "nominal"
         assert run(["calibrate", daemon.url, "--undo"]) == 0

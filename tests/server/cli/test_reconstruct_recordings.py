@@ -17,7 +17,7 @@ def compiled_for(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Compile nothing, and return the orders that were to be compiled for."""
     orders: list[int] = []
     take = lambda recipe: orders.append(recipe.applied.sequence.harmonics)  # noqa: E731
-    monkeypatch.setattr(offline, "load_lanes", take)
+    monkeypatch.setattr(offline, "load_kernels", take)
     return orders
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any, cast
 
-from transientcam_server.daemon._fair_queue import Account, Turns
+from transientcam_server.daemon._fair_queue import Account, FairQueue
 
 SHARE = 0.3
 STEP_S = 0.0005
@@ -55,9 +55,9 @@ class Loop:
         """Spend processor time."""
         self.spent_s += costs_s
 
-    def turns(self, share: float = SHARE, *, share_of_one: float | None = None) -> Turns:
+    def turns(self, share: float = SHARE, *, share_of_one: float | None = None) -> FairQueue:
         """Return turns by these clocks; one address may have all unless it is given less."""
-        return Turns(
+        return FairQueue(
             cast("Any", self),
             share=lambda: share,
             share_of_one=lambda: share if share_of_one is None else share_of_one,

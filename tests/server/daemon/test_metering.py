@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from tests.server.daemon.loops import Loop
-from transientcam_server.daemon._fair_queue import BURST_S, Turns
+from transientcam_server.daemon._fair_queue import BURST_S, FairQueue
 from transientcam_server.daemon._metering import CountingExecutor, Metered, in_turns
 
 Application = Callable[[Any, Any, Any], Awaitable[None]]
@@ -20,7 +20,7 @@ class Served:
     def __init__(self) -> None:
         self.time = Loop()
         self.sent: list[Any] = []
-        self.turns = Turns(
+        self.turns = FairQueue(
             asyncio.get_running_loop(),
             share=lambda: 0.5,
             share_of_one=lambda: 0.5,

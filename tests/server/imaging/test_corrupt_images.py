@@ -65,10 +65,10 @@ def metas(
 def test_a_rebuilt_image_is_counted(camera: Camera) -> None:
     first, second = captured(camera)
 
-    good, spoilt = metas(camera, [first, spoil(second, PAIR[1])], camera.applied, "repair")
+    good, corrupt = metas(camera, [first, spoil(second, PAIR[1])], camera.applied, "repair")
 
     assert (good["repaired_images"], good["unrepaired_images"], good["filled_images"]) == (0, 0, [])
-    assert (spoilt["repaired_images"], spoilt["unrepaired_images"]) == (1, 0)
+    assert (corrupt["repaired_images"], corrupt["unrepaired_images"]) == (1, 0)
 
 
 @pytest.mark.parametrize("take_order", ["sequential", "interleaved"])

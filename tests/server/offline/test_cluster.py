@@ -35,7 +35,7 @@ from transientcam_server.settings import ReconstructionSettings
 
 FRAMES = 3 * BLOCK_FRAMES - 20
 OPTIONS = BatchOptions(("range", "validity"))
-LOAD_LANES = job.load_lanes
+LOAD_KERNELS = job.load_kernels
 NOTHING: Any = lambda *_: None  # noqa: E731 - in place of what compiles
 pytestmark = pytest.mark.usefixtures("zarr_clients")
 
@@ -70,7 +70,7 @@ def client() -> Iterator[distributed.Client]:
         ) as local,
         distributed.Client(local) as client,
     ):
-        patch.setattr(job, "load_lanes", NOTHING)  # these are compared on NumPy
+        patch.setattr(job, "load_kernels", NOTHING)  # these are compared on NumPy
         for worker in client.scheduler_info(n_workers=-1)["workers"]:
             client.submit(int, workers=[worker], pure=False).result()  # starts its thread
         yield client
@@ -312,11 +312,11 @@ def test_python_has_the_products_as_dask_arrays(source: Path, serial: dict[str, 
     np.testing.assert_allclose(part, serial["range"][60:70], rtol=1e-5, atol=1e-5)
 
 
-def test_the_lanes_that_frames_need_are_made_ready_first(
+def test_the_kernels_that_frames_need_are_made_ready_first(
     source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[dict[str, Any]] = []
-    monkeypatch.setattr(job, "load_lanes", LOAD_LANES)
+    monkeypatch.setattr(job, "load_kernels", LOAD_KERNELS)
     monkeypatch.setattr(tm.kernels, "compile", lambda **options: asked.append(options))
     settings = ReconstructionSettings(estimator="likelihood")
 

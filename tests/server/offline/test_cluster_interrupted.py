@@ -42,7 +42,7 @@ def test_ctrl_c_ends_the_workers_and_leaves_a_store_to_go_on_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("TRANSIENTCAM_KERNELS", "off")  # all is compared on NumPy
-    monkeypatch.setattr(job, "load_lanes", lambda *_: None)
+    monkeypatch.setattr(job, "load_kernels", lambda *_: None)
     source, store = record(tmp_path / "a.h5", FRAMES), tmp_path / "a.zarr"
     interrupt(
         tmp_path,

@@ -145,10 +145,10 @@ def test_pixels_that_were_saturated_are_flagged_at_the_relay_too(
 def test_a_calibration_of_the_origin_comes_with_the_first_frame_of_it(
     at_origin: transientcam.Camera, at_relay: transientcam.Camera, origin: Served, relay: Served
 ) -> None:
-    at_origin.simulate(diffusor=True)
+    at_origin.simulate(diffuser=True)
     job = at_origin.calibrations.measure(frames=4, activate=True, harmonics=False)
     active = at_origin.wait_for(job["id"])["result"]["calibration"]
-    at_origin.simulate(diffusor=False)
+    at_origin.simulate(diffuser=False)
     number, theirs = frame_of(relay, lambda meta: meta["calibration_id"] == active)
     for product in ("range", "flags"):
         ours = at_relay.frame(product, number=number).array
@@ -169,7 +169,7 @@ def test_a_calibration_of_the_origin_comes_with_the_first_frame_of_it(
         lambda camera: setattr(camera, "reconstruction", {"spoilt_images": "fill"}),
         lambda camera: camera.plan({"range_std_m": 0.01}),
     ],
-    ids=["recording", "calibration", "spoilt-images", "plan"],
+    ids=["recording", "calibration", "corrupt-images", "plan"],
 )
 def test_what_needs_images_is_refused_with_the_origins_address(
     at_relay: transientcam.Camera, origin: Served, request_images: Callable[[Any], Any]
@@ -191,7 +191,7 @@ def test_there_are_no_images_and_the_reason_is_stated(
         RelayCamera(Origin(relay.url, None, timeout_s=PATIENCE_S))
 
 
-def test_what_becomes_of_spoilt_images_is_stated_as_at_the_origin(
+def test_what_becomes_of_corrupt_images_is_stated_as_at_the_origin(
     at_origin: transientcam.Camera, at_relay: transientcam.Camera
 ) -> None:
     before = at_origin.reconstruction

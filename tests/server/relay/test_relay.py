@@ -189,10 +189,10 @@ def test_a_calibration_is_not_measured_through_a_relay(
 def test_a_recording_of_the_relay_has_the_origins_range_to_the_bit(
     at_origin: transientcam.Camera, at_relay: transientcam.Camera, relay: Served
 ) -> None:
-    at_origin.simulate(diffusor=True)
+    at_origin.simulate(diffuser=True)
     job = at_origin.calibrations.measure(frames=4, activate=True, harmonics=False)
     active = at_origin.wait_for(job["id"])["result"]["calibration"]
-    at_origin.simulate(diffusor=False)
+    at_origin.simulate(diffuser=False)
     with serving_relay(relay.url) as second, transientcam.Camera(second.url) as camera:
         wait_until(lambda: camera.calibrations.active()["calibration_id"] == active)  # through both
     with at_relay.stream("raw") as stream:

@@ -8,8 +8,8 @@ import pytest
 from transientcam_driver.camera import Sensor
 from transientcam_driver.sequence import Sequence
 from transientcam_simulation.base import SparseResponses
-from transientcam_simulation.compiled import LANES
-from transientcam_simulation.compiled._lanes import Lanes
+from transientcam_simulation.compiled import IMAGE_KERNELS
+from transientcam_simulation.compiled._image_kernels import ImageKernels
 from transientcam_simulation.imaging import World
 from transientcam_simulation.light import GivenScenery
 
@@ -18,10 +18,10 @@ NO_NOISE = {"shot-noise": "off", "read-noise": "off"}
 
 
 @pytest.fixture(autouse=True)
-def no_lanes_afterwards() -> Iterator[None]:
+def no_kernels_afterwards() -> Iterator[None]:
     yield
-    LANES.kernels.compiled.clear()
-    LANES._ready = {}
+    IMAGE_KERNELS.kernels.compiled.clear()
+    IMAGE_KERNELS._ready = {}
 
 
 def codes(effects: dict[str, str], seed: int) -> bytes:
@@ -50,21 +50,23 @@ def codes(effects: dict[str, str], seed: int) -> bytes:
 def test_codes_are_those_of_the_effects_one_by_one(effects: dict[str, str], seed: int) -> None:
     expected = codes(effects, seed)
 
-    LANES.compile_now()
+    IMAGE_KERNELS.compile_now()
 
     assert codes(effects, seed) == expected
 
 
 @pytest.mark.parametrize(("effects", "expected"), [({}, 4 * 200_000), (NO_NOISE, 0)])
-def test_pixels_whose_noise_numpy_draws_count_towards_lanes(
+def test_pixels_whose_noise_numpy_draws_count_towards_kernels(
     effects: dict[str, str], expected: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     counted = []
-    monkeypatch.setattr(Lanes, "want_for_images", lambda _self, pixels: counted.append(pixels))
+    monkeypatch.setattr(
+        ImageKernels, "want_for_images", lambda _self, pixels: counted.append(pixels)
+    )
 
     codes(effects, 1)
     assert sum(counted) == expected
 
-    LANES.compile_now()
+    IMAGE_KERNELS.compile_now()
     codes(effects, 1)
     assert sum(counted) == expected

@@ -49,7 +49,7 @@ def test_truth_name_and_explanation_follow_the_scene(open_virtual: OpenCamera) -
     assert simulation.scene == simulation.explain().scene == "wall"
 
 
-def test_the_camera_stays_the_same_specimen_before_every_scene(open_virtual: OpenCamera) -> None:
+def test_the_camera_stays_the_same_unit_before_every_scene(open_virtual: OpenCamera) -> None:
     camera = open_virtual("sim:wall?device=prototype&noise=off")
     simulation = _simulation(camera)
     sensor, serial = simulation.sensor, camera.capabilities.serial
@@ -168,7 +168,7 @@ def test_a_sequence_set_while_a_world_is_prepared_is_prepared_for_as_well() -> N
     assert coming.prepared_for == [first, second]
 
 
-def test_the_diffusor_hides_the_scene_and_comes_off_again(open_virtual: OpenCamera) -> None:
+def test_the_diffuser_hides_the_scene_and_comes_off_again(open_virtual: OpenCamera) -> None:
     camera = open_virtual("sim:mirrors?noise=off")
     through = open_virtual("sim:calibration?noise=off")
     simulation = _simulation(camera)
@@ -176,13 +176,13 @@ def test_the_diffusor_hides_the_scene_and_comes_off_again(open_virtual: OpenCame
     through.start()
     before = _frame_after_the_change(camera)
 
-    simulation.change(diffusor=True)
+    simulation.change(diffuser=True)
     behind = _frame_after_the_change(camera)
-    assert (simulation.scene, simulation.diffusor) == ("mirrors", True)
+    assert (simulation.scene, simulation.diffuser) == ("mirrors", True)
     np.testing.assert_array_equal(behind, _frame_after_the_change(through))
 
     simulation.change(effects={})  # what is not named stays
-    assert simulation.diffusor
-    simulation.change(diffusor=False)
+    assert simulation.diffuser
+    simulation.change(diffuser=False)
     np.testing.assert_array_equal(_frame_after_the_change(camera), before)
-    assert not simulation.diffusor
+    assert not simulation.diffuser

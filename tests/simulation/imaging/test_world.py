@@ -13,7 +13,7 @@ from transientcam_driver.camera import Sensor
 from transientcam_simulation.base import SparseResponses
 from transientcam_simulation.effects import EFFECTS, FEW_E, Call, Effect, ShotNoise
 from transientcam_simulation.imaging import World
-from transientcam_simulation.light import GivenScenery, Views, Wanted
+from transientcam_simulation.light import GivenScenery, LightRequirements, Views
 
 SENSOR = Sensor(full_well_e=40_000, gain_e_per_dn=9.0, read_noise_e=30.0, dark_dn=64.0, bits=12)
 QUIET = {"shot-noise": "off", "read-noise": "off"}
@@ -195,7 +195,7 @@ def test_light_is_traced_for_images_or_ahead_of_them_once() -> None:
     class Traced(GivenScenery):
         views = 0
 
-        def view(self, wanted: Wanted) -> Views:
+        def view(self, wanted: LightRequirements) -> Views:
             self.views += 1
             return super().view(wanted)
 

@@ -10,7 +10,7 @@ import pytest
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_simulation.emulated import find_scene
-from transientcam_simulation.light import Wanted, shared_scenery
+from transientcam_simulation.light import LightRequirements, shared_scenery
 
 SIZE = {"width": 40, "height": 30}
 
@@ -43,7 +43,7 @@ def test_large_sensors_share_nothing() -> None:
 def test_what_is_not_shared_is_freed_at_once_without_the_garbage_collector() -> None:
     large = {"width": 320, "height": 240}
     scenery = shared_scenery(find_scene("wall"), **large)
-    scenery.view(Wanted(highest_hz=92e6))
+    scenery.view(LightRequirements(highest_hz=92e6))
     scenery.facts.changes("mixed-pixels", (23e6, 92e6))
     freed = weakref.ref(scenery), weakref.ref(scenery.facts)
     gc.disable()

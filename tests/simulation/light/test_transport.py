@@ -14,7 +14,7 @@ from transientcam_simulation.base import Scatter, SparseResponses
 from transientcam_simulation.emulated import find_scene, world_of
 from transientcam_simulation.emulated._build import scenery_of
 from transientcam_simulation.imaging import World
-from transientcam_simulation.light import Wanted
+from transientcam_simulation.light import LightRequirements
 from transientcam_simulation.scene import load_scene
 
 C = 299_792_458.0
@@ -208,7 +208,9 @@ def write(folder: Path, text: str) -> Path:
 
 def test_a_composed_scene_is_seen_where_it_is_at_that_time(tmp_path: Path) -> None:
     scene = load_scene(write(tmp_path, COMPOSED))
-    view = scenery_of(scene, width=41, height=31).view(Wanted(frozenset({"scattering"}))).at
+    view = (
+        scenery_of(scene, width=41, height=31).view(LightRequirements(frozenset({"scattering"}))).at
+    )
     for time_s, x in ((0.0, -0.5), (0.5, 0.0), (1.0, 0.5)):
         delay_s = view(time_s).responses.returns()[0][0]
         nearest = np.nanargmin(delay_s[15])
@@ -243,7 +245,8 @@ def test_a_composed_scene_is_seen_where_it_is_at_that_time(tmp_path: Path) -> No
             "0",
         ),
         ("[light]", "[transport]\npatches = 1\n[light]", "transport.patches", "from 2 to 64"),
-        ("[light]", "[diffusor]\n[light]", "surface", "only one of them"),
+        ("[light]", "[diffuser]\n[light]", "surface", "only one of them"),
+        ("[light]", "[diffuser]\n[diffusor]\n[light]", "diffusor", "absent beside [diffuser]"),
     ],
 )
 def test_an_error_in_a_composition_is_named(

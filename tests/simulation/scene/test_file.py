@@ -210,3 +210,11 @@ def test_a_scene_that_is_sent_names_no_files_and_costs_no_more_than_it_may(
         parse_scene(text)
 
     assert refused.value.key == key
+
+
+@pytest.mark.parametrize("spelling", ["diffuser", "diffusor"])
+def test_a_diffuser_may_be_spelt_as_it_was_before(spelling: str) -> None:
+    scene = parse_scene(f"[light]\nelectrons_per_s = 1\n[{spelling}]\nfall_off = 0.25\n")
+
+    assert scene.diffuser is not None
+    assert scene.diffuser.fall_off == 0.25

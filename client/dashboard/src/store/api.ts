@@ -235,7 +235,7 @@ export class Api {
     return this.#json("POST /calibrations", { body: wanted });
   }
 
-  /** One that was not measured on a diffusor is refused without force. */
+  /** One that was not measured on a diffuser is refused without force. */
   activateCalibration(id: string, force: boolean): Promise<unknown> {
     return this.#json("PUT /calibrations/active", { body: { id, force } });
   }

@@ -52,9 +52,9 @@ export class Simulation {
     await this.refresh();
   }
 
-  /** Puts filter and diffusor before the lens, or takes them away. */
-  async putDiffusor(diffusor: boolean): Promise<void> {
-    await this.#api.setSimulation({ diffusor });
+  /** Puts filter and diffuser before the lens, or takes them away. */
+  async putDiffuser(diffuser: boolean): Promise<void> {
+    await this.#api.setSimulation({ diffuser });
     await this.refresh();
   }
 

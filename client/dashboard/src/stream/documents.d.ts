@@ -32,7 +32,7 @@ export interface AcquisitionRequest {
 export interface ActivationRequest {
   /** `nominal` for none. */
   readonly id: string;
-  /** Use it even if it was not measured on a diffusor. */
+  /** Use it even if it was not measured on a diffuser. */
   readonly force?: boolean;
 }
 
@@ -211,7 +211,7 @@ export interface CalibrationRequest {
   readonly name?: string;
   /** Captured with the light on, and as many in the dark; averaged without outliers. */
   readonly frames?: number;
-  /** Use it at once, if it was measured on a diffusor. */
+  /** Use it at once, if it was measured on a diffuser. */
   readonly activate?: boolean;
   /** Let it be used whatever the verdict on it. */
   readonly force?: boolean;
@@ -372,7 +372,7 @@ export interface FindingDocument {
   readonly test: string;
   /** What was found; null where no pixel could be judged. */
   readonly value: number | null;
-  /** The most that a diffusor may have, either sign. */
+  /** The most that a diffuser may have, either sign. */
   readonly limit: number;
   readonly unit: "share" | "m" | "rad";
   readonly kept: boolean;
@@ -1183,7 +1183,7 @@ export interface SimulationDocument {
   readonly effects: Readonly<Record<string, "auto" | "on" | "off">>;
   /** What the camera can be put before. */
   readonly scenes: readonly SceneDocumentOutput[];
-  /** Whether filter and diffusor are before the lens, and hide the scene. */
+  /** Whether filter and diffuser are before the lens, and hide the scene. */
   readonly diffusor: boolean;
   /** Whether the simulated cable is in. */
   readonly plugged: boolean;
@@ -1198,8 +1198,10 @@ export interface SimulationRequest {
   readonly definition?: string | null;
   /** By name, in place of all earlier choices; of the others the scene decides. */
   readonly effects?: Readonly<Record<string, "auto" | "on" | "off">> | null;
-  /** Put filter and diffusor before the lens, to measure a calibration, or take them away. */
-  readonly diffusor?: boolean | null;
+  /** Put filter and diffuser before the lens, to measure a calibration, or take them away.
+   *
+   * Also accepted as `diffusor`, which answers call it. */
+  readonly diffuser?: boolean | null;
 }
 
 /** Where the stream is. */
@@ -1228,7 +1230,7 @@ export interface TargetDocument {
   readonly range_std_m?: number | null;
   /** Distance at which two equal returns are both found. */
   readonly separation_m?: number | null;
-  /** In what share of all captures they are. */
+  /** Share of captures in which both are found. */
   readonly separation_share?: number;
   /** Width of the bounds on the density over the mean density, at most. */
   readonly bound_width?: number | null;
@@ -1282,19 +1284,19 @@ export interface TruthDocument {
   readonly returns: readonly ReturnDocument[];
 }
 
-/** Whether a calibration was measured on a diffusor, by what its images look like.
+/** Whether a calibration was measured on a diffuser, by what its images look like.
  *
- * Through a diffusor all pixels see one return at the same time; a scene has ranges, and several
+ * Through a diffuser all pixels see one return at the same time; a scene has ranges, and several
  * returns in a pixel. */
 export interface VerdictDocument {
   /** Only the first is used without `force`. */
   readonly verdict: "diffusor" | "in-doubt" | "scene";
-  /** What speaks against a diffusor; null where nothing does. */
+  /** What speaks against a diffuser; null where nothing does. */
   readonly reason: string | null;
   readonly tests: readonly FindingDocument[];
   /** Side in pixels of the blocks that were judged. */
   readonly block_px: number;
-  /** A text for each row of blocks: `.` like a diffusor, `#` unlike one, `?` not judged. */
+  /** A text for each row of blocks: `.` like a diffuser, `#` unlike one, `?` not judged. */
   readonly blocks: readonly string[];
   /** What it was compared with: the id of a calibration, or `nominal`. */
   readonly reference: string;

@@ -54,10 +54,10 @@ test("a measurement is followed to its end, and the list read anew then", async 
 });
 
 test.each([
-  ["scene", false, "Measured on a scene, not a diffusor: It is kept, but not used."],
-  ["in-doubt", false, "Measured on what may be no diffusor: It is kept, but not used."],
-  ["scene", true, "Measured on a scene, not a diffusor: It is used, as it was forced."],
-])("a measurement on what is no diffusor is no success (%s, activated: %s)", async (verdict, activated, words) => {
+  ["scene", false, "Measured on a scene, not a diffuser: It is kept, but not used."],
+  ["in-doubt", false, "Measured on what may be no diffuser: It is kept, but not used."],
+  ["scene", true, "Measured on a scene, not a diffuser: It is used, as it was forced."],
+])("a measurement on what is no diffuser is no success (%s, activated: %s)", async (verdict, activated, words) => {
   await calibrations.measure({ name: "", frames: 40, activate: true });
   answers.push(job("done", { result: { bad_pixels: 0, rejected_images: 0, activated, verdict: { verdict, reason: "…", block_px: 8, blocks: ["#"] } } }));
   await vi.advanceTimersByTimeAsync(500);

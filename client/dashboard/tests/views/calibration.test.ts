@@ -11,7 +11,7 @@ test("drift is shown beside what it was, and called for only where it has grown"
   expect(driftOf({ invalid_share: 0.4, invalid_share_at_capture: null, frame: 9 })).toEqual({ grown: false, words: "40.0\u202f% of the pixels contradict themselves." });
 });
 
-test("only what was not measured on a diffusor is doubted", () => {
+test("only what was not measured on a diffuser is doubted", () => {
   const verdict = { reason: null, block_px: 8, blocks: ["."], tests: [], reference: "nominal" };
   expect(doubtOf({ ...verdict, verdict: "diffusor" })).toBeNull();
   expect(doubtOf({ ...verdict, verdict: "in-doubt" })?.tag).toBe("in doubt");

@@ -18,8 +18,8 @@ from transientcam_driver.camera import (
 )
 from transientcam_driver.cameras.kinect2._abilities import UNREAD_S, capabilities_of
 from transientcam_driver.cameras.kinect2._device import Kinect2
+from transientcam_driver.cameras.kinect2._frame_queue import Arrival, FrameQueue
 from transientcam_driver.cameras.kinect2._frames import UNKNOWN_C, FrameMaker
-from transientcam_driver.cameras.kinect2._intake import Arrival, Intake
 from transientcam_driver.cameras.kinect2._parameters import DepthParameters, Rows
 from transientcam_driver.cameras.kinect2._tables import P0Tables
 from transientcam_driver.cameras.kinect2._watch import Watch
@@ -83,7 +83,7 @@ class Kinect2Camera(HostCamera):
         self._connect = connect
         self._silence_s = silence_s
         self._now_s = now_s
-        self._intake = Intake(self.counters, self._clock)
+        self._frame_queue = FrameQueue(self.counters, self._clock)
         self._frames = FrameMaker(self._since_s)
         self._lit = False
         self._heard = 0, 0.0  # whole images, and when their count had last changed
@@ -165,7 +165,7 @@ class Kinect2Camera(HostCamera):
                 return
             self._closed = True
             self._state = CameraState.DISCONNECTED
-            self._intake.end()
+            self._frame_queue.end()
         self._watch.close()
         with self._reading, self._control:
             self._lit = False
@@ -212,7 +212,7 @@ class Kinect2Camera(HostCamera):
 
     def _take(self, timeout_s: float) -> Arrival | None:
         try:
-            return self._intake.take(timeout_s)
+            return self._frame_queue.take(timeout_s)
         except CameraError as error:
             with self._control:
                 self._require_open()  # closed by another thread: no loss
@@ -261,15 +261,15 @@ class Kinect2Camera(HostCamera):
 
     def _light_on(self) -> None:
         if not self._lit:
-            self._intake.restart()
+            self._frame_queue.restart()
             self._frames.restart()
             self._heard = self.counters.images, self._now_s()
-            self._asked(lambda: self._device.start(self._intake.push, self._intake.fail))
+            self._asked(lambda: self._device.start(self._frame_queue.push, self._frame_queue.fail))
             self._lit = True
         self._state = CameraState.STREAMING
 
     def _light_off(self) -> None:
-        self._intake.end()
+        self._frame_queue.end()
         self._asked(self._device.stop)
         self._lit = False
 
@@ -283,7 +283,7 @@ class Kinect2Camera(HostCamera):
     def _lose(self) -> None:
         """Mark the camera as gone, and switch off what still answers."""
         self._state = CameraState.DISCONNECTED
-        self._intake.end()
+        self._frame_queue.end()
         self._device.close()
         self._lit = False
 

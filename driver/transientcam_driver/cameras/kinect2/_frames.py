@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from transientcam_driver.camera import AppliedSequence, RawFrame
 from transientcam_driver.cameras.kinect2 import _measurement as measurement
 from transientcam_driver.cameras.kinect2._abilities import FRAME_RATE_HZ
-from transientcam_driver.cameras.kinect2._intake import Arrival
+from transientcam_driver.cameras.kinect2._frame_queue import Arrival
 from transientcam_driver.cameras.kinect2._packets import TICK_S
 
 UNKNOWN_C: Final = 0.0

@@ -107,7 +107,7 @@ def dcs_images(data: bytes, region: Region, integration_us: int) -> NDArray[np.u
         )
     pixels = np.frombuffer(data, dtype="<u2", offset=HEADER_BYTES)
     images = pixels.reshape(4, region.height, region.width)
-    spoilt = images >= CODES_FROM
-    return np.where(spoilt, np.uint16(FULL_SCALE_DN), np.minimum(images, FULL_SCALE_DN)).astype(
+    corrupt = images >= CODES_FROM
+    return np.where(corrupt, np.uint16(FULL_SCALE_DN), np.minimum(images, FULL_SCALE_DN)).astype(
         np.uint16
     )

@@ -15,7 +15,7 @@ from transientcam_simulation.emulated._plugged_camera import PluggedCamera
 
 PERIOD_S: Final = 1 / FRAME_RATE_HZ
 _NUMBERS: Final = 1 << 32
-_SPOILT_PACKET: Final = 3  # of a sub-image
+_CORRUPT_PACKET: Final = 3  # of a sub-image
 
 
 class Pixels(Protocol):
@@ -88,10 +88,10 @@ class EmulatedKinect2(PluggedCamera[EmulatedLink]):
         packets = encoder.packets(sub_images, sequence=number % _NUMBERS, timestamp=timestamp)
         image = place = 0
         for packet in packets:
-            spoilt = place == _SPOILT_PACKET and image < MEASURED
-            if spoilt and self._takes(Fault.CORRUPT_PIXELS):
+            corrupt = place == _CORRUPT_PACKET and image < MEASURED
+            if corrupt and self._takes(Fault.CORRUPT_PIXELS):
                 yield packet[: len(packet) // 2]
-            elif not (spoilt and self._takes(Fault.DROP)):
+            elif not (corrupt and self._takes(Fault.DROP)):
                 yield packet
             image, place = (image, place + 1) if packet else (image + 1, 0)
 

@@ -226,7 +226,7 @@ class EmulatedFirmware:
 
     def _computed(self) -> tuple[_Words, _Words]:
         images = self._differences()
-        spoilt = images.max(axis=0)
+        corrupt = images.max(axis=0)
         dcs = images.astype(np.float64)
         phasor = dcs[0] - dcs[2] + 1j * (dcs[1] - dcs[3])
         unambiguous_m = SPEED_OF_LIGHT_M_S / (2 * self.frequency_hz)
@@ -236,7 +236,7 @@ class EmulatedFirmware:
         distance_mm = np.minimum(np.rint(distance_m * 1e3), CODES_FROM - 1).astype(np.uint16)
         distance_mm[amplitude < self.minimum_amplitude] = LOW_AMPLITUDE
         for plane in (distance_mm, amplitude):
-            np.copyto(plane, spoilt, where=spoilt >= CODES_FROM)
+            np.copyto(plane, corrupt, where=corrupt >= CODES_FROM)
         return distance_mm, amplitude
 
     def _cropped(self, images: _Words) -> _Words:

@@ -24,7 +24,7 @@ _BURST: Final = 16
 _BURST_S: Final = 2e-3
 """16 packets in 2 ms are 90 Mbit/s: what arrives faster than it is read would be lost."""
 _SEND_S: Final = 5.0
-_SPOILT_TYPE: Final = 9
+_CORRUPT_TYPE: Final = 9
 _LOST_PACKET: Final = 3
 _READ_BYTES: Final = 4096
 
@@ -201,7 +201,7 @@ class EmulatedTofcam660:
             return
         self._measurement = (self._measurement + 1) % (1 << 16)
         if self._faults.take(Fault.CORRUPT_PIXELS):
-            image = image[:1] + _SPOILT_TYPE.to_bytes(2, "big") + image[3:]
+            image = image[:1] + _CORRUPT_TYPE.to_bytes(2, "big") + image[3:]
         lost = self._faults.take(Fault.DROP)
         if not self._firmware.over_tcp:
             peer = self._firmware.data_address or connection.getpeername()[0]

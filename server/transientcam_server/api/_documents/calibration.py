@@ -43,27 +43,27 @@ class FindingDocument(Document):
     value: float | None = None
     """What was found; null where no pixel could be judged."""
     limit: float
-    """The most that a diffusor may have, either sign."""
+    """The most that a diffuser may have, either sign."""
     unit: Literal["share", "m", "rad"]
     kept: bool
 
 
 class VerdictDocument(Document):
-    """Whether a calibration was measured on a diffusor, by what its images look like.
+    """Whether a calibration was measured on a diffuser, by what its images look like.
 
-    Through a diffusor all pixels see one return at the same time; a scene has ranges, and several
+    Through a diffuser all pixels see one return at the same time; a scene has ranges, and several
     returns in a pixel.
     """
 
     verdict: Literal["diffusor", "in-doubt", "scene"]
     """Only the first is used without `force`."""
     reason: str | None = None
-    """What speaks against a diffusor; null where nothing does."""
+    """What speaks against a diffuser; null where nothing does."""
     tests: list[FindingDocument]
     block_px: int
     """Side in pixels of the blocks that were judged."""
     blocks: list[str]
-    """A text for each row of blocks: `.` like a diffusor, `#` unlike one, `?` not judged."""
+    """A text for each row of blocks: `.` like a diffuser, `#` unlike one, `?` not judged."""
     reference: str
     """What it was compared with: the id of a calibration, or `nominal`."""
 
@@ -156,7 +156,7 @@ class CalibrationRequest(Document):
     frames: JsonInteger = Field(default=DEFAULT_TAKES, ge=2, le=10_000)
     """Captured with the light on, and as many in the dark; averaged without outliers."""
     activate: bool = False
-    """Use it at once, if it was measured on a diffusor."""
+    """Use it at once, if it was measured on a diffuser."""
     force: bool = False
     """Let it be used whatever the verdict on it."""
     harmonics: bool = True
@@ -176,4 +176,4 @@ class ActivationRequest(Document):
     id: str = Field(max_length=200)
     """`nominal` for none."""
     force: bool = False
-    """Use it even if it was not measured on a diffusor."""
+    """Use it even if it was not measured on a diffuser."""

@@ -9,11 +9,11 @@ from transientcam_server.api._documents.frame import FrameDocument
 from transientcam_server.api._documents.sequence import SequenceDocument
 
 
-class _Asked(Document):
+class _StrictDocument(Document):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
-class TargetDocument(_Asked):
+class TargetDocument(_StrictDocument):
     """What has to be reached; all that is given."""
 
     range_error_m: float | None = Field(default=None, gt=0)
@@ -23,12 +23,12 @@ class TargetDocument(_Asked):
     separation_m: float | None = Field(default=None, gt=0)
     """Distance at which two equal returns are both found."""
     separation_share: float = Field(default=0.9, gt=0, lt=1)
-    """In what share of all captures they are."""
+    """Share of captures in which both are found."""
     bound_width: float | None = Field(default=None, gt=0)
     """Width of the bounds on the density over the mean density, at most."""
 
 
-class BudgetDocument(_Asked):
+class BudgetDocument(_StrictDocument):
     """What may be spent; all that is given."""
 
     capture_s: float | None = Field(default=None, gt=0)
@@ -39,7 +39,7 @@ class BudgetDocument(_Asked):
     """Share of the time between two frames that reconstruction may take, at most."""
 
 
-class GivenReturnDocument(_Asked):
+class GivenReturnDocument(_StrictDocument):
     """Light that comes back from one range."""
 
     range_m: float = Field(gt=0, le=1e6)
@@ -47,7 +47,7 @@ class GivenReturnDocument(_Asked):
     """Relative to the others."""
 
 
-class SceneDocument(_Asked):
+class SceneDocument(_StrictDocument):
     """A scene of equal pixels."""
 
     brightness_dn_per_s: float = Field(gt=0, le=1e12)
@@ -59,7 +59,7 @@ class SceneDocument(_Asked):
     )
 
 
-class PlanRequest(_Asked):
+class PlanRequest(_StrictDocument):
     """What a sequence is wanted for."""
 
     model_config = ConfigDict(
@@ -229,7 +229,7 @@ AccuracyName = Literal["range_error_m", "range_std_m", "bound_width"]
 """Which accuracy capture time is held against."""
 
 
-class TradeoffRequest(_Asked):
+class TradeoffRequest(_StrictDocument):
     """What the front is wanted for."""
 
     model_config = ConfigDict(

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Final, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import AliasChoices, ConfigDict, Field
 
 from transientcam_server.api._documents.document import Document
 
@@ -27,7 +27,7 @@ class SimulationDocument(Document):
     scenes: list[SceneDocument]
     """What the camera can be put before."""
     diffusor: bool
-    """Whether filter and diffusor are before the lens, and hide the scene."""
+    """Whether filter and diffuser are before the lens, and hide the scene."""
     plugged: bool
     """Whether the simulated cable is in."""
     faults: list[str]
@@ -47,8 +47,12 @@ class SimulationRequest(Document):
     """In its place the text of a scene's file (TOML); it may name no other file."""
     effects: Annotated[dict[str, Choice], Field(max_length=64)] | None = None
     """By name, in place of all earlier choices; of the others the scene decides."""
-    diffusor: bool | None = None
-    """Put filter and diffusor before the lens, to measure a calibration, or take them away."""
+    diffuser: Annotated[
+        bool | None, Field(validation_alias=AliasChoices("diffuser", "diffusor"))
+    ] = None
+    """Put filter and diffuser before the lens, to measure a calibration, or take them away.
+
+    Also accepted as `diffusor`, which answers call it."""
 
 
 class FaultRequest(Document):

@@ -92,10 +92,10 @@ async def measure_calibration(
 ) -> JobDocument:
     """Start a job that measures a calibration with the present sequence.
 
-    Put filter and diffusor before the lens first, so that the light shines at the sensor
+    Put filter and diffuser before the lens first, so that the light shines at the sensor
     (Sec. 4.2). The job has the camera for itself, so that no frames come meanwhile; switching the
     light off ends it. Its result holds the id of the calibration, in `calibration`, and in
-    `verdict` whether the images look like a diffusor's. If they don't, the calibration is kept, but
+    `verdict` whether the images look like a diffuser's. If they don't, the calibration is kept, but
     not used without `force`: `activated` says whether it is. `harmonics` has those of the
     modulation, from a phase sweep, or `no_harmonics` why there are none.
     """
@@ -131,7 +131,7 @@ async def activate_calibration(service: ServiceOf, wanted: ActivationRequest) ->
     """Calibrate frames from the next one on, and after the next start, by this.
 
     One that is not good for this camera and its present sequence is refused, and so is one that was
-    not measured on a diffusor, unless `force` is set. Streams are sent a
+    not measured on a diffuser, unless `force` is set. Streams are sent a
     `calibration-changed` notice, and each frame carries the id of its calibration.
     """
     service.require_images(_CALIBRATED)

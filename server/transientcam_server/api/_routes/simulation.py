@@ -40,7 +40,7 @@ async def read_simulation(service: ServiceOf) -> SimulationDocument:
     responses=documented(kinds.NOT_SIMULATED, kinds.BAD_REQUEST, kinds.INVALID_REQUEST),
 )
 async def change_simulation(service: ServiceOf, wanted: SimulationRequest) -> SimulationDocument:
-    """Change the scene, force effects on or off, or put the diffusor before the lens.
+    """Change the scene, force effects on or off, or put the diffuser before the lens.
 
     `definition` is a scene of one's own; a name it has must not be that of a built-in scene. One
     that would take much memory or time to prepare is refused.
@@ -61,7 +61,7 @@ async def change_simulation(service: ServiceOf, wanted: SimulationRequest) -> Si
         scene=wanted.scene,
         definition=wanted.definition,
         effects=wanted.effects,
-        diffusor=wanted.diffusor,
+        diffuser=wanted.diffuser,
     )
     service.fronts.forget()
     changed = _document(simulation)
@@ -113,7 +113,7 @@ def _document(simulation: Simulation) -> SimulationDocument:
             "scene": simulation.scene,
             "effects": simulation.effects,
             "scenes": [{"name": each.name, "description": each.description} for each in _offered()],
-            "diffusor": simulation.diffusor,
+            "diffusor": simulation.diffuser,
             "plugged": simulation.plugged,
             "faults": list(_FAULTS),
         }

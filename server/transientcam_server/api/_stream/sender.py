@@ -9,7 +9,7 @@ from fastapi import WebSocket
 
 from transientcam import wire
 from transientcam_server.api._metrics import Metrics
-from transientcam_server.broadcast import Channel, Close, Delivery, Item, Lost, Outbox
+from transientcam_server.broadcast import Channel, Close, Delivery, DroppedFrames, Item, Outbox
 from transientcam_server.errors import Problem, problem_document
 from transientcam_server.imaging import View
 
@@ -113,7 +113,7 @@ class Sender:
             channel.product, channel.encoding, View(crop=channel.crop), channel=channel.number
         )
 
-    async def _report_dropped(self, channel: Channel, lost: Lost) -> None:
+    async def _report_dropped(self, channel: Channel, lost: DroppedFrames) -> None:
         channel.dropped_total += lost.count
         details = {
             "channel": channel.number,

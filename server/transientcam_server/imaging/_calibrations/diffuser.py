@@ -1,6 +1,6 @@
-"""Tests whether a calibration was measured on a diffusor, or on a scene.
+"""Tests whether a calibration was measured on a diffuser, or on a scene.
 
-Through a diffusor every pixel sees one return at the same time (Sec. 4.2). Over the sensor the
+Through a diffuser every pixel sees one return at the same time (Sec. 4.2). Over the sensor the
 phase of a frequency then is one number, up to a smooth field and a pattern that differs from pixel
 to pixel; the phases of all frequencies belong to one time, and no moment is weakened by a second
 return. All of it is tested on medians of blocks of pixels, which neither dirt nor single bad pixels
@@ -26,7 +26,7 @@ from transientcam_server.imaging._recipe.calibration import (
 _Array = NDArray[Any]
 
 LIMIT_SHARE: Final = 0.05
-"""Share of the pixels that may be unlike a diffusor: damage, a corner outside the lens's circle."""
+"""Share of the pixels that may be unlike a diffuser: damage, a corner outside the lens's circle."""
 LIMIT_UNKNOWN: Final = 0.25
 """Share of the pixels that may be too dark, saturated, bad or too noisy to be judged."""
 LIMIT_RESIDUAL_M: Final = 0.10
@@ -64,9 +64,9 @@ def judge(
     full_scale: float | None = None,
     reference: Calibration | None = None,
 ) -> Verdict:
-    """Judge whether a measurement was made on a diffusor.
+    """Judge whether a measurement was made on a diffuser.
 
-    It is compared with an ideal camera, and if it does not look like a diffusor so, with the
+    It is compared with an ideal camera, and if it does not look like a diffuser so, with the
     ``reference``: what the same camera measured before has its delay and its pattern.
 
     Parameters

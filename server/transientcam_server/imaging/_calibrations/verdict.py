@@ -1,4 +1,4 @@
-"""The verdict on a calibration measurement: whether it was measured on a diffusor."""
+"""The verdict on a calibration measurement: whether it was measured on a diffuser."""
 
 import math
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ class Finding:
     test
         Its name, a key of `REASONS`.
     value, limit
-        What was found (NaN: nothing could be), and the most that a diffusor may have.
+        What was found (NaN: nothing could be), and the most that a diffuser may have.
     unit
         ``m``, ``rad`` or ``share``.
     """
@@ -49,7 +49,7 @@ class Finding:
 REASONS: Final[Mapping[str, str]] = {
     "unknown_share": "{value:.0%} of the pixels are too dark, saturated, bad or too noisy to be "
     "judged (at most {limit:.0%})",
-    "unlike_share": "{value:.0%} of the pixels are unlike a diffusor (at most {limit:.0%})",
+    "unlike_share": "{value:.0%} of the pixels are unlike a diffuser (at most {limit:.0%})",
     "residual_m": "the range differs by {value:.2f} m from a smooth field (at most {limit:.2f} m)",
     "harmonic_phase_rad": "the phases of the harmonics differ by {value:.2f} rad from those of a "
     "single return (at most {limit:.2f} rad)",
@@ -65,13 +65,13 @@ REASONS: Final[Mapping[str, str]] = {
 """Of a test that failed, in words."""
 _FAR: Final = frozenset({"offset_m", "low_frequency_m"})
 _FLAT_WALL: Final = (
-    " A flat wall there cannot be told from a diffusor with a delay of the electronics."
+    " A flat wall there cannot be told from a diffuser with a delay of the electronics."
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a calibration was measured on a diffusor, and what that rests on.
+    """Whether a calibration was measured on a diffuser, and what that rests on.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Verdict:
     block_px
         Side in pixels of the blocks that were judged.
     blocks
-        A text for each row of blocks with a character a block: ``.`` like a diffusor, ``#``
+        A text for each row of blocks with a character a block: ``.`` like a diffuser, ``#``
         unlike one, ``?`` not judged.
     reference
         What the measurement was compared with: the id of a calibration, or ``nominal``.
@@ -101,7 +101,7 @@ class Verdict:
 
     @property
     def reason(self) -> str | None:
-        """Return what speaks against a diffusor; None where nothing does."""
+        """Return what speaks against a diffuser; None where nothing does."""
         failed = [each for each in self.findings if not each.kept]
         if not failed:
             return None

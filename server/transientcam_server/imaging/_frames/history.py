@@ -17,7 +17,7 @@ _OPENED: Final = 2
 
 
 @dataclass(frozen=True, slots=True)
-class _Kept:
+class _StoredFrame:
     """A frame of which nothing is computed, and when it came."""
 
     frame: Frame
@@ -47,7 +47,7 @@ class History:
         self.latest: Frame | None = None
         self.size_bytes = 0
         self._clock = clock
-        self._kept: deque[_Kept] = deque()
+        self._kept: deque[_StoredFrame] = deque()
         self._opened: OrderedDict[int, Frame] = OrderedDict()
 
     @property
@@ -81,7 +81,7 @@ class History:
             self.size_bytes -= gone.size_bytes
             self._opened.pop(gone.frame.number, None)
         if room_bytes >= 0:
-            self._kept.append(_Kept(frame.bare(), now_s, size_bytes))
+            self._kept.append(_StoredFrame(frame.bare(), now_s, size_bytes))
             self.size_bytes += size_bytes
 
     def frame(self, number: int) -> Frame:

@@ -67,7 +67,7 @@ def compute(
 ) -> Computed:
     """Compute stages of a frame; one that fails leaves the others as they are. Never raises.
 
-    ``spread`` is how compiled lanes use several threads.
+    ``spread`` is how compiled kernels use several threads.
     """
     requested = set(stages)
     computed = replace(before, failures={})
@@ -96,7 +96,7 @@ def compute(
 
 
 def spread_of(raw: RawFrame) -> tm.kernels.Spread:
-    """Return how lanes compute a new frame: on all cores where it is large, else on one."""
+    """Return how kernels compute a new frame: on all cores where it is large, else on one."""
     large = math.prod(raw.images.shape[-2:]) >= LEAST_SPREAD_PIXELS
     return tm.kernels.over_all_cores() if large else tm.kernels.at_once
 

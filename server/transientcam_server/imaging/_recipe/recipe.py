@@ -20,7 +20,7 @@ from transientcam_server.settings import ReconstructionSettings
 
 _log = logging.getLogger("transientcam_server.imaging.recipe")
 _UNTIL_COMPILED: Final = "pisarenko"
-"""In NumPy as in compiled lanes fast enough for a camera of 163 x 120 pixels."""
+"""In NumPy as in compiled kernels fast enough for a camera of 163 x 120 pixels."""
 _ONE_RETURN: Final = "unwrapped-phase"
 """For frequencies with gaps: in NumPy the only one that keeps up with 512 x 424 pixels."""
 _LEAST_FOR_PAIRS: Final = 3
@@ -238,8 +238,8 @@ class Recipe:
     ) -> tm.Reconstruction:
         """Return the reconstruction of a capture; it computes what is read of it.
 
-        ``previous``, where it has the same sequence, is what spoilt images are filled in from;
-        ``spread`` is how compiled lanes use several threads.
+        ``previous``, where it has the same sequence, is what corrupt images are filled in from;
+        ``spread`` is how compiled kernels use several threads.
         """
         if isinstance(raw, MomentFrame):
             return self._reconstructor.of_measured(

@@ -11,7 +11,7 @@ from benchmarks.kinect2 import seen
 
 @pytest.mark.parametrize("scene", seen.SCENES)
 def test_infrared_and_depth_of_the_emulation_are_those_that_libfreenect2_gave(scene: str) -> None:
-    frame, theirs = seen.Seen.of(scene), seen.stored(scene)
+    frame, theirs = seen.ObservedFrame.of(scene), seen.stored(scene)
     depth_mm, infrared = frame.depth_mm(), frame.infrared()
 
     given = theirs["depth_mm"] > 0

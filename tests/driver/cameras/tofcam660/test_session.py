@@ -76,9 +76,9 @@ def test_our_driver_sends_recorded_bytes_and_reads_recorded_images(data_dir: Pat
     for group, megahertz in enumerate(("0.25", "7", "14", "21", "28")):
         wire = stored[f"flex_{megahertz}MHz_dcs_wire_u16"]
         images = frame.images[4 * group : 4 * group + 4]
-        spoilt = wire >= 64000
-        assert np.array_equal(images[~spoilt], wire[~spoilt])
-        assert (images[spoilt] == 4095).all()
+        corrupt = wire >= 64000
+        assert np.array_equal(images[~corrupt], wire[~corrupt])
+        assert (images[corrupt] == 4095).all()
     assert frame.temperature_c == 41.25
     assert (capabilities.serial, capabilities.firmware) == ("7-4242", "3.59")
     assert (capabilities.width, capabilities.height) == (80, 60)

@@ -84,22 +84,22 @@ def test_differences_give_the_vendors_distance_and_amplitude(
 
     images = dcs_images(header.pack() + wire.astype("<u2").tobytes(), ROI, 300).astype(float)
 
-    spoilt = (wire >= 64000).any(axis=0)
-    assert np.array_equal((images == 4095).any(axis=0), spoilt)
+    corrupt = (wire >= 64000).any(axis=0)
+    assert np.array_equal((images == 4095).any(axis=0), corrupt)
     phasor = images[0] - images[2] + 1j * (images[1] - images[3])
     period_m = SPEED_OF_LIGHT_M_S / (2 * float(megahertz) * 1e6)
     measured_m = np.angle(phasor) / (2 * np.pi) * period_m
     distance_m = (measured_m - offset_m(ENTRIES, 41.25)) % period_m
     theirs_m = stored[f"flex_{megahertz}MHz_vendor_distance_mm"] / 1e3
     apart_m = np.abs((distance_m - theirs_m + period_m / 2) % period_m - period_m / 2)
-    judged = ~spoilt & (theirs_m != 64.001)  # that is its code for too little light
+    judged = ~corrupt & (theirs_m != 64.001)  # that is its code for too little light
     assert judged.mean() > 0.9
     assert apart_m[judged].max() < 2e-5
     amplitude = stored[f"flex_{megahertz}MHz_vendor_amplitude"]
     assert np.abs(np.abs(phasor) / 2 - amplitude)[judged].max() < 1e-3
 
 
-def test_spoilt_pixels_have_the_highest_code_and_others_keep_theirs() -> None:
+def test_corrupt_pixels_have_the_highest_code_and_others_keep_theirs() -> None:
     region = Region(0, 119, 2, 121)
     wire = np.full((4, 2, 2), 2048, "<u2")
     wire[:, 0, 0], wire[1, 0, 1], wire[2, 1, 0] = 64002, 64003, 4094

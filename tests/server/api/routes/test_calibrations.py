@@ -84,7 +84,7 @@ def test_harmonics_are_measured_by_a_phase_sweep_and_taken_out(tmp_path: Path) -
         client_of(daemon) as http,
     ):
         sub_phases = {"scheme": "arccos", "n": 4}
-        # two frequencies have four sums of opposite images, which find spoilt ones in each take
+        # two frequencies have four sums of opposite images, which find corrupt ones in each take
         sequence = QUICK | {"harmonics": 2, "sub_phases": sub_phases}
         http.put("/api/v1/sequence", json=sequence)
         result = measured(http, frames=30, activate=True, force=True)["result"]
@@ -281,7 +281,7 @@ def test_one_of_a_scene_is_kept_but_used_only_if_forced_and_undone_at_once(
     problem = refused.json()
     assert problem["type"] == "/problems/calibration-doubted"
     assert problem["verdict"] == "scene"
-    assert "unlike a diffusor" in problem["detail"]
+    assert "unlike a diffuser" in problem["detail"]
     assert http.get(f"{CALIBRATIONS}/active").json()["id"] == "nominal"
 
     forced = http.put(f"{CALIBRATIONS}/active", json={"id": identity, "force": True}).json()
@@ -299,9 +299,9 @@ def test_one_of_a_scene_is_no_reference_for_another(http: httpx.Client) -> None:
     assert (again["verdict"]["verdict"], again["activated"]) == ("scene", False)
 
 
-def test_the_diffusor_is_put_before_the_lens_and_the_scene_is_behind_it(http: httpx.Client) -> None:
+def test_the_diffuser_is_put_before_the_lens_and_the_scene_is_behind_it(http: httpx.Client) -> None:
     http.put("/api/v1/simulation", json={"scene": "mirrors"})
-    through = http.put("/api/v1/simulation", json={"diffusor": True}).json()
+    through = http.put("/api/v1/simulation", json={"diffuser": True}).json()
     result = measured(http, activate=True)["result"]
     scene = http.put("/api/v1/simulation", json={"diffusor": False}).json()
 

@@ -306,7 +306,7 @@ def test_a_region_and_every_so_many_pixels_of_it_are_cut_out_of_the_whole(
         part = product(still, name, region="40,30,65,48", decimation=4)
 
         expected = whole.array[..., 30:78:4, 40:105:4]
-        # what is over time is evaluated anew, in lanes of other lengths
+        # what is over time is evaluated anew, in vectors of other lengths
         tolerance = 2e-3 * np.nanmax(np.abs(expected)) if "time" in whole.axes else 0.0
         np.testing.assert_allclose(part.array, expected, rtol=0.0, atol=tolerance, err_msg=name)
         assert (part.meta["region"], part.meta["decimation"]) == ([40, 30, 65, 48], 4)

@@ -32,7 +32,8 @@ def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
     source = record(directory / "kept.h5", FRAMES)
     wanted = ["--product", "range", "--product", "flags"]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(job, "load_lanes", lambda recipe: None)  # nothing here needs compiled kernels
+        # nothing here needs compiled kernels
+        patch.setattr(job, "load_kernels", lambda recipe: None)
         assert run(["reconstruct", str(source), "-o", str(directory / "kept.zarr"), *wanted]) == 0
     return directory
 

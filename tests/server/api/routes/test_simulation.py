@@ -6,7 +6,7 @@ import transientcam
 from tests.serving import Served
 from transientcam import wire
 from transientcam_driver import open_camera
-from transientcam_server.camera import twin_of
+from transientcam_server.camera import snapshot_of
 
 
 def test_the_simulated_scene_is_reported(http: httpx.Client) -> None:
@@ -107,11 +107,11 @@ def test_the_camera_is_put_before_a_scene_that_the_client_sends(
             assert again.raise_for_status().json()["effects"] == {"ambient": "on"}
             truth_m = camera.frame("truth", after=camera.frame("truth").frame, wait_s=10).array
             assert truth_m[60, 81] == pytest.approx(1.5, abs=1e-3)
-            assert twin_of(served.camera, "sim:mirrors?noise=off").definition == OWN
+            assert snapshot_of(served.camera, "sim:mirrors?noise=off").definition == OWN
         finally:
             back = http.put("/api/v1/simulation", json={"scene": "mirrors", "effects": {}})
             assert back.raise_for_status().json()["scene"] == "mirrors"
-    assert twin_of(served.camera, "sim:mirrors?noise=off").definition is None
+    assert snapshot_of(served.camera, "sim:mirrors?noise=off").definition is None
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""A diffusor is distinguished from a scene, by images made from the measurement's equations."""
+"""A diffuser is distinguished from a scene, by images made from the measurement's equations."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -126,7 +126,7 @@ def five_percent_bad(images: _Array) -> None:
         ),
     ],
 )
-def test_a_real_diffusor_is_trusted(capture: Callable[[], CalibrationCapture]) -> None:
+def test_a_real_diffuser_is_trusted(capture: Callable[[], CalibrationCapture]) -> None:
     verdict = judged(capture())
 
     assert verdict.trusted, verdict.reason
@@ -145,7 +145,7 @@ def test_steps_in_the_range_make_a_scene_and_the_map_shows_where() -> None:
     expected = box[::6, ::6]
     assert verdict.blocks == tuple("".join(np.where(row, "#", ".")) for row in expected)
     assert value(verdict, "unlike_share") == pytest.approx(expected.mean())
-    assert "unlike a diffusor" in str(verdict.reason)
+    assert "unlike a diffuser" in str(verdict.reason)
 
 
 def test_a_second_return_is_found_though_the_phase_of_one_frequency_is_smooth() -> None:
@@ -241,7 +241,7 @@ def test_no_built_in_scene_is_trusted(scene: str) -> None:
     assert not judge(capture, evaluate(capture).gains.bad, full_scale=65535.0).trusted
 
 
-def test_the_simulated_diffusor_is_trusted() -> None:
+def test_the_simulated_diffuser_is_trusted() -> None:
     capture = captured("sim:calibration?device=prototype")
 
     verdict = judge(capture, evaluate(capture).gains.bad, full_scale=65535.0)

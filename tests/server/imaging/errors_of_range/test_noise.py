@@ -86,15 +86,15 @@ def test_pixels_without_light_are_not_counted() -> None:
     assert share(np.zeros_like(b)) is None
 
 
-@pytest.mark.parametrize("spoilt", [(8, 12), (30, 50)], ids=["few", "many"])
+@pytest.mark.parametrize("corrupt", [(8, 12), (30, 50)], ids=["few", "many"])
 @pytest.mark.parametrize("smoothing_px", [0.0, 0.6])
 def test_pixels_settled_without_their_neighbours_are_those_of_the_smoothed_noise(
-    smoothing_px: float, spoilt: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+    smoothing_px: float, corrupt: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "_BLOCK_PIXELS", 300)  # of which there are several, the last short
     b = moments((0.0, 0.0, 0.0, 0.0))
     b *= np.random.default_rng(2).uniform(0.05, 1.0, SHAPE).astype(np.float32)
-    rows, columns = spoilt
+    rows, columns = corrupt
     b[2, :rows, :columns] *= np.linspace(1.0, 1.6, columns, dtype=np.float32)
     b[:, 3, 4] = np.nan
     found = tm.reconstruct(b, tm.Settings(smoothing_sigma_px=smoothing_px))

@@ -58,7 +58,7 @@ class Modulated(Sensor):
 
 
 def steps(sensor: Sensor, lit_dn: float = 800.0) -> list[_Array]:
-    """Two takes of b_1 .. b_3 at each step of a sweep through the diffusor."""
+    """Two takes of b_1 .. b_3 at each step of a sweep through the diffuser."""
     lit = np.full(SHAPE, lit_dn)
     images = [
         sensor.images(each, lit, np.zeros(SHAPE)) for each in PhaseSweep(1).sequences(SEQUENCE)

@@ -109,7 +109,7 @@ function MeasureForm({ task }: { task: Task }) {
         </Steer>
       </div>
       <p class="quiet form-wide">
-        Put filter and diffusor before the lens first, so that the light shines at the sensor. <Diffusor task={task} />{" "}
+        Put filter and diffuser before the lens first, so that the light shines at the sensor. <Diffuser task={task} />{" "}
         <label class="check">
           <input type="checkbox" checked={activate.value} onChange={(event) => (activate.value = event.currentTarget.checked)} /> Use it at once
         </label>
@@ -118,15 +118,15 @@ function MeasureForm({ task }: { task: Task }) {
   );
 }
 
-/** Puts the diffusor before the lens of a simulated camera, and takes it away; nothing for a real one. */
-function Diffusor({ task }: { task: Task }) {
+/** Puts the diffuser before the lens of a simulated camera, and takes it away; nothing for a real one. */
+function Diffuser({ task }: { task: Task }) {
   const { simulation } = useStore();
   useEffect(() => void simulation.refresh(), [simulation]);
   const world = simulation.world.value;
   if (world === null) return null;
-  const words = world.diffusor ? "Take the diffusor away" : "Put the diffusor before the lens";
+  const words = world.diffusor ? "Take the diffuser away" : "Put the diffuser before the lens";
   return (
-    <Steer title={`${words} of the simulated camera`} disabled={task.busy.value !== null} onClick={() => void task.run(`${words}…`, () => simulation.putDiffusor(!world.diffusor))}>
+    <Steer title={`${words} of the simulated camera`} disabled={task.busy.value !== null} onClick={() => void task.run(`${words}…`, () => simulation.putDiffuser(!world.diffusor))}>
       {words}
     </Steer>
   );

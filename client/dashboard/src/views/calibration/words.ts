@@ -9,12 +9,12 @@ export function ageOf(age_s: number): string {
   return `${Math.round(age_s / 86_400)} days ago`;
 }
 
-/** What is said of a calibration that was not measured on a diffusor; null where it was. */
+/** What is said of a calibration that was not measured on a diffuser; null where it was. */
 export function doubtOf({ verdict }: VerdictDocument): { tag: string; words: string } | null {
   if (verdict === "diffusor") return null;
   return verdict === "scene"
-    ? { tag: "of a scene", words: "It was measured on a scene, not on a diffusor." }
-    : { tag: "in doubt", words: "It may not have been measured on a diffusor." };
+    ? { tag: "of a scene", words: "It was measured on a scene, not on a diffuser." }
+    : { tag: "in doubt", words: "It may not have been measured on a diffuser." };
 }
 
 /** From this growth on, in shares of the pixels and as a factor, a calibration should be measured anew. */

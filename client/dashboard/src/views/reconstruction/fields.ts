@@ -60,7 +60,7 @@ const LABELS: Readonly<Record<string, string | undefined>> = {
   return_threshold: "Threshold of a return",
   estimator: "Range by",
   minimum_brightness_dn: "Least brightness",
-  spoilt_images: "Spoilt images",
+  spoilt_images: "Corrupt images",
 };
 
 /** A name for people: the page's own, or the service's without its unit. */

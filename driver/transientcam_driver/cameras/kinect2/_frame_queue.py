@@ -31,7 +31,7 @@ class Arrival(NamedTuple):
     lost: int
 
 
-class Intake:
+class FrameQueue:
     """Takes packets on one thread, and hands over frames on another.
 
     A frame for which there is no room replaces the oldest one, which counts as lost.

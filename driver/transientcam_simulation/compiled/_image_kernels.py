@@ -1,6 +1,6 @@
-"""Compiled lanes beside this folder's arithmetic: the same bytes, used once they are ready.
+"""Compiled kernels beside this folder's arithmetic: the same bytes, used once they are ready.
 
-A lane stands beside a statement in NumPy, which serves until the lane is made ready in the
+A kernel stands beside a statement in NumPy, which serves until the kernel is made ready in the
 background: no image waits for a compiler. Importing this module imports none. The driver does not
 depend on numba; without it NumPy goes on serving.
 """
@@ -13,14 +13,14 @@ from typing import Any, Final
 from transientcam_compiled import Cache, Kernels
 
 OF_IMAGES: Final = ("imaging._compiled_images",)
-"""Modules of the lanes that images of any scene use."""
+"""Modules of the kernels that images of any scene use."""
 WORTH_PIXELS: Final = 100_000_000
-"""Of images in NumPy, after which their lanes are asked for.
+"""Of images in NumPy, after which their kernels are asked for.
 
 They save some 2 ns a pixel, and loading them takes 0.2 to 0.7 s of processor time.
 """
 CHUNK: Final = 64
-"""Points or pixels that lanes take at a time, which are mostly beside each other in a row."""
+"""Points or pixels that kernels take at a time, which are mostly beside each other in a row."""
 FUNCTIONS: Final[dict[str, dict[str, Callable[..., Any]]]] = {}
 """Those that each module has compiled, by their names."""
 _PACKAGE: Final = "transientcam_simulation"
@@ -32,13 +32,13 @@ def _load(name: str) -> dict[str, Callable[..., Any]]:
     return FUNCTIONS[import_module(f"{_PACKAGE}.{name}").__name__]
 
 
-class Lanes:
-    """The compiled lanes of a process; ``TRANSIENTCAM_KERNELS`` as `Kernels` reads it.
+class ImageKernels:
+    """The compiled kernels of a process; ``TRANSIENTCAM_KERNELS`` as `Kernels` reads it.
 
     Attributes
     ----------
     kernels : Kernels
-        The lanes of each module: they become ready together.
+        The kernels of each module: they become ready together.
     """
 
     def __init__(self, environ: Mapping[str, str]) -> None:
@@ -47,22 +47,22 @@ class Lanes:
         self._pixels = 0
 
     def find(self, name: str) -> Callable[..., Any] | None:
-        """Return a lane, or None where NumPy is to be used."""
+        """Return a kernel, or None where NumPy is to be used."""
         return self._ready.get(name)
 
     def want(self, modules: tuple[str, ...] = OF_IMAGES) -> None:
-        """Have lanes made ready in the background, once; returns at once."""
+        """Have kernels made ready in the background, once; returns at once."""
         for name in modules:
             self.kernels.want(name)
 
     def want_for_images(self, pixels: int) -> None:
-        """Want lanes of images once NumPy has computed many; it has one more of so many pixels."""
+        """Want kernels of images once NumPy has computed many; it adds one of so many pixels."""
         self._pixels += pixels
         if self._pixels >= WORTH_PIXELS:
             self.want(OF_IMAGES)
 
     def compile_now(self) -> None:
-        """Make all lanes ready before returning."""
+        """Make all kernels ready before returning."""
         for name in OF_IMAGES:
             self.kernels.make_ready(name)
 
@@ -71,4 +71,4 @@ class Lanes:
 
 
 # The one place that reads the environment; a process has one set of machine code.
-LANES: Final = Lanes(os.environ)
+IMAGE_KERNELS: Final = ImageKernels(os.environ)

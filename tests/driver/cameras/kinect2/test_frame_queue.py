@@ -7,8 +7,8 @@ from tests.driver.cameras.kinect2.standing import STILL, emulated
 from transientcam_driver import CameraError, CameraLost, Counters
 from transientcam_driver.camera import AppliedSequence
 from transientcam_driver.cameras.kinect2 import Identity, capabilities_of, encoder, measurement
+from transientcam_driver.cameras.kinect2._frame_queue import ROOM_FRAMES, Arrival, FrameQueue
 from transientcam_driver.cameras.kinect2._frames import FrameMaker
-from transientcam_driver.cameras.kinect2._intake import ROOM_FRAMES, Arrival, Intake
 from transientcam_driver.cameras.kinect2._packets import SubImages
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.sequence import Sequence
@@ -23,9 +23,9 @@ def frame(sequence: int) -> list[bytes]:
     return list(encoder.packets(STILL.data, sequence=sequence, timestamp=ticks))
 
 
-def push(intake: Intake, packets: list[bytes]) -> None:
+def push(frame_queue: FrameQueue, packets: list[bytes]) -> None:
     for packet in packets:
-        intake.push(packet)
+        frame_queue.push(packet)
 
 
 @pytest.fixture
@@ -34,32 +34,32 @@ def counters() -> Counters:
 
 
 @pytest.fixture
-def intake(counters: Counters) -> Intake:
-    return Intake(counters, VirtualClock(start_s=5.0, unix_s=1e9))
+def frame_queue(counters: Counters) -> FrameQueue:
+    return FrameQueue(counters, VirtualClock(start_s=5.0, unix_s=1e9))
 
 
 def test_a_frame_is_handed_over_with_the_time_at_which_it_was_complete(
-    intake: Intake, counters: Counters
+    frame_queue: FrameQueue, counters: Counters
 ) -> None:
-    push(intake, frame(7))
-    arrival = intake.take(0.0)
+    push(frame_queue, frame(7))
+    arrival = frame_queue.take(0.0)
 
     assert arrival is not None
     assert (arrival.now_s, arrival.unix_s, arrival.lost) == (5.0, 1e9, 0)
     assert np.array_equal(arrival.sub_images.data, STILL.data)
     assert (counters.images, counters.lost) == (9, 0)
-    assert intake.take(0.0) is None
+    assert frame_queue.take(0.0) is None
 
 
 @pytest.mark.parametrize("torn", [False, True], ids=["lost", "torn"])
 def test_a_packet_that_is_lost_or_torn_costs_one_image(
-    intake: Intake, counters: Counters, torn: bool
+    frame_queue: FrameQueue, counters: Counters, torn: bool
 ) -> None:
-    spoilt = frame(0)
-    spoilt[3:4] = [spoilt[3][:100]] if torn else []
-    push(intake, spoilt)
-    push(intake, frame(1))
-    arrival = intake.take(0.0)
+    corrupt = frame(0)
+    corrupt[3:4] = [corrupt[3][:100]] if torn else []
+    push(frame_queue, corrupt)
+    push(frame_queue, frame(1))
+    arrival = frame_queue.take(0.0)
 
     assert arrival is not None
     assert (arrival.sub_images.sequence, arrival.lost) == (1, 1)
@@ -67,12 +67,12 @@ def test_a_packet_that_is_lost_or_torn_costs_one_image(
 
 
 def test_what_is_not_read_in_time_is_dropped_from_the_oldest_on_and_counted(
-    intake: Intake, counters: Counters
+    frame_queue: FrameQueue, counters: Counters
 ) -> None:
     for sequence in range(ROOM_FRAMES + 2):
-        push(intake, frame(sequence))
+        push(frame_queue, frame(sequence))
 
-    arrivals = [intake.take(0.0) for _ in range(ROOM_FRAMES + 1)]
+    arrivals = [frame_queue.take(0.0) for _ in range(ROOM_FRAMES + 1)]
 
     assert [each and (each.sub_images.sequence, each.lost) for each in arrivals] == [
         (2, 18),
@@ -83,23 +83,23 @@ def test_what_is_not_read_in_time_is_dropped_from_the_oldest_on_and_counted(
 
 
 def test_a_failure_comes_behind_the_frames_before_it_and_ends_with_a_restart(
-    intake: Intake,
+    frame_queue: FrameQueue,
 ) -> None:
-    push(intake, frame(0))
-    intake.fail(CameraLost("gone"))
+    push(frame_queue, frame(0))
+    frame_queue.fail(CameraLost("gone"))
 
-    assert intake.take(60.0) is not None
+    assert frame_queue.take(60.0) is not None
     with pytest.raises(CameraLost, match="gone"):
-        intake.take(60.0)
-    intake.restart()
-    assert intake.take(0.0) is None
+        frame_queue.take(60.0)
+    frame_queue.restart()
+    assert frame_queue.take(0.0) is None
 
 
-def test_an_end_releases_the_reader_and_drops_what_there_is(intake: Intake) -> None:
-    push(intake, frame(0))
-    intake.end()
+def test_an_end_releases_the_reader_and_drops_what_there_is(frame_queue: FrameQueue) -> None:
+    push(frame_queue, frame(0))
+    frame_queue.end()
 
-    assert intake.take(60.0) is None
+    assert frame_queue.take(60.0) is None
 
 
 def applied(takes: int = 1) -> AppliedSequence:
@@ -147,11 +147,11 @@ def test_a_fault_of_the_emulated_cable_spoils_a_packet_of_as_many_images(fault: 
     whole = [len(packet) for packet in device.frame()]
     device.inject(fault, 2)
 
-    spoilt, after = ([len(packet) for packet in device.frame()] for _ in range(2))
+    corrupt, after = ([len(packet) for packet in device.frame()] for _ in range(2))
 
-    missing = sum(whole) - sum(spoilt)
+    missing = sum(whole) - sum(corrupt)
     assert missing == 2 * 33_792 // (1 if fault is Fault.DROP else 2)
-    assert spoilt.count(0) == 10
+    assert corrupt.count(0) == 10
     assert after == whole
 
 

@@ -5,8 +5,8 @@ import threading
 from typing import Any, cast
 
 from tests.server.daemon.loops import SHARE, Loop
-from transientcam_server.daemon._fair_queue import BURST_S, Turns
-from transientcam_server.daemon._read_limiter import PORTION_BYTES, Intake
+from transientcam_server.daemon._fair_queue import BURST_S, FairQueue
+from transientcam_server.daemon._read_limiter import PORTION_BYTES, ReadLimiter
 
 
 class Transport:
@@ -50,19 +50,19 @@ class Protocol(asyncio.Protocol):
 
 
 class Connection:
-    """A client's end of an intake."""
+    """A client's end of a limiter."""
 
-    def __init__(self, loop: Loop, turns: Turns, *, costs_s: float = 0.0) -> None:
+    def __init__(self, loop: Loop, turns: FairQueue, *, costs_s: float = 0.0) -> None:
         self.protocol = Protocol(loop, costs_s=costs_s)
         self.transport = Transport()
         self.lost = 0
-        self.intake = Intake(
+        self.limiter = ReadLimiter(
             self.protocol,
             requests=turns.account("client"),
             streams=loop.turns().account("client"),
             lost=self._count,
         )
-        self.intake.connection_made(cast("asyncio.Transport", self.transport))
+        self.limiter.connection_made(cast("asyncio.Transport", self.transport))
 
     def _count(self) -> None:
         self.lost += 1
@@ -70,10 +70,10 @@ class Connection:
     def send(self, data: bytes) -> None:
         """Send as much as is read."""
         while data and self.transport.reading:
-            buffer = self.intake.get_buffer(-1)
+            buffer = self.limiter.get_buffer(-1)
             portion, data = data[: len(buffer)], data[len(buffer) :]
             buffer[: len(portion)] = portion
-            self.intake.buffer_updated(len(portion))
+            self.limiter.buffer_updated(len(portion))
 
 
 def test_what_arrives_is_handed_over_at_once_in_portions() -> None:
@@ -170,7 +170,7 @@ def test_a_connection_that_is_closing_is_handed_nothing_more() -> None:
     loop.pass_s(10.0)
 
     assert waiting.protocol.received == []
-    waiting.intake.connection_lost(None)
+    waiting.limiter.connection_lost(None)
     assert waiting.lost == 1
 
 
@@ -191,8 +191,8 @@ def test_each_thread_reads_into_a_buffer_of_its_own() -> None:
 
     def buffer() -> memoryview:
         nothing = cast("Any", None)
-        intake = Intake(nothing, requests=nothing, streams=nothing, lost=lambda: None)
-        return intake.get_buffer(0)
+        limiter = ReadLimiter(nothing, requests=nothing, streams=nothing, lost=lambda: None)
+        return limiter.get_buffer(0)
 
     here, there = buffer(), []
     thread = threading.Thread(target=lambda: there.append(buffer()))
