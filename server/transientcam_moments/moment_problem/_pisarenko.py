@@ -315,8 +315,11 @@ def _roots(
     """Yield phase and share of so many returns, of pixels that have as many."""
     order = (0,) * count
     turns = circle.half_turns(count, inverse[0].dtype)
-    _, wr, wi = circle.circle_roots(order, turns, _STEPS, ar[: count + 1], ai[: count + 1])
+    wr, wi = bank(inverse[0], order, 0), bank(inverse[0], order, 0)
+    circle.circle_roots(order, turns, _STEPS, ar[: count + 1], ai[: count + 1], wr, wi)
     for x, y in zip(wr, wi, strict=True):
+        # the weights add up to the light of the returns at exact roots only
+        _, x, y = circle.weigh(order, gr, gi, inverse, x, y)
         share, x, y = circle.weigh(order, gr, gi, inverse, x, y)
         yield circle.phase_of(*circle.doubled(x, y)), share
 
