@@ -187,9 +187,10 @@ def first_returns(
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
         re, im, scale = normalised(b)
         if uniform is None:
-            uniform = _raised(re, im, smallest_eigenvalue((0,) * (len(re) - 1), re, im))
+            uniform = smallest_eigenvalue((0,) * (len(re) - 1), re, im)
         else:
             uniform = namespace(b).where(scale > 0, uniform / scale, 0 * scale)
+        uniform = _raised(re, im, uniform)
         floor = 4 * (len(re) - 1) * (noise or float(np.finfo(scale.dtype).eps))
         phase, weight, count = _returns(re, im, uniform, scale, floor)
         return phase, weight, uniform * scale, count
