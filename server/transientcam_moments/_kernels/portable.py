@@ -90,7 +90,7 @@ cgutils: Any = numba_cgutils
 
 
 def _room(function: Callable[..., Any], size: Callable[[int, Any], int | None]) -> None:
-    """Give a function that makes room its meaning; the room is the calling function's."""
+    """Give a function that makes room its meaning; it lasts until the calling function returns."""
 
     @templates.infer_global(function)
     class _Template(templates.AbstractTemplate):  # type: ignore[misc]  # numba is untyped

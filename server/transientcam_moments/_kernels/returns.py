@@ -66,6 +66,7 @@ def _returns(
     re, im = bank(one, order, 1), bank(one, order, 1)
     ar, ai = bank(one, order, 1), bank(one, order, 1)
     gr, gi = bank(one, order, 0), bank(one, order, 0)
+    wr, wi = bank(one, order, 0), bank(one, order, 0)
     inverse, weights, phases = bank(one, order, 0), bank(one, order, 0), bank(one, order, 0)
     floor = simd.spread(one, 4.0 * m * noise)
     tolerance = simd.spread(one, 16.0 * (m + 1) * noise)
@@ -93,7 +94,7 @@ def _returns(
             toeplitz.singular(order, re, im, floor, ar, ai, gr, gi, inverse)
             for k in range(1, m + 1):
                 re[k], im[k] = re[k] / factor, im[k] / factor
-        _, wr, wi = circle.circle_roots(order, turns, steps, ar, ai)
+        circle.circle_roots(order, turns, steps, ar, ai, wr, wi)
         found = one * 0.0
         for i in range(m):
             w, x, y = circle.weigh(order, gr, gi, inverse, wr[i], wi[i])

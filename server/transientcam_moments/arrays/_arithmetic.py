@@ -78,7 +78,11 @@ def _space(x: Plane | Mask) -> _Space:
 
 
 def bank(like: Plane, length: Length, extra: int) -> Any:
-    """Return room for ``len(length) + extra`` planes like one that is at hand."""
+    """Return room for ``len(length) + extra`` planes like one that is at hand.
+
+    A kernel's room is that of the function which asks for it, and gone when that returns: results
+    go into banks of the caller's.
+    """
     return [like] * (len(length) + extra)
 
 

@@ -44,12 +44,12 @@ def phase_of(x: Plane, y: Plane) -> Plane:
 
 
 def circle_roots(
-    order: Length, turns: Array, steps: int, ar: Bank, ai: Bank
-) -> tuple[Mask, Array, Array]:
-    """Return the half angles of the m roots of sum_j conj(a_j) exp(i j phi), all on the circle.
+    order: Length, turns: Array, steps: int, ar: Bank, ai: Bank, wr: Bank, wi: Bank
+) -> Mask:
+    """Fill ``wr``, ``wi`` with the half angles of the m roots of sum_j conj(a_j) exp(i j phi).
 
-    On the circle the polynomial is a phase factor times a real Q(phi), since |a_m| = 1, all of
-    whose zeros are real. Newton's iteration on Q with the other roots divided out (Ehrlich,
+    All are on the circle, where the polynomial is a phase factor times a real Q(phi), since
+    |a_m| = 1. Newton's iteration on Q with the other roots divided out (Ehrlich,
     Aberth), as rotations, which cannot leave the circle: if the other roots are exact, cot of half
     the error is 2 Q' / Q - sum_k cot((phi - phi_k) / 2), and one step arrives. ``turns`` is from
     `half_turns`. At most ``steps`` are done; the mask says where that wasn't enough.
@@ -73,12 +73,14 @@ def circle_roots(
     s = angle * (1.0 - square * (1.0 - square / 20.0) / 6.0)
     size = 1.0 / root(c * c + s * s)
     c, s = c * size, s * size
-    wr, wi = bank(gr, order, 0), bank(gr, order, 0)
     for k in range(m):
         wr[k], wi[k] = c * turns[k] - s * turns[m + k], c * turns[m + k] + s * turns[k]
     state = middle <= middle, wr, wi  # NaN does not move
-    moving, wr, wi = repeat(turn_roots, steps, (order,), (middle, hr, hi), state)
-    return moving, wr, wi
+    found = repeat(turn_roots, steps, (order,), (middle, hr, hi), state)
+    for k in range(m):
+        wr[k], wi[k] = found[1][k], found[2][k]
+    moving: Mask = found[0]
+    return moving
 
 
 def turn_roots(

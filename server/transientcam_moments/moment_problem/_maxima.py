@@ -34,8 +34,8 @@ POLE_STEPS = 80
 CLIMB_STEPS = 60
 
 
-def poles(order: Length, starts: Array, ar: Bank, ai: Bank) -> tuple[Array, Array]:
-    """Return banks of the roots of z^m + a_1 z^(m-1) + ... + a_m, all within the circle.
+def poles(order: Length, starts: Array, ar: Bank, ai: Bank, zr: Bank, zi: Bank) -> None:
+    """Fill ``zr``, ``zi`` with the roots of z^m + a_1 z^(m-1) + ... + a_m, all within the circle.
 
     The iteration of Ehrlich and Aberth: Newton's with the other roots divided out. ``starts`` is
     from `start_angles`.
@@ -46,12 +46,12 @@ def poles(order: Length, starts: Array, ar: Bank, ai: Bank) -> tuple[Array, Arra
         most = larger(most, ar[j] * ar[j] + ai[j] * ai[j])
     # no root is farther out than 2 max |a_j|^(1/j); a start on a circle of about the right size
     radius = smaller(root(most), most * 0.0 + 0.9) + 0.05
-    zr, zi = bank(radius, order, 0), bank(radius, order, 0)
     for i in range(m):
         zr[i], zi[i] = radius * starts[i], radius * starts[m + i]
     state = radius <= radius, radius * 0.0 + infinity(radius), zr, zi  # NaN does not move
     found = repeat(move_poles, POLE_STEPS, (order,), (ar, ai), state)
-    return found[2], found[3]
+    for i in range(m):
+        zr[i], zi[i] = found[2][i], found[3][i]
 
 
 def move_poles(
@@ -188,7 +188,8 @@ def peaks(
     """
     floor = least_modulus(order, gr, gi)
     scale = error * (0.5 / np.pi)
-    zr, zi = poles(order, starts, ar, ai)
+    zr, zi = bank(scale, order, 0), bank(scale, order, 0)
+    poles(order, starts, ar, ai, zr, zi)
     for k in range(len(order)):
         x, y = climb(order, zr, zi, zr[k], zi[k])
         _, curvature, _, modulus = shape(order, zr, zi, x, y)

@@ -187,9 +187,10 @@ def first_returns(
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
         re, im, scale = normalised(b)
         if uniform is None:
-            uniform = _raised(re, im, smallest_eigenvalue((0,) * (len(re) - 1), re, im))
+            uniform = smallest_eigenvalue((0,) * (len(re) - 1), re, im)
         else:
             uniform = namespace(b).where(scale > 0, uniform / scale, 0 * scale)
+        uniform = _raised(re, im, uniform)
         floor = 4 * (len(re) - 1) * (noise or float(np.finfo(scale.dtype).eps))
         phase, weight, count = _returns(re, im, uniform, scale, floor)
         return phase, weight, uniform * scale, count
@@ -315,8 +316,11 @@ def _roots(
     """Yield phase and share of so many returns, of pixels that have as many."""
     order = (0,) * count
     turns = circle.half_turns(count, inverse[0].dtype)
-    _, wr, wi = circle.circle_roots(order, turns, _STEPS, ar[: count + 1], ai[: count + 1])
+    wr, wi = bank(inverse[0], order, 0), bank(inverse[0], order, 0)
+    circle.circle_roots(order, turns, _STEPS, ar[: count + 1], ai[: count + 1], wr, wi)
     for x, y in zip(wr, wi, strict=True):
+        # the weights add up to the light of the returns at exact roots only
+        _, x, y = circle.weigh(order, gr, gi, inverse, x, y)
         share, x, y = circle.weigh(order, gr, gi, inverse, x, y)
         yield circle.phase_of(*circle.doubled(x, y)), share
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from transientcam_moments.arrays import Array, parts, to_complex
+from transientcam_moments.arrays import Array, bank, parts, to_complex
 from transientcam_moments.moment_problem import _maxima as maxima
 
 
@@ -20,6 +20,7 @@ def disc_roots(a: Array) -> list[Array]:
     """
     order = (0,) * (a.shape[0] - 1)
     re, im = parts(a)
+    real, imag = bank(re[0], order, 0), bank(re[0], order, 0)
     with np.errstate(all="ignore"):
-        real, imag = maxima.poles(order, maxima.start_angles(len(order), re[0].dtype), re, im)
+        maxima.poles(order, maxima.start_angles(len(order), re[0].dtype), re, im, real, imag)
     return [to_complex(x, y) for x, y in zip(real, imag, strict=True)]

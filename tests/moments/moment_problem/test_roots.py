@@ -50,7 +50,9 @@ def test_roots_on_the_circle_are_found_there(m: int) -> None:
     re: list[Any] = list(a.real)
     im: list[Any] = list(a.imag)
 
-    moving, wr, wi = circle_roots((0,) * m, half_turns(m, float), 80, re, im)
+    wr, wi = list(re[:m]), list(im[:m])
+
+    moving = circle_roots((0,) * m, half_turns(m, float), 80, re, im, wr, wi)
 
     half: list[Any] = [np.stack(wr), np.stack(wi)]
     double: Any = doubled(*half)
