@@ -71,7 +71,7 @@ _LONGEST_FIRST = (
     "tests/experiments/paper/test_figures.py",
     "tests/server/api/routes/test_recordings.py",
     # before all others that need what it compiles: two workers would compile it at the same time
-    "tests/moments/kernels/test_kernels_lanes.py",
+    "tests/moments/kernels/test_kernels_compiled.py",
     "tests/simulation/light/test_compiled.py",  # the same, of simulated light
     "tests/conformance/test_conformance.py",
     "tests/stability/test_sweep.py",

@@ -36,7 +36,7 @@ PLACES = {
     "planning": "server/transientcam_server/planning",
     "moments": "server/transientcam_moments",
 }
-COMPILED = {"_kernels", "_lanes"}  # rooms whose tests compile for minutes
+COMPILED = {"_kernels"}  # rooms whose tests compile for minutes
 OPERATORS = re.compile(
     r"core/(ReplaceComparisonOperator_((?!.*Is)|Is_IsNot|IsNot_Is)"
     r"|ReplaceBinaryOperator_(?!.*(Bit|Shift))|ReplaceUnaryOperator|Replace(True|False|And|Or)"

@@ -1,4 +1,4 @@
-"""The data everything is measured on, and the lanes it is measured with."""
+"""The data everything is measured on, and the kernels it is measured with."""
 
 import math
 import os
@@ -72,18 +72,18 @@ def constants(m: int) -> Constants:
 @contextmanager
 def numpy_alone() -> Iterator[None]:
     """Leave everything to NumPy inside."""
-    lanes = dict(KERNELS.compiled)
+    kernels = dict(KERNELS.compiled)
     KERNELS.compiled.clear()
     automatic, KERNELS.automatic = KERNELS.automatic, False
     try:
         yield
     finally:
         KERNELS.automatic = automatic
-        KERNELS.compiled.update(lanes)
+        KERNELS.compiled.update(kernels)
 
 
-def lane(name: str, planes: Array) -> Any:
-    """Return a compiled lane, which has to be there."""
+def kernel(name: str, planes: Array) -> Any:
+    """Return a compiled kernel, which has to be there."""
     precision = PRECISIONS[planes.dtype.char]
     found = lookup(name, len(planes) - 1, planes[0].size, precision)
     if found is None:

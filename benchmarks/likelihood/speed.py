@@ -59,7 +59,7 @@ def _row(m: int, name: str, shape: tuple[int, int], returns: int) -> tuple[str, 
         assert noise is not None
         moments = tm.noise.draw(b, noise, random, draws=1)[:, 0]
     estimate = partial(tm.likelihood, moments, noise, model_error=MODEL_ERROR)
-    lane = measure(partial(estimate, threads=1))
+    kernel = measure(partial(estimate, threads=1))
     spread = measure(partial(estimate, threads=CORES))
     one_pass = measure(partial(reconstructor, raw))
     planar = "-"
@@ -69,9 +69,9 @@ def _row(m: int, name: str, shape: tuple[int, int], returns: int) -> tuple[str, 
     return (
         f"{m}, {name}",
         "one return" if returns == 1 else "three returns",
-        str(lane),
+        str(kernel),
         str(spread),
         str(one_pass),
-        f"{lane.median_s / one_pass.median_s:.1f}",
+        f"{kernel.median_s / one_pass.median_s:.1f}",
         planar,
     )

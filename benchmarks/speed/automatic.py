@@ -35,14 +35,14 @@ def timed(call):
     call()
     return time.perf_counter() - start_s
 
-def lane_of(name):
+def kernel_of(name):
     return f"{name} m={m} float32" in tm.kernels.state()["compiled"]
 
 def program(name, call):
     first_s = timed(call)
     start_s = time.perf_counter()
     if tm.kernels.state()["enabled"]:
-        while not lane_of(name):  # a user reads the first result meanwhile
+        while not kernel_of(name):  # a user reads the first result meanwhile
             time.sleep(0.01)
         ready_s = time.perf_counter() - start_s
     else:
@@ -64,18 +64,18 @@ _Times = dict[str, dict[str, float]]
 
 
 def tables() -> Iterator[Table]:
-    """Run fresh processes in turn, with lanes from a warm cache and with NumPy alone."""
+    """Run fresh processes in turn, with kernels from a warm cache and with NumPy alone."""
     table = Table(
         f"Fresh processes that ask for nothing, 163 x 120, float32, {CORES} cores",
         heads(
-            "call | NumPy: first | second | later | lanes: first | ready after | second | "
+            "call | NumPy: first | second | later | kernels: first | ready after | second | "
             "later | gain: second | later"
         ),
         notes=[
             f"density: {_FRAMES} times. NumPy: with BLAS, all cores, `TRANSIENTCAM_KERNELS=off`. "
             f"Medians of {_PAIRS} processes of either kind, in turn; later: the median of fifteen "
             "calls. A gain holds the same call of both kinds of processes against each other. "
-            "The first call computes with NumPy; then the lane is loaded from the cache, beside "
+            "The first call computes with NumPy; then the kernel is loaded from the cache, beside "
             "what the program does next.",
         ],
     )
@@ -88,8 +88,8 @@ def tables() -> Iterator[Table]:
     for m in _ORDERS:
         _fresh(m, "on")  # warms the cache
         pairs = [(_fresh(m, "off"), _fresh(m, "on")) for _ in range(_PAIRS)]
-        numpy, lanes = (_medians([pair[kind] for pair in pairs]) for kind in (0, 1))
-        for name, found in lanes.items():
+        numpy, kernels = (_medians([pair[kind] for pair in pairs]) for kind in (0, 1))
+        for name, found in kernels.items():
             alone = numpy[name]
             gain = {step: alone[step] / found[step] for step in ("second", "later")}
             times = [alone[step] for step in ("first", "second", "later")]
@@ -106,9 +106,9 @@ def tables() -> Iterator[Table]:
                     table.notes.append(verdict(each, _DENSITY_BAR, f"m = {m}, density, {step}"))
                 seconds = [pair[kind][name]["second"] for kind in (0, 1) for pair in pairs]
                 table.notes.append(
-                    f"m = {m}, density, second calls: NumPy {_span(seconds[:_PAIRS])}, lanes "
+                    f"m = {m}, density, second calls: NumPy {_span(seconds[:_PAIRS])}, kernels "
                     f"{_span(seconds[_PAIRS:])}; NumPy's later calls over the second one with "
-                    f"lanes: {alone['later'] / found['second']:.1f}."
+                    f"kernels: {alone['later'] / found['second']:.1f}."
                 )
             if name == "pisarenko" and m == _ORDERS[-1]:
                 quick = _PISARENKO_BAR_S / found["later"]

@@ -25,8 +25,9 @@ tm.kernels.compile(
         (name, time.perf_counter(), time.process_time())
     ),
 )
-lanes = [(a[0], b[1] - a[1], b[2] - a[2]) for a, b in zip(steps, steps[1:])]
-print(json.dumps({"import_s": imported_s, "lanes": lanes, "failed": tm.kernels.state()["failed"]}))
+kernels = [(a[0], b[1] - a[1], b[2] - a[2]) for a, b in zip(steps, steps[1:])]
+failed = tm.kernels.state()["failed"]
+print(json.dumps({"import_s": imported_s, "kernels": kernels, "failed": failed}))
 """
 
 
@@ -34,10 +35,10 @@ def tables() -> Iterator[Table]:
     """Compile in fresh processes, first with an empty cache and then with the one that is left."""
     table = Table(
         "Compiling on one thread: seconds (of them, processor time)",
-        ("lane", *(f"m = {m}" for m in _ORDERS)),
+        ("kernel", *(f"m = {m}" for m in _ORDERS)),
         notes=[
-            "Lanes share what has been compiled: each costs what the ones above have left of it.",
-            "Nothing waits for it: NumPy serves until a lane is there.",
+            "Kernels share what has been compiled: each costs what the ones above have left of it.",
+            "Nothing waits for it: NumPy serves until a kernel is there.",
         ],
     )
     rows: dict[str, list[str]] = {}
@@ -45,13 +46,13 @@ def tables() -> Iterator[Table]:
     for m in _ORDERS:
         with tempfile.TemporaryDirectory() as cache:
             cold, warm = _run(cache, m), _run(cache, m)
-        for name, wall_s, processor_s in cold["lanes"]:
-            lane, _, precision = name.replace(f" m={m}", "").rpartition(" ")
-            row = f"{lane.replace('_', ' ')}, {precision}"
+        for name, wall_s, processor_s in cold["kernels"]:
+            kernel, _, precision = name.replace(f" m={m}", "").rpartition(" ")
+            row = f"{kernel.replace('_', ' ')}, {precision}"
             rows.setdefault(row, []).append(f"{wall_s:.2f} ({processor_s:.2f})")
-        total = [sum(step[index] for step in cold["lanes"]) for index in (1, 2)]
+        total = [sum(step[index] for step in cold["kernels"]) for index in (1, 2)]
         rows.setdefault("all", []).append(f"{total[0]:.2f} ({total[1]:.2f})")
-        loads.append(duration(sum(step[1] for step in warm["lanes"])))
+        loads.append(duration(sum(step[1] for step in warm["kernels"])))
         import_s = warm["import_s"]
     table.rows.extend((name, *row) for name, row in rows.items())
     table.rows.append(("all, from the cache", *loads))

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 import transientcam_moments as tm
-from benchmarks.common.data import CORES, PAPER, Array, lane, moments, numpy_alone
+from benchmarks.common.data import CORES, PAPER, Array, kernel, moments, numpy_alone
 from benchmarks.common.tables import Table, verdict
 from benchmarks.common.timing import measure
 from benchmarks.speed.ceiling import Ceiling, measured, together
@@ -32,7 +32,7 @@ def tables() -> Iterator[Table]:
     yield _ceiling_table(ceilings)
     table = Table(
         "Density, 163 x 120, float32, modulus: frames a second",
-        ("m, phases, cores, frames", "lane", "NumPy", "gain", "roofline", "share", "paper"),
+        ("m, phases, cores, frames", "kernel", "NumPy", "gain", "roofline", "share", "paper"),
     )
     for m in ORDERS:
         rows, notes = _rows(m, ceilings)
@@ -70,7 +70,7 @@ def _rows(m: int, ceilings: dict[int, Ceiling]) -> tuple[list[Sequence[str]], li
 def _frames_s(c: tm.Coefficients, phase_rad: Array, cores: int) -> float:
     frames = phase_rad.size
     out = np.empty((frames, *PAPER), np.float32)
-    evaluate = lane("density", c.polynomial)
+    evaluate = kernel("density", c.polynomial)
     with ThreadPoolExecutor(max(1, cores - 1)) as executor:
         spread = tm.kernels.over(executor, cores)
         run = partial(evaluate, c.polynomial, c.reflection, c.error, phase_rad, out, spread=spread)
@@ -79,7 +79,7 @@ def _frames_s(c: tm.Coefficients, phase_rad: Array, cores: int) -> float:
 
 def _cached_frames_s(c: tm.Coefficients, phase_rad: Array, cores: int) -> float:
     frames = phase_rad.size
-    evaluate = lane("density", c.polynomial)
+    evaluate = kernel("density", c.polynomial)
     outs = [np.empty((frames, *PAPER), np.float32) for _ in range(cores)]
 
     def work(core: int) -> None:

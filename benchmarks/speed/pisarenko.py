@@ -23,7 +23,7 @@ def tables() -> Iterator[Table]:
 
 def _table(name: str, shape: tuple[int, int]) -> Table:
     table = Table(
-        f"Returns of all pixels, {name}, lanes on one core",
+        f"Returns of all pixels, {name}, kernels on one core",
         ("m", "float32", "float64", "planar NumPy", "eigh + eigvals", "gain"),
         notes=["eigh + eigvals: LAPACK in complex64 through NumPy, on as many cores as it likes."],
     )

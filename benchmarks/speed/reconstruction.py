@@ -40,7 +40,7 @@ def _whole() -> Table:
     table = Table(
         f"Raw images to coefficients, range, direct, indirect and validity, m = {_M}, float32",
         ("", "163 x 120", "frames/s", "640 x 480", "frames/s"),
-        notes=["Smoothing, biasing and flags included; lanes redo ill pixels in float64."],
+        notes=["Smoothing, biasing and flags included; kernels redo ill pixels in float64."],
     )
     timings: dict[str, list[Timing]] = {}
     for shape in (PAPER, VGA):
@@ -51,20 +51,23 @@ def _whole() -> Table:
     for name, (small, large) in timings.items():
         rates = [f"{1 / timing.median_s:.4g}" for timing in (small, large)]
         table.rows.append((name, str(small), rates[0], str(large), rates[1]))
-    lanes, slow = timings[f"lanes, {CORES} cores"], timings["batched LAPACK (solve, eigh, eigvals)"]
-    for size, ours, theirs in zip(("163 x 120", "640 x 480"), lanes, slow, strict=True):
+    kernels, slow = (
+        timings[f"kernels, {CORES} cores"],
+        timings["batched LAPACK (solve, eigh, eigvals)"],
+    )
+    for size, ours, theirs in zip(("163 x 120", "640 x 480"), kernels, slow, strict=True):
         gain = theirs.median_s / ours.median_s
         table.notes.append(verdict(gain, 60, f"{size}, times batched LAPACK"))
-    table.notes.append(verdict(1 / lanes[1].median_s, 40, "640 x 480, frames/s"))
+    table.notes.append(verdict(1 / kernels[1].median_s, 40, "640 x 480, frames/s"))
     return table
 
 
 def _ways(raw: Array) -> Iterator[tuple[str, Callable[[], object]]]:
     made = reconstructor(_M)
-    yield "lanes, 1 core", lambda: _read(made(raw))
+    yield "kernels, 1 core", lambda: _read(made(raw))
     with ThreadPoolExecutor(max(1, CORES - 1)) as executor:
         spread = tm.kernels.over(executor, CORES)
-        yield f"lanes, {CORES} cores", lambda: _read(made(raw, spread=spread))
+        yield f"kernels, {CORES} cores", lambda: _read(made(raw, spread=spread))
     with numpy_alone():
         yield "planar NumPy", lambda: _read(made(raw))
     yield "batched LAPACK (solve, eigh, eigvals)", partial(obvious.reconstruct, raw, SETTINGS)
@@ -86,7 +89,7 @@ def _coefficients() -> Table:
     )
     b = moments(_M, PAPER).reshape(_M + 1, -1)
     matrix = obvious.toeplitz(b)
-    table.rows.append(("lanes, 1 core", *_pair(lambda: tm.levinson(b), lambda: tm.pisarenko(b))))
+    table.rows.append(("kernels, 1 core", *_pair(lambda: tm.levinson(b), lambda: tm.pisarenko(b))))
     with numpy_alone():
         table.rows.append(("planar NumPy", *_pair(lambda: tm.levinson(b), lambda: tm.pisarenko(b))))
     table.rows.append(("JAX on the CPU, jitted", *_jax(b)))

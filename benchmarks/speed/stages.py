@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import transientcam_moments as tm
-from benchmarks.common.data import PAPER, VGA, constants, images, lane, moments, numpy_alone
+from benchmarks.common.data import PAPER, VGA, constants, images, kernel, moments, numpy_alone
 from benchmarks.common.tables import Table
 from benchmarks.common.timing import duration, measure
 from transientcam_moments._kernels.one_pass import OnePass
@@ -77,7 +77,7 @@ def _spent(m: int) -> tuple[dict[str, float], float]:
 
 def _precisions() -> Table:
     table = Table(
-        "float32 against float64, 163 x 120, lanes on one core",
+        "float32 against float64, 163 x 120, kernels on one core",
         ("", *(f"m = {m}, float{bits}" for m in _ORDERS for bits in (32, 64))),
         notes=["Density: a frame out of 64."],
     )
@@ -88,7 +88,7 @@ def _precisions() -> Table:
             b = moments(m, PAPER, dtype).reshape(m + 1, -1)
             c = tm.levinson(b)
             out = np.empty((64, b.shape[1]), c.error.dtype)
-            evaluate = lane("density", c.polynomial)
+            evaluate = kernel("density", c.polynomial)
             density = partial(evaluate, c.polynomial, c.reflection, c.error, phase_rad, out)
             rows["levinson"].append(str(measure(partial(tm.levinson, b))))
             rows["smallest eigenvalue"].append(str(measure(partial(tm.smallest_eigenvalue, b))))
@@ -114,7 +114,7 @@ def _evaluations() -> Table:
         for evaluation in ("modulus", "fourier"):
             found = tm.density(c, phase_rad, evaluation=evaluation)
             worst = float(np.abs(found / exact - 1).max())
-            # the lane stands beside the modulus only: both are compared without it
+            # the kernel stands beside the modulus only: both are compared without it
             with numpy_alone():
                 timing = measure(partial(tm.density, c, phase_rad, evaluation=evaluation))
             row += [str(timing), f"{worst:.1e}"]

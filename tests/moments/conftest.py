@@ -1,4 +1,4 @@
-"""The planar statements are tested as they stand, whatever lanes another test has compiled."""
+"""The planar statements are tested as they stand, whatever kernels another test has compiled."""
 
 import pytest
 
@@ -7,6 +7,6 @@ from transientcam_moments._dispatch import KERNELS
 
 @pytest.fixture(autouse=True)
 def planar_statements(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Hide the compiled lanes from all tests but the lanes' own."""
+    """Hide the compiled kernels from all tests but the kernels' own."""
     if "kernels" not in request.module.__name__:
         monkeypatch.setattr(KERNELS, "compiled", {})

@@ -55,7 +55,7 @@ def _analyse(
 
 def analysis_entry(m: int) -> Callable[..., Any]:
     """Compile the kernel of order m in single precision."""
-    eigenvalue_entry(m, "f")  # which are linked, as they are kept for other lanes anyway
+    eigenvalue_entry(m, "f")  # which are linked, as they are kept for other kernels anyway
     returns_entry(m, "f")
     plane, planes, moments = real_arrays("f")[1], real_arrays("f")[2], complex_arrays("f")[2]
     return entry(

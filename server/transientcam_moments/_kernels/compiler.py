@@ -3,34 +3,34 @@
 from collections.abc import Callable
 
 from transientcam_moments._dispatch import Kernel, Key
-from transientcam_moments._kernels.covariance import covariance_lane
-from transientcam_moments._kernels.density import density_lane
-from transientcam_moments._kernels.direct_noise import direct_noise_lane
-from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue_lane
-from transientcam_moments._kernels.frames import measure_lane, separate_lane, smooth_lane
-from transientcam_moments._kernels.harmonics import harmonics_lane
-from transientcam_moments._kernels.levinson import levinson_lane
-from transientcam_moments._kernels.likelihood import likelihood_lane
-from transientcam_moments._kernels.pairs import pairs_lane
-from transientcam_moments._kernels.peaks import peaks_lane
-from transientcam_moments._kernels.pisarenko import pisarenko_lane
-from transientcam_moments._kernels.reconstruct import reconstruct_lane
+from transientcam_moments._kernels.covariance import covariance_kernel
+from transientcam_moments._kernels.density import density_kernel
+from transientcam_moments._kernels.direct_noise import direct_noise_kernel
+from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue_kernel
+from transientcam_moments._kernels.frames import measure_kernel, separate_kernel, smooth_kernel
+from transientcam_moments._kernels.harmonics import harmonics_kernel
+from transientcam_moments._kernels.levinson import levinson_kernel
+from transientcam_moments._kernels.likelihood import likelihood_kernel
+from transientcam_moments._kernels.pairs import pairs_kernel
+from transientcam_moments._kernels.peaks import peaks_kernel
+from transientcam_moments._kernels.pisarenko import pisarenko_kernel
+from transientcam_moments._kernels.reconstruct import reconstruct_kernel
 
 COMPILERS: dict[str, Callable[[int, str], Kernel]] = {
-    "pisarenko": pisarenko_lane,
-    "smallest_eigenvalue": smallest_eigenvalue_lane,
-    "levinson": levinson_lane,
-    "density": density_lane,
-    "peaks": peaks_lane,
-    "measure": measure_lane,
-    "smooth": smooth_lane,
-    "separate": separate_lane,
-    "reconstruct": reconstruct_lane,
-    "likelihood": likelihood_lane,
-    "pairs": pairs_lane,
-    "harmonics": harmonics_lane,
-    "covariance": covariance_lane,
-    "direct_noise": direct_noise_lane,
+    "pisarenko": pisarenko_kernel,
+    "smallest_eigenvalue": smallest_eigenvalue_kernel,
+    "levinson": levinson_kernel,
+    "density": density_kernel,
+    "peaks": peaks_kernel,
+    "measure": measure_kernel,
+    "smooth": smooth_kernel,
+    "separate": separate_kernel,
+    "reconstruct": reconstruct_kernel,
+    "likelihood": likelihood_kernel,
+    "pairs": pairs_kernel,
+    "harmonics": harmonics_kernel,
+    "covariance": covariance_kernel,
+    "direct_noise": direct_noise_kernel,
 }
 
 

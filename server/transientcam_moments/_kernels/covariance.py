@@ -115,12 +115,12 @@ def half_turned(phase: Reals) -> Any:
     return np.concatenate([np.cos(half), np.sin(half)])
 
 
-def covariance_lane(m: int, precision: str) -> Callable[..., Any]:
+def covariance_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the covariance of order m; see the table in ``_kernels``."""
     order, both = (0,) * m, (0,) * (2 * m)
     run, basis = covariance_entry(m), interpolation(m)
 
-    def lane(phase: Reals, variance: Reals, *, spread: Spread = at_once) -> Any:
+    def kernel(phase: Reals, variance: Reals, *, spread: Spread = at_once) -> Any:
         turned, planes = half_turned(phase), np.ascontiguousarray(variance)
         out = np.empty((4 * m * m, phase.shape[1]))
         spread(
@@ -129,4 +129,4 @@ def covariance_lane(m: int, precision: str) -> Callable[..., Any]:
         )
         return out.reshape((2 * m, 2 * m, -1))
 
-    return lane
+    return kernel

@@ -263,7 +263,7 @@ def _density(
         simd.fence()
 
 
-def density_lane(m: int, precision: str) -> Callable[..., Any]:
+def density_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the density of order m; see the table in ``_kernels`` for what it takes."""
     order = (0,) * m
     real, cplx = real_arrays(precision), complex_arrays(precision)
@@ -274,7 +274,7 @@ def density_lane(m: int, precision: str) -> Callable[..., Any]:
     )  # fmt: skip
     grouped = grouping(m, precision)
 
-    def lane(
+    def kernel(
         polynomial: Complexes,
         reflection: Complexes,
         error: Reals,
@@ -305,5 +305,5 @@ def density_lane(m: int, precision: str) -> Callable[..., Any]:
 
     # the first call reads machine code and NumPy's tables, which takes as long as a whole film
     nothing = np.zeros((m + 1, LEAST_PIXELS), f"c{2 * np.dtype(precision).itemsize}")
-    lane(nothing, nothing[1:], nothing[0].real, np.arange(8.0))
-    return lane
+    kernel(nothing, nothing[1:], nothing[0].real, np.arange(8.0))
+    return kernel

@@ -74,7 +74,7 @@ def _direct_noise(
         found[1, p] = holds
 
 
-def direct_noise_lane(m: int, precision: str) -> Callable[..., Any]:
+def direct_noise_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the deviation of order m; see the table in ``_kernels``."""
     order, both = (0,) * m, (0,) * (2 * m)
     covariance_entry(m)  # which is linked
@@ -86,7 +86,7 @@ def direct_noise_lane(m: int, precision: str) -> Callable[..., Any]:
     )  # fmt: skip
     basis = interpolation(m)
 
-    def lane(
+    def kernel(
         phase: Reals,
         weight: Reals,
         variance: Reals,
@@ -105,4 +105,4 @@ def direct_noise_lane(m: int, precision: str) -> Callable[..., Any]:
         )  # fmt: skip
         return found[0], found[1] > 0, found[2] > 0
 
-    return lane
+    return kernel

@@ -48,16 +48,16 @@ def eigenvalue_entry(m: int, precision: str) -> Callable[..., Any]:
     return entry(smallest_eigenvalue, order_type(m), cplx[2], PIXELS, real[1], PIXELS, PIXELS)
 
 
-def smallest_eigenvalue_lane(m: int, precision: str) -> Callable[..., Any]:
+def smallest_eigenvalue_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the smallest eigenvalue of order m; see the table in ``_kernels``."""
     order = (0,) * m
     run = eigenvalue_entry(m, precision)
 
-    def lane(b: Complexes, *, spread: Spread = at_once) -> Any:
+    def kernel(b: Complexes, *, spread: Spread = at_once) -> Any:
         pixels = b[0].size
         planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
         out = empty(pixels, precision)
         spread(lambda start, stop: run(order, planes, 0, out, start, stop), pixels)
         return out.reshape(b.shape[1:])
 
-    return lane
+    return kernel

@@ -1,4 +1,4 @@
-"""Lanes for what happens to whole frames before and after the mathematics, in single precision."""
+"""Kernels for whole frames before and after the mathematics, in single precision."""
 
 from collections.abc import Callable
 from typing import Any
@@ -61,12 +61,12 @@ def separate_entry(m: int) -> Callable[..., Any]:
     )  # fmt: skip
 
 
-def measure_lane(m: int, precision: str) -> Callable[..., Any]:
+def measure_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the way from raw images to uncalibrated moments."""
     order, run = (0,) * m, measure_entry(m)
     ones = np.ones((m + 1, LEAST_PIXELS), np.complex64)
 
-    def lane(images: Images, zeroth: str, *, spread: Spread = at_once) -> Any:
+    def kernel(images: Images, zeroth: str, *, spread: Spread = at_once) -> Any:
         pixels = images[0].size
         raw = np.ascontiguousarray(images).reshape(len(images), pixels)
         moments, saturated = empty((m + 1, pixels), np.complex64), empty(pixels, np.uint8)
@@ -77,16 +77,16 @@ def measure_lane(m: int, precision: str) -> Callable[..., Any]:
         spread(part, pixels)
         return moments.reshape((m + 1, *images.shape[1:]))
 
-    return lane
+    return kernel
 
 
-def smooth_lane(m: int, precision: str) -> Callable[..., Any]:
-    """Compile smoothing; the lane gives None for
+def smooth_kernel(m: int, precision: str) -> Callable[..., Any]:
+    """Compile smoothing; the kernel gives None for
     moments that aren't finite, narrow images and other axes.
     """
     run = smooth_entry()
 
-    def lane(moments: Complexes, taps: Reals, *, spread: Spread = at_once) -> Any:
+    def kernel(moments: Complexes, taps: Reals, *, spread: Spread = at_once) -> Any:
         height, width = moments.shape[-2:]
         if width < LEAST_WIDTH or moments.ndim != 3:
             return None
@@ -103,14 +103,14 @@ def smooth_lane(m: int, precision: str) -> Callable[..., Any]:
         spread(part, height, 8)
         return out.view(np.complex64).reshape(moments.shape) if all(finite) else None
 
-    return lane
+    return kernel
 
 
-def separate_lane(m: int, precision: str) -> Callable[..., Any]:
+def separate_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the separation of direct and indirect light."""
     order, run = (0,) * m, separate_entry(m)
 
-    def lane(weight: Reals, phase: Reals, threshold: float, *, spread: Spread = at_once) -> Any:
+    def kernel(weight: Reals, phase: Reals, threshold: float, *, spread: Spread = at_once) -> Any:
         shape, pixels = weight.shape[1:], weight[0].size
         angles = np.ascontiguousarray(phase).reshape(m, pixels)
         weights = np.ascontiguousarray(weight).reshape(m, pixels)
@@ -123,4 +123,4 @@ def separate_lane(m: int, precision: str) -> Callable[..., Any]:
         spread(part, pixels)
         return direct.reshape(shape), indirect.reshape(shape), first.reshape(shape)
 
-    return lane
+    return kernel

@@ -67,14 +67,14 @@ def _without_harmonics(
         simd.store(misfit, p, distance)
 
 
-def harmonics_lane(m: int, precision: str) -> Callable[..., Any]:
+def harmonics_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the round of order m; see the table in ``_kernels``."""
     order = (0,) * m
     real, cplx = real_arrays(precision), complex_arrays(precision)
     planes = (cplx[2],) * 6
     run = entry(_without_harmonics, order_type(m), PLACES, *planes, real[1], PIXELS, PIXELS)
 
-    def lane(
+    def kernel(
         given: Complexes,
         current: Complexes,
         polynomial: Complexes,
@@ -98,4 +98,4 @@ def harmonics_lane(m: int, precision: str) -> Callable[..., Any]:
         spread(part, following.shape[1])
         return following, misfit
 
-    return lane
+    return kernel

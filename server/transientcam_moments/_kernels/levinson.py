@@ -74,12 +74,12 @@ def levinson_entry(m: int, precision: str) -> Callable[..., Any]:
     )
 
 
-def levinson_lane(m: int, precision: str) -> Callable[..., Any]:
+def levinson_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile Levinson's recursion of order m; see the table in ``_kernels``."""
     order = (0,) * m
     run = levinson_entry(m, precision)
 
-    def lane(
+    def kernel(
         b: Complexes, brightness: Reals | None = None, *, spread: Spread = at_once
     ) -> tuple[Any, Any, Any]:
         shape, pixels = b.shape[1:], b[0].size
@@ -101,4 +101,4 @@ def levinson_lane(m: int, precision: str) -> Callable[..., Any]:
             reflection.reshape((m, *shape)),
         )
 
-    return lane
+    return kernel

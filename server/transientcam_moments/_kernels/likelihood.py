@@ -1,4 +1,4 @@
-"""The likelihood of few returns: the fits of `transientcam_moments.likelihood` in lanes.
+"""The likelihood of few returns: the fits of `transientcam_moments.likelihood` in kernels.
 
 Pixels go through in blocks. Each model is fitted to the pixels that simpler ones leave something to
 explain, packed without gaps between stages, so that vectors are full; so are the pixels whose tail
@@ -67,7 +67,7 @@ def fit_returns(
         finish(order, slots, all_rooms, rooms, first, last, stop, planes, free, count)
 
 
-def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
+def likelihood_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the estimate of order m; see the table in ``_kernels``."""
     order, slots = (0,) * m, (0,) * min(MOST_RETURNS, m)
     real, cplx = real_arrays(precision), complex_arrays(precision)
@@ -78,7 +78,7 @@ def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
     )  # fmt: skip
     turns = choice.turns_of(m).astype(precision)
 
-    def lane(
+    def kernel(
         b: Complexes,
         variance: Reals,
         returns: int,
@@ -101,4 +101,4 @@ def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
         four = (planes[k * size : (k + 1) * size] for k in range(4))
         return (*four, *planes[4 * size :], free, count)
 
-    return lane
+    return kernel

@@ -120,7 +120,7 @@ def gather(
     """Collect pixels from ``begin`` on whose residual is above the tolerance, until room ends.
 
     Fills moments ``wide`` (m + 1, n) in double precision and their places ``where`` (n), both
-    padded with the first one to as many as a lane takes; returns the number of pixels. ``ramp``
+    padded with the first one to as many as a kernel takes; returns the number of pixels. ``ramp``
     counts from 0, ``packed`` is room for as many.
     """
     room, found = where.shape[0], 0

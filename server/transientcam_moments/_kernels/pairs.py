@@ -1,4 +1,4 @@
-"""Two returns by all pairs: `transientcam_moments.two_returns` in lanes."""
+"""Two returns by all pairs: `transientcam_moments.two_returns` in kernels."""
 
 from collections.abc import Callable
 from typing import Any
@@ -40,7 +40,7 @@ from transientcam_moments.likelihood import (
     sharp,
 )
 
-__all__ = ["pairs_lane", "portable"]  # which gives the fits' arithmetic its meaning
+__all__ = ["pairs_kernel", "portable"]  # which gives the fits' arithmetic its meaning
 
 
 @njit(error_model="numpy")
@@ -299,7 +299,7 @@ def fit_pairs(
         simd.store(planes[13], p, lead)
 
 
-def pairs_lane(m: int, precision: str) -> Callable[..., Any]:
+def pairs_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the estimate of order m, 2 or more; see the table in ``_kernels``."""
     order = (0,) * m
     sizes = (2 * (m + 1), STARTS, PEAKS, FINALISTS, 4 * FINALISTS)
@@ -314,7 +314,7 @@ def pairs_lane(m: int, precision: str) -> Callable[..., Any]:
     phase, same = grid(m), least_alike(m)
     turns = np.stack([np.cos(phase), np.sin(phase)]).astype(precision)
 
-    def lane(
+    def kernel(
         b: Complexes, variance: Reals, error: float, *, spread: Spread = at_once
     ) -> tuple[Any, ...]:
         pixels = b.shape[1]
@@ -338,4 +338,4 @@ def pairs_lane(m: int, precision: str) -> Callable[..., Any]:
             planes[13],
         )
 
-    return lane
+    return kernel

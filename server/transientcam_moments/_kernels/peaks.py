@@ -67,7 +67,7 @@ def _peaks(
         simd.store(strongest, p, select(heights[0] > 0.0, highest, nothing))
 
 
-def peaks_lane(m: int, precision: str) -> Callable[..., Any]:
+def peaks_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the peaks of order m; see the table in ``_kernels``."""
     order = (0,) * m
     real, cplx = real_arrays(precision), complex_arrays(precision)
@@ -78,7 +78,7 @@ def peaks_lane(m: int, precision: str) -> Callable[..., Any]:
     )  # fmt: skip
     starts = maxima.start_angles(m, precision)
 
-    def lane(
+    def kernel(
         polynomial: Complexes,
         reflection: Complexes,
         error: Reals,
@@ -97,4 +97,4 @@ def peaks_lane(m: int, precision: str) -> Callable[..., Any]:
         spread(part, pixels)
         return first, strongest, phase, height
 
-    return lane
+    return kernel

@@ -16,14 +16,14 @@ from transientcam_moments.moment_problem import half_turns
 _ROOM = 256  # pixels that are redone in double precision at a time
 
 
-def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
+def pisarenko_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile Pisarenko's returns of order m; see the table in ``_kernels``."""
     order = (0,) * m
     turns = half_turns(m, precision)
     run_eigenvalue, run_returns = eigenvalue_entry(m, precision), returns_entry(m, precision)
     wide = WideReturns(m) if precision == "f" else None
 
-    def lane(
+    def kernel(
         b: Complexes,
         eigenvalue: Reals | None = None,
         *,
@@ -67,4 +67,4 @@ def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
             count.reshape(shape),
         )
 
-    return lane
+    return kernel

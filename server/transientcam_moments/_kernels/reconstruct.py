@@ -16,14 +16,14 @@ from transientcam_moments._kernels.wide import WideReturns
 from transientcam_moments.moment_problem import half_turns
 
 
-def reconstruct_lane(m: int, precision: str) -> Callable[..., Any]:
-    """Compile all stages of order m; the lane prepares the pass for pixels of one shape."""
+def reconstruct_kernel(m: int, precision: str) -> Callable[..., Any]:
+    """Compile all stages of order m; the kernel prepares the pass for pixels of one shape."""
     stages = reconstruct_stages(m)
 
-    def lane(shape: tuple[int, ...], constants: Constants) -> OnePass:
+    def kernel(shape: tuple[int, ...], constants: Constants) -> OnePass:
         return OnePass(stages, shape, constants)
 
-    return lane
+    return kernel
 
 
 def reconstruct_stages(m: int) -> Stages:

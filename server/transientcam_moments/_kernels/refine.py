@@ -1,4 +1,4 @@
-"""What lanes cannot do safely: a few pixels, with more digits or by the planar statement."""
+"""What kernels cannot do safely: a few pixels, with more digits or by the planar statement."""
 
 from typing import Any, NamedTuple
 

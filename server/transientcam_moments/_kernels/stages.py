@@ -1,4 +1,4 @@
-"""The stages of the likelihood's lane: each does a block of pixels, packed in rows (`packing`)."""
+"""Stages of the likelihood's kernel: each does a block of pixels, packed in rows (`packing`)."""
 
 from typing import Any, Final
 

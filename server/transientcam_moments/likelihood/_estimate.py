@@ -188,7 +188,7 @@ def likelihood(
         leave it: a standard deviation over the pixel's largest moment, 0 to 1. It is part of all
         that is said of deviations and chi-square. `MODEL_ERROR` is a camera's.
     threads : int, optional
-        How many the compiled lane uses; all cores, when left out.
+        How many the compiled kernel uses; all cores, when left out.
 
     Returns
     -------

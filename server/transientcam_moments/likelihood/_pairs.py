@@ -76,7 +76,7 @@ def two_returns(
     model_error : float
         As of `likelihood`.
     threads : int, optional
-        How many the compiled lane uses; all cores, when left out.
+        How many the compiled kernel uses; all cores, when left out.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def two_returns(
     that explain more than those beside them, the 16 best take two steps of Levenberg and Marquardt,
     and the best four of these more. Where one of them has another direct return, a quarter of
     a period of the highest frequency away or more, `lead` says how much worse it explains.
-    In single precision a compiled lane does the same; see `kernels`.
+    In single precision a compiled kernel does the same; see `kernels`.
     """
     return fitted_pairs(b, noise, on_threads(threads), harmonics, model_error)
 

@@ -73,7 +73,7 @@ def levinson(
     brightness : array, shape (...), optional
         Real, in place of b_0, as biasing raises it (Sec. 4.3).
     threads : int, optional
-        How many threads a compiled lane uses; all cores when left out.
+        How many threads a compiled kernel uses; all cores when left out.
 
     Returns
     -------

@@ -40,7 +40,7 @@ def density(
         a peak of relative depth d grows like eps / sqrt(d), or as a real Fourier series, which is
         half the work and errs like eps / d.
     threads : int, optional
-        How many threads a compiled lane uses; all cores when left out.
+        How many threads a compiled kernel uses; all cores when left out.
 
     Returns
     -------

@@ -93,7 +93,7 @@ def pisarenko(b: Array, *, eigenvalue: Array | None = None, threads: int | None 
     eigenvalue : array, shape (...), optional
         Smallest eigenvalue of `b`, where it is at hand already.
     threads : int, optional
-        How many threads a compiled lane uses; all cores when left out.
+        How many threads a compiled kernel uses; all cores when left out.
 
     Returns
     -------

@@ -106,16 +106,16 @@ def direct_phase_noise(
     """Return `direct_phase_std_rad` and `holds` of `return_noise` alone, in less time."""
     in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
     count, pixels = returns.phase_rad.shape[0], returns.phase_rad.shape[1:]
-    lane = None
+    kernel = None
     if isinstance(returns.phase_rad, np.ndarray) and count == noise.variance.shape[0] - 1:
-        lane = lookup("direct_noise", count, math.prod(pixels), "d")
-    if lane is None:
+        kernel = lookup("direct_noise", count, math.prod(pixels), "d")
+    if kernel is None:
         return _planar_direct_phase_noise(returns, noise, threshold)
     phase, weight, variance = (
         np.asarray(planes, float).reshape((count, -1))
         for planes in (returns.phase_rad, returns.weight, noise.variance[1:])
     )
-    std_rad, holds, whole = lane(phase, weight, variance, threshold, CLEAR, COINCIDE_RAD)
+    std_rad, holds, whole = kernel(phase, weight, variance, threshold, CLEAR, COINCIDE_RAD)
     if not whole.all():
         others = ~whole
         some = Returns(

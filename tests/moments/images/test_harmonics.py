@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from tests.moments.kernel_lanes import lanes, without_lanes
+from tests.moments.compiled_kernels import kernels, without_kernels
 from tests.moments.oracles import Content, phasor
 from transientcam_moments.images._harmonics import ROUNDS
 
@@ -206,7 +206,7 @@ def test_a_waveform_that_cannot_be_one_is_refused(
         tm.HarmonicCorrection(waveform, np.ones(5), ())
 
 
-def test_the_lane_gives_what_the_planes_give() -> None:
+def test_the_kernel_gives_what_the_planes_give() -> None:
     random = np.random.default_rng(3)
     pixels = [
         calibrated(KNOWN, [(p, 1.0), (p + 0.8, 0.5)], 3, d)
@@ -215,9 +215,9 @@ def test_the_lane_gives_what_the_planes_give() -> None:
     b, gains = (np.stack([pixel[i] for pixel in pixels], -1) for i in range(2))
     b = b.astype(np.complex64)
     correction = tm.HarmonicCorrection(columns(KNOWN, 3, 4), gains, (100,))
-    with without_lanes():
+    with without_kernels():
         planar = correction(b)
-    with lanes(3, precisions=("float32",), names=("harmonics",)):
+    with kernels(3, precisions=("float32",), names=("harmonics",)):
         compiled = correction(b)
 
     np.testing.assert_allclose(compiled.moments, planar.moments, atol=2e-5)
@@ -291,10 +291,10 @@ def test_the_compiled_pass_follows_the_correction() -> None:
     b, gains, _ = frame()
     settings_ = tm.Settings(base_frequency_hz=23e6, zeroth="on-off", takes=1)
     raw = (b * gains).astype(np.complex64)
-    with without_lanes():
+    with without_kernels():
         staged = tm.reconstruct(raw, settings_, calibration=gains, waveform=columns(KNOWN, 3, 4))
         range_m = staged.range_m
-    with lanes(3, precisions=("float32",), names=("reconstruct",)):
+    with kernels(3, precisions=("float32",), names=("reconstruct",)):
         passed = tm.reconstruct(raw, settings_, calibration=gains, waveform=columns(KNOWN, 3, 4))
 
     assert "range_m" in vars(passed), "the pass did not serve it"

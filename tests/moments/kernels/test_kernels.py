@@ -1,4 +1,4 @@
-"""When lanes are there and when they aren't; nothing may wait for a compiler."""
+"""When kernels are there and when they aren't; nothing may wait for a compiler."""
 
 import os
 import subprocess
@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 import transientcam_moments as tm
-from tests.moments import kernel_lanes
-from tests.moments.kernel_lanes import find, lanes, without_lanes
+from tests.moments import compiled_kernels
+from tests.moments.compiled_kernels import find, kernels, without_kernels
 from transientcam_compiled import Kernels
 from transientcam_moments._dispatch import CACHE, KERNELS, LEAST_PIXELS, Key, accelerated
 
 
 @pytest.fixture(autouse=True)
 def nothing_compiled() -> Iterator[None]:
-    with without_lanes():
+    with without_kernels():
         yield
 
 
@@ -73,14 +73,14 @@ def test_kernels_are_on_otherwise(environ: dict[str, str]) -> None:
     assert Kernels[Key](environ, CACHE).enabled
 
 
-def test_a_lane_is_compiled_where_nothing_can_be_written() -> None:
+def test_a_kernel_is_compiled_where_nothing_can_be_written() -> None:
     code = (
         "import transientcam_moments as tm\n"
         "from transientcam_moments._kernels.compiler import compile_kernel\n"
         "from transientcam_moments._dispatch import Key\n"
         "import numpy as np\n"
-        "lane = compile_kernel(Key('smallest_eigenvalue', 1, 'f'))\n"
-        "print(lane(np.full((2, 64), 3 + 0j, np.complex64))[0])"
+        "kernel = compile_kernel(Key('smallest_eigenvalue', 1, 'f'))\n"
+        "print(kernel(np.full((2, 64), 3 + 0j, np.complex64))[0])"
     )
     nowhere = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null", "NUMBA_CACHE_DIR": ""}
 
@@ -101,23 +101,23 @@ def test_the_second_process_loads_what_the_first_compiled(tmp_path: Path) -> Non
     assert in_fresh_process(code, **environ) == "1 0"
 
 
-def test_progress_names_every_lane_and_ends_at_the_total() -> None:
+def test_progress_names_every_kernel_and_ends_at_the_total() -> None:
     seen: list[tuple[int, int, str]] = []
-    with lanes(3, precisions=("float32",)):
+    with kernels(3, precisions=("float32",)):
         tm.kernels.compile(
             harmonics=[3],
             precisions=["float32"],
-            names=kernel_lanes.FEW,
+            names=compiled_kernels.FEW,
             progress=lambda *step: seen.append(step),
         )
 
-        names = [str(Key(name, 3, "f")) for name in kernel_lanes.FEW]
+        names = [str(Key(name, 3, "f")) for name in compiled_kernels.FEW]
         assert seen == [(i, len(names), name) for i, name in enumerate([*names, ""])]
         assert set(tm.kernels.state()["compiled"]) == set(names)
 
 
-def test_compiling_in_the_background_ends_with_the_lanes_in_use() -> None:
-    with lanes():  # the cache of the tests
+def test_compiling_in_the_background_ends_with_the_kernels_in_use() -> None:
+    with kernels():  # the cache of the tests
         thread = tm.kernels.compile_in_background(harmonics=[3], precisions=["float32"])
         assert thread.name == "transientcam-compile"
         thread.join()
@@ -140,7 +140,7 @@ def test_the_pairs_that_a_camera_of_gapped_frequencies_waits_for_are_compiled_fi
     assert "likelihood" not in {key.name for key in asked}
 
 
-def test_a_lane_that_cannot_be_compiled_leaves_numpy_and_the_other_lanes(
+def test_a_kernel_that_cannot_be_compiled_leaves_numpy_and_the_other_kernels(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     from transientcam_moments._kernels import compiler
@@ -149,7 +149,7 @@ def test_a_lane_that_cannot_be_compiled_leaves_numpy_and_the_other_lanes(
         raise RuntimeError("no such processor\nand a long story")
 
     monkeypatch.setattr(KERNELS, "failed", {})
-    with lanes():
+    with kernels():
         monkeypatch.setitem(compiler.COMPILERS, "levinson", broken)
         tm.kernels.compile(harmonics=[3], precisions=["float32"])
 
@@ -174,7 +174,7 @@ def test_background_compiling_stops_when_the_program_ends() -> None:
     assert len(lines) <= 2, "it went on after the main thread had ended"
 
 
-def test_several_threads_compile_each_lane_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_several_threads_compile_each_kernel_once(monkeypatch: pytest.MonkeyPatch) -> None:
     from transientcam_moments._kernels import compiler
 
     made: list[tuple[str, int, str]] = []
@@ -214,13 +214,13 @@ def test_orders_and_precisions_out_of_range_are_refused(
         tm.kernels.compile_in_background(also="levinson")
 
 
-def test_every_public_lane_has_its_compiler() -> None:
+def test_every_public_kernel_has_its_compiler() -> None:
     from transientcam_moments._kernels import compiler
 
     assert set(compiler.COMPILERS) == set(tm.kernels.LANES)
 
 
-def test_lanes_are_found_by_name_order_and_precision() -> None:
+def test_kernels_are_found_by_name_order_and_precision() -> None:
     KERNELS.compiled[Key("levinson", 3, "f")] = found = lambda b: b
 
     assert find("levinson", np.ones((4, 64), np.complex64)) is found
@@ -252,7 +252,7 @@ def test_what_no_kernel_takes_is_left_to_numpy(planes: object) -> None:
     assert planar(planes) == "of NumPy"
 
 
-def test_a_lane_is_ready_once_it_is_compiled() -> None:
+def test_a_kernel_is_ready_once_it_is_compiled() -> None:
     assert not tm.kernels.ready("likelihood", 4)
     KERNELS.compiled[Key("likelihood", 4, "f")] = lambda b: b
     assert tm.kernels.ready("likelihood", 4)
@@ -262,6 +262,6 @@ def test_a_lane_is_ready_once_it_is_compiled() -> None:
 @pytest.mark.parametrize(
     ("name", "harmonics"), [("likelihood", 33), ("likelihood", 0), ("range", 3)]
 )
-def test_what_no_lane_is_offered_for_is_never_asked_for(name: str, harmonics: int) -> None:
+def test_what_no_kernel_is_offered_for_is_never_asked_for(name: str, harmonics: int) -> None:
     with pytest.raises(tm.ParameterError):
         tm.kernels.ready(name, harmonics)

@@ -1,4 +1,4 @@
-"""Calls have their lanes made ready in the background, and use all cores; no call waits."""
+"""Calls have their kernels made ready in the background, and use all cores; no call waits."""
 
 import logging
 import os
@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from tests.moments.kernel_lanes import CACHE, lanes
+from tests.moments.compiled_kernels import CACHE, kernels
 from transientcam_compiled import Kernels, _kernels, _spread
 from transientcam_compiled._memory import Pool
 from transientcam_moments import _dispatch
@@ -72,7 +72,7 @@ def compiler(anew: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[Compiler]:
     made.finish()
 
 
-def test_a_heavy_call_returns_while_its_lane_is_being_compiled(compiler: Compiler) -> None:
+def test_a_heavy_call_returns_while_its_kernel_is_being_compiled(compiler: Compiler) -> None:
     b = moments(3)
 
     first = tm.levinson(b)  # would never return if it waited
@@ -89,7 +89,7 @@ def test_small_calls_are_not_worth_a_compiler(compiler: Compiler) -> None:
     assert compiler.finish() == []
 
 
-def test_an_order_that_has_no_lane_is_left_to_numpy(compiler: Compiler) -> None:
+def test_an_order_that_has_no_kernel_is_left_to_numpy(compiler: Compiler) -> None:
     tm.pisarenko(moments(9))
 
     assert "pisarenko" not in {key.name for key in compiler.finish()}
@@ -120,7 +120,7 @@ def test_a_process_may_note_what_calls_want_and_make_it_ready_later(compiler: Co
     assert compiler.finish() == [Key("levinson", 3, "f")]
 
 
-def test_lanes_are_settled_once_those_there_are_serve_or_have_failed(
+def test_kernels_are_settled_once_those_there_are_serve_or_have_failed(
     compiler: Compiler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert not tm.kernels.settled(["levinson", "pisarenko"], 3)
@@ -169,7 +169,7 @@ def test_loading_begins_when_the_first_call_has_returned(
     assert loaded_meanwhile == []
 
 
-def test_memory_for_the_results_of_the_next_call_is_there_with_its_lane(
+def test_memory_for_the_results_of_the_next_call_is_there_with_its_kernel(
     anew: None,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -215,8 +215,8 @@ def in_fresh_process(setting: str) -> str:
 
 
 def test_a_fresh_process_changes_over_by_itself_with_its_threads_running() -> None:
-    lanes, loaded, shared = in_fresh_process("on").rsplit(" ", 2)
-    assert (lanes, loaded) == ("['levinson m=1 float32']", "True")
+    kernels, loaded, shared = in_fresh_process("on").rsplit(" ", 2)
+    assert (kernels, loaded) == ("['levinson m=1 float32']", "True")
     assert (int(shared) > 0) == (_spread._cores() > 1)
 
 
@@ -248,7 +248,7 @@ def everything(b: NDArray[np.complex64], threads: int | None) -> list[NDArray[np
 @pytest.mark.parametrize("threads", [None, 2, 5])
 def test_no_digit_depends_on_the_number_of_threads(threads: int | None) -> None:
     b = moments(3, 5000)
-    with lanes(3, precisions=("float32",), names=("levinson", "density", "pisarenko")):
+    with kernels(3, precisions=("float32",), names=("levinson", "density", "pisarenko")):
         for alone, together in zip(everything(b, 1), everything(b, threads), strict=True):
             np.testing.assert_array_equal(alone, together)
 
@@ -289,7 +289,7 @@ def test_a_worker_uses_no_other_thread_unless_it_says_so(monkeypatch: pytest.Mon
     assert all_cores is not tm.kernels.at_once
 
 
-def test_a_lane_that_is_not_ready_is_made_ready_once_the_compiler_is_free(
+def test_a_kernel_that_is_not_ready_is_made_ready_once_the_compiler_is_free(
     compiler: Compiler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(KERNELS, "compiling", Key("levinson", 4, "f"))
@@ -298,5 +298,5 @@ def test_a_lane_that_is_not_ready_is_made_ready_once_the_compiler_is_free(
 
     monkeypatch.setattr(KERNELS, "compiling", None)
     assert not tm.kernels.ready("likelihood", 4)
-    assert not tm.kernels.ready("likelihood", 9), "no lane of this order is offered"
+    assert not tm.kernels.ready("likelihood", 9), "no kernel of this order is offered"
     assert compiler.finish() == [Key("likelihood", 4, "f")]

@@ -1,4 +1,4 @@
-"""The likelihood's lane against its planar statement, and what it leaves to it."""
+"""The likelihood's kernel against its planar statement, and what it leaves to it."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import transientcam_moments as tm
-from tests.moments.kernel_lanes import find, lanes, without_lanes
+from tests.moments.compiled_kernels import find, kernels, without_kernels
 from tests.moments.oracles import moments_of_returns
 
 M = 3
@@ -15,7 +15,7 @@ M = 3
 
 @pytest.fixture(autouse=True, scope="module")
 def compiled() -> Iterator[None]:
-    with without_lanes(), lanes(M, precisions=("float32",), names=("likelihood",)):
+    with without_kernels(), kernels(M, precisions=("float32",), names=("likelihood",)):
         yield
 
 
@@ -34,12 +34,12 @@ def measured(pixels: int, std: float = 0.01) -> tuple[np.ndarray, tm.noise.Momen
 def both(b: np.ndarray, noise: tm.noise.MomentNoise, **options: Any) -> tuple[Any, Any]:
     assert find("likelihood", b) is not None
     mine = tm.likelihood(b, noise, **options)
-    with without_lanes():
+    with without_kernels():
         theirs = tm.likelihood(b, noise, **options)
     return mine, theirs
 
 
-def test_the_lane_finds_what_the_planar_statement_finds() -> None:
+def test_the_kernel_finds_what_the_planar_statement_finds() -> None:
     mine, theirs = both(*measured(4003))
 
     same = mine.count == theirs.count

@@ -1,4 +1,4 @@
-"""The lane of two returns by all pairs against its planar statement, and what it leaves to it."""
+"""The kernel of two returns by all pairs against its planar statement, and what it leaves to it."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import transientcam_moments as tm
-from tests.moments.kernel_lanes import find, lanes, without_lanes
+from tests.moments.compiled_kernels import find, kernels, without_kernels
 from tests.moments.oracles import around
 
 MULTIPLES = (1, 3, 4)
@@ -15,7 +15,7 @@ STD = 0.01
 
 @pytest.fixture(autouse=True, scope="module")
 def compiled() -> Iterator[None]:
-    with without_lanes(), lanes(max(MULTIPLES), precisions=("float32",), names=("pairs",)):
+    with without_kernels(), kernels(max(MULTIPLES), precisions=("float32",), names=("pairs",)):
         yield
 
 
@@ -41,21 +41,21 @@ def noise_of(pixels: int) -> tm.noise.MomentNoise:
     return tm.noise.MomentNoise((STD**2 * factor).astype(np.float32))
 
 
-def by_lane(
+def by_kernel(
     b: np.ndarray, noise: tm.noise.MomentNoise | None = None, threads: int = 1
 ) -> tm.Likelihood:
     return tm.two_returns(b, noise, harmonics=MULTIPLES, threads=threads)
 
 
-def test_the_lane_finds_what_the_planar_statement_finds() -> None:
+def test_the_kernel_finds_what_the_planar_statement_finds() -> None:
     pixels = 2003
     b, noise = moments_of(*random_pairs(pixels)), noise_of(pixels)
     assert find("pairs", np.empty((5, pixels), np.complex64)) is not None
 
-    mine = by_lane(b, noise)
+    mine = by_kernel(b, noise)
 
-    with without_lanes():
-        theirs = by_lane(b, noise)
+    with without_kernels():
+        theirs = by_kernel(b, noise)
     same = mine.count == theirs.count
     assert same.mean() > 0.999  # rounding decides where two models are as good
     assert set(np.unique(mine.count)) == {1, 2}
@@ -69,10 +69,10 @@ def test_the_lane_finds_what_the_planar_statement_finds() -> None:
     assert np.quantile(np.abs(off), 0.99) < 0.05
 
 
-def test_the_lane_finds_the_returns_that_the_moments_are_of() -> None:
+def test_the_kernel_finds_the_returns_that_the_moments_are_of() -> None:
     first, second, ratio = random_pairs(2003)
 
-    found = by_lane(moments_of(first, second, ratio), noise_of(2003))
+    found = by_kernel(moments_of(first, second, ratio), noise_of(2003))
 
     one = ratio == 0
     assert (found.count[one] == 1).mean() > 0.99
@@ -84,10 +84,10 @@ def test_the_lane_finds_the_returns_that_the_moments_are_of() -> None:
 
 def test_a_result_depends_neither_on_its_neighbours_nor_on_threads() -> None:
     b, noise = moments_of(*random_pairs(2500)), noise_of(2500)
-    whole = by_lane(b, noise)
+    whole = by_kernel(b, noise)
 
-    alone = by_lane(b[:, 1000:1077], tm.noise.MomentNoise(noise.variance[:, 1000:1077]))
-    together = by_lane(b, noise, threads=3)
+    alone = by_kernel(b[:, 1000:1077], tm.noise.MomentNoise(noise.variance[:, 1000:1077]))
+    together = by_kernel(b, noise, threads=3)
 
     for name in whole._fields[:-1]:
         np.testing.assert_array_equal(getattr(whole, name)[..., 1000:1077], getattr(alone, name))
@@ -96,12 +96,12 @@ def test_a_result_depends_neither_on_its_neighbours_nor_on_threads() -> None:
 
 def test_pixels_without_light_or_number_disturb_no_other() -> None:
     b = moments_of(*random_pairs(128))
-    clean = by_lane(b)
+    clean = by_kernel(b)
     b[:, 5] = 0
     b[1, 9] = np.nan
     b[2, 70] = np.inf
 
-    found = by_lane(b)
+    found = by_kernel(b)
 
     wrong = np.zeros(128, bool)
     wrong[[5, 9, 70]] = True
@@ -117,4 +117,4 @@ def test_double_precision_is_left_to_the_planar_statement() -> None:
 
 def test_less_than_one_thread_is_refused() -> None:
     with pytest.raises(tm.ParameterError, match="threads"):
-        by_lane(moments_of(*random_pairs(64)), threads=0)
+        by_kernel(moments_of(*random_pairs(64)), threads=0)

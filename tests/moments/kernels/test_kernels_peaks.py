@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from tests.moments.kernel_lanes import find, lanes, without_lanes
+from tests.moments.compiled_kernels import find, kernels, without_kernels
 from transientcam_compiled import over
 from transientcam_moments.moment_problem._peaks import PEAK_THRESHOLD
 
@@ -21,14 +21,14 @@ Array = NDArray[Any]
 
 @pytest.fixture(autouse=True, scope="module")
 def compiled() -> Iterator[None]:
-    with lanes(*ORDERS, names=("peaks",)):
+    with kernels(*ORDERS, names=("peaks",)):
         yield
 
 
-def found_by_lane(c: tm.Coefficients, threshold: float, **how: Any) -> tuple[Array, ...]:
-    lane = find("peaks", c.polynomial)
-    assert lane is not None
-    found: tuple[Array, ...] = lane(c.polynomial, c.reflection, c.error, threshold, **how)
+def found_by_kernel(c: tm.Coefficients, threshold: float, **how: Any) -> tuple[Array, ...]:
+    kernel = find("peaks", c.polynomial)
+    assert kernel is not None
+    found: tuple[Array, ...] = kernel(c.polynomial, c.reflection, c.error, threshold, **how)
     return found
 
 
@@ -49,7 +49,7 @@ def coefficients(m: int, dtype: type, *, pixels: int = 500) -> tm.Coefficients:
         with np.errstate(all="ignore"):
             b[:, place] *= factor
     b[1:, 377] = 0  # uniform
-    with np.errstate(all="ignore"), without_lanes():
+    with np.errstate(all="ignore"), without_kernels():
         return tm.levinson(tm.bias(b.astype(dtype)).moments)
 
 
@@ -57,13 +57,13 @@ def coefficients(m: int, dtype: type, *, pixels: int = 500) -> tm.Coefficients:
 @pytest.mark.parametrize("m", ORDERS)
 def test_all_local_maxima_are_found(m: int, epsilon: float) -> None:
     b = oracles.random_moments(np.random.default_rng(m), m, 64, noise=0.1)
-    with without_lanes():
+    with without_kernels():
         c = tm.levinson(tm.bias(b, epsilon).moments)
         phase_rad = np.linspace(0, 2 * np.pi, 40_000, endpoint=False)
         h = tm.density(c, phase_rad)
     higher = (h > np.roll(h, 1, axis=0)) & (h >= np.roll(h, -1, axis=0))
 
-    _, _, found_rad, height = found_by_lane(c, 0.0)
+    _, _, found_rad, height = found_by_kernel(c, 0.0)
 
     for pixel in range(64):
         mine = found_rad[height[:, pixel] > 0, pixel]
@@ -78,9 +78,9 @@ def test_all_local_maxima_are_found(m: int, epsilon: float) -> None:
 def test_peaks_follow_the_planar_statement(m: int, dtype: type, threshold: float) -> None:
     c = coefficients(m, dtype)
 
-    first, strongest, phase, height = found_by_lane(c, threshold)
+    first, strongest, phase, height = found_by_kernel(c, threshold)
 
-    with without_lanes():
+    with without_kernels():
         planar = tm.peaks(c, threshold=threshold)
     # one of two that rounding can tell from none, or from one, or from the higher one
     counts = (height > 0).sum(axis=0) == (planar.density > 0).sum(axis=0)
@@ -100,23 +100,23 @@ def test_peaks_follow_the_planar_statement(m: int, dtype: type, threshold: float
 def test_parts_on_threads_give_the_same_bits() -> None:
     c = coefficients(4, np.complex64)
 
-    whole = found_by_lane(c, 0.1)
+    whole = found_by_kernel(c, 0.1)
     with ThreadPoolExecutor(2) as executor:
 
         def spread(part: Any, total: int, /, unit: int = 1024, each: int = 1) -> None:
             over(executor, 3)(part, total, 64, each)
 
-        parts = found_by_lane(c, 0.1, spread=spread)
+        parts = found_by_kernel(c, 0.1, spread=spread)
 
     for one, other in zip(whole, parts, strict=True):
         assert one.tobytes() == other.tobytes()
 
 
-def test_a_call_uses_the_lane() -> None:
+def test_a_call_uses_the_kernel() -> None:
     c = coefficients(3, np.complex64)
 
     found = tm.peaks(tm.Coefficients(*(part.reshape((*part.shape[:-1], 20, 25)) for part in c)))
 
     assert found.first_rad.shape == (20, 25)
     assert found.phase_rad.shape == (3, 20, 25)
-    assert found.phase_rad.tobytes() == found_by_lane(c, PEAK_THRESHOLD)[2].tobytes()
+    assert found.phase_rad.tobytes() == found_by_kernel(c, PEAK_THRESHOLD)[2].tobytes()

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from tests.moments.kernel_lanes import lanes, without_lanes
+from tests.moments.compiled_kernels import kernels, without_kernels
 from transientcam_moments._dispatch import KERNELS
 from transientcam_moments.images import harmonics_of
 from transientcam_moments.reconstruction._one_pass import PassedReconstruction
@@ -24,7 +24,7 @@ Array = NDArray[Any]
 
 @pytest.fixture(autouse=True, scope="module")
 def compiled() -> Iterator[None]:
-    with lanes(*ORDERS, precisions=("float32",)):
+    with kernels(*ORDERS, precisions=("float32",)):
         yield
 
 
@@ -208,7 +208,7 @@ def test_a_pass_gives_what_numpy_gives(settings: tm.Settings) -> None:
 
     found = in_one_pass(images, settings, calibration=gain)
 
-    with without_lanes():
+    with without_kernels():
         expected = reconstructed(images, settings, calibration=gain)
         flags, count = expected.flags, expected.returns.count
         stages = {
@@ -465,7 +465,7 @@ def test_what_a_pass_cannot_do_is_left_to_the_stages(settings: tm.Settings) -> N
     found = tm.Reconstructor(settings, calibration=np.ones(M + 1))(raw_images(settings))
 
     assert not isinstance(found, PassedReconstruction)
-    with without_lanes():
+    with without_kernels():
         expected = reconstructed(raw_images(settings), settings)
         assert np.array_equal(found.flags, expected.flags)
         assert np.nanmax(np.abs(found.direct - expected.direct)) < 1
@@ -486,7 +486,7 @@ def test_a_reconstructor_changes_over_when_its_kernel_is_there() -> None:
     reconstructor = tm.Reconstructor(settings_of(), calibration=np.ones(M + 1))
     images = raw_images(settings_of())
 
-    with without_lanes():
+    with without_kernels():
         before = reconstructor(images)
     after = reconstructor(images)
 

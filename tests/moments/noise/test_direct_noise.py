@@ -1,10 +1,10 @@
-"""The lane for the direct return's deviation, held to `return_noise`, which needs none."""
+"""The kernel for the direct return's deviation, held to `return_noise`, which needs none."""
 
 import numpy as np
 import pytest
 
 import transientcam_moments as tm
-from tests.moments.kernel_lanes import lanes, without_lanes
+from tests.moments.compiled_kernels import kernels, without_kernels
 from transientcam_moments import noise
 from transientcam_moments.noise import direct_phase_noise
 
@@ -36,12 +36,12 @@ def sample(m: int, seed: int) -> tuple[tm.Returns, noise.MomentNoise]:
 
 @pytest.mark.parametrize("m", [1, 3, 4])
 @pytest.mark.parametrize("threshold", [0.0, 0.25, 1.0])
-def test_the_lane_states_what_return_noise_states(m: int, threshold: float) -> None:
+def test_the_kernel_states_what_return_noise_states(m: int, threshold: float) -> None:
     returns, of_moments = sample(m, seed=m)
-    with without_lanes():
+    with without_kernels():
         expected = noise.return_noise(returns, of_moments, threshold=threshold)
 
-    with lanes(m, precisions=("float64",), names=("direct_noise",)):
+    with kernels(m, precisions=("float64",), names=("direct_noise",)):
         std_rad, holds = direct_phase_noise(returns, of_moments, threshold=threshold)
 
     np.testing.assert_allclose(std_rad, expected.direct_phase_std_rad, rtol=1e-6)
@@ -56,7 +56,7 @@ def test_fewer_returns_than_harmonics_are_left_to_numpy() -> None:
     )
     expected = noise.return_noise(two, of_moments)
 
-    with lanes(2, 3, precisions=("float64",), names=("direct_noise",)):
+    with kernels(2, 3, precisions=("float64",), names=("direct_noise",)):
         std_rad, holds = direct_phase_noise(two, of_moments)
 
     np.testing.assert_array_equal(std_rad, expected.direct_phase_std_rad)

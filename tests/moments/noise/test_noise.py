@@ -16,7 +16,7 @@ from hypothesis import given, strategies as st
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from tests.moments.kernel_lanes import lanes
+from tests.moments.compiled_kernels import kernels
 from transientcam_driver import RawFrame, Sequence, SubPhases, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_moments import noise
@@ -385,7 +385,7 @@ def test_bound_of_as_many_returns_as_harmonics_is_exact_however_close_they_are(m
     weight, variance = random.uniform(0.1, 1, (m, 64)), random.uniform(1, 3, (m + 1, 64))
 
     planar = noise.cramer_rao(phase, weight, noise.MomentNoise(variance)).covariance
-    with lanes(m, precisions=("float64",), names=("covariance",)):
+    with kernels(m, precisions=("float64",), names=("covariance",)):
         compiled = noise.cramer_rao(phase, weight, noise.MomentNoise(variance)).covariance
 
     for pixel in range(0, 64, 21):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import transientcam_moments as tm
-from tests.moments.kernel_lanes import without_lanes
+from tests.moments.compiled_kernels import without_kernels
 from transientcam import wire
 from transientcam_driver import AppliedSequence, Camera, RawFrame, Sampling, Sequence, open_camera
 from transientcam_moments._dispatch import KERNELS, Key
@@ -398,7 +398,7 @@ def test_frames_are_those_of_pisarenko_until_the_likelihood_is_compiled_and_say_
 ) -> None:
     async def test(pipeline: Pipeline, frame: Frame) -> None:
         pipeline.reconstruction = SettingsVersion(7, ReconstructionSettings())
-        with without_lanes():
+        with without_kernels():
             before = pipeline.frame(raw, camera.applied)
             harmonics = camera.applied.sequence.harmonics
             KERNELS.compiled[Key("likelihood", harmonics, "f")] = lambda *_: None

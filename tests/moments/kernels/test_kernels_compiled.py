@@ -1,4 +1,4 @@
-"""Compiled lanes against the planar statement beside them, and against LAPACK."""
+"""Compiled kernels against the planar statement beside them, and against LAPACK."""
 
 import itertools
 import threading
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from tests.moments.kernel_lanes import FEW, find, lanes, without_lanes
+from tests.moments.compiled_kernels import FEW, find, kernels, without_kernels
 from transientcam_compiled import BLOCK, Part, blocks
 from transientcam_compiled._spread import LARGE
 from transientcam_moments._kernels import density as density_module, phase_groups
@@ -35,11 +35,11 @@ PHASES: dict[str, Callable[[int], Array]] = {
 
 @pytest.fixture(autouse=True, scope="module")
 def compiled() -> Iterator[None]:
-    with lanes(*ORDERS, names=LANES):
+    with kernels(*ORDERS, names=LANES):
         yield
 
 
-def lane(name: str, planes: Array) -> Any:
+def kernel(name: str, planes: Array) -> Any:
     found = find(name, planes)
     assert found is not None
     return found
@@ -92,7 +92,7 @@ def special_moments(m: int, dtype: type) -> tuple[Array, dict[str, slice]]:
 def test_smallest_eigenvalues_are_those_of_lapack(m: int, dtype: type) -> None:
     b = varied_moments(m, dtype)
 
-    found = lane("smallest_eigenvalue", b)(b)
+    found = kernel("smallest_eigenvalue", b)(b)
 
     expected = oracles.smallest_eigenvalue(b.astype(complex))
     assert found.dtype == b.real.dtype
@@ -106,7 +106,7 @@ def test_equal_smallest_eigenvalues_are_found_to_the_last_digits(m: int) -> None
     b = oracles.moments_of_returns(phase, np.ones((1, 128)), m)
     b[0] += 0.25
 
-    found = lane("smallest_eigenvalue", b)(b)
+    found = kernel("smallest_eigenvalue", b)(b)
 
     assert np.abs(found - 0.25).max() < 8 * (m + 1) * eps(b)
 
@@ -116,9 +116,9 @@ def test_equal_smallest_eigenvalues_are_found_to_the_last_digits(m: int) -> None
 def test_eigenvalues_of_special_pixels_follow_the_planar_statement(m: int, dtype: type) -> None:
     b, where = special_moments(m, dtype)
 
-    found = lane("smallest_eigenvalue", b)(b)
+    found = kernel("smallest_eigenvalue", b)(b)
 
-    with without_lanes():
+    with without_kernels():
         planar = tm.smallest_eigenvalue(b)
     scale = np.nan_to_num(np.abs(b).max(axis=0))
     assert np.array_equal(np.isnan(found), np.isnan(planar))
@@ -135,7 +135,7 @@ def test_levinson_follows_the_planar_statement(m: int, dtype: type) -> None:
     with np.errstate(all="ignore"):
         b = tm.bias(b).moments
 
-    found = lane("levinson", b)(b)
+    found = kernel("levinson", b)(b)
 
     planar = _levinson(b)
     with np.errstate(all="ignore"):
@@ -161,9 +161,9 @@ def test_levinson_takes_a_brightness_in_place_of_b_0(dtype: type) -> None:
     with np.errstate(all="ignore"):
         biased = tm.bias(b).moments
 
-    beside = lane("levinson", b)(b, biased[0].real)
+    beside = kernel("levinson", b)(b, biased[0].real)
 
-    for part, expected in zip(beside, lane("levinson", b)(biased), strict=True):
+    for part, expected in zip(beside, kernel("levinson", b)(biased), strict=True):
         assert np.array_equal(part, expected, equal_nan=True)
 
 
@@ -173,7 +173,7 @@ def test_indefinite_moments_are_projected_as_by_the_planar_statement(m: int, dty
     b = varied_moments(m, dtype)
     b[0] = 0.6 * np.abs(b[0])
 
-    error, _, reflection = lane("levinson", b)(b)
+    error, _, reflection = kernel("levinson", b)(b)
 
     planar = _levinson(b)
     assert (np.abs(reflection) < 1).all()
@@ -196,7 +196,7 @@ def test_densities_follow_the_planar_statement(m: int, dtype: type, phases: int,
 
     found = tm.density(coefficients, phase_rad)
 
-    with without_lanes():
+    with without_kernels():
         planar = tm.density(coefficients, phase_rad)
     assert found.shape == planar.shape == (phases, b.shape[1])
     assert found.dtype == b.real.dtype
@@ -230,13 +230,13 @@ def test_densities_are_written_to_every_pixel_and_no_other_place(
     for offset in (3, 16, 31):  # wherever memory begins
         out = room[offset : offset + phases * pixels].reshape(phases, pixels)
         out[:] = np.nan
-        lane("density", c.polynomial)(c.polynomial, c.reflection, c.error, phase_rad, out)
+        kernel("density", c.polynomial)(c.polynomial, c.reflection, c.error, phase_rad, out)
 
-        with without_lanes():
+        with without_kernels():
             assert np.allclose(out, tm.density(c, phase_rad), rtol=1e-3)
         whole = out.copy()
         out[:] = np.nan
-        lane("density", c.polynomial)(
+        kernel("density", c.polynomial)(
             c.polynomial, c.reflection, c.error, phase_rad, out, spread=last_part_first
         )
         assert np.array_equal(out, whole)
@@ -303,7 +303,7 @@ def test_no_phases_give_an_empty_density() -> None:
 def test_single_precision_returns_reproduce_their_moments(m: int) -> None:
     b = varied_moments(m, np.complex64, pixels=4001)
 
-    phase, weight, uniform, count = lane("pisarenko", b)(b)
+    phase, weight, uniform, count = kernel("pisarenko", b)(b)
 
     wide = (part.astype(float) for part in (phase, weight, uniform))
     error = size(residual(b.astype(complex), *wide), b)
@@ -318,7 +318,7 @@ def test_single_precision_returns_reproduce_their_moments(m: int) -> None:
 def test_double_precision_returns_reproduce_their_moments(m: int) -> None:
     b = varied_moments(m, np.complex128)
 
-    phase, weight, uniform, _ = lane("pisarenko", b)(b)
+    phase, weight, uniform, _ = kernel("pisarenko", b)(b)
 
     error = size(residual(b, phase, weight, uniform), b)
     assert error.max() < 32 * (m + 1) * eps(b)
@@ -334,9 +334,9 @@ def test_well_separated_returns_are_those_of_the_planar_statement(m: int, dtype:
     b[0] += 0.1 * b[0].real
     b = b.astype(dtype)
 
-    found = tm.Returns(*lane("pisarenko", b)(b))
+    found = tm.Returns(*kernel("pisarenko", b)(b))
 
-    with without_lanes():
+    with without_kernels():
         planar = tm.pisarenko(b)
     assert np.abs(found.phase_rad - planar.phase_rad).max() < 1e4 * eps(b)
     assert np.abs(found.weight / b[0].real - planar.weight / b[0].real).max() < 1e4 * eps(b)
@@ -355,7 +355,7 @@ def test_fewer_returns_than_harmonics_are_counted(m: int, returns: int, dtype: t
     b[0] += 0.05
     b = b.astype(dtype)
 
-    found = tm.Returns(*lane("pisarenko", b)(b))
+    found = tm.Returns(*kernel("pisarenko", b)(b))
 
     assert (found.count == returns).all()
     assert np.abs(found.phase_rad[:returns] - phase).max() < 1e4 * eps(b)
@@ -369,9 +369,9 @@ def test_fewer_returns_than_harmonics_are_counted(m: int, returns: int, dtype: t
 def test_returns_of_special_pixels_follow_the_planar_statement(m: int, dtype: type) -> None:
     b, where = special_moments(m, dtype)
 
-    found = tm.Returns(*lane("pisarenko", b)(b))
+    found = tm.Returns(*kernel("pisarenko", b)(b))
 
-    with without_lanes():
+    with without_kernels():
         planar = tm.pisarenko(b)
     for kind in ("zero", "uniform", "NaN in b_0", "NaN in b_m", "infinite b_1"):
         pixels = where[kind]
@@ -395,9 +395,9 @@ def test_returns_of_special_pixels_follow_the_planar_statement(m: int, dtype: ty
 @pytest.mark.parametrize("m", ORDERS)
 def test_a_known_eigenvalue_is_taken(m: int) -> None:
     b = varied_moments(m, np.complex64)
-    eigenvalue = lane("smallest_eigenvalue", b)(b)
+    eigenvalue = kernel("smallest_eigenvalue", b)(b)
 
-    searched, known = lane("pisarenko", b)(b), lane("pisarenko", b)(b, eigenvalue)
+    searched, known = kernel("pisarenko", b)(b), kernel("pisarenko", b)(b, eigenvalue)
 
     for first, second in zip(searched, known, strict=True):
         assert np.array_equal(first, second, equal_nan=True)
@@ -405,7 +405,7 @@ def test_a_known_eigenvalue_is_taken(m: int) -> None:
 
 def test_pixels_that_single_precision_is_not_enough_for_are_redone() -> None:
     b = varied_moments(4, np.complex64, pixels=4001)
-    phase, weight, uniform, _ = lane("pisarenko", b)(b)
+    phase, weight, uniform, _ = kernel("pisarenko", b)(b)
 
     wide = (part.astype(float) for part in (phase, weight, uniform))
     assert size(residual(b.astype(complex), *wide), b).max() < 32 * 5 * eps(b)
@@ -417,7 +417,7 @@ def test_every_number_of_pixels_gives_the_same_results(name: str, pixels: int) -
     """The last pixels share a register with some that were done already."""
     b = varied_moments(3, np.complex64)
 
-    whole, part = lane(name, b)(b), lane(name, b)(b[:, :pixels])
+    whole, part = kernel(name, b)(b), kernel(name, b)(b[:, :pixels])
 
     whole, part = (x if isinstance(x, tuple) else (x,) for x in (whole, part))
     for of_all, of_some in zip(whole, part, strict=True):
@@ -429,7 +429,7 @@ def test_results_have_the_shape_of_any_pixels(name: str) -> None:
     b = varied_moments(3, np.complex64, pixels=1020)
     strided = np.moveaxis(b.reshape(4, 4, 255).copy(), 1, 2)
 
-    found, expected = lane(name, b)(strided), lane(name, b)(b)
+    found, expected = kernel(name, b)(strided), kernel(name, b)(b)
 
     found, expected = (x if isinstance(x, tuple) else (x,) for x in (found, expected))
     for one, other in zip(found, expected, strict=True):
@@ -440,21 +440,21 @@ def test_results_have_the_shape_of_any_pixels(name: str) -> None:
 @pytest.mark.parametrize("parts", [1, 2, 3, 7])
 def test_several_threads_give_the_same_results(parts: int) -> None:
     b = varied_moments(3, np.complex64, pixels=9005)
-    c = tm.Coefficients(*lane("levinson", b)(b))
+    c = tm.Coefficients(*kernel("levinson", b)(b))
     phase_rad = np.linspace(0, 6, 9)
     with ThreadPoolExecutor(3) as executor:
         spread = tm.kernels.over(executor, parts)
         many = [
-            *lane("levinson", b)(b, spread=spread),
-            *lane("pisarenko", b)(b, spread=spread),
-            lane("smallest_eigenvalue", b)(b, spread=spread),
-            lane("density", b)(c.polynomial, c.reflection, c.error, phase_rad, spread=spread),
+            *kernel("levinson", b)(b, spread=spread),
+            *kernel("pisarenko", b)(b, spread=spread),
+            kernel("smallest_eigenvalue", b)(b, spread=spread),
+            kernel("density", b)(c.polynomial, c.reflection, c.error, phase_rad, spread=spread),
         ]
     one = [
         *c,
-        *lane("pisarenko", b)(b),
-        lane("smallest_eigenvalue", b)(b),
-        lane("density", b)(c.polynomial, c.reflection, c.error, phase_rad),
+        *kernel("pisarenko", b)(b),
+        kernel("smallest_eigenvalue", b)(b),
+        kernel("density", b)(c.polynomial, c.reflection, c.error, phase_rad),
     ]
     for first, second in zip(one, many, strict=True):
         assert np.array_equal(first, second, equal_nan=True)
@@ -544,7 +544,7 @@ def test_raw_images_are_measured_as_by_the_planar_statement(m: int, zeroth: str)
 
     found = tm.measure(raw, zeroth=zeroth)
 
-    with without_lanes():
+    with without_kernels():
         planar = tm.measure(raw, zeroth=zeroth)
     assert found.dtype == planar.dtype
     assert np.allclose(found, planar, rtol=1e-6)
@@ -555,7 +555,7 @@ def test_takes_are_averaged_by_the_planar_statement() -> None:
 
     found = tm.measure(raw.reshape(48, 9, 40), zeroth="low-frequency", takes=3)
 
-    with without_lanes():
+    with without_kernels():
         planar = tm.measure(raw.reshape(48, 9, 40), zeroth="low-frequency", takes=3)
     assert np.array_equal(found, planar)
 
@@ -570,7 +570,7 @@ def test_images_are_smoothed_as_by_the_planar_statement(
 
     found = tm.smooth(b, sigma_px)
 
-    with without_lanes():
+    with without_kernels():
         planar = tm.smooth(b, sigma_px)
     assert found.dtype == planar.dtype
     assert np.abs(found - planar).max() < 1e-6 * np.abs(b).max()
@@ -582,20 +582,20 @@ def test_a_pixel_that_is_not_finite_counts_as_nothing_for_its_neighbours() -> No
 
     found = tm.smooth(b)
 
-    with without_lanes():
+    with without_kernels():
         assert np.array_equal(found, tm.smooth(b), equal_nan=True)
     assert np.isfinite(found).all(axis=0).sum() == 998
 
 
 @pytest.mark.parametrize("shape", [(4, 40, 20), (4, 300), (2, 4, 25, 40)])
-def test_images_no_lane_takes_are_smoothed_all_the_same(shape: tuple[int, ...]) -> None:
+def test_images_no_kernel_takes_are_smoothed_all_the_same(shape: tuple[int, ...]) -> None:
     if len(shape) < 3:
         shape = (*shape[:1], 10, shape[1] // 10)
     b = np.random.default_rng(0).normal(size=shape).astype(np.complex64)
 
     found = tm.smooth(b)
 
-    with without_lanes():
+    with without_kernels():
         assert np.array_equal(found, tm.smooth(b))
 
 
@@ -607,7 +607,7 @@ def test_light_is_separated_as_by_the_planar_statement(m: int, threshold: float)
 
     found = tm.separate(returns, threshold)
 
-    with without_lanes():
+    with without_kernels():
         planar = tm.separate(returns, threshold)
     for one, other in zip(found, planar, strict=True):
         assert one.dtype == other.dtype

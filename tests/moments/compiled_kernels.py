@@ -1,4 +1,4 @@
-"""Lanes for tests: compiled once a session, and present only in the tests that ask for them."""
+"""Kernels for tests: compiled once a session, and present only in the tests that ask for them."""
 
 import os
 from collections.abc import Iterator
@@ -21,12 +21,12 @@ FEW = tuple(
 
 
 @contextmanager
-def lanes(
+def kernels(
     *harmonics: int,
     precisions: tuple[str, ...] = ("float32", "float64"),
     names: tuple[str, ...] = FEW,
 ) -> Iterator[None]:
-    """Have the lanes of these orders inside, as well as those that were there before."""
+    """Have the kernels of these orders inside, as well as those that were there before."""
     before = dict(KERNELS.compiled)
     set_by_user = "NUMBA_CACHE_DIR" in os.environ
     os.environ.setdefault("NUMBA_CACHE_DIR", str(CACHE))
@@ -42,7 +42,7 @@ def lanes(
 
 
 @contextmanager
-def without_lanes() -> Iterator[None]:
+def without_kernels() -> Iterator[None]:
     """Leave everything to NumPy inside."""
     before = dict(KERNELS.compiled)
     KERNELS.compiled.clear()
