@@ -1,1 +1,1 @@
-"""Measurements of speed and accuracy; the tests never time anything."""
+"""Measurements: functions that return tables, by one runner; see `benchmarks.catalogue`."""

@@ -6,6 +6,7 @@ MathML, and search runs in the browser over an index that lies beside the pages.
 
 import importlib.metadata
 import re
+import sys
 import tomllib
 from pathlib import Path
 
@@ -14,6 +15,9 @@ from docutils.utils.math import latex2mathml
 from pygments.lexers.special import TextLexer
 from sphinx.application import Sphinx
 from sphinx.writers.html5 import HTML5Translator
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from benchmarks.common.records import marked
 
 _PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text("utf-8"))[
     "project"
@@ -71,8 +75,14 @@ def _left_out(
     return True if said.startswith("Alias for field number") else None
 
 
+def _measured(_app: Sphinx, _page: str, source: list[str]) -> None:
+    """Say what was measured of other code than there is now."""
+    source[0] = marked(source[0])
+
+
 def setup(app: Sphinx) -> None:
     """Register formulas as MathML, which browsers draw without a script, and recorded bytes."""
+    app.connect("source-read", _measured)
     app.connect("autodoc-process-docstring", _moduli)
     app.connect("autodoc-skip-member", _left_out)
     app.add_lexer("hex", TextLexer)

@@ -40,7 +40,7 @@ _LIBRARY_THREADS = (
     "pydev",
     "OpenBLAS",
     "transientcam-compile",
-    "transientcam-lane",
+    "transientcam-kernel",
     "AnyIO worker",
     "uvloop_",
     "zarr_io",
@@ -72,6 +72,7 @@ _LONGEST_FIRST = (
     "tests/server/api/routes/test_recordings.py",
     # before all others that need what it compiles: two workers would compile it at the same time
     "tests/moments/kernels/test_kernels_lanes.py",
+    "tests/simulation/light/test_compiled.py",  # the same, of simulated light
     "tests/conformance/test_conformance.py",
     "tests/stability/test_sweep.py",
     "tests/moments/noise/test_noise.py",

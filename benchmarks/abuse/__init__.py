@@ -1,1 +1,1 @@
-"""Whether clients can take the service away from others: ``python -m benchmarks.abuse``."""
+"""Whether clients can take the service away from others."""

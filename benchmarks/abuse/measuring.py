@@ -15,17 +15,15 @@ from typing import Final
 import httpx
 import trustme
 
-from benchmarks.daemon import Process
-from benchmarks.viewers import Viewer, cut, watch
+from benchmarks.common.daemon import VIDEO, Process
+from benchmarks.service.viewers import Viewer, cut, watch
 from transientcam import wire
 
-VIDEO = {"base_frequency_hz": 23e6, "harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
 RANGE = wire.Subscribe((wire.Subscription("range"),)).to_document()
 GIVE_UP_S: Final = 30.0
 """What was not done by then is taken for never."""
 LEASE_S: Final = 2.0
 _PROBE_EVERY_S = 0.2
-_COMPILED_WITHIN_S = 900.0
 _LIGHT_OFF_S: Final = 1.5
 COMES_BACK_S: Final = 3.0
 _FIRST_FRAMES_S: Final = 1.0
@@ -133,8 +131,8 @@ def measure(
         served(checkout, tls=tls) as process,
         httpx.Client(base_url=process.url, timeout=GIVE_UP_S, verify=False) as client,
     ):
-        prepare(client)
-        viewer = None if tls else Viewer(stream_url(process), RANGE)  # the viewers speak no TLS
+        prepare(process, client)
+        viewer = None if tls else Viewer(process.stream_url, RANGE)  # the viewers speak no TLS
         if viewer is not None:
             watch([viewer], duration_s=_FIRST_FRAMES_S)
         before = _frames(viewer, client, duration_s)
@@ -162,11 +160,6 @@ def measure(
     return seen
 
 
-def stream_url(process: Process) -> str:
-    """Return the address of the stream."""
-    return process.url.replace("http", "ws", 1) + "/api/v1/stream"
-
-
 @contextlib.contextmanager
 def _probing(probe: Probe) -> Iterator[None]:
     ended = threading.Event()
@@ -179,12 +172,10 @@ def _probing(probe: Probe) -> Iterator[None]:
         thread.join()
 
 
-def prepare(client: httpx.Client) -> float:
+def prepare(process: Process, client: httpx.Client) -> float:
     """Set the paper's video setting, wait for the kernels, and return the frame rate in Hz."""
     applied = client.put("/api/v1/sequence", json=VIDEO).raise_for_status().json()
-    end_s = time.monotonic() + _COMPILED_WITHIN_S
-    while client.get("/api/v1/info").json()["kernels"]["compiling"] and time.monotonic() < end_s:
-        time.sleep(0.5)
+    process.settle()
     # what is made once is made now, so that it does not count as growth
     client.get("/api/v1/frames/latest/transient", params={"bins": 100, "wait_s": 10.0})
     client.get("/api/v1/frames/latest/transient.tiff", params={"bins": 1})

@@ -2,14 +2,16 @@
 
 import statistics
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
 import httpx
 
-from benchmarks.abuse.measuring import GIVE_UP_S, RANGE, attacked, prepare, served, stream_url
-from benchmarks.soak import Samples
-from benchmarks.viewers import Viewer, cut, watch
+from benchmarks.abuse.measuring import GIVE_UP_S, RANGE, attacked, prepare, served
+from benchmarks.common.tables import Table, heads
+from benchmarks.service.soak import Samples
+from benchmarks.service.viewers import Viewer, cut, watch
 
 CONNECTIONS: Final = 8
 SAMPLE_S: Final = 2.0
@@ -21,46 +23,22 @@ _MIB = 2**20
 class Soak:
     """What a daemon held before, during and after the attacks."""
 
-    minutes: float
     frames: int
     expected: float
     before: Samples
     during: Samples
     after: Samples
 
-    def rows(self) -> list[tuple[str, list[str]]]:
-        """Return a line for each of what it holds."""
-        minute = max(1, round(60.0 / SAMPLE_S))
-        found = []
-        for name, attribute, unit in (
-            ("memory, MiB", "memory_bytes", _MIB),
-            ("descriptors", "descriptors", 1),
-            ("threads", "threads", 1),
-        ):
-            before, during, after = (
-                [each / unit for each in getattr(samples, attribute)]
-                for samples in (self.before, self.during, self.after)
-            )
-            values = (
-                statistics.mean(before),
-                statistics.mean(during[:minute]),
-                statistics.mean(during[-minute:]),
-                max(during),
-                statistics.mean(after[-3:]),
-            )
-            found.append((name, [f"{each:.0f}" for each in values]))
-        return found
 
-
-def soak(*, minutes: float) -> Soak:
+def soak(minutes: float) -> Soak:
     """Attack in every way, one after the other, and look at the daemon all the while."""
     before, during, after = Samples(), Samples(), Samples()
     with (
         served(None, tls=False) as process,
         httpx.Client(base_url=process.url, timeout=GIVE_UP_S) as client,
     ):
-        rate_hz = prepare(client)
-        viewer = Viewer(stream_url(process), RANGE)
+        rate_hz = prepare(process, client)
+        viewer = Viewer(process.stream_url, RANGE)
         watch([viewer], duration_s=REST_S, every_s=SAMPLE_S, meanwhile=lambda: before.take(process))
         count = len(viewer.seen.numbers)
         with attacked("mixed", process.url, CONNECTIONS):
@@ -74,4 +52,28 @@ def soak(*, minutes: float) -> Soak:
         time.sleep(1.0)
         watch([viewer], duration_s=REST_S, every_s=SAMPLE_S, meanwhile=lambda: after.take(process))
         cut([viewer.connection])
-    return Soak(minutes, frames, rate_hz * took_s, before, during, after)
+    return Soak(frames, rate_hz * took_s, before, during, after)
+
+
+def tables(*, minutes: float = 10.0) -> Iterator[Table]:
+    """Mix all attacks for so many minutes."""
+    result = soak(minutes)
+    minute = max(1, round(60.0 / SAMPLE_S))
+    columns = heads(" | before:.0f | first minute:.0f | last minute:.0f | most:.0f | after:.0f")
+    table = Table("", columns)
+    table.text.append(
+        f"Frames of a viewer, of those due: {result.frames} of {result.expected:.0f}."
+    )
+    for name, attribute, unit in (
+        ("memory, MiB", "memory_bytes", _MIB),
+        ("descriptors", "descriptors", 1),
+        ("threads", "threads", 1),
+    ):
+        before, during, after = (
+            [each / unit for each in getattr(samples, attribute)]
+            for samples in (result.before, result.during, result.after)
+        )
+        means = (before, during[:minute], during[-minute:])
+        most, left = max(during), statistics.mean(after[-3:])
+        table.rows.append((name, *map(statistics.mean, means), most, left))
+    yield table

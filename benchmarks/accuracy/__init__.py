@@ -1,1 +1,1 @@
-"""What accuracy costs on every scene, how well it is predicted, and docs/accuracy.md of both."""
+"""What accuracy costs on every scene, how well it is predicted, and whether plans keep it."""

@@ -1,14 +1,10 @@
-"""What was measured of plans, and how docs/plans.md states it."""
+"""What was measured of plans, and how the page of plans states it."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-WRONG = """\
-- The bias is predicted too small where light comes back late and no frequency of the look shows it:
-  where it enters the material, as in wax and soap, or where a part of the scene is lit by other
-  walls alone. A longer capture does not help there. The upper end of an interval is made for such
-  scenes, and plans for them are marked: `bias_known` is false, and the summary says why."""
+from benchmarks.common.tables import Cell, Table, heads
 
 
 @dataclass(frozen=True)
@@ -56,6 +52,29 @@ class Kept:
         """Whether the target was met; None without one."""
         return None if self.target_m is None else self.measured["error"] <= self.target_m
 
+    def row(self) -> tuple[Cell, ...]:
+        """Return what the table says of it, in mm."""
+        p, q = ({name: 1e3 * each for name, each in of.items()} for of in self._both)
+        low, high = (1e3 * end for end in self.interval)
+        outliers = (f"{100 * each['outliers']:.1f}" for each in self._both)
+        return (
+            self.scene,
+            self.goal,
+            self.choice,
+            1e3 * self.capture_s,
+            p["std"],
+            p["bias"],
+            f"{p['error']:.3g} ({low:.3g} to {high:.3g})",
+            f"{q['std']:.3g}, {q['bias']:.3g}, {q['error']:.3g}",
+            self.ratios["error"],
+            ", ".join(outliers),
+            {None: None, True: "yes", False: "no"}[self.met],
+        )
+
+    @property
+    def _both(self) -> tuple[dict[str, float], dict[str, float]]:
+        return self.predicted, self.measured
+
 
 @dataclass(frozen=True)
 class Refused:
@@ -66,25 +85,35 @@ class Refused:
     why: str
 
 
-def expectations(rows: list[Kept]) -> str:
-    """State in plain words what to expect of a plan."""
+def expectations(rows: list[Kept]) -> list[str]:
+    """State in plain words what to expect of a plan: coverage, targets met, ratios."""
     targets = [row.met for row in rows if row.met is not None]
     above = [row for row in rows if row.above]
     below = [row for row in rows if row.below]
     inside = len(rows) - len(above) - len(below)
-    noise = np.array([row.ratios["std"] for row in rows])
-    low, high = np.quantile(noise, [0.1, 0.9])
-    lines = [
+    biased = [row for row in rows if row.measured["bias"] > row.measured["std"] / 2]
+    of_bias = f"bias, of the {len(biased)} where it is more than half of the noise"
+    off = max(abs(row.device_s / row.capture_s - 1) for row in rows)
+    return [
         f"- A target is reached by {sum(targets)} of {len(targets)} plans, "
         f"{sum(targets) / max(len(targets), 1):.0%} (bar: 80 %).",
         f"- The interval that a plan states, 90 %, holds the measured error of {inside} of "
         f"{len(rows)}, {inside / len(rows):.0%} (bar: 85 to 95 %). {len(above)} errors lie above "
         f"it{_of(above)}, {len(below)} below it{_of(below)}.",
         f"- {by_mark(rows)}",
-        f"- Noise: 80 % of the measured deviations are {low:.2f} to {high:.2f} of the predicted.",
-        WRONG,
+        *(
+            f"- {what}: measured / predicted least, 10 %, 50 %, 90 %, most: "
+            + ", ".join(f"{np.quantile(ratios, q):.2f}" for q in (0, 0.1, 0.5, 0.9, 1))
+            for what, ratios in (
+                ("noise", [row.ratios["std"] for row in rows]),
+                (of_bias, [row.ratios["bias"] for row in biased]),
+                ("error", [row.ratios["error"] for row in rows]),
+            )
+            if ratios
+        ),
+        f"- times of the device differ from planned ones by at most {off:.2%}",
+        f"- saturated pixels: at most {max(row.saturated for row in rows):.2%}",
     ]
-    return "\n".join(lines)
 
 
 def by_mark(rows: list[Kept]) -> str:
@@ -107,55 +136,11 @@ def _of(rows: list[Kept]) -> str:
     return f" ({', '.join(names)})" if names else ""
 
 
-def summary(rows: list[Kept]) -> str:
-    """State ratios, coverage and targets met."""
-    lines = []
-    biased = [row for row in rows if row.measured["bias"] > row.measured["std"] / 2]
-    of_bias = f"bias, of the {len(biased)} where it is more than half of the noise"
-    for name, which in (("std", rows), ("bias", biased), ("error", rows)):
-        if which:
-            ratios = [row.ratios[name] for row in which]
-            quantiles = ", ".join(f"{np.quantile(ratios, q):.2f}" for q in (0, 0.1, 0.5, 0.9, 1))
-            what = of_bias if name == "bias" else name
-            lines.append(f"{what}: measured / predicted least, 10 %, 50 %, 90 %, most: {quantiles}")
-    covered = np.mean([row.covered for row in rows])
-    lines.append(
-        f"90 % intervals hold the measured error in {covered:.0%} of {len(rows)} (bar: 85 to 95 %)"
+def table(rows: list[Kept], refused: list[Refused]) -> Table:
+    """Return all plans, and what was refused."""
+    columns = heads(
+        "scene | goal | recommended | ms:.0f | noise:.3g | bias:.3g | error (90 %) mm | "
+        "measured noise, bias, error | ratio:.2f | outliers % | met"
     )
-    targets = [row.met for row in rows if row.met is not None]
-    if targets:
-        share = np.mean(targets)
-        lines.append(f"targets met: {sum(targets)} of {len(targets)}, {share:.0%} (bar: 80 %)")
-    off = max(abs(row.device_s / row.capture_s - 1) for row in rows)
-    lines.append(f"times of the device differ from planned ones by at most {off:.2%}")
-    lines.append(f"saturated pixels: at most {max(row.saturated for row in rows):.2%}")
-    return "\n".join(lines)
-
-
-def table(rows: list[Kept]) -> str:
-    """Return all plans as a table."""
-    head = (
-        "| scene | goal | recommended | ms | noise | bias | error (90 %) mm | "
-        "measured noise, bias, error | ratio | outliers % | met |\n" + "|---" * 11 + "|"
-    )
-    lines = [head]
-    for row in rows:
-        p, q = row.predicted, row.measured
-        low, high = row.interval
-        met = {None: "–", True: "yes", False: "no"}[row.met]
-        lines.append(
-            f"| {row.scene} | {row.goal} | {row.choice} | {row.capture_s * 1e3:.0f} "
-            f"| {p['std'] * 1e3:.3g} | {p['bias'] * 1e3:.3g} "
-            f"| {p['error'] * 1e3:.3g} ({low * 1e3:.3g} to {high * 1e3:.3g}) "
-            f"| {q['std'] * 1e3:.3g}, {q['bias'] * 1e3:.3g}, {q['error'] * 1e3:.3g} "
-            f"| {row.ratios['error']:.2f} | {p['outliers'] * 100:.1f}, {q['outliers'] * 100:.1f} "
-            f"| {met} |"
-        )
-    return "\n".join(lines)
-
-
-def page(rows: list[Kept], refused: list[Refused]) -> str:
-    """Return summary, table and refusals."""
-    lines = [f"- {line}" for line in summary(rows).splitlines()]
-    lines += [f"- refused: {each.scene}, {each.goal}: {each.why}" for each in refused]
-    return "\n".join([*lines, "", table(rows)])
+    said = [f"- refused: {each.scene}, {each.goal}: {each.why}" for each in refused]
+    return Table("Do plans keep what they promise?", columns, [each.row() for each in rows], said)

@@ -1,14 +1,12 @@
-"""How much quicker than a plan could one have been? ``python -m benchmarks.accuracy.regret``.
+"""How much quicker than a plan one could have been.
 
 Every set of frequencies and every estimator that could be quicker than the plan is captured and
 compared with the truth, the longest capture first and then by bisection over exposures and takes:
-brute force that knows the truth, against a plan that does not. Scenes are the four of `SCENES`, and
-all others of `promises.scenes`. Each search has a share of ``--minutes``; families are searched in
-a random order, and the table says how many there was time for, so that a regret is a lower bound
-where these are not all. ``--write`` keeps the table.
+brute force that knows the truth, against a plan that does not. Families are searched in a random
+order, and the table says how many there was time for, so that a regret is a lower bound where these
+are not all.
 """
 
-import argparse
 import math
 import os
 import random
@@ -24,20 +22,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.accuracy import evidence
-from benchmarks.accuracy.promises import (
-    GOALS,
-    LOOK_SEED,
-    dimmest_dn_per_s,
-    looked,
-    measured,
-    opened,
-    scenes,
-)
+from benchmarks.accuracy.capturing import LOOK_SEED, dimmest_dn_per_s, looked, measured
+from benchmarks.accuracy.promises import GOALS, all_scenes
+from benchmarks.common.tables import Cell, Table, heads
 from transientcam_driver import Sequence
+from transientcam_experiments.tradeoff import camera_before
 from transientcam_server.errors import Problem
 from transientcam_server.planning import ESTIMATORS, Goal, Planner, SceneStatistics, in_words
-from transientcam_server.planning._scene.scene import AMBIGUOUS_SHARE
 from transientcam_server.planning._search.families import Family
 
 SCENES = ("wall", "mirrors", "translucent", "corner")
@@ -46,14 +37,6 @@ CAPTURES = 10
 ORDER = 1
 BAR = 1.3
 MORE_OUTLIERS = 0.02
-FAIR = (
-    "The search knows the true ranges and judges by them. A sequence is no candidate where more "
-    f"than {AMBIGUOUS_SHARE:.0%} of the lit pixels are beyond its unambiguous range: that is the "
-    "rule of plans, too, which go by the ranges that the look found, and also by later returns. "
-    "Nor is one whose share of outliers is larger than that of the captured plan by more than "
-    f"{MORE_OUTLIERS:.0%}: the error is that of the median pixel, which says nothing of them. "
-    "Missed is a target that neither the plan nor anything quicker reaches; it does not count."
-)
 
 
 @dataclass(frozen=True)
@@ -159,32 +142,19 @@ def every_family(
 
 def true_ranges_m(scene: str) -> NDArray[Any]:
     """Return the range of every lit pixel of a scene."""
-    with opened(scene, LOOK_SEED) as camera:
+    with camera_before(scene, seed=LOOK_SEED) as camera:
         assert camera.simulation is not None
         truth = camera.simulation.truth()
     lit = np.isfinite(truth.range_m) & (truth.brightness > 0)
     return np.asarray(truth.range_m[lit], dtype=float)
 
 
-def table(found: list[Regret]) -> str:
-    """Return all searches, and the shares that are within the bar."""
-    lines = [
-        "| scene | target | plan | ms | quickest | ms | regret | searched |\n" + "|---" * 8 + "|"
-    ]
-    lines += [
-        f"| {each.scene} | {each.goal} | {each.plan} | {each.plan_s * 1e3:.0f} "
-        + ("| missed | – | – " if each.missed else _of_quickest(each))
-        + f"| {each.searched} of {each.families} |"
-        for each in found
-    ]
-    four = [each for each in found if each.scene in SCENES]
-    return "\n".join(
-        [*lines, "", f"{_within(four)} (bar: 90 %); of all scenes {_within(found)}.", "", FAIR]
-    )
-
-
-def _of_quickest(each: Regret) -> str:
-    return f"| {each.quickest} | {each.quickest_s * 1e3:.0f} | {each.factor:.2f} "
+def _row(each: Regret) -> tuple[Cell, ...]:
+    searched = f"{each.searched} of {each.families}"
+    quickest: tuple[Cell, ...] = ("missed", None, None)
+    if not each.missed:
+        quickest = (each.quickest, 1e3 * each.quickest_s, each.factor)
+    return (each.scene, each.goal, each.plan, 1e3 * each.plan_s, *quickest, searched)
 
 
 def _within(found: list[Regret]) -> str:
@@ -193,25 +163,21 @@ def _within(found: list[Regret]) -> str:
     return f"{count} of {len(factors)} within {BAR:g}, {count / max(1, len(factors)):.0%}"
 
 
-def main() -> None:
-    """Search the scenes named, or all there are; print a table, or write it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    others = [each for each in scenes() if each not in SCENES]
-    parser.add_argument("scenes", nargs="*", default=[*SCENES, *others])
-    parser.add_argument("--targets", nargs="+", choices=TARGETS, default=list(TARGETS))
-    parser.add_argument("--minutes", type=float, default=20.0, help="for all searches together")
-    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--write", action="store_true", help="write to docs/plans.md")
-    arguments = parser.parse_args()
-    searches = len(arguments.scenes) * len(arguments.targets)
-    each_s = 60 * arguments.minutes * arguments.processes / searches
-    search = partial(regrets, targets=arguments.targets, search_s=each_s)
-    with ProcessPoolExecutor(arguments.processes, mp_context=get_context("spawn")) as pool:
-        found = [each for of_scene in pool.map(search, arguments.scenes) for each in of_scene]
-    print(table(found))
-    if arguments.write:
-        evidence.write("regret", table(found), "python -m benchmarks.accuracy.regret --write")
-
-
-if __name__ == "__main__":
-    main()
+def tables(
+    *,
+    scenes: tuple[str, ...] = (),
+    targets: tuple[str, ...] = TARGETS,
+    minutes: float = 20.0,
+    processes: int = os.cpu_count() or 1,
+) -> Iterator[Table]:
+    """Search the scenes named, or all there are, for so many minutes together."""
+    named = scenes or (*SCENES, *(each for each in all_scenes() if each not in SCENES))
+    each_s = 60 * minutes * processes / (len(named) * len(targets))
+    search = partial(regrets, targets=list(targets), search_s=each_s)
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        found = [each for of_scene in pool.map(search, named) for each in of_scene]
+    columns = heads("scene | target | plan | ms:.0f | quickest | ms:.0f | regret:.2f | searched")
+    four = _within([each for each in found if each.scene in SCENES])
+    notes = [f"{four} (bar: 90 %); of all scenes {_within(found)}."]
+    title = "How much quicker could a plan have been?"
+    yield Table(title, columns, [_row(each) for each in found], notes)

@@ -1,11 +1,8 @@
 """Have libfreenect2 itself read the emulated Kinect v2 over USB, and store what it makes of it.
 
-Run ``python -m benchmarks.kinect2.by_libfreenect2 SOURCE BUILD`` with a checkout of
-OpenKinect/libfreenect2 and the folder where CMake built it, unchanged. It needs g++, umockdev and
-libusb. The camera is a node of an emulated bus, and libusb in the other process the real one.
+The camera is a node of an emulated bus, and libusb in the other process the real one.
 """
 
-import argparse
 import os
 import subprocess
 from pathlib import Path
@@ -70,17 +67,17 @@ def read(program: Path, scene: str, *, filters: bool) -> tuple[list[NDArray[Any]
     return frames[0], ran.stdout
 
 
-def main() -> None:
-    """Write what libfreenect2 made of all scenes, every so many pixels of it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("source", type=Path, help="its checkout")
-    parser.add_argument("build", type=Path, help="where CMake built it")
-    given = parser.parse_args()
+def store(*, source: Path, build: Path) -> None:
+    """Store what libfreenect2 made of all scenes, every so many pixels of it.
+
+    ``source`` is a checkout of OpenKinect/libfreenect2, and ``build`` the folder where CMake built
+    it, unchanged. It needs g++, umockdev and libusb.
+    """
     if missing := missing_libraries():
         raise SystemExit(missing)
     outputs: dict[str, NDArray[Any]] = {}
     with TemporaryDirectory() as folder:
-        program = compiled(given.source, given.build, Path(folder))
+        program = compiled(source, build, Path(folder))
         for scene in SCENES:
             (depth, infrared), said = read(program, scene, filters=False)
             (filtered, _), _ = read(program, scene, filters=True)
@@ -91,7 +88,3 @@ def main() -> None:
                 f"{scene}_ir": infrared[EVERY],
             }
     np.savez_compressed(STORED, allow_pickle=False, **outputs)
-
-
-if __name__ == "__main__":
-    main()

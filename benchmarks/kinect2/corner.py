@@ -1,5 +1,6 @@
 """The corner of a room in front of an emulated Kinect v2, by one return and by two."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -7,13 +8,14 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.tables import Table, heads
 from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import TOO_LONG
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array
-from benchmarks.tables import Table
 from transientcam_driver.camera import CameraName
 from transientcam_driver.cameras.kinect2 import SAMPLING
 from transientcam_driver.clock import VirtualClock
+from transientcam_experiments.tradeoff.picture import blank, saved
 from transientcam_server.camera import sensor_of
 from transientcam_server.imaging import Intrinsics
 from transientcam_server.settings import SensorSettings
@@ -73,9 +75,19 @@ def captured() -> Corner:
     return Corner(found_m, true_m[every[1:]], intrinsics)
 
 
+def tables(figures: Path) -> Iterator[Table]:
+    """Hold the three against the truth, and draw kinect2-corner.png."""
+    corner = captured()
+    draw(corner, figures / "kinect2-corner.png")
+    yield table(corner)
+
+
 def table(corner: Corner) -> Table:
     """Hold the three against the truth."""
-    columns = ("one frame of the corner", "median error", "90 %", "mean", "without a range")
+    columns = heads(
+        "one frame of the corner | median error, mm:.1f | 90 %, mm:.1f | mean, mm:+.1f | "
+        "without a range:.2%"
+    )
     made = Table("A corner of a room", columns)
     for name, found_m in corner.found_m.items():
         off_mm = 1e3 * (found_m - corner.true_m)
@@ -84,27 +96,19 @@ def table(corner: Corner) -> Table:
         made.rows.append(
             (
                 name,
-                f"{np.median(size_mm):.1f} mm",
-                f"{np.percentile(size_mm, 90):.1f} mm",
-                f"{off_mm[there].mean():+.1f} mm",
-                f"{1 - there.mean():.2%}",
+                np.median(size_mm),
+                np.percentile(size_mm, 90),
+                off_mm[there].mean(),
+                1 - there.mean(),
             )
         )
-    made.notes.append(
-        f"One frame of `{SPEC}` through packets and codes, with the noise of the simulated "
-        f"sensor; every {STEP}th row and column. Light between the walls of a corner comes back "
-        "over a while, which two returns are a simplification of."
-    )
     return made
 
 
 def draw(corner: Corner, path: Path) -> None:
     """Draw the middle row from above, and how far each estimate is off."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     row = len(corner.true_m) // 2
-    figure = Figure(figsize=(9, 3.6), layout="constrained")
+    figure = blank(9, 3.6)
     above, error = figure.subplots(1, 2)
     columns = STEP * np.arange(corner.true_m.shape[1]) + STEP // 2
     slope = (columns - corner.lens.cx) / corner.lens.fx
@@ -120,4 +124,4 @@ def draw(corner: Corner, path: Path) -> None:
     above.legend(fontsize=8)
     error.axhline(0.0, color="black", linewidth=1.0)
     error.set(title="error of the range", xlabel="column", ylabel="mm")
-    FigureCanvasAgg(figure).print_png(path)  # type: ignore[no-untyped-call]  # matplotlib's
+    path.write_bytes(saved(figure, "png"))

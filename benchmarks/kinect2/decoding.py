@@ -1,14 +1,15 @@
 """How the decoder differs from libfreenect2's, and how fast it is."""
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.tables import Table, verdict
+from benchmarks.common.timing import duration, measure
 from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Scene, folder, load, noise
-from benchmarks.tables import Table, verdict
-from benchmarks.timing import duration, measure
 from transientcam_driver.cameras.kinect2 import SUB_IMAGES, Assembler, Rows, encoder, measurement
 
 SCENES: Final = ("ramp", "noisy", "two_returns")
@@ -19,6 +20,12 @@ ROUNDING: Final = 0.29
 TOO_LONG: Final = libfreenect2.SPEED_OF_LIGHT_M_S / tm.SPEED_OF_LIGHT_M_S
 """libfreenect2 takes the speed of light for 300 000 km/s."""
 _VARIANTS: Final[dict[str, Rows]] = {"off": "bottom", "off_tables_flipped": "top"}
+
+
+def tables() -> Iterator[Table]:
+    """Compare with libfreenect2's outputs, and time the way to moments."""
+    yield differences()
+    yield speed()
 
 
 def infrared(scene: Scene) -> float:
@@ -64,7 +71,6 @@ def differences() -> Table:
         "frequency and amplitude here, and depth is the exact intersection of ray and ellipsoid; "
         "libfreenect2 adds three phases with equal weights, and its geometry is to first order."
     )
-    made.notes.append("")
     made.notes.append(_restated())
     return made
 

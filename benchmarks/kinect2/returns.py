@@ -1,14 +1,15 @@
 """One and two returns by the estimators here, and by libfreenect2's on the same frames."""
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.tables import Table, verdict
 from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import NOISY_STD, ROUNDING, TOO_LONG
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array, Scene, load, noise
-from benchmarks.tables import Table, verdict
 from transientcam_driver.cameras.kinect2 import (
     BASE_FREQUENCY_HZ,
     HEIGHT,
@@ -30,6 +31,14 @@ _AMPLITUDE: Final = 200.0
 _SRA_BINS: Final = 1024
 _SRA_BLOCKS: Final = 12
 """Of the blocks every so many are given to SRA, which takes 50 ms each."""
+
+
+def tables() -> Iterator[Table]:
+    """Compare on synthetic frames, and on returns through codes and back."""
+    yield two_returns()
+    yield separations()
+    yield enough()
+    yield one_return()
 
 
 def one_return() -> Table:
@@ -54,11 +63,6 @@ def one_return() -> Table:
         rms_m = np.sqrt(np.mean(off[given][~gross] ** 2))
         shares = f"{given.mean():.2%}", f"{gross.sum() / given.size:.3%}"
         made.rows.append((name, *shares, f"{1e3 * rms_m:.2f} mm"))
-    made.notes.append(
-        f"Noise of {NOISY_STD:g} counts a sample. Gross is more than {100 * GROSS_M:g} cm, as a "
-        "share of all pixels. Pixels with a saturated sample and those of a patch with an "
-        "amplitude of 2 counts are among all."
-    )
     return made
 
 
@@ -87,13 +91,6 @@ def two_returns() -> Table:
     ours = np.abs(found["`tm.two_returns`"] - true_m)
     made.notes.append(verdict(100 * (ours < 0.05).mean(), 90, "per cent within 5 cm"))
     made.notes.append(verdict(100 * (ours < 0.01).mean(), 60, "per cent within 1 cm"))
-    made.notes.append(
-        "The second return is 0.05 to 3.05 m behind the first, 0.3 or 0.7 times as strong, "
-        "without noise. Errors are those of the first return's range, libfreenect2's of its depth "
-        "with its speed of light put right. Pixels of 8 x 8 have the same codes, and one of a row "
-        f"stands for eight; SRA, a linear program of {_SRA_BINS} bins for each pixel, is computed "
-        f"for one of {_SRA_BLOCKS} of these."
-    )
     return made
 
 
@@ -130,11 +127,6 @@ def separations() -> Table:
             for mine, their in zip(ours, theirs, strict=True)
         )
         made.rows.append((f"{each:g}", *texts))
-    made.notes.append(
-        f"First return at 1 to 5 m, {_AMPLITUDE:g} counts, no noise but that of the codes. Of "
-        "`tm.two_returns` the absolute error, of libfreenect2 with its sign, which changes with "
-        "the separation: no calibration takes it away. Void is where half of the pixels are."
-    )
     return made
 
 
@@ -153,10 +145,6 @@ def enough() -> Table:
         found = tm.two_returns(moments, total, harmonics=MULTIPLES)
         share = (np.asarray(found.count) == 2).mean(axis=1)
         made.rows.append((f"{std:g} counts", *(f"{each:.1%}" for each in share)))
-    made.notes.append(
-        f"First return of {_AMPLITUDE:g} counts, the second one 0.5 times as strong. What is one "
-        "return by the noise has `count` 1, and no indirect light."
-    )
     return made
 
 

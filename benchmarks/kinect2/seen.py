@@ -3,17 +3,18 @@
 `benchmarks.kinect2.by_libfreenect2` makes the outputs that are read here.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.records import ROOT
+from benchmarks.common.tables import Cell, Table, heads
 from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import ROUNDING, TOO_LONG
 from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array, noise
-from benchmarks.tables import Table
 from transientcam_driver.camera import CameraName
 from transientcam_driver.cameras.kinect2 import HEIGHT, SAMPLING, WIDTH, Kinect2Camera
 from transientcam_driver.cameras.kinect2._codes import SATURATED_DN
@@ -25,7 +26,7 @@ SCENES: Final = ("corner", "hall")
 STEP: Final = 12
 """Every so many rows and columns are stored."""
 EVERY: Final = np.s_[STEP // 2 :: STEP, STEP // 2 :: STEP]
-STORED: Final = Path(__file__).parents[2] / "tests" / "driver" / "kinect2" / "libfreenect2.npz"
+STORED: Final = ROOT / "tests" / "driver" / "cameras" / "kinect2" / "libfreenect2.npz"
 
 
 def spec(scene: str) -> str:
@@ -100,9 +101,12 @@ def stored(scene: str) -> dict[str, Array]:
         }
 
 
-def table() -> Table:
+def tables() -> Iterator[Table]:
     """Hold libfreenect2's depths and our ranges of the same frames against the truth."""
-    columns = ("scene, one frame without noise", "median error", "90 %", "mean", "without a range")
+    columns = heads(
+        "scene, one frame without noise | median error, mm:.1f | 90 %, mm:.1f | "
+        "mean, mm:+.1f | without a range:.2%"
+    )
     made = Table("Read by libfreenect2", columns)
     apart_mm, same = 0.0, 1.0
     for scene in SCENES:
@@ -131,16 +135,16 @@ def table() -> Table:
         "libfreenect2's arithmetic as it is stated on this page is void in the same pixels "
         f"({same:.2%} of them), and its depths are within {apart_mm:.2f} mm of those that it gave."
     )
-    return made
+    yield made
 
 
-def _errors(off_m: Array) -> tuple[str, ...]:
+def _errors(off_m: Array) -> tuple[Cell, ...]:
     off_mm = 1e3 * off_m
     there = np.isfinite(off_mm)
     size_mm = np.abs(off_mm[there])
     return (
-        f"{np.median(size_mm):.1f} mm",
-        f"{np.percentile(size_mm, 90):.1f} mm",
-        f"{off_mm[there].mean():+.1f} mm",
-        f"{1 - there.mean():.2%}",
+        np.median(size_mm),
+        np.percentile(size_mm, 90),
+        off_mm[there].mean(),
+        1 - there.mean(),
     )

@@ -1,6 +1,5 @@
 """Synthetic frames of a Kinect v2, what libfreenect2's processor made of them, and the truth."""
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -9,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from benchmarks.common.measured_scenes import data_folder
 from transientcam_driver.cameras.kinect2 import (
     BASE_FREQUENCY_HZ,
     HEIGHT,
@@ -30,12 +30,11 @@ RESPONSE: Final = np.array([1.0, 1.322581, 1.612903])
 """Noise of a moment at 16, 80 and 120 MHz over that of a sample, but for sqrt(2 / 3)."""
 BLOCK: Final = 8
 """Pixels of a side that have one scene and one P0, and so one code without noise."""
-_DEFAULT: Final = Path(__file__).parents[3] / "shared" / "data"
 
 
 def folder() -> Path:
     """Return where the vectors are; TRANSIENTCAM_TEST_DATA names another folder."""
-    found = Path(os.environ.get("TRANSIENTCAM_TEST_DATA", _DEFAULT)).resolve() / "kinect2"
+    found = (data_folder() or Path()) / "kinect2"
     if not found.is_dir():
         raise SystemExit(f"no vectors at {found}: set TRANSIENTCAM_TEST_DATA")
     return found

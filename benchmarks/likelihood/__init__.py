@@ -1,1 +1,1 @@
-"""Run ``python -m benchmarks.likelihood [--data FOLDER] [--only PART] [--write]``."""
+"""Few returns by their likelihood, beside the other estimators and the least possible errors."""

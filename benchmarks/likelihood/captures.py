@@ -9,6 +9,8 @@ from typing import Final, Literal
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.measured_scenes import composite_scene, cornell_scene
+from benchmarks.common.tables import Table
 from benchmarks.likelihood.errors import (
     COLUMNS,
     ESTIMATORS,
@@ -19,8 +21,6 @@ from benchmarks.likelihood.errors import (
     ranges,
     turn_m,
 )
-from benchmarks.measured_scenes import composite_scene, cornell_scene
-from benchmarks.tables import Table
 from transientcam_driver import Sequence as Capture, Truth
 from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
 
@@ -85,13 +85,6 @@ def _tables_of(scenes: Mapping[str, str]) -> Iterator[Table]:
         table = Table(
             f"{name}: {HEAD}",
             ("m, takes", "capture / ms", *COLUMNS, "explained", "predicted / mm"),
-            notes=[
-                "Simulated camera `prototype`, its outliers off, all other errors on, calibrated; "
-                "f = 23 MHz, at m = 8 11.5 MHz; smoothed by 0.6 pixels. explained: share of "
-                "pixels whose chi-square noise and model error exceed in more than one of a "
-                "thousand; predicted: median standard deviation by the likelihood's information "
-                "matrix." + _of_truth(scene)
-            ],
         )
         for m in ORDERS:
             for count in TAKES if m <= MOST_OF_SHORT else TAKES_OF_MANY:
@@ -161,16 +154,6 @@ def _row(
         *(str(each) for each in errors.values()),
         f"{model.likelihood.explained()[shot.lit].mean():.0%}",
         f"{np.nanmedian(std_mm):.1f}",
-    )
-
-
-def _of_truth(scene: str) -> str:
-    if scene != SOFT:
-        return ""
-    return (
-        " Half of these pixels have no direct light; they are held to the first maximum of their "
-        "response (Sec. 5.3), not to the mean delay of all their light, which the simulation has "
-        "for them and a single frequency measures by definition."
     )
 
 

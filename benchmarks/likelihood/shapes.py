@@ -8,8 +8,9 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.measured_scenes import data_folder
+from benchmarks.common.tables import Table
 from benchmarks.likelihood.errors import Array, errors_of, ranges, turn_m
-from benchmarks.tables import Table
 from transientcam_moments.likelihood import MODEL_ERROR, TAIL_SHAPE
 
 BASE_HZ: Final = 23e6
@@ -46,8 +47,9 @@ class Responses:
         return share
 
 
-def tables(data: Path | None) -> Iterator[Table]:
+def tables() -> Iterator[Table]:
     """Measure the range of one return with a tail by each exponent, and of the other estimators."""
+    data = data_folder()
     responses = [*analytic(), *(() if data is None else measured(data)), *_rendered(data)]
     for m in ORDERS:
         table = Table(

@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.tables import Table, heads
 from benchmarks.likelihood.errors import COLUMNS, Array, ranges, turn_m
-from benchmarks.tables import Table
 
 BASE_HZ: Final = 23e6
 NOISE_SHARE: Final = 1 / 200
@@ -18,6 +18,7 @@ SPLIT_PIXELS: Final = 100_000
 APART: Final = 4.4
 """Over m: distance of neighbouring returns in radians; closer ones cannot be resolved."""
 SEED: Final = 1
+_NUMBERS: Final = [f"{each}:.2f" for each in ("bound", *COLUMNS, "likelihood over bound")]
 
 
 def tables() -> Iterator[Table]:
@@ -41,7 +42,7 @@ def _bound() -> Table:
     random = np.random.default_rng(SEED)
     table = Table(
         "Sharp returns: RMSE of the first one's range, and the Cramer-Rao bound, mm",
-        ("returns, m", "bound", *COLUMNS, "likelihood over bound"),
+        heads(" | ".join(["returns, m", *_NUMBERS])),
         notes=[
             f"{PIXELS} random responses each: returns at least {APART:g}/m radians apart, of 0.4 "
             "to 1.0 before they are made 1 in all; f = 23 MHz; every part of a moment has a "
@@ -64,9 +65,9 @@ def _bound() -> Table:
         table.rows.append(
             (
                 f"{returns}, {m}",
-                f"{bound_mm:.2f}",
-                *(f"{value:.2f}" for value in rmse.values()),
-                f"{rmse['likelihood'] / bound_mm:.2f}",
+                bound_mm,
+                *rmse.values(),
+                rmse["likelihood"] / bound_mm,
             )
         )
     return table
@@ -76,7 +77,10 @@ def _splits() -> Table:
     random = np.random.default_rng(SEED)
     table = Table(
         "Single returns that are taken for something else",
-        ("m", "b_0", "as two or three", "as one with a tail", "explained", "reduced chi-square"),
+        heads(
+            "m | b_0 | as two or three:.3% | as one with a tail:.3% | explained:.2% | "
+            "reduced chi-square:.3f"
+        ),
         notes=[
             f"{SPLIT_PIXELS} pixels each; explained: chi-square below what noise exceeds in one "
             "pixel of a thousand."
@@ -95,10 +99,10 @@ def _splits() -> Table:
                 (
                     str(m),
                     "measured" if zeroth else "not measured",
-                    f"{np.mean(found.count > 1):.3%}",
-                    f"{np.mean(found.has_tail):.3%}",
-                    f"{np.mean(found.explained()):.2%}",
-                    f"{np.nanmean(found.reduced_chi_square):.3f}",
+                    np.mean(found.count > 1),
+                    np.mean(found.has_tail),
+                    np.mean(found.explained()),
+                    np.nanmean(found.reduced_chi_square),
                 )
             )
     return table

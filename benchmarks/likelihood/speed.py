@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
-from benchmarks.data import CORES, PAPER, SETTINGS, VGA, images, numpy_alone
-from benchmarks.tables import Table
-from benchmarks.timing import measure
+from benchmarks.common.data import CORES, PAPER, SETTINGS, VGA, images, numpy_alone
+from benchmarks.common.tables import Table
+from benchmarks.common.timing import measure
 from transientcam_moments.likelihood import MODEL_ERROR
 
 ORDERS: Final = (3, 4, 8)

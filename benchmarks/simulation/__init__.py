@@ -1,1 +1,1 @@
-"""What the simulated camera costs, and how true it is: ``docs/simulation.md``."""
+"""What the simulated camera costs, and how true it is: ``docs/measured/simulation.md``."""

@@ -5,15 +5,16 @@ reference follows rays at every image's own time, with all effects that the scen
 where something moves, in some of the pixels, drawn once.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.simulation.reference import COARSE, FINE_MOVING, FINE_STILL, reference_moments
-from benchmarks.simulation.scenes import scene_named
+from benchmarks.common.tables import Table, heads
+from benchmarks.simulation.reference import FINE_MOVING, FINE_STILL, reference_moments
+from benchmarks.simulation.scenes import BUILT_IN, scene_named, unseen
 from transientcam_driver import Sequence
 from transientcam_driver.sequence import ImageLabel
 from transientcam_simulation.emulated import world_of
@@ -181,32 +182,20 @@ def _reference(
     return _four_buckets(sequence, image)
 
 
-def accuracy_lines(results: list[Accuracy]) -> list[str]:
-    """Return the section of the page."""
-    return [
-        "## What is left out",
-        "",
-        "Automatic against everything that the scene has anything for, against none of it, and",
-        f"rays into the pixels of every image, {COARSE} in each, and in those at an edge",
-        f"{FINE_STILL}, or {FINE_MOVING} where something moves:",
-        f"differences of the moments of {SIZE[0]} x {SIZE[1]} pixels in units of the noise, as",
-        "root mean square, largest, and share of the lit pixels beyond half the noise. Where",
-        f"something moves, rays are followed into {DRAWN} pixels. Of many takes the first, the",
-        "middle and the last are compared, with the noise of all. The last column is what the rays",
-        f"themselves leave out: their difference from {_FINER_IN} times as many at edges. The more",
-        "takes, the smaller the noise that edges have to be resolved to.",
-        "",
-        "| scene | sequence | called for | automatic - everything | automatic - nothing "
-        "| automatic - rays | rays - more rays |",
-        "|---|---|---|---|---|---|---|",
-        *(
-            f"| {each.scene} | {each.sequence} | {', '.join(_of_scene(each.called))} "
-            f"| {_words(each.everything)} | {_words(each.nothing)} | {_words(each.rays)} "
-            f"| {_words(each.finer_rays)} |"
-            for each in results
-        ),
-        "",
-    ]
+def tables(*, small: bool = False) -> Iterator[Table]:
+    """Compare all scenes with each sequence; ``small``: only with that of video."""
+    columns = heads(
+        "scene | sequence | called for | automatic - everything | automatic - nothing | "
+        "automatic - rays | rays - more rays"
+    )
+    table = Table("", columns)
+    for name in (*BUILT_IN, *unseen()):
+        for sequence in list(SEQUENCES)[: 1 if small else None]:
+            each = measure(name, sequence)
+            others = (each.everything, each.nothing, each.rays, each.finer_rays)
+            called = ", ".join(_of_scene(each.called))
+            table.rows.append((each.scene, each.sequence, called, *map(_words, others)))
+    yield table
 
 
 def _of_scene(called: tuple[str, ...]) -> list[str]:

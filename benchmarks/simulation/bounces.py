@@ -4,11 +4,13 @@ Paths start at the point a pixel sees, go on in directions drawn by the cosine, 
 light of each surface they meet, up to as many bounces as the simulation chose.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.common.tables import Column, Table
 from benchmarks.simulation.scenes import scene_named
 from transientcam_driver import Sequence
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
@@ -26,6 +28,7 @@ from transientcam_simulation.light._rays import camera_rays
 from transientcam_simulation.scene import Scene
 
 WIDTH, HEIGHT = 163, 120
+CORNERS = (("corner", "anywhere"), ("corner", "crease"), ("corner-left", "anywhere"))
 PATHS = 20_000
 PIXELS = 24
 FREQUENCIES_HZ = (0.0, 23e6, 69e6, 138e6)
@@ -121,26 +124,13 @@ def _by_cosine(normal: NDArray[np.float64], random: np.random.Generator) -> NDAr
     return unit
 
 
-def bounce_lines(results: list[Bounces]) -> list[str]:
-    """Return the section of the page."""
-    frequencies = " | ".join(f"{f_hz / 1e6:g} MHz" for f_hz in FREQUENCIES_HZ)
-    return [
-        "## Light over several surfaces",
-        "",
-        f"Radiosity against {PATHS} paths in each of {PIXELS} pixels, at the number of bounces",
-        "that the noise of one take at 0.5 ms calls for: root mean square and largest difference",
-        "in units of that noise. The paths' own error at 0 MHz is in the last column. Beside a",
-        "crease the spread of a patch's own times of flight, which radiosity leaves out, shows.",
-        "",
-        f"| scene | pixels | bounces | {frequencies} | paths |",
-        "|---" * (4 + len(FREQUENCIES_HZ)) + "|",
-        *(
-            f"| {each.scene} | {each.where} | {each.bounces} | "
-            + " | ".join(
-                f"{rms:.2f}, {most:.2f}" for rms, most in zip(each.rms, each.largest, strict=True)
-            )
-            + f" | {each.error_of_paths:.2f} |"
-            for each in results
-        ),
-        "",
-    ]
+def tables() -> Iterator[Table]:
+    """Compare corners, anywhere and beside the crease."""
+    frequencies = (f"{f_hz / 1e6:g} MHz" for f_hz in FREQUENCIES_HZ)
+    known = ("scene", "pixels", "bounces", *frequencies)
+    table = Table("", [*known, Column("paths", ".2f")])
+    for each in (measure(*corner) for corner in CORNERS):
+        apart = zip(each.rms, each.largest, strict=True)
+        cells = (f"{rms:.2f}, {most:.2f}" for rms, most in apart)
+        table.rows.append((each.scene, each.where, each.bounces, *cells, each.error_of_paths))
+    yield table

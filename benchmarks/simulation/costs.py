@@ -6,18 +6,19 @@ are processor time on one core, the median of several frames.
 
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
+from benchmarks.common.tables import Cell, Column, Table, heads
 from benchmarks.simulation.scenes import scene_named
 from transientcam_driver import Sequence
+from transientcam_simulation.compiled import LANES
 from transientcam_simulation.effects import EFFECTS
 from transientcam_simulation.emulated import world_of
 from transientcam_simulation.imaging import World
 from transientcam_simulation.scene import Scene
 
 VIDEO = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005)
-VIDEO_HZ = 18.6
 READOUT_S = 3.98e-3
 BARRED = ("wall", "corner", "mirrors", "visitor")
 SCENES = (*BARRED, "ball", "corner-left", "translucent", "calibration")
@@ -111,47 +112,43 @@ def measure_effects(name: str, size: tuple[int, int]) -> list[tuple[str, float]]
     return [(effect, added_s(effect)) for effect in OPTIONAL]
 
 
-def cost_lines(scenes: list[Scenes], effects: dict[str, list[tuple[str, float]]]) -> list[str]:
-    """Return the section of the page."""
-    return [
-        "## What a frame costs",
-        "",
-        "Frames of the paper's video setting (m = 3, 0.5 ms, 12 images); processor time, one core.",
-        f"At {VIDEO_HZ} Hz a frame may take {1e3 / VIDEO_HZ:.0f} ms. In a scene that stands still",
-        "light is computed once, so that leaving effects out saves nothing but their share of the",
-        "opening; what is called for saves time where something moves. Light of what moves is",
-        "computed by compiled lanes, as it is from some seconds after a scene is first opened.",
-        "They draw the noise of still scenes, too, once these have computed 100 million pixels",
-        "without: 27 frames of 640 x 480, of which each takes up to twice as long.",
-        "",
-        "| scene | pixels | none | called for | everything | everything / called for "
-        "| frames/s, called for | opening, called for | what is called for |",
-        "|---|---|---|---|---|---|---|---|---|",
-        *map(_row, scenes),
-        "",
-        "What one effect adds to a frame without any, at 163 x 120:",
-        "",
-        "| effect | " + " | ".join(f"on {name}" for name in effects) + " |",
-        "|---" * (1 + len(effects)) + "|",
-        *(
-            f"| {effect} | "
-            + " | ".join(
-                f"{max(0.0, dict(costs)[effect]) * 1e3:.1f} ms" for costs in effects.values()
-            )
-            + " |"
-            for effect in OPTIONAL
-        ),
-        "",
+def tables(*, small: bool = False) -> Iterator[Table]:
+    """Measure each scene and each effect alone; ``small``: only 163 x 120.
+
+    Run it with OMP_NUM_THREADS=1: times are those of one core.
+    """
+    LANES.compile_now()  # rather than beside what is measured
+    columns = heads(
+        "scene | pixels | none, ms:.1f | called for, ms:.1f | everything, ms:.1f | "
+        "everything / called for:.1f | frames/s, called for:.0f | opening, called for, s:.2f | "
+        "what is called for"
+    )
+    rows = [
+        _row(each)
+        for size in SIZES[: 1 if small else None]
+        for each in measure_scenes(SCENES if size == SIZES[0] else BARRED, size)
     ]
+    yield Table("", columns, rows)
+    effects = {name: dict(measure_effects(name, SIZES[0])) for name in ("mirrors", "visitor")}
+    yield Table(
+        "",
+        ["effect", *[Column(f"on {name}, ms", ".1f") for name in effects]],
+        [
+            (effect, *(max(0.0, costs[effect]) * 1e3 for costs in effects.values()))
+            for effect in OPTIONAL
+        ],
+        text=["What one effect adds to a frame without any, at 163 x 120:"],
+    )
 
 
-def _row(each: Scenes) -> str:
-    def ms(cost: Cost) -> str:
-        return f"{cost.frame_s * 1e3:.1f} ms"
-
+def _row(each: Scenes) -> tuple[Cell, ...]:
     width, height = each.size
     return (
-        f"| {each.scene} | {width} x {height} | {ms(each.none)} | {ms(each.called)} "
-        f"| {ms(each.everything)} | {each.everything.frame_s / each.called.frame_s:.1f} "
-        f"| {1 / each.called.frame_s:.0f} | {each.called.open_s:.2f} s | {', '.join(each.built)} |"
+        each.scene,
+        f"{width} x {height}",
+        *(1e3 * cost.frame_s for cost in (each.none, each.called, each.everything)),
+        each.everything.frame_s / each.called.frame_s,
+        1 / each.called.frame_s,
+        each.called.open_s,
+        ", ".join(each.built),
     )

@@ -1,8 +1,11 @@
 """Statistics of the noise: the mean-variance line, independence, kurtosis."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.common.tables import Table
 from transientcam_driver import Sequence
 from transientcam_driver.camera import Sensor
 from transientcam_simulation.base import SparseResponses
@@ -32,8 +35,8 @@ def _series(mean_e: float) -> NDArray[np.float64]:
     return np.array(images, dtype=np.float64)
 
 
-def noise_lines() -> list[str]:
-    """Measure, and return the section of the page."""
+def tables() -> Iterator[Table]:
+    """Measure images of even light."""
     sensor = Sensor()
     series = [_series(mean_e) for mean_e in LEVELS_E]
     means = [float(each.mean()) - sensor.dark_dn for each in series]
@@ -45,19 +48,20 @@ def noise_lines() -> list[str]:
     onwards = np.corrcoef(bright[1:].ravel(), bright[:-1].ravel())[0, 1]
     kurtosis = float(np.mean(bright**4) / np.mean(bright**2) ** 2)
     gain = sensor.gain_e_per_dn
-    return [
-        "## Noise",
-        "",
-        f"Of {IMAGES} images of {len(LEVELS_E)} even levels of light, {bright.size} values each.",
-        "",
-        "| what | measured | expected |",
-        "|---|---|---|",
-        f"| slope of variance over mean | {slope:.4f} DN | {1 / gain:.4f} DN |",
-        f"| variance at no light | {offset:.2f} DN² "
-        f"| {(sensor.read_noise_e / gain) ** 2 + 1 / 12:.2f} DN² |",
-        f"| kurtosis | {kurtosis:.3f} | 3, ± {2 * np.sqrt(24 / bright.size):.3f} |",
-        f"| correlation of neighbours, right and down | {sideways:.4f}, {downwards:.4f} "
-        f"| 0 ± {2 / np.sqrt(bright.size):.4f} |",
-        f"| correlation of successive images | {onwards:.4f} | the same |",
-        "",
+    rows = [
+        ("slope of variance over mean", f"{slope:.4f} DN", f"{1 / gain:.4f} DN"),
+        (
+            "variance at no light",
+            f"{offset:.2f} DN²",
+            f"{(sensor.read_noise_e / gain) ** 2 + 1 / 12:.2f} DN²",
+        ),
+        ("kurtosis", f"{kurtosis:.3f}", f"3, ± {2 * np.sqrt(24 / bright.size):.3f}"),
+        (
+            "correlation of neighbours, right and down",
+            f"{sideways:.4f}, {downwards:.4f}",
+            f"0 ± {2 / np.sqrt(bright.size):.4f}",
+        ),
+        ("correlation of successive images", f"{onwards:.4f}", "the same"),
     ]
+    text = f"Of {IMAGES} images of {len(LEVELS_E)} even levels of light, {bright.size} values each."
+    yield Table("", ("what", "measured", "expected"), rows, text=[text])

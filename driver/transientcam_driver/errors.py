@@ -9,6 +9,7 @@
     ├── SceneError             a scene file is not valid
     ├── SpecError              open_camera() was given a name that is not valid
     ├── PluginError            the package of a camera cannot be used
+    ├── CompilerMissing        a simulated scene moves, and numba is not installed
     ├── CalibrationError
     │   ├── CalibrationMismatch   a calibration belongs to something else
     │   └── CalibrationFileError  a file holds no calibration
@@ -111,6 +112,17 @@ class PluginError(DriverError):
     kind: str
     reason: str
     _sentence = "the camera {kind!r} cannot be used: {reason}"
+
+
+@dataclass(eq=False, repr=False)
+class CompilerMissing(DriverError):
+    """The light of a simulated scene that moves is computed by numba, which cannot be used."""
+
+    reason: str
+    _sentence = (
+        "scenes that move need numba ({reason}): pip install 'transientcam[simulation]', "
+        "or choose a scene that stands still"
+    )
 
 
 class CalibrationError(DriverError):

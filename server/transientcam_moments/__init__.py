@@ -13,7 +13,6 @@ of pixels after them, single or double precision, NumPy, JAX or CuPy. ::
 """
 
 from transientcam_moments import comparisons, kernels, noise
-from transientcam_moments._kernels.cache import cache_directory, digest_of_sources
 from transientcam_moments.errors import (
     MomentsError,
     ParameterError,
@@ -112,14 +111,12 @@ __all__ = [
     "average_takes",
     "bias",
     "bounds",
-    "cache_directory",
     "calibrate",
     "calibration_of",
     "checked_waveform",
     "comparisons",
     "cumulative",
     "density",
-    "digest_of_sources",
     "estimate_zeroth",
     "extend",
     "fill_bad_pixels",

@@ -1,12 +1,13 @@
-"""Compiled lanes for the hot algorithms: what is ready, and how to make it ready.
+"""Compiled kernels for the hot algorithms: what is ready, and how to make it ready.
 
 Nothing has to be called. Every algorithm runs on NumPy and gives the same results; from the first
-call with 4096 pixels or more on, the lane that would have served it is loaded from the cache (half
-a second) on a thread that no call waits for, and later calls change over to it. What is not in the
-cache is compiled into it first (seconds, once on a machine), by a process of low priority, or by
-that thread where there can be none. `compile` makes lanes ready beforehand, and waits for them.
+call with 4096 pixels or more on, the kernel that would have served it is loaded from the cache
+(half a second) on a thread that no call waits for, and later calls change over to it. What is not
+in the cache is compiled into it first (seconds, once on a machine), by a process of low priority,
+or by that thread where there can be none. `compile` makes kernels ready beforehand, and waits for
+them.
 
-A process that ends meanwhile waits for no lane, or at most for the one that is being compiled by
+A process that ends meanwhile waits for no kernel, or at most for the one that is being compiled by
 its thread. The environment variable ``TRANSIENTCAM_KERNELS=off`` leaves everything to NumPy,
 ``TRANSIENTCAM_KERNELS=manual`` compiles only what `compile` and `compile_in_background` are called
 for. Compiled code is kept for the next process in ``NUMBA_CACHE_DIR``, else in
@@ -21,19 +22,11 @@ each of these, and `use_all_cores` for what is urgent.
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TypedDict
 
-from transientcam_moments._lanes import lookup
-from transientcam_moments._lanes.automatic import (
-    MOST_ROOTS,
+from transientcam_compiled import (
     THREAD,
-    compile_one,
-    is_offered,
-    want,
-    work_on_wanted,
-)
-from transientcam_moments._lanes.helper import Helper, program
-from transientcam_moments._lanes.parallel import (
     Spread,
     at_once,
     over,
@@ -41,12 +34,15 @@ from transientcam_moments._lanes.parallel import (
     use_all_cores,
     use_one_thread,
 )
-from transientcam_moments._lanes.registry import (
+from transientcam_moments._dispatch import (
+    CACHE,
+    KERNELS,
     LEAST_PIXELS,
+    MOST_ROOTS,
     PRECISION_NAMES,
-    REGISTRY,
+    Kernel,
     Key,
-    Lane,
+    lookup,
 )
 from transientcam_moments.arrays import MAX_HARMONICS, chosen
 from transientcam_moments.errors import ParameterError
@@ -60,6 +56,7 @@ __all__ = [
     "Spread",
     "State",
     "at_once",
+    "cache_directory",
     "compile",
     "compile_in_background",
     "make_ready",
@@ -92,7 +89,7 @@ LANES = (
 WHEN_NEEDED = ("likelihood", "pairs", "harmonics", "peaks")
 """Those that `compile_in_background` leaves out, but for one of them of its first order."""
 Progress = Callable[[int, int, str], None]
-"""Takes lanes done, lanes in all, and the name of the lane that is next ("" after the last)."""
+"""Takes kernels done, kernels in all, and the name of the next one ("" after the last)."""
 
 
 class State(TypedDict):
@@ -105,26 +102,31 @@ class State(TypedDict):
 
 
 def state() -> State:
-    """Say which lanes this process has.
+    """Say which kernels this process has.
 
     Returns
     -------
     State
-        ``enabled``: False when ``TRANSIENTCAM_KERNELS=off``. ``compiled``: names of the lanes in
+        ``enabled``: False when ``TRANSIENTCAM_KERNELS=off``. ``compiled``: names of the kernels in
         use, as in "levinson m=4 float32". ``compiling``: the one being compiled now, or None.
         ``failed``: those that could not be compiled, with the reason; NumPy stands in for them.
     """
-    compiling = REGISTRY.compiling
+    compiling = KERNELS.compiling
     return {
-        "enabled": REGISTRY.enabled,
-        "compiled": [str(key) for key in list(REGISTRY.compiled)],
+        "enabled": KERNELS.enabled,
+        "compiled": [str(key) for key in list(KERNELS.compiled)],
         "compiling": None if compiling is None else str(compiling),
-        "failed": [f"{key}: {reason}" for key, reason in list(REGISTRY.failed.items())],
+        "failed": [f"{key}: {reason}" for key, reason in list(KERNELS.failed.items())],
     }
 
 
+def cache_directory() -> Path | None:
+    """Return where kernels are kept between processes; None where nothing can be written to."""
+    return CACHE.directory()
+
+
 def ready(name: str, harmonics: int) -> bool:
-    """Say whether a lane for single precision serves calls from now on.
+    """Say whether a kernel for single precision serves calls from now on.
 
     One that does not is made ready in the background, unless another one just is; ask again.
 
@@ -133,20 +135,20 @@ def ready(name: str, harmonics: int) -> bool:
     name : str
         One of `LANES`.
     harmonics : int
-        The order m, 1 to 32. Where there is no such lane, it is never ready.
+        The order m, 1 to 32. Where there is no such kernel, it is never ready.
 
     Raises
     ------
     ParameterError
-        For another order or lane.
+        For another order or kernel.
     """
     chosen("name", name, LANES)
     _require_order(harmonics)
     key = Key(name, harmonics, "f")
-    if key in REGISTRY.compiled:
+    if key in KERNELS.compiled:
         return True
-    if REGISTRY.compiling is None:
-        want(key)
+    if KERNELS.compiling is None and key.is_offered:
+        KERNELS.want(key)
     return False
 
 
@@ -157,35 +159,41 @@ def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the buil
     names: Sequence[str] = LANES,
     progress: Progress | None = None,
 ) -> None:
-    """Compile all lanes, or load them from the cache, before returning.
+    """Compile all kernels, or load them from the cache, before returning.
 
     Parameters
     ----------
     harmonics : sequence of int
-        Orders m, each 1 to 32, the most urgent first. Above 8 there are lanes for coefficients,
+        Orders m, each 1 to 32, the most urgent first. Above 8 there are kernels for coefficients,
         densities and their peaks only.
     precisions : sequence of {"float32", "float64"}
-        Most urgent first; all of one order before the next. Single precision uses the lanes for
+        Most urgent first; all of one order before the next. Single precision uses the kernels for
         double where it isn't enough.
     names : sequence of str
         Which of `LANES`; all of them, when left out.
     progress : callable, optional
-        Called as ``progress(done, total, name)`` before each lane and after the last.
+        Called as ``progress(done, total, name)`` before each kernel and after the last.
 
     Raises
     ------
     ParameterError
-        For another order, precision or lane.
+        For another order, precision or kernel.
 
     Notes
     -----
-    A lane that fails to compile is noted in `state`; the others are compiled all the same. Does
-    nothing when kernels are off. Safe to call from several threads: each lane is compiled once.
+    A kernel that fails to compile is noted in `state`; the others are compiled all the same. Does
+    nothing when kernels are off. Safe to call from several threads: each kernel is compiled once.
     """
     for name in names:
         chosen("names", name, LANES)
     keys = [key for key in _keys(harmonics, precisions) if key.name in names]
-    _compile(keys, progress, lambda: True)
+    if not KERNELS.enabled:
+        return
+    report = progress or (lambda done, total, name: None)
+    for done, key in enumerate(keys):
+        report(done, len(keys), str(key))
+        KERNELS.make_ready(key)
+    report(len(keys), len(keys), "")
 
 
 def compile_in_background(
@@ -210,40 +218,31 @@ def compile_in_background(
         if key.name not in WHEN_NEEDED or (key.name == also and key.harmonics == harmonics[0])
     ]
     keys.sort(key=lambda key: key.name != "pairs")
-    main = threading.main_thread()
-
-    def work() -> None:
-        with Helper(program()) as helper:
-            _compile(keys, None, main.is_alive, helper)
-
-    # not a daemon: those are frozen at exit wherever they are, which a compiler doesn't survive
-    thread = threading.Thread(target=work, name=THREAD)
-    thread.start()
-    return thread
+    return KERNELS.make_ready_in_background(keys)
 
 
 @contextmanager
 def only_note() -> Iterator[None]:
     """Only note, inside the block, what calls would have made ready in the background.
 
-    For a process that has to answer in seconds: importing what loads lanes takes half of one.
+    For a process that has to answer in seconds: importing what loads kernels takes half of one.
     `make_ready` begins with what was noted. Nothing is noted where ``TRANSIENTCAM_KERNELS`` is
     "off" or "manual".
     """
-    before, REGISTRY.noting = REGISTRY.noting, True
+    before, KERNELS.noting = KERNELS.noting, True
     try:
         yield
     finally:
-        REGISTRY.noting = before
+        KERNELS.noting = before
 
 
 def make_ready() -> None:
     """Load or compile in the background what calls since `only_note` would have used."""
-    work_on_wanted()
+    KERNELS.make_wanted_ready()
 
 
 def settled(names: Sequence[str], harmonics: int) -> bool:
-    """Say whether calls in single precision already use all lanes that they will get by themselves.
+    """Say whether calls in single precision use all kernels already that they get by themselves.
 
     Parameters
     ----------
@@ -255,13 +254,13 @@ def settled(names: Sequence[str], harmonics: int) -> bool:
     Raises
     ------
     ParameterError
-        For another order or lane.
+        For another order or kernel.
     """
     for name in names:
         chosen("names", name, LANES)
     keys = [key for key in _keys([harmonics], ["float32"]) if key.name in names]
-    return not REGISTRY.automatic or all(
-        lookup(key.name, key.harmonics, LEAST_PIXELS) or key in REGISTRY.failed for key in keys
+    return not KERNELS.automatic or all(
+        lookup(key.name, key.harmonics, LEAST_PIXELS) or key in KERNELS.failed for key in keys
     )
 
 
@@ -282,38 +281,13 @@ def _keys(harmonics: Sequence[int], precisions: Sequence[str]) -> list[Key]:
         for precision in precisions
         for name in LANES
     )
-    return [key for key in keys if is_offered(key)]
+    return [key for key in keys if key.is_offered]
 
 
-def _compile(
-    keys: list[Key],
-    progress: Progress | None,
-    go_on: Callable[[], bool],
-    helper: Helper | None = None,
-) -> None:
-    if not REGISTRY.enabled:
-        return
-    for done, key in enumerate(keys):
-        if not go_on():
-            return
-        if progress is not None:
-            progress(done, len(keys), str(key))
-        compile_one(key, helper)
-    if progress is not None:
-        progress(len(keys), len(keys), "")
+def _load(key: Key) -> Kernel:
+    from transientcam_moments._kernels.compiler import compile_kernel  # numba, where it compiles
+
+    return compile_kernel(key)
 
 
-def _make(key: Key, helper: Helper | None) -> Lane | None:
-    """Return a lane from the cache, else compiled; None where the program ends meanwhile."""
-    from transientcam_moments._kernels import compiler  # numba, on the thread that compiles
-
-    if helper is not None and compiler.is_kept():
-        lane = compiler.load_lane(key)
-        if lane is not None:
-            return lane
-        if not helper.compile(*key):
-            return None
-    return compiler.compile_lane(key)
-
-
-REGISTRY.make = _make
+KERNELS.load = _load

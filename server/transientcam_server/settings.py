@@ -38,8 +38,8 @@ SpoiltImages = Literal["keep", "repair", "fill"]
 class SequenceSettings(_Group):
     """What the camera captures from the start, until a client sets something else.
 
-    The default is on the front of accuracy against time (docs/default-sequence.md). A camera that
-    cannot do it does what is nearest.
+    The default is on the front of accuracy against time (docs/measured/default-sequence.md). A
+    camera that cannot do it does what is nearest.
     """
 
     base_frequency_hz: _Finite = Field(default=23e6, gt=0.0)

@@ -6,7 +6,7 @@ import httpx
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 
 import transientcam_moments as tm
 from tests.browser.conftest import Watch
@@ -211,3 +211,33 @@ def test_of_a_held_frame_that_is_not_kept_any_more_it_is_said(
     )
     point_at(page, "map", *PIXEL, click=True)
     expect(page.locator(".response-side")).to_contain_text(f"the curves are of frame {held}")
+
+
+def test_only_the_time_with_light_is_plotted_where_that_is_wanted_and_a_link_says_so(
+    page: Page, served: Served, browser: Browser
+) -> None:
+    select(page, served)
+    light = page.evaluate(
+        "() => [...transientcam.store.frames.of('coefficients').peek().light.arrivals]"
+    )
+    bright = np.flatnonzero(np.array(light) > 0.05 * max(light)) / len(light)
+    turn = float(bright.mean())
+    page.evaluate("(turn) => transientcam.store.player.seek(turn)", turn)
+    head = page.locator(".response-head")
+    place = "(each) => parseFloat(each.style.left)"
+    assert head.evaluate(place) == pytest.approx(100 * turn, abs=0.01)
+    button = page.locator(".panel-response").get_by_role("button", name="lit")
+    button.click()
+    expect(button).to_have_attribute("aria-pressed", "true")
+    # two hundredths of the period stay dark at either end
+    first = max(0.0, bright[0] - 0.02)
+    last = min(1.0, bright[-1] + 1 / len(light) + 0.02)
+    assert last - first < 0.9
+    assert head.evaluate(place) == pytest.approx(100 * (turn - first) / (last - first), abs=0.01)
+    link = page.evaluate("() => transientcam.store.settings.hash(true)")
+    context = browser.new_context(reduced_motion="reduce", base_url=served.url)
+    other = context.new_page()
+    other.goto(f"/?debug{link}")
+    opened = other.locator(".panel-response").get_by_role("button", name="lit")
+    expect(opened).to_have_attribute("aria-pressed", "true")
+    context.close()

@@ -11,7 +11,7 @@ from typing import Any, cast
 import pytest
 from websockets.sync.server import Server, ServerConnection, serve
 
-from transientcam.frame import FrameMeta
+from transientcam.documents import FrameMeta
 
 SPECIFICATION = Path(__file__).resolve().parents[2] / "docs" / "stream.md"
 _BLOCK = re.compile(r"```(hex|json) (\w+)\n(.*?)```", re.DOTALL)

@@ -18,6 +18,7 @@ EXAMPLES: list[DriverError] = [
     errors.CameraUnreachable("10.10.31.180:50660"),
     errors.ImagesLost("12 bytes are missing"),
     errors.PluginError("lidar", "it is not installed"),
+    errors.CompilerMissing("No module named 'numba'"),
     errors.PermissionDenied("/dev/bus/usb/001/002", "RULE"),
     errors.CameraBusy("/dev/bus/usb/001/002"),
     errors.LibusbMissing(),

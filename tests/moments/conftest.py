@@ -2,11 +2,11 @@
 
 import pytest
 
-from transientcam_moments._lanes.registry import REGISTRY
+from transientcam_moments._dispatch import KERNELS
 
 
 @pytest.fixture(autouse=True)
 def planar_statements(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Hide the compiled lanes from all tests but the lanes' own."""
     if "kernels" not in request.module.__name__:
-        monkeypatch.setattr(REGISTRY, "compiled", {})
+        monkeypatch.setattr(KERNELS, "compiled", {})

@@ -4,9 +4,12 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 import transientcam_moments as tm
-from transientcam_moments._lanes.registry import REGISTRY
+from transientcam_moments._dispatch import KERNELS, PRECISIONS, lookup
 
 CACHE = Path(__file__).resolve().parents[2] / ".pytest_cache" / "kernels"
 FEW = tuple(
@@ -24,7 +27,7 @@ def lanes(
     names: tuple[str, ...] = FEW,
 ) -> Iterator[None]:
     """Have the lanes of these orders inside, as well as those that were there before."""
-    before = dict(REGISTRY.compiled)
+    before = dict(KERNELS.compiled)
     set_by_user = "NUMBA_CACHE_DIR" in os.environ
     os.environ.setdefault("NUMBA_CACHE_DIR", str(CACHE))
     try:
@@ -34,17 +37,22 @@ def lanes(
     finally:
         if not set_by_user:
             del os.environ["NUMBA_CACHE_DIR"]
-        REGISTRY.compiled.clear()
-        REGISTRY.compiled.update(before)
+        KERNELS.compiled.clear()
+        KERNELS.compiled.update(before)
 
 
 @contextmanager
 def without_lanes() -> Iterator[None]:
     """Leave everything to NumPy inside."""
-    before = dict(REGISTRY.compiled)
-    REGISTRY.compiled.clear()
+    before = dict(KERNELS.compiled)
+    KERNELS.compiled.clear()
     try:
         yield
     finally:
-        REGISTRY.compiled.clear()
-        REGISTRY.compiled.update(before)
+        KERNELS.compiled.clear()
+        KERNELS.compiled.update(before)
+
+
+def find(name: str, planes: np.ndarray) -> Any:
+    """Return the compiled kernel for planes of this order and type, or None."""
+    return lookup(name, len(planes) - 1, planes[0].size, PRECISIONS[planes.dtype.char])

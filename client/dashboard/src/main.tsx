@@ -1,3 +1,4 @@
+import "./base.css";
 import { effect } from "@preact/signals";
 import { render } from "preact";
 
@@ -7,7 +8,6 @@ import { StreamClient } from "./store/client";
 import { keepAddress } from "./store/permalink";
 import { Store, StoreContext } from "./store/store";
 import "@fontsource-variable/inter/wght.css";
-import "./style.css";
 
 const loop = new AnimationLoop((callback) => requestAnimationFrame(callback));
 const store = new Store();

@@ -1,6 +1,11 @@
 """The wire contract of docs/stream.md, for both ends: constants, products, messages, parsing."""
 
-from transientcam.frame import Frame, FrameMeta, PixelCounts, PredictedStd
+from transientcam.documents import (
+    FrameMeta,
+    PixelCountsDocument as PixelCounts,
+    PredictedStdDocument as PredictedStd,
+)
+from transientcam.frame import Frame
 from transientcam.wire import _fields as fields
 from transientcam.wire._arrays import DTYPES, array_document, parse_array
 from transientcam.wire._codec import ALIGNMENT, array_head, pack, unpack

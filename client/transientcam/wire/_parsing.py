@@ -3,8 +3,9 @@
 from collections.abc import Mapping
 from typing import Any, Final, cast
 
+from transientcam.documents import FrameMeta
 from transientcam.errors import ProtocolError
-from transientcam.frame import Frame, FrameMeta
+from transientcam.frame import Frame
 from transientcam.wire import _fields as fields
 from transientcam.wire._arrays import DTYPES, MAX_DIMENSIONS, MAX_LENGTH, parse_array
 from transientcam.wire._codec import unpack

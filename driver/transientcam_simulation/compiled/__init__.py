@@ -1,56 +1,8 @@
-"""Compiling of what the simulated light computes pixel by pixel."""
+"""Compiling of what the simulated light computes pixel by pixel.
 
-from transientcam_simulation.compiled._compiling import (
-    AROUND,
-    CODES,
-    DOUBLES,
-    FLAGS,
-    INDICES,
-    LINE,
-    MARKS,
-    NUMBERS,
-    PIXELS,
-    PLACES,
-    PLANE,
-    PLANES,
-    REGION,
-    ROWS,
-    STACK,
-    TILES,
-    WHOLE,
-    float32,
-    float64,
-    inner,
-    int32,
-    int64,
-    lane,
-)
-from transientcam_simulation.compiled._lanes import CHUNK, LANES
+numba is imported when a name of `_compiling` is asked for: scenes that stand still need none.
+"""
 
-__all__ = [
-    "AROUND",
-    "CHUNK",
-    "CODES",
-    "DOUBLES",
-    "FLAGS",
-    "INDICES",
-    "LANES",
-    "LINE",
-    "MARKS",
-    "NUMBERS",
-    "PIXELS",
-    "PLACES",
-    "PLANE",
-    "PLANES",
-    "REGION",
-    "ROWS",
-    "STACK",
-    "TILES",
-    "WHOLE",
-    "float32",
-    "float64",
-    "inner",
-    "int32",
-    "int64",
-    "lane",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

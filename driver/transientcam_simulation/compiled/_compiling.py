@@ -1,8 +1,7 @@
-"""From functions to lanes: compiled for one signature by numba, or loaded from its cache."""
+"""From functions to lanes: compiled for one signature by numba, or loaded from the cache."""
 
 from collections.abc import Callable
-from contextlib import suppress
-from typing import Any
+from typing import Any, TypeVar
 
 from numba import (
     float32 as numba_float32,
@@ -14,8 +13,9 @@ from numba import (
     uint16 as numba_uint16,
 )
 
-LANES: dict[str, Callable[..., Any]] = {}
-"""All lanes that are compiled, by their names."""
+from transientcam_simulation.compiled._lanes import CACHE, FUNCTIONS
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 # numba is only partly annotated
 float32: Any = numba_float32
@@ -33,6 +33,7 @@ STACK = _types.Array(float32, 3, "C")
 TILES = _types.boolean[:, :, ::1]
 MARKS = _types.boolean[:, ::1]
 FLAGS = _types.boolean[::1]
+FLAG = _types.boolean
 PLACES = int64[::1]
 CODES = _types.Array(numba_uint16, 1, "C")
 NUMBERS = int64[:, ::1]
@@ -44,25 +45,26 @@ REGION = _types.UniTuple(int64, 4)
 """First row and column, numbers of rows and columns."""
 
 
-def inner(function: Callable[..., Any]) -> Any:
+def inner(function: Function) -> Function:
     """Have a function compiled into those that call it, which are in the same file.
 
     The cache notices changes of that file only. Calls that remain would count references of every
     array they pass, one by one between all cores: a fourth of the time of loops over short rows.
     """
-    return njit(nogil=True, error_model="numpy", forceinline=True)(function)
+    dispatcher: Any = njit(nogil=True, error_model="numpy", forceinline=True)(function)
+    compiled: Function = dispatcher
+    return compiled
 
 
-def lane(*signature: Any) -> Callable[[Callable[..., Any]], Any]:
+def lane(*signature: Any) -> Callable[[Function], Function]:
     """Compile a function now, and for this signature only: no call starts the compiler."""
 
-    def decorate(function: Callable[..., Any]) -> Any:
-        dispatcher = njit(nogil=True, error_model="numpy")(function)
-        with suppress(RuntimeError):  # where there is no place to keep it between processes
-            dispatcher.enable_caching()
-        dispatcher.compile(signature)
+    def decorate(function: Function) -> Function:
+        dispatcher: Any = njit(nogil=True, error_model="numpy")(function)
+        CACHE.compile(dispatcher, signature)
         dispatcher.disable_compile()
-        LANES[function.__name__] = dispatcher
-        return dispatcher
+        FUNCTIONS.setdefault(function.__module__, {})[function.__name__] = dispatcher
+        compiled: Function = dispatcher
+        return compiled
 
     return decorate

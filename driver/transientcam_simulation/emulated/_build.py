@@ -19,7 +19,13 @@ from transientcam_simulation.effects import (
 from transientcam_simulation.emulated._handle import PrepareScene, SimulationHandle
 from transientcam_simulation.emulated._open_usb import EmulatedDevice, Firmware, prototype
 from transientcam_simulation.imaging import SwitchableWorld, World
-from transientcam_simulation.light import GivenScenery, Scenery, load_responses, shared_scenery
+from transientcam_simulation.light import (
+    GivenScenery,
+    Scenery,
+    load_compiled,
+    load_responses,
+    shared_scenery,
+)
 from transientcam_simulation.scene import (
     BUILT_IN,
     Background,
@@ -159,9 +165,13 @@ def world_before(
     ------
     SceneError
         A file that the scene names cannot be read, or has other content.
+    CompilerMissing
+        It moves, and there is no compiler.
     """
 
     def world_of_scene(scene: Scene) -> World:
+        if scene.moves:
+            load_compiled()  # rather than when the first image is due
         return world_of(scene, width=width, height=height, seed=seed, readout_s=readout_s)
 
     quiet = {each.name: "off" for each in NOISE if scene.effects.get(each.name) == "off"}

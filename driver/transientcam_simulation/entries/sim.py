@@ -149,7 +149,7 @@ def _check(name: CameraName) -> None:
 
 
 PLUGIN = CameraPlugin(
-    summary="a simulated camera in front of a scene (docs/simulation.md)",
+    summary="a simulated camera in front of a scene (docs/measured/simulation.md)",
     usage="sim:SCENE, sim:FILE.toml or sim:measured:FILE.npz",
     open=_open,
     find=_find,

@@ -1,11 +1,13 @@
 """Electrons of an image, and their codes: compiled arithmetic, the same bytes as in NumPy."""
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import NDArray
 
-from transientcam_simulation.compiled import CODES, LINE, WHOLE, float32, inner, int64, lane
+from transientcam_simulation.compiled import CODES, LINE, WHOLE, float32, inner, lane
 
+Plane = NDArray[np.float32]
+Codes = NDArray[np.uint16]
+Noise = tuple[np.float32, np.float32, np.float32, np.float32, np.float32]
 _ZERO = np.float32(0)
 _WHOLE = np.float32(3 << 22)
 """Added and taken away, it rounds what is between 0 and 2^22 to whole numbers, as `rint` does."""
@@ -14,7 +16,10 @@ _BLOCK = 4096
 
 
 @inner
-def _turn(offset: Any, in_phase: Any, quadrature: Any, of: Any, electrons: Any) -> None:
+def _turn(
+    offset: Plane, in_phase: Plane, quadrature: Plane, of: tuple[np.float32, np.float32],
+    electrons: Plane,
+) -> None:  # fmt: skip
     cosine, sine = of
     for i in range(len(offset)):
         light = offset[i] + in_phase[i] * cosine
@@ -23,16 +28,20 @@ def _turn(offset: Any, in_phase: Any, quadrature: Any, of: Any, electrons: Any) 
 
 
 @lane(WHOLE, WHOLE, WHOLE, float32, float32)
-def at_phase(offset: Any, in_phase: Any, quadrature: Any, cosine: Any, sine: Any) -> Any:
+def at_phase(
+    offset: Plane, in_phase: Plane, quadrature: Plane, cosine: np.float32, sine: np.float32
+) -> Plane:
     """Return the electrons of an image at a phase, given its cosine and sine."""
-    electrons = np.empty(offset.shape, float32)
+    electrons = np.empty(offset.shape, np.float32)
     for row in range(len(offset)):
         _turn(offset[row], in_phase[row], quadrature[row], (cosine, sine), electrons[row])
     return electrons
 
 
 @inner
-def _code(signal: Any, bins: Any, quantiles: Any, of: Any, noise: Any, codes: Any) -> Any:
+def _code(
+    signal: Plane, bins: Codes, quantiles: Plane, of: Noise, noise: Plane, codes: Codes
+) -> int:  # fmt: skip
     """Put the codes of a block of pixels; return how many have one of the outermost bins."""
     light, variance_e2, dn_per_e, dark_dn, highest_dn = of
     outermost = 0
@@ -49,15 +58,15 @@ def _code(signal: Any, bins: Any, quantiles: Any, of: Any, noise: Any, codes: An
 
 @lane(LINE, CODES, LINE, float32, float32, float32, float32, float32)
 def coded(
-    signal: Any, bins: Any, quantiles: Any, light: Any, variance_e2: Any, dn_per_e: Any,
-    dark_dn: Any, highest_dn: Any,
-) -> Any:  # fmt: skip
+    signal: Plane, bins: Codes, quantiles: Plane, light: np.float32, variance_e2: np.float32,
+    dn_per_e: np.float32, dark_dn: np.float32, highest_dn: np.float32,
+) -> tuple[Codes, NDArray[np.int64]]:  # fmt: skip
     """Return codes of pixels with noise, and the places of those with one of the outermost bins.
 
     The variance of the noise is the signal times ``light``, and the same everywhere.
     """
-    count, noise = len(signal), np.empty(_BLOCK, float32)
-    codes, outermost, found = np.empty(count, np.uint16), np.empty(count, int64), 0
+    count, noise = len(signal), np.empty(_BLOCK, np.float32)
+    codes, outermost, found = np.empty(count, np.uint16), np.empty(count, np.int64), 0
     of = light, variance_e2, dn_per_e, dark_dn, highest_dn
     for start in range(0, count, _BLOCK):
         stop = min(start + _BLOCK, count)

@@ -8,6 +8,7 @@ effects out to see what they are worth; ``transport`` puts together what is call
 """
 
 from transientcam_simulation.light._bundle import Region, holds
+from transientcam_simulation.light._compiler import load_compiled
 from transientcam_simulation.light._measured import load_responses
 from transientcam_simulation.light._shared import shared_scenery
 from transientcam_simulation.light._transport import GivenScenery, Scenery, View, Views, Wanted
@@ -20,6 +21,7 @@ __all__ = [
     "Views",
     "Wanted",
     "holds",
+    "load_compiled",
     "load_responses",
     "shared_scenery",
 ]

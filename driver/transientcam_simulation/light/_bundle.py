@@ -8,11 +8,12 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from transientcam_simulation.compiled import LANES
-from transientcam_simulation.light._coverage import Plane, axes_of
-from transientcam_simulation.scene import Points, Shape
+from transientcam_simulation.light._coverage import Plane
+from transientcam_simulation.scene import Points
 
 Region = tuple[slice, slice]
+Numbers = tuple[int, int, int, int]
+"""Of a region: first row and column, numbers of rows and columns."""
 NOWHERE: Final[Region] = (slice(0, 0), slice(0, 0))
 TILE: Final = 4
 """Pixels a side."""
@@ -75,39 +76,6 @@ class Bundle:
             (low.min(axis=2), high.max(axis=2)),
         )
 
-    def meeting(self, shapes: list[Shape]) -> tuple[NDArray[np.bool_], list[Region | None]]:
-        """Return which tiles (N, R, C) have lines that may meet shapes, and regions that hold them.
-
-        A region is None if there are none.
-        """
-        lane = LANES.find("met")
-        axes = axes_of(shapes)
-        if lane is not None and len(axes) == len(shapes):
-            tiles, spans = lane(axes, self.apex, self.frame, self.low, self.high, *self.rows)
-            return tiles, self._regions(spans.tolist())
-        middle, *across = self.frame
-        meets: NDArray[np.bool_] = np.ones((len(shapes), *self.low.shape[1:]), dtype=bool)
-        for axis, low, high in zip(across, self.low, self.high, strict=True):
-            limits = np.array([each.tangents(self.apex, middle, axis) for each in shapes])
-            meets &= (low <= limits[:, 1, None, None]) & (high >= limits[:, 0, None, None])
-        rows: NDArray[np.bool_] = np.logical_or.reduce(meets, axis=2)
-        columns: NDArray[np.bool_] = np.logical_or.reduce(meets, axis=1)
-        spans = np.stack([*_span(rows), *_span(columns)], axis=1)
-        return meets, self._regions((spans * rows.any(axis=1, keepdims=True)).tolist())
-
-    def _regions(self, spans: list[list[int]]) -> list[Region | None]:
-        """Return regions of pixels, given their first tiles and those after the last."""
-        height, width = self.way[0].shape
-        return [
-            (
-                slice(top * TILE, min(bottom * TILE, height)),
-                slice(left * TILE, min(right * TILE, width)),
-            )
-            if bottom
-            else None
-            for top, bottom, left, right in spans
-        ]
-
     def within(self, region: Region) -> tuple[tuple[Plane, Plane, Plane], Plane, Plane]:
         """Return the ways of a region's lines, and from where to where they count."""
         x, y, z = (each[region] for each in self.way)
@@ -121,11 +89,6 @@ def plane_of(values: NDArray[np.floating] | np.floating | float, shape: tuple[in
     if plane.size and (plane == plane[0, 0]).all():
         return plane[:1].copy()
     return plane.copy()
-
-
-def _span(tiles: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the first tiles (N, T) that are true, and those after the last."""
-    return tiles.argmax(axis=1), tiles.shape[1] - tiles[:, ::-1].argmax(axis=1)
 
 
 def _frame(middle: Points) -> NDArray[np.float64]:
@@ -153,7 +116,7 @@ def extent(region: Region) -> tuple[int, int]:
     return region[0].stop - region[0].start, region[1].stop - region[1].start
 
 
-def numbers(region: Region) -> tuple[int, int, int, int]:
+def numbers(region: Region) -> Numbers:
     """Return first row and column, and numbers of rows and columns."""
     return region[0].start, region[1].start, *extent(region)
 

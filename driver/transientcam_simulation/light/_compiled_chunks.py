@@ -1,11 +1,7 @@
-"""Points that are seen, chunks of them, and what is beside them: compiled arithmetic.
-
-Bytes are those of the statements in NumPy, as in `compiled_edges`.
-"""
-
-from typing import Any
+"""Compiled: points that are seen, chunks of them, and what is beside them."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from transientcam_simulation.compiled import (
     AROUND,
@@ -15,20 +11,20 @@ from transientcam_simulation.compiled import (
     PIXELS,
     PLACES,
     WHOLE,
-    float32,
     inner,
-    int32,
     int64,
     lane,
 )
+from transientcam_simulation.light._coverage import ZERO, Plane
 
-Plane = Any
-"""A float32 array as numba compiles it."""
-_ZERO = np.float32(0)
+Indices = NDArray[np.int32]
+Places = NDArray[np.int64]
 
 
 @inner
-def _put_run(share: Any, at: Any, way: Any, apex: Any, k: int, lines: Any) -> None:
+def _put_run(
+    share: Plane, at: Plane, way: tuple[Plane, Plane, Plane], apex: Plane, k: int, lines: Plane
+) -> None:
     """Put what is known of successive pixels of a row into columns from one on."""
     for axis in range(3):
         each, start = way[axis], apex[axis]
@@ -42,19 +38,19 @@ def _put_run(share: Any, at: Any, way: Any, apex: Any, k: int, lines: Any) -> No
 
 @lane(WHOLE, WHOLE, WHOLE, WHOLE, WHOLE, int64, int64, LINE, int64, PIXELS, WHOLE)
 def points(
-    share: Plane, at: Plane, x: Plane, y: Plane, z: Plane, top: int, left: int, apex: Any,
-    start: int, places: Any, lines: Any,
+    share: Plane, at: Plane, x: Plane, y: Plane, z: Plane, top: int, left: int, apex: Plane,
+    start: int, places: Indices, lines: Plane,
 ) -> None:  # fmt: skip
     """Put rows, columns, shares, t, points and ways of the pixels that show a surface."""
     k, width = start, share.shape[1]
     for row in range(share.shape[0]):
         shown, r, column = share[row], row + top, 0
         while column < width:
-            if shown[column] == _ZERO:
+            if shown[column] == ZERO:
                 column += 1
                 continue
             first = column
-            while column < width and shown[column] != _ZERO:
+            while column < width and shown[column] != ZERO:
                 column += 1
             a, b, after = first + left, column + left, k + column - first
             rows, columns = places[0, k:after], places[1, k:after]
@@ -68,11 +64,13 @@ def points(
 
 
 @lane(INDICES, INDICES, int64, int64, int64, int64)
-def around(rows: Any, columns: Any, top: int, left: int, height: int, width: int) -> Any:
+def around(
+    rows: Indices, columns: Indices, top: int, left: int, height: int, width: int
+) -> Indices:
     """Return what is around points in a region of an image."""
     count, wide = len(rows), width + 2
-    place = np.full((height + 2) * wide, count, int32)
-    at, beside = np.empty(count, int32), np.empty((4, count), int32)
+    place = np.full((height + 2) * wide, count, np.int32)
+    at, beside = np.empty(count, np.int32), np.empty((4, count), np.int32)
     for i in range(count):
         at[i] = (rows[i] - top + 1) * wide + columns[i] - left + 1
     for i in range(count):
@@ -86,14 +84,14 @@ def around(rows: Any, columns: Any, top: int, left: int, height: int, width: int
 
 
 @lane(PLACES, AROUND)
-def among(on: Any, beside: Any) -> Any:
+def among(on: Places, beside: Indices) -> Indices:
     """Return what is beside some of the points, by their own indices."""
-    place = np.empty(beside.shape[1] + 1, int32)
+    place = np.empty(beside.shape[1] + 1, np.int32)
     for k in range(len(place)):
         place[k] = len(on)
     for k in range(len(on)):
         place[on[k]] = k
-    found = np.empty((4, len(on)), int32)
+    found = np.empty((4, len(on)), np.int32)
     for side in range(4):
         for k in range(len(on)):
             found[side, k] = place[beside[side, on[k]]]
@@ -101,14 +99,14 @@ def among(on: Any, beside: Any) -> Any:
 
 
 @lane(AROUND)
-def reach(beside: Any) -> Any:
+def reach(beside: Indices) -> tuple[Places, NDArray[np.bool_]]:
     """Return chunks of the points beside those of each chunk, and which points lack neighbours.
 
     Of those above, below, left and right, the first chunk, and the one after the last.
     """
     count = beside.shape[1]
     chunks = (count + CHUNK - 1) // CHUNK
-    reached, rim = np.zeros((chunks, 8), int64), np.zeros(count, np.bool_)
+    reached, rim = np.zeros((chunks, 8), np.int64), np.zeros(count, np.bool_)
     for c in range(chunks):
         start, stop = c * CHUNK, min((c + 1) * CHUNK, count)
         alone = rim[start:stop]
@@ -124,13 +122,13 @@ def reach(beside: Any) -> Any:
 
 
 @inner
-def _ordered(bits: Any) -> Any:
+def _ordered(bits: np.int32) -> np.int32:
     """Return a number that is ordered as the float32 that has these bits; again, they return."""
     return bits ^ ((bits >> np.int32(31)) & np.int32(0x7FFFFFFF))
 
 
 @inner
-def _bounds(bits: Any) -> Any:
+def _bounds(bits: Indices) -> tuple[np.int32, np.int32]:
     """Return the bits of the least and the greatest of a chunk of numbers, none of them NaN.
 
     Compilers make vectors of such loops over integers, which have an order of all values.
@@ -143,13 +141,13 @@ def _bounds(bits: Any) -> Any:
 
 
 @lane(LINE, LINE, LINE)
-def boxes(x: Any, y: Any, z: Any) -> Any:
+def boxes(x: Plane, y: Plane, z: Plane) -> Plane:
     """Return boxes (6, C) around successive chunks of points: lowest coordinates, then highest."""
     count = len(x)
     chunks = (count + CHUNK - 1) // CHUNK
-    found = np.empty((6, chunks), float32)
-    bits = found.view(int32)
-    u, v, w = x.view(int32), y.view(int32), z.view(int32)
+    found = np.empty((6, chunks), np.float32)
+    bits = found.view(np.int32)
+    u, v, w = x.view(np.int32), y.view(np.int32), z.view(np.int32)
     for c in range(chunks):
         a, b = c * CHUNK, min((c + 1) * CHUNK, count)
         bits[0, c], bits[3, c] = _bounds(u[a:b])

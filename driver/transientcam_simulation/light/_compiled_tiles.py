@@ -1,11 +1,7 @@
-"""Tiles of pixels whose lines may meet shapes, and those that are seen: compiled arithmetic.
-
-Bytes are those of the statements in NumPy, as in `compiled_edges`.
-"""
-
-from typing import Any
+"""Compiled: tiles of pixels whose lines may meet shapes, and those that are seen."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from transientcam_simulation.compiled import (
     DOUBLES,
@@ -13,39 +9,60 @@ from transientcam_simulation.compiled import (
     PLANES,
     ROWS,
     WHOLE,
-    float32,
     inner,
     int64,
     lane,
 )
+from transientcam_simulation.light._coverage import ZERO, Plane
 
-Plane = Any
-"""A float32 array as numba compiles it."""
-_ZERO = np.float32(0)
-_CLEAR = 1e-9  # as in Ellipsoid.tangents
-
-
-@inner
-def _times(one: Any, other: Any) -> Any:
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+Tiles = NDArray[np.bool_]
+Doubles = NDArray[np.float64]
+_CLEAR = 1e-9  # fraction of a way that counts as its end
 
 
 @inner
-def _tangents(away: Any, radii: Any, middle: Any, across: Any) -> Any:
-    """Return what `Ellipsoid.tangents` does, of one that is so far away."""
-    along, aside = _times(away, middle), _times(away, across)
+def _dot(one: Doubles, other: Doubles) -> float:
+    product: float = one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+    return product
+
+
+@inner
+def _tangents(
+    away: Doubles, radii: Doubles, middle: Doubles, across: Doubles
+) -> tuple[float, float]:
+    """Return what `Rectangle.tangents` does, of an ellipsoid with its centre so far away."""
+    along, aside = _dot(away, middle), _dot(away, across)
     along_m, across_m = radii * middle, radii * across
-    a = along * along - _times(along_m, along_m)
+    a = along * along - _dot(along_m, along_m)
     if along <= 0 or a <= _CLEAR:
         return -np.inf, np.inf
-    b = along * aside - _times(along_m, across_m)
-    c = aside * aside - _times(across_m, across_m)
+    # planes through the apex that touch it: (aside - t along)^2 = |radii (across - t middle)|^2
+    b = along * aside - _dot(along_m, across_m)
+    c = aside * aside - _dot(across_m, across_m)
     root = np.sqrt(max(b * b - a * c, 0.0))
     return (b - root) / a, (b + root) / a
 
 
+@lane(PLANES, DOUBLES, ROWS)
+def tangents(axes: Doubles, apex: Doubles, frame: Doubles) -> Doubles:
+    """Return lowest and highest tangents (N, 2, 2) of ellipsoids' angles at an apex.
+
+    To the first of the directions of a frame, in the planes with each of the two others.
+    ``axes`` (N, 2, 3) are centres and radii. Infinite where one reaches behind the apex.
+    """
+    limits = np.empty((len(axes), 2, 2), np.float64)
+    for n in range(len(axes)):
+        away, radii = axes[n, 0] - apex, axes[n, 1]
+        for k in range(2):
+            limits[n, k, 0], limits[n, k, 1] = _tangents(away, radii, frame[0], frame[k + 1])
+    return limits
+
+
 @inner
-def _met_row(tiles: Any, low: Any, high: Any, down: Any, up: Any, of: Any) -> Any:
+def _met_row(
+    tiles: Tiles, low: Doubles, high: Doubles, down: Doubles, up: Doubles,
+    of: tuple[float, float, float, float],
+) -> tuple[int, int]:  # fmt: skip
     """Mark the tiles of a row; return the first, and the one after the last."""
     width = len(tiles)
     for k in range(width):
@@ -59,16 +76,20 @@ def _met_row(tiles: Any, low: Any, high: Any, down: Any, up: Any, of: Any) -> An
     return first, after
 
 
-@lane(PLANES, DOUBLES, ROWS, PLANES, PLANES, ROWS, ROWS)
-def met(axes: Any, apex: Any, frame: Any, low: Any, high: Any, lowest: Any, highest: Any) -> Any:
-    """Return tiles whose lines may meet ellipsoids, and their spans of rows and of columns."""
-    count, height, width = len(axes), low.shape[1], low.shape[2]
+@lane(PLANES, PLANES, PLANES, ROWS, ROWS)
+def met(
+    limits: Doubles, low: Doubles, high: Doubles, lowest: Doubles, highest: Doubles
+) -> tuple[Tiles, NDArray[np.int64]]:
+    """Return tiles whose lines may meet shapes, and their spans of rows and of columns.
+
+    Of `tangents` of the shapes, of each tile's lines (2, R, C), and of each row's (2, R).
+    """
+    count, height, width = len(limits), low.shape[1], low.shape[2]
     tiles = np.zeros((count, height, width), np.bool_)
-    spans = np.zeros((count, 4), int64)
+    spans = np.zeros((count, 4), np.int64)
     for n in range(count):
-        away, radii = axes[n, 0] - apex, axes[n, 1]
-        first, last = _tangents(away, radii, frame[0], frame[1])
-        start, end = _tangents(away, radii, frame[0], frame[2])
+        first, last = limits[n, 0, 0], limits[n, 0, 1]
+        start, end = limits[n, 1, 0], limits[n, 1, 1]
         top, bottom, left, right = height, 0, width, 0
         for row in range(height):
             if lowest[0, row] > last or highest[0, row] < first:
@@ -88,14 +109,14 @@ def met(axes: Any, apex: Any, frame: Any, low: Any, high: Any, lowest: Any, high
 
 
 @lane(WHOLE, int64)
-def shown_tiles(shown: Plane, side: int) -> Any:
+def shown_tiles(shown: Plane, side: int) -> Tiles:
     """Return tiles (R, C) of pixels whose shares are not all 0."""
     height, width = shown.shape
     rows, columns = (height + side - 1) // side, (width + side - 1) // side
-    line, tiles = np.empty(columns * side, float32), np.zeros((rows, columns), np.bool_)
+    line, tiles = np.empty(columns * side, np.float32), np.zeros((rows, columns), np.bool_)
     for row in range(rows):
         for i in range(len(line)):
-            line[i] = _ZERO
+            line[i] = ZERO
         for r in range(row * side, min((row + 1) * side, height)):
             part = shown[r]
             for i in range(width):
@@ -103,12 +124,12 @@ def shown_tiles(shown: Plane, side: int) -> Any:
         put = tiles[row]
         for c in range(columns):
             for i in range(c * side, (c + 1) * side):
-                put[c] |= line[i] > _ZERO
+                put[c] |= line[i] > ZERO
     return tiles
 
 
 @lane(MARKS, int64)
-def grown(tiles: Any, beside: int) -> Any:
+def grown(tiles: Tiles, beside: int) -> Tiles:
     """Return tiles that are marked, and those up to so many rows and columns beside one."""
     rows, columns = tiles.shape
     tall, wide = np.zeros(tiles.shape, np.bool_), np.zeros(tiles.shape, np.bool_)

@@ -3,21 +3,34 @@
 Lines through one apex are tested against a shape. What is computed of each line changes its sign at
 the silhouette and is smooth across it, so that its differences between neighbouring pixels say how
 far the silhouette is from the pixel's centre.
+
+Functions of planes that have no branches are also compiled, for one number at a time: see
+`compiled_numbers`.
 """
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_simulation.compiled import LANES
 from transientcam_simulation.scene import Ellipsoid, Points, Rectangle, Shape
 
 Plane = NDArray[np.float32]
+Values: TypeAlias = NDArray[Any]
+"""Of a plane, whose type NumPy's stubs lose in arithmetic."""
+Ball: TypeAlias = tuple[np.float32, ...]
+"""1 / radii, origin of lines over the radii, 1 - its square, and what keeps from dividing by 0."""
+Plate: TypeAlias = Sequence[Sequence[np.float32]] | Plane
+"""(3, 5) axes (normal, right, up), places along them, and the rest that `on_rectangle` needs."""
 TOUCHING = np.float32(1e-4)
 """Of the way from the apex: what is so close to a point touches it."""
+ZERO, ONE, TWO = np.float32(0), np.float32(1), np.float32(2)
+LEAST = np.float32(1e-9)
 _TINY = np.float32(1e-12)
+_GENTLEST = np.float32(1e-2)
+_MEAN_BEND = np.float32(24)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,52 +47,55 @@ class Crossing:
 
     inside: tuple[Plane, ...]
     at: Plane
-    _length: Plane | None = None
 
-    def between(self, near: Plane | np.float32, far: Plane | np.float32) -> NDArray[np.bool_]:
+    def between(self, near: Plane, far: Plane) -> NDArray[np.bool_]:
         """Whether lines meet the shape between two of their points, and not just at one."""
         between: NDArray[np.bool_] = self.at > near + TOUCHING
         between &= self.at < far * (1 - TOUCHING)
         return between
 
-    def holds(self, t: float) -> NDArray[np.bool_]:
-        """Whether the points at t are inside the shape, which rectangles have no inside for."""
-        if self._length is None:
-            return np.zeros(self.at.shape, dtype=bool)
-        away = (self.at - np.float32(t)) * self._length
-        within: NDArray[np.bool_] = away * away < self.inside[0]
-        return within
 
-    def entered(self, root: Plane) -> Plane:
-        """Return the t at which lines enter, given the square root of ``inside`` for ellipsoids."""
-        return self.at if self._length is None else single(self.at - root / self._length)
-
-
-def crossing(shape: Shape, apex: Points, way: tuple[Plane, ...]) -> Crossing:
+def crossing(shape: Shape, apex: Points, way: tuple[Plane, Plane, Plane]) -> Crossing:
     """Cross lines, given by three planes of their components, with a shape."""
     if isinstance(shape, Ellipsoid):
-        return _ellipsoid(shape, apex, way)
-    return _rectangle(shape, apex, way)
+        inside, at, _squared = near_ellipsoid(ball_of(shape.centre, shape.radii, apex), *way)
+        return Crossing((inside,), at)
+    one, other, at, _facing = on_rectangle(plate_of(shape, apex), *way)
+    return Crossing((one, other), at)
 
 
-def axes_of(shapes: Iterable[Shape]) -> NDArray[np.float64]:
-    """Return (N, 2, 3) centres and radii of the ellipsoids among shapes."""
-    axes = [(each.centre, each.radii) for each in shapes if isinstance(each, Ellipsoid)]
-    return np.array(axes, dtype=np.float64).reshape(-1, 2, 3)
+def ball_of(centre: Points, radii: Points, apex: Points) -> Ball:
+    """Return what lines from an apex are crossed with, of an ellipsoid."""
+    x = (apex[0] - centre[0]) / radii[0]
+    y = (apex[1] - centre[1]) / radii[1]
+    z = (apex[2] - centre[2]) / radii[2]
+    return (
+        np.float32(1 / radii[0]),
+        np.float32(1 / radii[1]),
+        np.float32(1 / radii[2]),
+        np.float32(x),
+        np.float32(y),
+        np.float32(z),
+        np.float32(1 - (x * x + y * y + z * z)),
+        _TINY,
+    )
 
 
-def ball_of(shape: Ellipsoid, apex: Points) -> Plane:
-    """Return what lines from an apex are crossed with: 1 / radii, origin, 1 - its square, tiny."""
-    origin = (apex - shape.centre) / shape.radii
-    ball = np.empty(8, dtype=np.float32)
-    x, y, z = origin
-    squared = x * x + y * y + z * z  # a dot product's last digit depends on the machine's library
-    ball[:3], ball[3:6], ball[6], ball[7] = 1 / shape.radii, origin, 1 - squared, _TINY
-    return ball
+def near_ellipsoid(ball: Ball, x: Values, y: Values, z: Values) -> tuple[Values, Values, Values]:
+    """Return where lines (x, y, z) are closest to an ellipsoid's centre.
+
+    1 minus the squared distance there, where the ellipsoid is a unit sphere; the t; and the squared
+    length of (x, y, z) in that space.
+    """
+    x, y, z = x * ball[0], y * ball[1], z * ball[2]
+    squared = x * x + y * y + z * z + ball[7]
+    along = x * ball[3] + y * ball[4] + z * ball[5]
+    closest = along / squared
+    return along * closest + ball[6], -closest, squared
 
 
 def plate_of(shape: Rectangle, apex: Points) -> Plane:
-    """Return (3, 5) axes (normal, right, up), places along them, tiny, and 2 over the sides."""
+    """Return what lines from an apex are crossed with, of a rectangle: see `Plate`."""
     origin = apex - shape.centre
     plate = np.empty((3, 5), dtype=np.float32)
     plate[0, :3], plate[0, 3], plate[0, 4] = shape.normal, -(origin @ shape.normal), _TINY
@@ -88,38 +104,21 @@ def plate_of(shape: Rectangle, apex: Points) -> Plane:
     return plate
 
 
-def _ellipsoid(shape: Ellipsoid, apex: Points, way: tuple[Plane, ...]) -> Crossing:
-    ball = ball_of(shape, apex)
-    x, y, z = (w * scale for w, scale in zip(way, ball[:3], strict=True))
-    squared = single(x * x)
-    squared += y * y
-    squared += z * z
-    squared += _TINY
-    along: Plane = x * ball[3]
-    along += y * ball[4]
-    along += z * ball[5]
-    closest = single(along / squared)
-    # 1 minus the squared distance of the line from the centre, where the ellipsoid is a unit sphere
-    inside: Plane = along * closest
-    inside += ball[6]
-    np.negative(closest, out=closest)
-    return Crossing((inside,), closest, np.sqrt(squared))
+def on_rectangle(
+    plate: Plate, x: Values, y: Values, z: Values
+) -> tuple[Values, Values, Values, Values]:
+    """Return where lines (x, y, z) meet a rectangle's plane.
 
-
-def _rectangle(shape: Rectangle, apex: Points, way: tuple[Plane, ...]) -> Crossing:
-    normal, *sides = plate_of(shape, apex)
-
-    def part(axis: Plane) -> Plane:
-        x, y, z = (w * a for w, a in zip(way, axis, strict=False))
-        return single(x + y + z + _TINY)
-
-    at = single(normal[3] / part(normal))
-    inside: list[Plane] = []
-    for axis in sides:
-        place = at * part(axis)
-        place += axis[3]
-        inside.append(1 - np.abs(place) * axis[4])
-    return Crossing(tuple(inside), at)
+    Functions that are above 0 within its width and its height; the t; and the lines' component
+    along the normal.
+    """
+    normal, right, up = plate[0], plate[1], plate[2]
+    tiny = normal[4]
+    facing = x * normal[0] + y * normal[1] + z * normal[2]
+    at = normal[3] / (facing + tiny)
+    across = at * (x * right[0] + y * right[1] + z * right[2] + tiny) + right[3]
+    along = at * (x * up[0] + y * up[1] + z * up[2] + tiny) + up[3]
+    return ONE - np.abs(across) * right[4], ONE - np.abs(along) * up[4], at, facing
 
 
 def single(values: NDArray[np.floating]) -> Plane:
@@ -127,55 +126,65 @@ def single(values: NDArray[np.floating]) -> Plane:
     return values.astype(np.float32, copy=False)
 
 
-def covered(inside: Plane, *, rooted: bool = True) -> tuple[Plane, Plane]:
-    """Share of each pixel (H, W) where a function is above 0, and its mean square root there.
+def covered(inside: Plane) -> Plane:
+    """Share of each pixel (H, W) where a function is above 0; NaN is nowhere.
 
-    The function is taken as linear within a pixel, about its mean; NaN is nowhere. Without
-    ``rooted`` the second plane is the first.
+    The function is taken as linear within a pixel, about its mean.
     """
     positive = inside > 0
     share = positive.astype(np.float32)
-    root = np.sqrt(np.maximum(inside, np.float32(0))) if rooted else share
     near = np.flatnonzero(_at_border(positive))
     if near.size:
         flat = inside.ravel()
-        beside = tuple((flat[to], flat[of]) for to, of in _neighbours(inside.shape, near))
-        part, mean = _at(flat[near], beside, rooted=rooted)
-        share.ravel()[near] = part
-        if rooted:
-            root.ravel()[near] = mean
-    return share, root
-
-
-def covered_among(inside: Plane, around: NDArray[np.int32]) -> Plane:
-    """Share of each of some pixels (P) where a function is above 0; NaN is nowhere.
-
-    ``around`` (4, P) are the pixels above, below, left and right of each, by index; P is none.
-    """
-    values = np.append(inside, np.float32(np.nan))
-    positive = values > 0
-    share = positive[:-1].astype(np.float32)
-    near = np.flatnonzero((positive[around] != positive[:-1]).any(axis=0))
-    if near.size:
-        up, down, left, right = values[around[:, near]]
-        share[near] = _at(values[near], ((up, down), (left, right)), rooted=False)[0]
+        beside = (flat[each] for each in _neighbours(inside.shape, near))
+        share.ravel()[near] = at_border(flat[near], *beside)[0]
     return share
 
 
-def _at(
-    value: Plane, beside: tuple[tuple[Plane, Plane], ...], *, rooted: bool
-) -> tuple[Plane, Plane]:
-    """Share of pixels at a border, and the mean root, by the values on both sides of each."""
-    (down, bend), (right, more) = (_slope(value - one, other - value) for one, other in beside)
-    value = single(value + (bend + more) / 24)  # its mean over the pixel
-    share = _half_plane(value, np.maximum(down, right), np.minimum(down, right))
-    if not rooted:
-        return share, share
-    width = np.sqrt(down * down + right * right)
-    high = np.maximum(value + width / 2, np.float32(1e-9))
-    low = np.maximum(value - width / 2, np.float32(0))
-    cubes = high * np.sqrt(high) - low * np.sqrt(low)
-    return share, single(cubes / np.maximum(1.5 * (high - low), np.float32(1e-9)))
+def at_border(
+    value: Values, up: Values, down: Values, left: Values, right: Values
+) -> tuple[Values, Values, Values, Values]:
+    """Return the share of a pixel where a function is above 0, its mean over it, and its slopes.
+
+    By the values at the pixel's centre and those of its neighbours.
+    """
+    along, bend = slope(value - up, down - value)
+    across, more = slope(value - left, right - value)
+    mean = value + (bend + more) / _MEAN_BEND
+    share = half_plane(mean, np.maximum(along, across), np.minimum(along, across))
+    return share, mean, along, across
+
+
+def slope(before: Values, after: Values) -> tuple[Values, Values]:
+    """Size of a slope and its change, given the differences to both neighbours.
+
+    About an extremum, or beside pixels that have no value, it is the smaller difference.
+    """
+    even = before * after > ZERO
+    smaller = np.fmin(np.abs(before), np.abs(after))
+    smaller = select(np.isnan(smaller), ZERO, smaller)
+    return select(even, np.abs(before + after) / TWO, smaller), select(even, after - before, ZERO)
+
+
+def half_plane(value: Values, steep: Values, gentle: Values) -> Values:
+    """Area of a unit square where ``value + steep x + gentle y`` is above 0, about its centre."""
+    steep = np.maximum(steep, LEAST)
+    gentle = np.maximum(gentle, _GENTLEST * steep)
+    half, rest = (steep + gentle) / TWO, (steep - gentle) / TWO
+    # the integral of the step over the square: second differences of a parabola
+    a, b = np.maximum(value + half, ZERO), np.maximum(value + rest, ZERO)
+    c, d = np.maximum(value - rest, ZERO), np.maximum(value - half, ZERO)
+    area = a * a - b * b - c * c + d * d
+    share = np.minimum(np.maximum(area / (TWO * steep * gentle), ZERO), ONE)
+    # from where on nothing is left of the differences but rounding; and NaN is nowhere
+    return select(value >= half, ONE, select(np.isnan(value), ZERO, share))
+
+
+def select(
+    condition: NDArray[np.bool_], one: Values | np.float32, other: Values | np.float32
+) -> Values:
+    """Return one number where a condition holds, and else the other."""
+    return np.where(condition, one, other)
 
 
 def _at_border(positive: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -190,73 +199,16 @@ def _at_border(positive: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return border
 
 
-def overlapped(one: Plane, other: Plane) -> Plane:
-    """Share of each pixel (H, W) that lies in both of two shapes, given the share in either.
-
-    Two borders in one pixel are mostly nearly parallel, as of a surface and of its own shadow: the
-    shares then overlap as far as they can, or not at all if the borders face each other. Across
-    each other they overlap by their product.
-    """
-    lane = LANES.find("overlapped")
-    if lane is not None:
-        shared: Plane = lane(one, other)
-        return shared
-    both = one * other
-    at = np.flatnonzero((one > 0) & (one < 1) & (other > 0) & (other < 1))
-    if not at.size:
-        return both
-    neighbours = _neighbours(one.shape, at)
-    slopes = [[p.ravel()[to] - p.ravel()[of] for of, to in neighbours] for p in (one, other)]
-    (x, y), (u, v) = slopes
-    size = np.sqrt((x * x + y * y) * (u * u + v * v))
-    cosine = (x * u + y * v) / np.maximum(size, np.float32(1e-9))
-    first, second = one.ravel()[at], other.ravel()[at]
-    across = first * second
-    along = np.where(cosine > 0, np.minimum(first, second), np.maximum(first + second - 1, 0))
-    both.ravel()[at] = across + cosine * cosine * (along - across)
-    return both
-
-
-_Pairs = tuple[tuple[NDArray[np.intp], NDArray[np.intp]], tuple[NDArray[np.intp], NDArray[np.intp]]]
-
-
-def _neighbours(shape: tuple[int, ...], at: NDArray[np.intp]) -> _Pairs:
-    """Return the pixels above and below, and left and right, of some pixels, by index.
+def _neighbours(shape: tuple[int, ...], at: NDArray[np.intp]) -> tuple[NDArray[np.intp], ...]:
+    """Return the pixels above, below, left and right of some pixels, by index.
 
     Beyond the edge, the neighbour on the other side stands for the one that is not there.
     """
     height, width = shape
     row, column = np.divmod(at, width)
-    up = np.where(row > 0, at - width, at + width * (height > 1))
-    down = np.where(row < height - 1, at + width, at - width * (height > 1))
-    left = np.where(column > 0, at - 1, at + (width > 1))
-    right = np.where(column < width - 1, at + 1, at - (width > 1))
-    return (up, down), (left, right)
-
-
-def _slope(before: Plane, after: Plane) -> tuple[Plane, Plane]:
-    """Size of a slope and its change, given the differences to both neighbours.
-
-    About an extremum, or beside pixels that have no value, it is the smaller difference.
-    """
-    even = before * after > 0
-    smaller = np.fmin(np.abs(before), np.abs(after))
-    slope = np.where(even, np.abs(before + after) / 2, smaller)
-    slope[np.isnan(slope)] = 0
-    return slope, np.where(even, after - before, np.float32(0))
-
-
-def _half_plane(value: Plane, steep: Plane, gentle: Plane) -> Plane:
-    """Area of a unit square where ``value + steep x + gentle y`` is above 0, about its centre."""
-    steep = np.maximum(steep, np.float32(1e-9))
-    gentle = np.maximum(gentle, np.float32(1e-2) * steep)
-    area = np.zeros_like(value)
-    half, rest = (steep + gentle) / 2, (steep - gentle) / 2
-    # the integral of the step over the square: second differences of a parabola
-    for sign, offset in ((1, half), (-1, rest), (-1, -rest), (1, -half)):
-        part = np.maximum(value + offset, np.float32(0))
-        area += sign * part * part
-    share = single(np.clip(area / (2 * steep * gentle), 0, 1))
-    share[value >= half] = 1  # where nothing is left of the differences but rounding
-    share[np.isnan(share)] = 0
-    return share
+    return (
+        np.where(row > 0, at - width, at + width * (height > 1)),
+        np.where(row < height - 1, at + width, at - width * (height > 1)),
+        np.where(column > 0, at - 1, at + (width > 1)),
+        np.where(column < width - 1, at + 1, at - (width > 1)),
+    )

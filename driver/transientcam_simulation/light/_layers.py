@@ -8,9 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.base import Moments, Scatter, SparseResponses
-from transientcam_simulation.compiled import CHUNK, LANES
+from transientcam_simulation.compiled import CHUNK
+from transientcam_simulation.light import (
+    _compiled_light as compiled_light,
+    _compiled_shadows as compiled_shadows,
+)
 from transientcam_simulation.light._bundle import Region, inside, numbers
-from transientcam_simulation.light._coverage import Plane, overlapped
+from transientcam_simulation.light._coverage import Plane
 from transientcam_simulation.light._hit_points import LitEnds
 from transientcam_simulation.light._paths import Lit, scatter_of, sparse_image
 from transientcam_simulation.light._still import StillLight
@@ -46,22 +50,7 @@ class Shadow:
 
 @dataclass(frozen=True, slots=True)
 class _Dimmed:
-    """Shares (h, w) of the light by a chain of mirrors that are left in pixels of a region."""
-
-    chain: int
-    region: Region
-    light: Plane
-
-    @property
-    def places(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Rows and columns in the region of pixels that have not all; rounding may add to it."""
-        rows, columns = np.nonzero(self.light != 1)
-        return rows, columns
-
-
-@dataclass(frozen=True, slots=True)
-class _Dark:
-    """What shadows (N) leave of light, as lanes take it.
+    """What shadows (N) leave of light.
 
     Attributes
     ----------
@@ -73,21 +62,24 @@ class _Dark:
         (N, H, C) whether any pixel of successive chunks of a region's row has less than all.
     """
 
-    chains: NDArray[np.intp]
-    regions: NDArray[np.intp]
+    chains: NDArray[np.int64]
+    regions: NDArray[np.int64]
     light: NDArray[np.float32]
     marks: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, shadows: list[Shadow], shape: tuple[int, int]) -> "_Dark":
-        """Make one of shadows, with nothing known of the light yet."""
-        height, width = shape
-        return cls(
-            np.array([each.chain for each in shadows], dtype=np.intp),
-            np.array([numbers(each.region) for each in shadows], dtype=np.intp).reshape(-1, 4),
-            np.empty((len(shadows), *shape), dtype=np.float32),
+    def by(cls, shadows: list[Shadow], uncovered: Plane) -> "_Dimmed":
+        """Return what shadows leave of the light on what is not covered, by shares (H, W)."""
+        height, width = uncovered.shape
+        dimmed = cls(
+            np.array([each.chain for each in shadows], dtype=np.int64),
+            np.array([numbers(each.region) for each in shadows], dtype=np.int64).reshape(-1, 4),
+            np.empty((len(shadows), height, width), dtype=np.float32),
             np.zeros((len(shadows), height, -(-width // CHUNK)), dtype=np.bool_),
         )
+        for each, light, marks in zip(shadows, dimmed.light, dimmed.marks, strict=True):
+            compiled_shadows.dimmed(uncovered, each.left, light, marks, numbers(each.region))
+        return dimmed
 
 
 class MovingResponses:
@@ -120,30 +112,7 @@ class MovingResponses:
         self._shape = still.height, still.width
         self._layers = layers
         self._uncovered = uncovered
-        self._dark: _Dark | None = None
-        self._dimmed = self._dim_all(shadows)
-
-    def _dim_all(self, shadows: list[Shadow]) -> list[_Dimmed]:
-        """Return what shadows leave of the light on what is not covered."""
-        lane = LANES.find("dimmed")
-        if lane is None:
-            return [self._dim(each) for each in shadows]
-        dark = self._dark = _Dark.of(shadows, self._shape)
-        for k, each in enumerate(shadows):
-            planes = self._uncovered, each.left, dark.light[k], dark.marks[k]
-            lane(*planes, numbers(each.region))
-        return [
-            _Dimmed(each.chain, each.region, light[each.region])
-            for each, light in zip(shadows, dark.light, strict=True)
-        ]
-
-    def _dim(self, shadow: Shadow) -> _Dimmed:
-        """Return what a shadow leaves."""
-        seen, left = self._uncovered[shadow.region], shadow.left[shadow.region]
-        on = np.nonzero((left < 1) & (seen > 0))
-        light = np.ones_like(left)
-        light[on] = overlapped(seen, left)[on] / np.maximum(seen[on], np.float32(1e-9))
-        return _Dimmed(shadow.chain, shadow.region, light)
+        self._dimmed = _Dimmed.by(shadows, uncovered)
 
     @property
     def kind(self) -> Literal["sparse", "dense"]:
@@ -180,32 +149,20 @@ class MovingResponses:
             return moments
         of_rays, places = self._of_layers(self._layers, frequency_hz), self._layers.places
         top, left = (of.start for of in self.region)
-        lane = LANES.find("layered")
-        if lane is not None:
-            numbers_of = of_rays.view(np.float32).reshape(len(of_rays), -1)
-            lane(moments.view(np.float32), places, numbers_of, self._layers.share, top, left)
-            return moments
-        of_rays *= self._layers.share
-        for part in self._layers.parts:
-            rows, columns = places[:, part]
-            moments[rows - top, columns - left] += of_rays[part]
+        numbers_of = of_rays.view(np.float32).reshape(len(of_rays), -1)
+        planes = moments.view(np.float32)
+        compiled_light.layered(planes, places, numbers_of, self._layers.share, top, left)
         return moments
 
     def _of_still(self, frequency_hz: float) -> Moments:
         """Moments of the region, of what stands still and is not covered."""
         each, total = self._still.phasors(frequency_hz)
-        lane, dark = LANES.find("remaining"), self._dark
-        if lane is not None and dark is not None:
-            of = dark.chains, dark.regions, dark.light, dark.marks
-            planes = total.view(np.float32), each.view(np.float32)
-            left: NDArray[np.float32] = lane(*planes, *of, self._uncovered, numbers(self.region))
-            return left.view(total.dtype)
-        moments = total[self.region].copy()
-        for dimmed in self._dimmed:
-            _darken(moments, self.region, dimmed, each[dimmed.chain])
-        if self._layers is not None:
-            moments *= self._uncovered[self.region]
-        return moments
+        dimmed = self._dimmed
+        left = compiled_light.remaining(
+            total.view(np.float32), each.view(np.float32), dimmed.chains, dimmed.regions,
+            dimmed.light, dimmed.marks, self._uncovered, numbers(self.region),
+        )  # fmt: skip
+        return left.view(total.dtype)
 
     def _of_layers(self, layers: Layers, frequency_hz: float) -> Moments:
         """Moments of the points of layers, in single precision."""
@@ -216,17 +173,11 @@ class MovingResponses:
                 brightness[on] += way.weight
             return brightness
         of_rays = np.zeros(layers.places.shape[1], dtype=np.complex64)
-        lane = LANES.find("turned")
         for _chain, way in layers.lit.ways:
-            phase_rad = _phases(way.delay_s, 2 * np.pi * frequency_hz)
+            phase_rad = compiled_light.phases(way.delay_s, 2 * np.pi * frequency_hz)
             cosine, sine = np.cos(phase_rad), np.sin(phase_rad)
-            if lane is not None:
-                pairs = of_rays.view(np.float32).reshape(-1, 2)
-                lane(pairs, way.on, way.weight, cosine, sine)
-                continue
-            on = slice(None) if len(way.on) == len(of_rays) else way.on
-            of_rays.real[on] += way.weight * cosine
-            of_rays.imag[on] += way.weight * sine
+            pairs = of_rays.view(np.float32).reshape(-1, 2)
+            compiled_light.turned(pairs, way.on, way.weight, cosine, sine)
         scatter = scatter_of(self.scene, layers.lit.ends.index)
         if scatter is not None:
             of_rays *= scatter.transfer(frequency_hz)
@@ -283,11 +234,13 @@ class MovingResponses:
         delay_s, weight, scatter = self._still.returns
         weight = weight * self._uncovered.ravel()
         chains = len(self._still.lit.weight)
-        for dimmed in self._dimmed:
-            rows, columns = dimmed.places
-            top, left = (of.start for of in dimmed.region)
-            pixel = np.ravel_multi_index((rows + top, columns + left), self._shape)
-            weight[dimmed.chain :: chains, pixel] *= dimmed.light[rows, columns]
+        dimmed = self._dimmed
+        for chain, light, of in zip(dimmed.chains, dimmed.light, dimmed.regions, strict=True):
+            top, left, rows, columns = of
+            part = light[top : top + rows, left : left + columns]
+            row, column = np.nonzero(part != 1)
+            pixel = np.ravel_multi_index((row + top, column + left), self._shape)
+            weight[chain::chains, pixel] *= part[row, column]
         delays, weights, spreads = [delay_s], [weight], [scatter]
         if self._layers is not None:
             for part in self._layers.parts:
@@ -316,28 +269,5 @@ def uncovered_by(layers: Layers | None, shape: tuple[int, int]) -> Plane:
     uncovered = np.ones(shape, dtype=np.float32)
     if layers is None:
         return uncovered
-    lane = LANES.find("uncover")
-    if lane is not None:
-        lane(uncovered, layers.places, layers.share)
-        return uncovered
-    for part in layers.parts:
-        rows, columns = layers.places[:, part]
-        uncovered[rows, columns] -= layers.share[part]
-    np.maximum(uncovered, 0, out=uncovered)  # what rounding leaves
+    compiled_light.uncover(uncovered, layers.places, layers.share)
     return uncovered
-
-
-def _phases(delay_s: NDArray[np.float64], angular_hz: float) -> NDArray[np.float32]:
-    lane = LANES.find("phases")
-    if lane is None:
-        return (angular_hz * delay_s).astype(np.float32)
-    phase_rad: NDArray[np.float32] = lane(delay_s, angular_hz)
-    return phase_rad
-
-
-def _darken(moments: Moments, region: Region, dimmed: _Dimmed, each: Moments) -> None:
-    """Take what a shadow leaves out of light by one chain (H, W) from the moments of a region."""
-    rows, columns = dimmed.places
-    part = moments[inside(dimmed.region, region)]
-    taken = (1 - dimmed.light[rows, columns]) * each[dimmed.region][rows, columns]
-    part[rows, columns] = part[rows, columns] - taken

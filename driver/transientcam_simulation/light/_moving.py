@@ -13,23 +13,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.compiled import LANES
-from transientcam_simulation.light._bundle import Bundle, Region, inside, overlap, union
+from transientcam_simulation.light import (
+    _compiled_chunks as compiled_chunks,
+    _compiled_overlaps as compiled_overlaps,
+)
+from transientcam_simulation.light._bundle import (
+    Bundle,
+    Region,
+    inside,
+    numbers,
+    overlap,
+    union,
+)
 from transientcam_simulation.light._coverage import Plane
 from transientcam_simulation.light._hit_points import Ends
 from transientcam_simulation.light._layers import Layers, MovingResponses, Shadow, uncovered_by
 from transientcam_simulation.light._paths import ImageLight, image_lights
 from transientcam_simulation.light._shares import (
+    alone,
     around,
     grown_tiles,
-    hide,
+    meeting,
     seen,
     shade,
     shown_tiles,
 )
 from transientcam_simulation.light._still import Sight, StillLight, segments
 from transientcam_simulation.scene import Scene, Shape
-
-_AWAY = np.array([0.0, 0.0, -1e6])  # where surfaces that move are put while the rest is traced
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,21 +62,11 @@ class _Seen:
 
         Rows and columns (2, P); shares, distances, and points and ways by component (8, P).
         """
-        bundle = self.sight.bundle
-        lane = LANES.find("points")
-        if lane is not None:
-            corner, apex = (of.start for of in self.region), bundle.apex.astype(np.float32)
-            lane(self.share, self.at_m, *bundle.way, *corner, apex, start, places, lines)
-            return
-        place = np.nonzero(self.share)
-        mine = slice(start, start + len(place[0]))
-        rows, columns = (on + of.start for on, of in zip(place, self.region, strict=True))
-        places[:, mine] = rows, columns
-        lines[0, mine], at_m = self.share[place], self.at_m[place]
-        lines[1, mine] = at_m
-        for axis, (each, start_m) in enumerate(zip(bundle.way, bundle.apex, strict=True)):
-            way = each[rows, columns]
-            lines[2 + axis, mine], lines[5 + axis, mine] = way * at_m + np.float32(start_m), way
+        bundle, corner = self.sight.bundle, numbers(self.region)[:2]
+        apex = bundle.apex.astype(np.float32)
+        compiled_chunks.points(
+            self.share, self.at_m, *bundle.way, *corner, apex, start, places, lines
+        )
 
 
 class MovingLight:
@@ -87,8 +87,7 @@ class MovingLight:
         self.scene = scene
         self.still = still
         self._soft = soft
-        if soft:
-            LANES.want()
+        LANES.want()
         self._movers = tuple(k for k, each in enumerate(scene.surfaces) if each.motions)
         self._lights = tuple(image_lights(scene))
         self._sights = still.lines_of_sight(soft=soft)
@@ -114,7 +113,7 @@ class MovingLight:
     def _cover(self, shapes: list[Shape], sight: Sight) -> Iterator[_Seen]:
         """Shares of pixels that surfaces cover, where nothing that stands still is before them."""
         bundle = sight.bundle
-        _tiles, regions = bundle.meeting(shapes)
+        _tiles, regions = meeting(shapes, bundle)
         for index, shape, region in zip(self._movers, shapes, regions, strict=True):
             if region is None:
                 continue
@@ -131,11 +130,10 @@ class MovingLight:
                 if both is None:
                     continue
                 mine, its = inside(both, one.region), inside(both, other.region)
-                hide(
-                    (one.share[mine], one.at_m[mine], left[k][mine]),
-                    (other.share[its], other.at_m[its], share[its]),
-                    soft=self._soft,
-                )
+                compiled_overlaps.hide(
+                    one.share[mine], one.at_m[mine], left[k][mine],
+                    other.share[its], other.at_m[its], share[its], self._soft,
+                )  # fmt: skip
         shown = zip(found, left, strict=True)
         return [replace(each, share=share) for each, share in shown if share.any()]
 
@@ -160,14 +158,12 @@ class MovingLight:
         ).lit(
             self._lights,
             movers=self._movers,
-            around=around(places[0], places[1], region) if self._soft else None,
+            around=around(places[0], places[1], region) if self._soft else alone(ends[-1]),
         )
         parts = tuple(slice(*pair) for pair in pairwise(ends))
         return Layers(places, share, lit, parts)
 
-    def _shadow(
-        self, shapes: list[Shape], chain: int, shows: NDArray[np.bool_] | None
-    ) -> Shadow | None:
+    def _shadow(self, shapes: list[Shape], chain: int, shows: NDArray[np.bool_]) -> Shadow | None:
         """Share of the light by a chain of mirrors that is left on what stands still.
 
         Only near tiles that show any of it: each shape takes light at the edge of another one by
@@ -191,12 +187,3 @@ class MovingLight:
         if not on.any():
             return []
         return segments(light, point, on.reshape(self.still.height, self.still.width))
-
-
-def still_scene(scene: Scene) -> Scene:
-    """Return the scene without what moves; surfaces keep their indices."""
-    surfaces = tuple(
-        replace(each, shape=each.shape.moved(_AWAY), motions=()) if each.motions else each
-        for each in scene.surfaces
-    )
-    return replace(scene, surfaces=surfaces)

@@ -345,11 +345,11 @@ def normals_at(scene: Scene, point: Points, surface: NDArray[np.intp]) -> Points
     return normals
 
 
-def beam(light: Light, cosine: NDArray[np.float64]) -> NDArray[np.float64]:
+def beam(light: Light, cosine: NDArray[np.floating]) -> NDArray[np.floating]:
     """Intensity relative to the beam's axis."""
     if light.beam_exponent == 0:
         return np.ones_like(cosine)
-    intensity: NDArray[np.float64] = np.maximum(cosine, 0) ** light.beam_exponent
+    intensity: NDArray[np.floating] = np.maximum(cosine, 0) ** light.beam_exponent
     return intensity
 
 

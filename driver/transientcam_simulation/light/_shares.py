@@ -1,45 +1,84 @@
-"""Which shares of pixels shapes cover along lines through one point, by lanes that are ready.
+"""Which shares of pixels shapes cover along lines through one point.
 
 ``soft`` edges take shares of the pixels that they cross; others run between pixels.
 """
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_simulation.compiled import LANES
-from transientcam_simulation.light._bundle import NOWHERE, TILE, Bundle, Region, numbers
-from transientcam_simulation.light._coverage import (
-    TOUCHING,
-    Crossing,
-    Plane,
-    axes_of,
-    covered,
-    covered_among,
-    crossing,
-    overlapped,
+from transientcam_simulation.light import (
+    _compiled_chunks as compiled_chunks,
+    _compiled_overlaps as compiled_overlaps,
+    _compiled_shadows as compiled_shadows,
+    _compiled_silhouettes as compiled_silhouettes,
+    _compiled_tiles as compiled_tiles,
 )
+from transientcam_simulation.light._bundle import NOWHERE, TILE, Bundle, Region, numbers
+from transientcam_simulation.light._coverage import Crossing, Plane, covered, crossing
 from transientcam_simulation.scene import Ellipsoid, Shape
 
-Hidden = tuple[Plane, Plane, Plane]
-"""Of a shape, its shares of pixels, the t of its front, and which shares are left to be seen."""
-_TINY = np.float32(1e-9)
 
-
+@dataclass(frozen=True)
 class Around:
     """Which points are above, below, left and right of each, by index (4, P); P is none."""
 
-    def __init__(self, beside: NDArray[np.int32]) -> None:
-        self.beside = beside
+    beside: NDArray[np.int32]
 
     @cached_property
-    def reach(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-        """Where the neighbours of successive points are, for lanes: see `compiled_chunks.reach`."""
-        lane = LANES.find("reach")
-        assert lane is not None  # noqa: S101  (lanes are made ready together)
-        reach, rim = lane(self.beside)
-        return reach, rim
+    def reach(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Where the neighbours of successive points are: see `compiled_chunks.reach`."""
+        return compiled_chunks.reach(self.beside)
+
+    def among(self, on: NDArray[np.intp]) -> "Around":
+        """Return what is around some of the points, by their own indices."""
+        if len(on) == self.beside.shape[1]:
+            return self
+        return Around(compiled_chunks.among(on, self.beside))
+
+
+def around(rows: NDArray[np.int32], columns: NDArray[np.int32], region: Region) -> Around:
+    """Return what is around points in a region of an image."""
+    return Around(compiled_chunks.around(rows, columns, *numbers(region)))
+
+
+def alone(points: int) -> Around:
+    """Return that nothing is around so many points: each is covered as a whole, or not at all."""
+    return Around(np.full((4, points), points, dtype=np.int32))
+
+
+def axes_of(shapes: Iterable[Shape]) -> NDArray[np.float64]:
+    """Return (N, 2, 3) centres and radii of the ellipsoids among shapes."""
+    axes = [(each.centre, each.radii) for each in shapes if isinstance(each, Ellipsoid)]
+    return np.array(axes, dtype=np.float64).reshape(-1, 2, 3)
+
+
+def meeting(shapes: list[Shape], bundle: Bundle) -> tuple[NDArray[np.bool_], list[Region | None]]:
+    """Return which tiles (N, R, C) have lines that may meet shapes, and regions that hold them.
+
+    A region is None if there are none.
+    """
+    limits = np.empty((len(shapes), 2, 2))
+    round_ = [isinstance(each, Ellipsoid) for each in shapes]
+    limits[round_] = compiled_tiles.tangents(axes_of(shapes), bundle.apex, bundle.frame)
+    for limit, shape in zip(limits, shapes, strict=True):
+        if not isinstance(shape, Ellipsoid):
+            limit[:] = [shape.tangents(bundle.apex, bundle.frame[0], k) for k in bundle.frame[1:]]
+    tiles, spans = compiled_tiles.met(limits, bundle.low, bundle.high, *bundle.rows)
+    height, width = bundle.way[0].shape
+    return tiles, [
+        (
+            slice(top * TILE, min(bottom * TILE, height)),
+            slice(left * TILE, min(right * TILE, width)),
+        )
+        if bottom
+        else None
+        for top, bottom, left, right in spans.tolist()
+    ]
 
 
 def seen(
@@ -49,143 +88,67 @@ def seen(
 
     ``fills`` are shares of all pixels, (H, W), or (1, W) where all are the same.
     """
-    lane = LANES.find("seen")
-    if lane is not None and soft and isinstance(shape, Ellipsoid):
+    if isinstance(shape, Ellipsoid):
         lines = *bundle.way, bundle.near, bundle.far
-        share, at = lane(axes_of([shape])[0], bundle.apex, *lines, fills, numbers(region))
-        return share, at
+        axes = axes_of([shape])[0]
+        return compiled_silhouettes.seen(axes, bundle.apex, *lines, fills, numbers(region), soft)
     way, near, far = bundle.within(region)
     cross = crossing(shape, bundle.apex, way)
-    share, root = _share(cross, soft=soft, rooted=True)
-    at = cross.entered(root)
+    share = _share(cross, soft=soft)
     share *= np.broadcast_to(fills, bundle.way[0].shape)[region]
-    share[~((at > near) & (at < far))] = 0
-    return share, at
+    share[~((cross.at > near) & (cross.at < far))] = 0
+    return share, cross.at
 
 
-def shown_tiles(shown: Plane) -> NDArray[np.bool_] | None:
-    """Return tiles (R, C) in which anything is shown, given shares of all pixels; None for all."""
-    lane = LANES.find("shown_tiles")
-    if lane is None:
-        return None
-    tiles: NDArray[np.bool_] = lane(shown, TILE)
-    return tiles
+def shown_tiles(shown: Plane) -> NDArray[np.bool_]:
+    """Return tiles (R, C) in which anything is shown, given shares of all pixels."""
+    return compiled_tiles.shown_tiles(shown, TILE)
 
 
-def grown_tiles(tiles: NDArray[np.bool_] | None, pixels: int) -> NDArray[np.bool_] | None:
+def grown_tiles(tiles: NDArray[np.bool_], pixels: int) -> NDArray[np.bool_]:
     """Return tiles, and those up to so many pixels from one."""
-    lane = LANES.find("grown")
-    if tiles is None or lane is None:
-        return None
-    grown: NDArray[np.bool_] = lane(tiles, -(-pixels // TILE))
-    return grown
+    return compiled_tiles.grown(tiles, -(-pixels // TILE))
 
 
 def shade(
-    shapes: list[Shape],
-    bundle: Bundle,
-    left: Plane,
-    shows: NDArray[np.bool_] | None,
-    *,
-    soft: bool,
+    shapes: list[Shape], bundle: Bundle, left: Plane, shows: NDArray[np.bool_], *, soft: bool
 ) -> list[Region]:
     """Take from shares (H, W) of light what shapes block; return the regions of those that do.
 
     Light is blocked on a bundle's lines between two of their points. It matters in tiles (R, C)
     that show it.
     """
-    tiles, regions = bundle.meeting(shapes)
-    if shows is not None:
-        tiles &= shows
-    lane = LANES.find("shade")
-    axes = axes_of(shapes)
-    if lane is not None and soft and len(axes) == len(shapes):
-        of = np.array([numbers(each or NOWHERE) for each in regions])
-        lines = *bundle.way, bundle.near, bundle.far
-        blocks = lane(axes, bundle.apex, *lines, tiles, TILE, of, TOUCHING, left)
-        return [each for each, does in zip(regions, blocks, strict=True) if each and does]
+    tiles, regions = meeting(shapes, bundle)
+    tiles &= shows
+    lines = *bundle.way, bundle.near, bundle.far
     blocking: list[Region] = []
-    for shape, region in zip(shapes, regions, strict=True):
-        if region is None:
+    for is_round, group in groupby(range(len(shapes)), lambda k: isinstance(shapes[k], Ellipsoid)):
+        some = list(group)
+        if is_round:
+            axes, of = axes_of(shapes[k] for k in some), [regions[k] or NOWHERE for k in some]
+            where = tiles[some[0] : some[-1] + 1], TILE, np.array([numbers(each) for each in of])
+            blocks = compiled_shadows.shade(axes, bundle.apex, *lines, *where, soft, left)
+            blocking += [each for each, does in zip(of, blocks, strict=True) if does]
             continue
-        way, near, far = bundle.within(region)
-        cross = crossing(shape, bundle.apex, way)
-        dark = _share(cross, soft=soft)[0] * cross.between(near, far)
-        if dark.any():
-            left[region] = overlapped(left[region], 1 - dark)
-            blocking.append(region)
+        for k in some:
+            region = regions[k]
+            if region is not None and _shade_flat(shapes[k], bundle, left, region, soft=soft):
+                blocking.append(region)
     return blocking
 
 
-def hide(one: Hidden, other: Hidden, *, soft: bool) -> None:
-    """Take from what is left of two shares what each shape hides of the other."""
-    lane = LANES.find("hide")
-    if lane is not None and soft:
-        lane(*one, *other)
-        return
-    (share, at, left), (its_share, its_at, rest) = one, other
-    hidden = overlapped(share, its_share)
-    if not hidden.any():
-        return
-    nearer = _above(its_at - at, soft=soft)
-    rest *= 1 - nearer * hidden / np.maximum(its_share, _TINY)
-    left *= 1 - (1 - nearer) * hidden / np.maximum(share, _TINY)
+def _shade_flat(shape: Shape, bundle: Bundle, left: Plane, region: Region, *, soft: bool) -> bool:
+    """Take what a rectangle blocks in a region; whether it blocks any."""
+    way, near, far = bundle.within(region)
+    cross = crossing(shape, bundle.apex, way)
+    dark = _share(cross, soft=soft) * cross.between(near, far)
+    blocks = bool(dark.any())
+    if blocks:
+        left[region] = compiled_overlaps.overlapped(left[region], 1 - dark)
+    return blocks
 
 
-def _above(values: Plane, *, soft: bool) -> Plane:
-    """Return the share of each pixel (h, w) where values are above 0."""
-    return covered(values, rooted=False)[0] if soft else (values > 0).astype(np.float32)
-
-
-def share_around(cross: Crossing, counts: NDArray[np.bool_], around: Around | None) -> Plane:
-    """Return the share of the pixels around points that a shape covers, where it counts.
-
-    Without ``around`` edges are not soft.
-    """
-    values = [np.where(counts, each, np.float32(np.nan)) for each in cross.inside]
-    if around is None:
-        return _product([(each > 0).astype(np.float32) for each in values])
-    return _product([covered_among(each, around.beside) for each in values])
-
-
-def around(rows: NDArray[np.int32], columns: NDArray[np.int32], region: Region) -> Around:
-    """Return what is around points in a region of an image."""
-    top, left, height, width = numbers(region)
-    lane = LANES.find("around")
-    if lane is not None:
-        return Around(lane(rows, columns, top, left, height, width))
-    place = np.full((height + 2, width + 2), len(rows), dtype=np.int32)
-    rows, columns = rows - top + 1, columns - left + 1
-    place[rows, columns] = np.arange(len(rows))
-    steps = ((-1, 0), (1, 0), (0, -1), (0, 1))
-    return Around(np.array([place[rows + down, columns + right] for down, right in steps]))
-
-
-def among(on: NDArray[np.intp], around: Around) -> Around:
-    """Return what is around some of the points, by their own indices."""
-    beside = around.beside
-    if len(on) == beside.shape[1]:
-        return around
-    lane = LANES.find("among")
-    if lane is not None:
-        return Around(lane(on, beside))
-    place = np.full(beside.shape[1] + 1, len(on), dtype=np.int32)
-    place[on] = np.arange(len(on))
-    return Around(place[beside.take(on, axis=1)])
-
-
-def _share(cross: Crossing, *, soft: bool, rooted: bool = False) -> tuple[Plane, Plane]:
-    """Share of each pixel that a shape covers; with the mean root that says where, if asked."""
-    if not soft:
-        shares = [_above(each, soft=False) for each in cross.inside]
-        root = np.sqrt(np.maximum(cross.inside[0], 0)) if rooted else shares[0]
-        return _product(shares), root
-    parts = [covered(each, rooted=rooted) for each in cross.inside]
-    return _product([share for share, _root in parts]), parts[0][1]
-
-
-def _product(planes: list[Plane]) -> Plane:
-    product = planes[0]
-    for plane in planes[1:]:
-        product = product * plane
-    return product
+def _share(cross: Crossing, *, soft: bool) -> Plane:
+    """Share of each pixel that a rectangle covers."""
+    parts = [covered(each) if soft else (each > 0).astype(np.float32) for each in cross.inside]
+    return parts[0] * parts[1]

@@ -244,7 +244,7 @@ class StillLight:
                     continue
                 mirror = surfaces[k].mirror
                 cross = crossing(mirror, apex, bundle.way)
-                shares = [covered(each, rooted=False)[0] for each in cross.inside]
+                shares = [covered(each) for each in cross.inside]
                 share = fills * np.minimum.reduce(
                     shares if soft else [each > 0 for each in cross.inside]
                 )

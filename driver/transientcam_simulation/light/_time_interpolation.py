@@ -3,14 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.base import Moments
-from transientcam_simulation.compiled import LANES
+from transientcam_simulation.light import _compiled_light as compiled_light
 from transientcam_simulation.light._bundle import Region, numbers, union
 from transientcam_simulation.light._coverage import single
 from transientcam_simulation.light._layers import MovingResponses
@@ -124,20 +123,15 @@ class Between:
     def moments_in(self, region: Region, frequency_hz: float) -> Moments:
         """Moments of a region that holds all that differs."""
         (one, first), (other, second) = self._parts
-        lane = LANES.find("blended")
-        if lane is not None:
-            parts = (
-                (np.float32(share), of.differing(frequency_hz).view(np.float32), numbers(of.region))
-                for share, of in self._parts
-            )
-            total = first.unchanged(frequency_hz)
-            plane = total.view(np.float32)
-            of = plane, plane.shape[1] // total.shape[1], numbers(region)
-            mixed: NDArray[np.float32] = lane(*of, *chain.from_iterable(parts))
-            return mixed.view(np.complex64) if frequency_hz else mixed
-        moments = np.float32(one) * first.moments_in(region, frequency_hz)
-        moments += np.float32(other) * second.moments_in(region, frequency_hz)
-        return moments
+        total = first.unchanged(frequency_hz)
+        plane = total.view(np.float32)
+        mixed = compiled_light.blended(
+            plane, plane.shape[1] // total.shape[1], numbers(region),
+            np.float32(one), first.differing(frequency_hz).view(np.float32), numbers(first.region),
+            np.float32(other), second.differing(frequency_hz).view(np.float32),
+            numbers(second.region),
+        )  # fmt: skip
+        return mixed.view(np.complex64) if frequency_hz else mixed
 
     @cached_property
     def reflectance(self) -> NDArray[np.float32]:

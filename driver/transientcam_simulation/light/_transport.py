@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,21 +22,24 @@ from transientcam_simulation.effects import (
     Scattering,
 )
 from transientcam_simulation.light._bundle import Region
+from transientcam_simulation.light._compiler import load_compiled
 from transientcam_simulation.light._facts import SceneFacts, cosine_to_axis
 from transientcam_simulation.light._followed import FollowedRays
-from transientcam_simulation.light._layers import MovingResponses
-from transientcam_simulation.light._moving import MovingLight, still_scene
 from transientcam_simulation.light._radiosity import Interreflection, WithInterreflection
 from transientcam_simulation.light._rays import camera_rays
 from transientcam_simulation.light._recent import Recent
 from transientcam_simulation.light._still import StillLight
-from transientcam_simulation.light._time_interpolation import Between, Steps
 from transientcam_simulation.light._variants import (
+    still_scene,
     without_gloss,
     without_mirrors,
     without_scattering,
 )
 from transientcam_simulation.scene import Scene
+
+if TYPE_CHECKING:
+    from transientcam_simulation.light._layers import MovingResponses
+    from transientcam_simulation.light._time_interpolation import Between
 
 Values = NDArray[np.float64]
 KEPT_PIXELS: Final = 40_000
@@ -64,12 +67,14 @@ class Wanted:
 class View:
     """What the camera sees: impulse responses, and the reflectance of the pixels' surfaces (H, W).
 
-    ``region``: rows and columns of the pixels that differ from the background; None: all may.
+    ``region``: rows and columns of the pixels that differ from the background, and
+    ``moments_in`` their moments, or those of a larger region; None: all may differ.
     """
 
     responses: Responses
     reflectance: Callable[[], NDArray[np.float32] | np.float32]
     region: Region | None = None
+    moments_in: Callable[[Region, float], Moments] | None = None
 
     def moments(
         self, frequency_hz: float, region: Region | None
@@ -77,8 +82,8 @@ class View:
         """Moments of all pixels, or of a region that holds all that differs."""
         if region is None:
             return self.responses.moments(frequency_hz)
-        if isinstance(self.responses, MovingResponses | Between):
-            return self.responses.moments_in(region, frequency_hz)
+        if self.moments_in is not None:
+            return self.moments_in(region, frequency_hz)
         return self.responses.moments(frequency_hz)[region]
 
 
@@ -109,8 +114,8 @@ class Latest:
         return self._last[1]
 
 
-def _view_of(now: MovingResponses | Between) -> View:
-    return View(now, lambda: now.reflectance, now.region)
+def _view_of(now: "MovingResponses | Between") -> View:
+    return View(now, lambda: now.reflectance, now.region, now.moments_in)
 
 
 class Scenery(Protocol):
@@ -226,7 +231,13 @@ class SurfaceScenery:
         return cosine_to_axis(self._camera, camera_rays(self._camera, **self._size)).reshape(shape)
 
     def view(self, wanted: Wanted) -> Views:
-        """Trace a still scene once; of a moving one what moves, for each time."""
+        """Trace a still scene once; of a moving one what moves, for each time.
+
+        Raises
+        ------
+        CompilerMissing
+            It moves, and there is no compiler.
+        """
         # what moves is remembered by its views, which belong to one camera
         if self.moves:
             return self._traced(wanted)
@@ -252,6 +263,10 @@ class SurfaceScenery:
         if not self.moves:
             view = self._still_view(still, followed, tolerance if further else None)
             return Views(lambda _time_s: view, lambda _time_s: view)
+        load_compiled()
+        from transientcam_simulation.light._moving import MovingLight
+        from transientcam_simulation.light._time_interpolation import Steps
+
         moving = MovingLight(scene, still, soft=MixedPixels.name in effects)
         if further:
             at = Latest(lambda time_s: self._lit_view(moving.at(time_s), tolerance))
@@ -261,7 +276,7 @@ class SurfaceScenery:
         between = Latest(lambda time_s: _view_of(steps.at(time_s)))
         return Views(between, exact, self._still_view(still, followed, None))
 
-    def _lit_view(self, now: MovingResponses, tolerance: float) -> View:
+    def _lit_view(self, now: "MovingResponses", tolerance: float) -> View:
         """View of a moving scene with light over several surfaces, computed anew."""
         width, height = self._size["width"], self._size["height"]
         light = Interreflection(now.scene, now.lit, width=width, height=height, tolerance=tolerance)

@@ -1,8 +1,12 @@
-"""Scenes without one effect of light."""
+"""Scenes without one effect of light, or without what moves."""
 
 from dataclasses import replace
 
+import numpy as np
+
 from transientcam_simulation.scene import Scene
+
+_AWAY = np.array([0.0, 0.0, -1e6])  # where surfaces that move are put while the rest is traced
 
 
 def without_mirrors(scene: Scene) -> Scene:
@@ -19,4 +23,13 @@ def without_gloss(scene: Scene) -> Scene:
 def without_scattering(scene: Scene) -> Scene:
     """Let no light enter surfaces."""
     surfaces = tuple(replace(each, scatter=None) for each in scene.surfaces)
+    return replace(scene, surfaces=surfaces)
+
+
+def still_scene(scene: Scene) -> Scene:
+    """Return the scene without what moves; surfaces keep their indices."""
+    surfaces = tuple(
+        replace(each, shape=each.shape.moved(_AWAY), motions=()) if each.motions else each
+        for each in scene.surfaces
+    )
     return replace(scene, surfaces=surfaces)

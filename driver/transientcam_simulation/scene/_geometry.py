@@ -3,10 +3,8 @@
 Lengths in m; x points right, y away from the camera, z up.
 """
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from operator import mul
 
 import numpy as np
 from numpy.typing import NDArray
@@ -223,28 +221,6 @@ class Ellipsoid:
             ahead = np.where(first > _CLEAR_OF_CURVED, first, second)
             at[met] = np.where(ahead > _CLEAR_OF_CURVED, ahead, np.inf)
         return at
-
-    def tangents(self, apex: Points, middle: Points, across: Points) -> tuple[float, float]:
-        """Lowest and highest tangent of its points' angles at an apex to a direction.
-
-        In the plane of the direction and of one across it, both unit vectors. Infinite where it
-        reaches behind the apex.
-        """
-        away, radii = (self.centre - apex).tolist(), self.radii.tolist()
-        # by numbers: each call of numpy takes as long as all of this
-        onwards, sideways = middle.tolist(), across.tolist()
-        along = sum(map(mul, away, onwards))
-        aside = sum(map(mul, away, sideways))
-        along_m = list(map(mul, radii, onwards))
-        across_m = list(map(mul, radii, sideways))
-        # planes through the apex that touch it: (aside - t along)^2 = |radii (across - t middle)|^2
-        a = along * along - sum(map(mul, along_m, along_m))
-        if along <= 0 or a <= _CLEAR:
-            return -math.inf, math.inf
-        b = along * aside - sum(map(mul, along_m, across_m))
-        c = aside * aside - sum(map(mul, across_m, across_m))
-        root = math.sqrt(max(b * b - a * c, 0.0))
-        return (b - root) / a, (b + root) / a
 
     def cells(self, edge_m: float) -> Cells:
         """Cut it along equal steps of height and of longitude."""

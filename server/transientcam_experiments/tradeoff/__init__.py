@@ -7,8 +7,24 @@ page of the results so far.
 """
 
 from transientcam_experiments.tradeoff.grid import Grid, load_grid
-from transientcam_experiments.tradeoff.measuring import Point, measure, points_of
+from transientcam_experiments.tradeoff.measuring import (
+    Point,
+    camera_before,
+    measure,
+    points_of,
+)
 from transientcam_experiments.tradeoff.records import Record, Records
-from transientcam_experiments.tradeoff.report import report
+from transientcam_experiments.tradeoff.report import file_name, report
 
-__all__ = ["Grid", "Point", "Record", "Records", "load_grid", "measure", "points_of", "report"]
+__all__ = [
+    "Grid",
+    "Point",
+    "Record",
+    "Records",
+    "camera_before",
+    "file_name",
+    "load_grid",
+    "measure",
+    "points_of",
+    "report",
+]

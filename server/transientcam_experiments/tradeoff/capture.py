@@ -1,7 +1,7 @@
 """Capture time against accuracy: one sequence on a scene, compared with the scene's truth."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -19,6 +19,8 @@ PHASES: Final = 128
 """Times of flight over one period at which densities are compared."""
 OUTLIER_M: Final = 0.1
 """A range further off than this is an outlier."""
+LONGEST_S: Final = 1e3
+"""Any capture has come by then."""
 
 QUANTITIES: Final[dict[str, str]] = {
     "capture_s": "time one capture takes, read-out included",
@@ -45,23 +47,26 @@ QUANTITIES: Final[dict[str, str]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameWithTruth:
-    """A frame, and the truth when its last image was taken."""
+    """A frame, and the truth."""
 
     raw: RawFrame
     truth: Truth
 
 
-def capture(camera: Camera, frames: int) -> list[FrameWithTruth]:
-    """Capture frames with the sequence that is set, each with its truth."""
-    assert camera.simulation is not None  # noqa: S101 - only simulated cameras are measured
+def capture(camera: Camera, frames: int, *, middle: bool = False) -> Iterator[FrameWithTruth]:
+    """Capture frames with the sequence that is set, each with its truth: of its end, or middle."""
+    simulation = camera.simulation
+    assert simulation is not None  # noqa: S101 - only simulated cameras are measured
     camera.start()
-    taken = [FrameWithTruth(camera.read_frame(), camera.simulation.truth()) for _ in range(frames)]
+    for _ in range(frames):
+        raw = camera.read_frame(timeout_s=LONGEST_S)
+        time_s = raw.device_time_s + raw.capture_s / 2 if middle else None
+        yield FrameWithTruth(raw, simulation.truth(device_time_s=time_s))
     camera.stop()
-    return taken
 
 
 def accuracy(
-    frames: list[FrameWithTruth],
+    frames: Iterable[FrameWithTruth],
     sample_of: Callable[[Truth], Sample],
     applied: AppliedSequence,
     *,

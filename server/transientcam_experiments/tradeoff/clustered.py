@@ -81,4 +81,4 @@ def measured(
 @lru_cache(maxsize=2)
 def _bench(scene: str, seed: int) -> Bench:
     """Return the bench that a process keeps for its tasks."""
-    return Bench.of(scene, seed=seed)
+    return Bench(scene, seed=seed)

@@ -138,7 +138,7 @@ def measure(
             progress(point.kind)
     if not left:
         return
-    bench = Bench.of(scene, seed=seed)
+    bench = Bench(scene, seed=seed)
     for point in left:
         records.append(point.measured(bench, clock=clock))
         progress(point.kind)
@@ -150,6 +150,15 @@ def spec_of(scene: str, *, seed: int) -> str:
     return f"{spec}{'&' if '?' in spec else '?'}seed={seed}"
 
 
+@contextmanager
+def camera_before(scene: str, *, seed: int) -> Iterator[Camera]:
+    """Open the simulated camera in front of a scene, `BEGINS_S` after power-up."""
+    clock = VirtualClock()
+    with open_camera(spec_of(scene, seed=seed), clock=clock) as camera:
+        clock.sleep(BEGINS_S)
+        yield camera
+
+
 class Bench:
     """Cameras before a scene, and what several points share.
 
@@ -157,21 +166,16 @@ class Bench:
     measured does not depend on what was measured before, nor on an interruption in between.
     """
 
-    def __init__(self, spec: str, *, seed: int) -> None:
-        self._spec = spec
+    def __init__(self, scene: str, *, seed: int) -> None:
+        self._scene = scene
         self._seed = seed
         self._settings = ReconstructionSettings()
         self._scenes: dict[int, estimating.Scene] = {}
         self._sampled: tuple[Truth, Sample] | None = None
 
-    @classmethod
-    def of(cls, scene: str, *, seed: int) -> "Bench":
-        """Return the bench with a scene by its name, and its chance."""
-        return cls(spec_of(scene, seed=seed), seed=seed)
-
     def capture(self, sequence: Sequence, repetitions: int) -> _Summary:
         """Return how accurately a sequence shows the scene: means and deviations."""
-        with self._camera() as camera:
+        with camera_before(self._scene, seed=self._seed) as camera:
             applied = camera.configure(sequence)
             return capture.accuracy(
                 capture.capture(camera, repetitions),
@@ -180,13 +184,6 @@ class Bench:
                 settings=self._settings,
                 bits=camera.capabilities.bits,
             )
-
-    @contextmanager
-    def _camera(self) -> Iterator[Camera]:
-        clock = VirtualClock()
-        with open_camera(self._spec, clock=clock) as camera:
-            clock.sleep(BEGINS_S)
-            yield camera
 
     def _sample_of(self, truth: Truth) -> Sample:
         """Sample pixels; of a scene that stands still, only once."""
@@ -202,7 +199,7 @@ class Bench:
     def scene(self, harmonics: int) -> estimating.Scene:
         """Return those moments and the truth of the same frame."""
         if harmonics not in self._scenes:
-            with self._camera() as camera:
+            with camera_before(self._scene, seed=self._seed) as camera:
                 most_hz = camera.capabilities.max_frequency_hz / harmonics
                 sequence = replace(
                     Sequence(harmonics=harmonics), base_frequency_hz=min(23e6, most_hz)

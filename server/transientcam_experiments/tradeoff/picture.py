@@ -26,8 +26,7 @@ def error_picture(
     present
         Time of one capture in s and error in m of the present setting.
     """
-    figure = Figure(figsize=(7.2, 5.0), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = blank(7.2, 5.0)
     panel: Axes = figure.subplots()
     for number, line in enumerate(tradeoff["lines"]):
         colour = f"C{number}"
@@ -58,6 +57,13 @@ def error_picture(
     panel.legend(fontsize="small")
     panel.grid(alpha=0.25)
     figure.supxlabel(tradeoff["summary"], fontsize="small", wrap=True)
+    return figure
+
+
+def blank(width_in: float, height_in: float) -> Figure:
+    """Return an empty picture that needs no display."""
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    FigureCanvasAgg(figure)
     return figure
 
 

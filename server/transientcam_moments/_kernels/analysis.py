@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from numba import njit
 
+from transientcam_moments._kernels.arrays import Complexes, Counts, Flags, Reals
 from transientcam_moments._kernels.compiled_entry import (
     BYTES,
     COUNTS,
@@ -23,6 +24,7 @@ from transientcam_moments._kernels.compiled_entry import (
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry, smallest_eigenvalue
 from transientcam_moments._kernels.outputs import flag_and_bias
 from transientcam_moments._kernels.returns import find_returns, returns_entry
+from transientcam_moments.arrays import Length
 
 _BLOCK: Final = 4096
 """Pixels, of which a thread's own cache holds all that the kernels read and write."""
@@ -30,10 +32,10 @@ _BLOCK: Final = 4096
 
 @njit(nogil=True, error_model="numpy")
 def _analyse(
-    order: Any, turns: Any, estimated: Any, b: Any, saturated: Any, eigenvalue: Any,
-    brightness: Any, uniform: Any, validity: Any, flags: Any, epsilon: float, least: float,
-    phase: Any, weight: Any, count: Any, residual: Any, noise: float, steps: int, start: int,
-    stop: int,
+    order: Length, turns: Reals, estimated: bool, b: Complexes, saturated: Flags, eigenvalue: Reals,
+    brightness: Reals, uniform: Reals, validity: Reals, flags: Flags, epsilon: float, least: float,
+    phase: Reals, weight: Reals, count: Counts, residual: Reals, noise: float, steps: int,
+    start: int, stop: int,
 ) -> None:  # fmt: skip
     """Do as `smallest_eigenvalue`, `flag_and_bias` and `find_returns` do one after the other."""
     left = start

@@ -1,17 +1,14 @@
 """From a jitted function to a compiled entry that never compiles again."""
 
-import os
 from collections.abc import Callable, Iterable
 from typing import Any
 
 from numba import types as numba_types
-from numba.core import config as numba_config
 
-from transientcam_moments._kernels.cache import cache_directory, digest_of_sources
+from transientcam_moments._dispatch import CACHE
 
 # numba is only partly annotated
 _types: Any = numba_types
-_config: Any = numba_config
 
 _REAL = {"f": _types.float32, "d": _types.float64}
 _COMPLEX = {"f": _types.complex64, "d": _types.complex128}
@@ -48,26 +45,5 @@ def sizes_type(sizes: Iterable[int]) -> Any:
 
 
 def entry(function: Any, *signature: Any) -> Callable[..., Any]:
-    """Compile ``function`` for one signature, or load it from the cache, and return its entry.
-
-    The entry unpacks its arguments by that signature without looking at their types, so that no
-    call, whatever it is handed, can start the compiler on its thread.
-    """
-    _keep_between_processes(function)
-    compiled: Callable[..., Any] = function.compile(signature)
-    return compiled
-
-
-def _keep_between_processes(function: Any) -> None:
-    """Enable numba's cache for ``function`` where there is a directory for it."""
-    directory = cache_directory(os.environ, digest_of_sources())
-    if directory is None or function.signatures:
-        return
-    # the place is chosen by a global setting at the moment of enabling: other users of numba in
-    # this process keep theirs
-    previous = _config.CACHE_DIR
-    _config.CACHE_DIR = str(directory)
-    try:
-        function.enable_caching()
-    finally:
-        _config.CACHE_DIR = previous
+    """Compile ``function`` for one signature, or load it from the cache, and return its entry."""
+    return CACHE.compile(function, signature)

@@ -7,7 +7,10 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from transientcam_moments._kernels import simd, toeplitz
+from transientcam_compiled import Spread, at_once, empty
+from transientcam_moments._dispatch import LEAST_PIXELS
+from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Places, Reals
 from transientcam_moments._kernels.compiled_entry import (
     FLAG,
     PIXELS,
@@ -18,9 +21,9 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.phase_groups import ANY, MIRRORED, TURN, grouping
-from transientcam_moments._lanes.parallel import Spread, at_once
-from transientcam_moments._lanes.pool import empty
-from transientcam_moments._lanes.registry import LEAST_PIXELS
+from transientcam_moments._kernels.portable import bank, eps, larger
+from transientcam_moments.arrays import Bank, Length, Plane
+from transientcam_moments.moment_problem import toeplitz
 
 _BANK = 240  # pairs of registers of coefficients, which stay in the first cache for all phases
 _PAST_CACHES_BYTES = 1 << 24
@@ -34,7 +37,9 @@ _PARTS_EACH = 4  # of a film for each thread: the other may be late
 
 
 @njit(forceinline=True, error_model="numpy")
-def _any_two(order: Any, q: Any, pitch: int, p: int, c0: Any, s0: Any, c1: Any, s1: Any) -> Any:
+def _any_two(
+    order: Length, q: Bank, pitch: int, p: int, c0: Bank, s0: Bank, c1: Bank, s1: Bank
+) -> Any:
     """Evaluate Eq. (2) for the pixels from ``p`` on at two phases, which share the loads."""
     # sum_j conj(a_j) exp(i j phi), a_0 = 1
     re, im = simd.load_within(q, 2 * pitch + p), simd.load_within(q, 3 * pitch + p)
@@ -47,14 +52,23 @@ def _any_two(order: Any, q: Any, pitch: int, p: int, c0: Any, s0: Any, c1: Any, 
         x1, y1 = x1 + re * c1[j] + im * s1[j], y1 + re * s1[j] - im * c1[j]
     scale, least = simd.load_within(q, p), simd.load_within(q, pitch + p)
     return (
-        scale / simd.maximum(x0 * x0 + y0 * y0, least),
-        scale / simd.maximum(x1 * x1 + y1 * y1, least),
+        scale / larger(x0 * x0 + y0 * y0, least),
+        scale / larger(x1 * x1 + y1 * y1, least),
     )
 
 
 @njit(forceinline=True, error_model="numpy")
 def _sums(
-    order: Any, uc: Any, zero: Any, q: Any, pitch: int, p: int, c: Any, s: Any, j0: int, every: int
+    order: Length,
+    uc: Plane,
+    zero: Plane,
+    q: Bank,
+    pitch: int,
+    p: int,
+    c: Bank,
+    s: Bank,
+    j0: int,
+    every: int,
 ) -> Any:
     """Sum u c, v s, u s and v c of every so many j from ``j0`` on; ``uc`` is what to add to."""
     vs = us = vc = zero
@@ -66,7 +80,7 @@ def _sums(
 
 
 @njit(forceinline=True, error_model="numpy")
-def _mirrored_two(order: Any, q: Any, pitch: int, p: int, c: Any, s: Any) -> Any:
+def _mirrored_two(order: Length, q: Bank, pitch: int, p: int, c: Bank, s: Bank) -> Any:
     """Evaluate Eq. (2) at two phases as far before as behind the one to which q is turned.
 
     With conj(a_j) turned to u + i v it is sum_j (u c - v s) + i (u s + v c), and s changes sign:
@@ -77,13 +91,13 @@ def _mirrored_two(order: Any, q: Any, pitch: int, p: int, c: Any, s: Any) -> Any
     uc, vs, us, vc = _sums(order, one, zero, q, pitch, p, c, s, 0, 1)
     x0, y0, x1, y1 = uc - vs, vc + us, uc + vs, vc - us
     return (
-        scale / simd.maximum(x0 * x0 + y0 * y0, least),
-        scale / simd.maximum(x1 * x1 + y1 * y1, least),
+        scale / larger(x0 * x0 + y0 * y0, least),
+        scale / larger(x1 * x1 + y1 * y1, least),
     )
 
 
 @njit(forceinline=True, error_model="numpy")
-def _four_of_a_turn(order: Any, q: Any, pitch: int, p: int, c: Any, s: Any) -> Any:
+def _four_of_a_turn(order: Length, q: Bank, pitch: int, p: int, c: Bank, s: Bank) -> Any:
     """Evaluate Eq. (2) at the two phases of `_mirrored_two` and half a turn from each of them.
 
     There the terms of odd j change sign: the same eight sums serve all four.
@@ -97,15 +111,15 @@ def _four_of_a_turn(order: Any, q: Any, pitch: int, p: int, c: Any, s: Any) -> A
     x2, y2, x3, y3 = x0 - dx0, y0 - dy0, x1 - dx1, y1 - dy1
     x0, y0, x1, y1 = x0 + dx0, y0 + dy0, x1 + dx1, y1 + dy1
     return (
-        scale / simd.maximum(x0 * x0 + y0 * y0, least),
-        scale / simd.maximum(x1 * x1 + y1 * y1, least),
-        scale / simd.maximum(x2 * x2 + y2 * y2, least),
-        scale / simd.maximum(x3 * x3 + y3 * y3, least),
+        scale / larger(x0 * x0 + y0 * y0, least),
+        scale / larger(x1 * x1 + y1 * y1, least),
+        scale / larger(x2 * x2 + y2 * y2, least),
+        scale / larger(x3 * x3 + y3 * y3, least),
     )
 
 
 @njit(forceinline=True, error_model="numpy")
-def _write(out: Any, place: int, value: Any, past_caches: bool) -> None:
+def _write(out: Reals, place: int, value: Plane, past_caches: bool) -> None:
     if past_caches:
         simd.stream(out, place, value)
     else:
@@ -113,7 +127,9 @@ def _write(out: Any, place: int, value: Any, past_caches: bool) -> None:
 
 
 @njit(forceinline=True, error_model="numpy")
-def _put(out: Any, place: int, stage: Any, at: int, value: Any, how: tuple[bool, bool]) -> None:
+def _put(
+    out: Reals, place: int, stage: Bank, at: int, value: Plane, how: tuple[bool, bool]
+) -> None:
     """Write to ``at`` of the stage, if there is one, or else to ``place`` of the results."""
     staged, past_caches = how
     if staged:
@@ -124,7 +140,7 @@ def _put(out: Any, place: int, stage: Any, at: int, value: Any, how: tuple[bool,
 
 @njit(forceinline=True, error_model="numpy")
 def _write_row(
-    out: Any, row: int, stage: Any, at: int, first: int, end: int, one: Any, step: int
+    out: Reals, row: int, stage: Bank, at: int, first: int, end: int, one: Plane, step: int
 ) -> None:
     """Write what the stage holds from ``at`` on to the pixels first..end of a row, at once."""
     for i in range(first, end, step):
@@ -136,8 +152,8 @@ def _write_row(
 
 @njit(forceinline=True, error_model="numpy")
 def _fill(
-    order: Any, polynomial: Any, reflection: Any, error: Any, centre: Any, turned: bool,
-    one: Any, q: Any, pitch: int, shift: int, left: int, held: int,
+    order: Length, polynomial: Complexes, reflection: Complexes, error: Reals, centre: Reals,
+    turned: bool, one: Plane, q: Bank, pitch: int, shift: int, left: int, held: int,
 ) -> None:  # fmt: skip
     """Put what Eq. (2) needs of pixels from ``left`` on into a bank, from ``shift`` on."""
     m, step = len(order), simd.width(one)
@@ -145,7 +161,7 @@ def _fill(
         p = min(i, held - step)
         at = p + shift
         simd.store_within(q, at, simd.load(one, error, left + p) * (0.5 / np.pi))
-        least = simd.eps(one)
+        least = eps(one)
         for j in range(m):
             re, im = simd.load_complex(one, polynomial[j + 1], left + p)
             if turned:  # conj(a_j) exp(i j centre)
@@ -160,14 +176,14 @@ def _fill(
 
 @njit(nogil=True, error_model="numpy")
 def _density(
-    order: Any,
-    polynomial: Any,
-    reflection: Any,
-    error: Any,
-    rows: Any,
-    waves: Any,
-    centre: Any,
-    out: Any,
+    order: Length,
+    polynomial: Complexes,
+    reflection: Complexes,
+    error: Reals,
+    rows: Places,
+    waves: Reals,
+    centre: Reals,
+    out: Reals,
     start: int,
     stop: int,
     together: int,
@@ -191,11 +207,11 @@ def _density(
     # rows that begin at a line of memory reach into the next block or part, which begins at its own
     block = pitch - 2 * step if past_caches else pitch
     pixels = error.shape[0]
-    q = simd.registers(one, (), _LANES)
-    stage = simd.registers(one, (), _LANES)
+    q = bank(one, (), _LANES)
+    stage = bank(one, (), _LANES)
     staged = past_caches and _IN_PARTS
-    c0, s0 = simd.registers(one, order, 0), simd.registers(one, order, 0)
-    c1, s1 = simd.registers(one, order, 0), simd.registers(one, order, 0)
+    c0, s0 = bank(one, order, 0), bank(one, order, 0)
+    c1, s1 = bank(one, order, 0), bank(one, order, 0)
     left = start
     while left < stop:
         left = min(left, stop - step)
@@ -259,11 +275,11 @@ def density_lane(m: int, precision: str) -> Callable[..., Any]:
     grouped = grouping(m, precision)
 
     def lane(
-        polynomial: Any,
-        reflection: Any,
-        error: Any,
-        phase_rad: Any,
-        out: Any = None,
+        polynomial: Complexes,
+        reflection: Complexes,
+        error: Reals,
+        phase_rad: Reals,
+        out: Reals | None = None,
         *,
         spread: Spread = at_once,
     ) -> Any:
@@ -289,5 +305,5 @@ def density_lane(m: int, precision: str) -> Callable[..., Any]:
 
     # the first call reads machine code and NumPy's tables, which takes as long as a whole film
     nothing = np.zeros((m + 1, LEAST_PIXELS), f"c{2 * np.dtype(precision).itemsize}")
-    lane(nothing, nothing[1:], nothing[0].real, np.arange(8))
+    lane(nothing, nothing[1:], nothing[0].real, np.arange(8.0))
     return lane

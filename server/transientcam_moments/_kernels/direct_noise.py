@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_compiled import Spread, at_once
+from transientcam_moments._kernels.arrays import Reals
 from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
     REAL,
@@ -20,13 +22,14 @@ from transientcam_moments._kernels.covariance import (
     half_turned,
     interpolation,
 )
-from transientcam_moments._lanes.parallel import Spread, at_once
+from transientcam_moments.arrays import Length
 
 
 @njit(nogil=True, error_model="numpy")
 def _direct_noise(
-    order: Any, both: Any, basis: Any, turned: Any, phase: Any, weight: Any, variance: Any,
-    threshold: float, clear: float, coincide_rad: float, out: Any, found: Any, pixels: int,
+    order: Length, both: Length, basis: Reals, turned: Reals, phase: Reals, weight: Reals,
+    variance: Reals, threshold: float, clear: float, coincide_rad: float, out: Reals, found: Reals,
+    pixels: int,
 ) -> None:  # fmt: skip
     """Fill ``found`` (3, P): deviation, whether first order holds, whether there are m returns.
 
@@ -84,9 +87,9 @@ def direct_noise_lane(m: int, precision: str) -> Callable[..., Any]:
     basis = interpolation(m)
 
     def lane(
-        phase: Any,
-        weight: Any,
-        variance: Any,
+        phase: Reals,
+        weight: Reals,
+        variance: Reals,
         threshold: float,
         clear: float,
         coincide_rad: float,

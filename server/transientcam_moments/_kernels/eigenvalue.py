@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from transientcam_moments._kernels import simd, toeplitz
+from transientcam_compiled import Spread, at_once, empty
+from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Reals
 from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
     complex_arrays,
@@ -14,27 +16,30 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._lanes.parallel import Spread, at_once
-from transientcam_moments._lanes.pool import empty
+from transientcam_moments._kernels.moments import load_harmonics, load_zeroth
+from transientcam_moments._kernels.portable import bank
+from transientcam_moments.arrays import Length
+from transientcam_moments.moment_problem import eigenvalue, toeplitz
 
 _INTERLEAVE = 4
 
 
 @njit(nogil=True, error_model="numpy")
-def smallest_eigenvalue(order: Any, b: Any, without: bool, out: Any, start: int, stop: int) -> None:
+def smallest_eigenvalue(
+    order: Length, b: Complexes, without: bool, out: Reals, start: int, stop: int
+) -> None:
     """Write the smallest eigenvalues of the pixels start..stop, with or ``without`` b_0."""
     one = simd.ones(out, _INTERLEAVE)
     step = simd.width(one)
-    re, im = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    h = simd.matrix(one, order, 1)
-    d, e = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    re, im = bank(one, order, 1), bank(one, order, 1)
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        zeroth = one * 0.0
+        re[0] = one * 0.0
         if not without:
-            zeroth = toeplitz.load_zeroth(one, b, p)
-        scale = toeplitz.load_relative(order, zeroth, b, p, re, im)
-        simd.store(out, p, scale * toeplitz.smallest_eigenvalue(order, re, im, h, d, e))
+            re[0] = load_zeroth(one, b, p)
+        load_harmonics(order, one, b, p, re, im)
+        scale = toeplitz.relative(order, re, im)
+        simd.store(out, p, scale * eigenvalue.smallest_eigenvalue(order, re, im))
 
 
 def eigenvalue_entry(m: int, precision: str) -> Callable[..., Any]:
@@ -48,7 +53,7 @@ def smallest_eigenvalue_lane(m: int, precision: str) -> Callable[..., Any]:
     order = (0,) * m
     run = eigenvalue_entry(m, precision)
 
-    def lane(b: Any, *, spread: Spread = at_once) -> Any:
+    def lane(b: Complexes, *, spread: Spread = at_once) -> Any:
         pixels = b[0].size
         planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
         out = empty(pixels, precision)

@@ -5,7 +5,24 @@ from typing import Any
 from numba import njit
 
 from transientcam_moments._kernels import portable, simd
-from transientcam_moments._kernels.returns import phase_of
+from transientcam_moments._kernels.arrays import Complexes, Counts, Reals
+from transientcam_moments._kernels.portable import (
+    bank,
+    eps,
+    infinity,
+    larger,
+    largest,
+    logarithm,
+    magnitude,
+    not_a_number,
+    product_bank,
+    root,
+    select,
+    smaller,
+    some,
+    tiny,
+)
+from transientcam_moments.arrays import Bank, Length, Mask, Plane
 from transientcam_moments.likelihood import (
     CHI_SQUARE,
     COUNT,
@@ -24,11 +41,10 @@ from transientcam_moments.likelihood import (
     X,
     Y,
     choice,
-    logarithm,
-    product_bank,
     sharp,
     tail,
 )
+from transientcam_moments.moment_problem import phase_of
 
 __all__ = ["fit", "fit_one", "portable", "vary", "write"]  # portable gives arithmetic its meaning
 
@@ -39,8 +55,8 @@ DAMPING = 6
 
 @njit(forceinline=True, error_model="numpy")
 def _prepare(
-    order: Any, b: Any, variance: Any, error: float, p: int, one: Any, data_r: Any, data_i: Any,
-    weight: Any,
+    order: Length, b: Complexes, variance: Reals, error: float, p: int, one: Plane, data_r: Bank,
+    data_i: Bank, weight: Bank,
 ) -> Any:  # fmt: skip
     """Load pixels, their largest moment made 1; return that, how many numbers, and their use."""
     m = len(order)
@@ -49,35 +65,35 @@ def _prepare(
     for j in range(m + 1):
         x, y = simd.load_complex(one, b[j], p)
         v = simd.load(one, variance[j], p)
-        seen = (v > 0.0) & (v < simd.infinity(one))
-        x = simd.select(seen, x, 0.0)
-        y = simd.select(seen, y, 0.0) if j > 0 else zero
-        size = simd.maximum(size, simd.maximum(simd.absolute(x), simd.absolute(y)))
+        seen = (v > 0.0) & (v < infinity(one))
+        x = select(seen, x, 0.0)
+        y = select(seen, y, 0.0) if j > 0 else zero
+        size = larger(size, larger(magnitude(x), magnitude(y)))
         poison = poison + x * 0.0 + y * 0.0
-        numbers = numbers + simd.select(seen, one * (2.0 if j > 0 else 1.0), 0.0)
-        waves = waves + simd.select(seen, one * (1.0 if j > 0 else 0.0), 0.0)
+        numbers = numbers + select(seen, one * (2.0 if j > 0 else 1.0), 0.0)
+        waves = waves + select(seen, one * (1.0 if j > 0 else 0.0), 0.0)
         data_r[j], data_i[j] = x, y
-        weight[j] = simd.select(seen, v, 0.0)
-    usable = (poison >= 0.0) & (size > 16.0 * simd.tiny(one)) & (size < simd.overflowing(one))
+        weight[j] = select(seen, v, 0.0)
+    usable = (poison >= 0.0) & (size > 16.0 * tiny(one)) & (size < (largest(one) * eps(one)))
     usable = usable & (waves > 0.0) & ~((weight[0] > 0.0) & ~(data_r[0] > 0.0))
-    scale = simd.select(usable, size, one)
-    inverse = simd.select(usable, 1.0 / scale, 0.0)
-    rounding = 4.0 * simd.eps(one)
+    scale = select(usable, size, one)
+    inverse = select(usable, 1.0 / scale, 0.0)
+    rounding = 4.0 * eps(one)
     for j in range(m + 1):
-        data_r[j] = simd.select(usable, data_r[j] * inverse, one)
-        data_i[j] = simd.select(usable, data_i[j] * inverse, 0.0)
+        data_r[j] = select(usable, data_r[j] * inverse, one)
+        data_i[j] = select(usable, data_i[j] * inverse, 0.0)
         seen = weight[j] > 0.0
-        std = simd.sqrt(simd.select(seen, weight[j], one)) * inverse
-        std = simd.minimum(simd.maximum(std, rounding), 1.0 / rounding)
+        std = root(select(seen, weight[j], one)) * inverse
+        std = smaller(larger(std, rounding), 1.0 / rounding)
         each = 1.0 / (std * std + error * error)
-        weight[j] = simd.select(usable, simd.select(seen, each, 0.0), one)
-    return scale, simd.select(usable, numbers, one), usable
+        weight[j] = select(usable, select(seen, each, 0.0), one)
+    return scale, select(usable, numbers, one), usable
 
 
 @njit(error_model="numpy")
 def _new(
-    order: Any, returns: Any, turns: Any, data_r: Any, data_i: Any, weight: Any, x: Any, y: Any,
-    w: Any, pr: Any, pi: Any, rr: Any, ri: Any,
+    order: Length, returns: Length, turns: Reals, data_r: Bank, data_i: Bank, weight: Bank,
+    x: Bank, y: Bank, w: Bank, pr: Bank, pi: Bank, rr: Bank, ri: Bank,
 ) -> Any:  # fmt: skip
     """Add the best return for what the others leave; return what all of them leave."""
     m, last = len(order), len(returns) - 1
@@ -87,7 +103,7 @@ def _new(
     for k in range(last):
         sharp.powers(order, x[k], y[k], k, pr, pi)
     sharp.remains(order, returns[1:], data_r, data_i, pr, pi, w, rr, ri)
-    re, im = simd.registers(like, order, 1), simd.registers(like, order, 1)
+    re, im = bank(like, order, 1), bank(like, order, 1)
     total = sharp.weigh_what_is_left(order, weight, rr, ri, re, im)
     # (m + 1) (K - 1) are enough
     kr, ki = product_bank(like, order, returns), product_bank(like, order, returns)
@@ -105,15 +121,16 @@ def _new(
 
 @njit(error_model="numpy")
 def fit(
-    order: Any, returns: Any, unknowns: Any, steps: int, turns: Any, data_r: Any, data_i: Any,
-    weight: Any, x: Any, y: Any, w: Any, pr: Any, pi: Any, rr: Any, ri: Any, active: Any, bar: Any,
+    order: Length, returns: Length, unknowns: Length, steps: int, turns: Reals, data_r: Bank,
+    data_i: Bank, weight: Bank, x: Bank, y: Bank, w: Bank, pr: Bank, pi: Bank, rr: Bank, ri: Bank,
+    active: Mask, bar: Plane,
 ) -> Any:  # fmt: skip
     """Add a return and fit all of them, until `active` pixels have settled; return chi-square."""
     m = len(order)
     cost = _new(order, returns, turns, data_r, data_i, weight, x, y, w, pr, pi, rr, ri)
-    damping = simd.select(active, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
+    damping = select(active, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
     for _ in range(steps):
-        if not simd.some(damping < sharp.SETTLED):
+        if not some(damping < sharp.SETTLED):
             break
         cost, damping = sharp.step(
             order, returns, unknowns, data_r, data_i, weight, pr, pi, w, rr, ri, cost, damping, bar
@@ -124,33 +141,33 @@ def fit(
 
 
 @njit(error_model="numpy")
-def start_tail(x2: Any, y2: Any, w2: Any, active: Any, state: Any) -> None:
+def start_tail(x2: Bank, y2: Bank, w2: Bank, active: Mask, state: Bank) -> None:
     """Put the state that the fit of a tail begins with in `state`, from two returns."""
     x, y, w, v, ratio, t = choice.start_of_tail(x2, y2, w2, DELAY_RAD)
     state[0], state[1], state[2], state[3], state[4], state[5] = x, y, w, v, ratio * _MEAN, t
-    state[DAMPING] = simd.select(active, sharp.FIRST_DAMPING + 0.0 * x, sharp.SETTLED)
+    state[DAMPING] = select(active, sharp.FIRST_DAMPING + 0.0 * x, sharp.SETTLED)
     state[7] = 0.0 * x
 
 
 @njit(error_model="numpy")
 def step_tail(
-    order: Any, powers: Any, unknowns: Any, steps: int, data_r: Any, data_i: Any, weight: Any,
-    state: Any, bar: Any,
+    order: Length, powers: Length, unknowns: Length, steps: int, data_r: Bank, data_i: Bank,
+    weight: Bank, state: Bank, bar: Plane,
 ) -> None:  # fmt: skip
     """Take at most so many steps of a return with a tail, until all pixels have settled."""
     like = data_r[0]
     x, y, w, v, d, t = state[0], state[1], state[2], state[3], state[4], state[5]
-    ur, ui = simd.registers(like, order, 1), simd.registers(like, order, 1)
-    qr, qi = simd.registers(like, order, 1), simd.registers(like, order, 1)
-    rr, ri = simd.registers(like, order, 1), simd.registers(like, order, 1)
-    lag = simd.registers(like, order, 1)
+    ur, ui = bank(like, order, 1), bank(like, order, 1)
+    qr, qi = bank(like, order, 1), bank(like, order, 1)
+    rr, ri = bank(like, order, 1), bank(like, order, 1)
+    lag = bank(like, order, 1)
     tail.shape(order, powers, d, lag, qr, qi)
     tail.turn_back(order, data_r, data_i, x, y, ur, ui)
     tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
     cost = sharp.chi_square(order, weight, rr, ri) + PRIOR * t * t
     damping = state[DAMPING]
     for _ in range(steps):
-        if not simd.some(damping < sharp.SETTLED):
+        if not some(damping < sharp.SETTLED):
             break
         x, y, w, v, d, t, cost, damping = tail.step(
             order, powers, unknowns, data_r, data_i, weight, PRIOR, x, y, w, v, d, t, lag, qr, qi,
@@ -162,72 +179,72 @@ def step_tail(
 
 @njit(forceinline=True, error_model="numpy")
 def write(
-    slots: Any, found: Any, scale: Any, numbers: Any, usable: Any, p: int, planes: Any, free: Any,
-    count: Any,
+    slots: Length, found: Bank, scale: Plane, numbers: Plane, usable: Mask, p: int, planes: Reals,
+    free: Counts, count: Counts,
 ) -> None:  # fmt: skip
     """Write the attributes of `Likelihood`, its returns sorted by phase."""
     one = scale / scale
-    nan, far = simd.nan(one), simd.infinity(one)
+    nan, far = not_a_number(one), infinity(one)
     size = len(slots)
-    keys, values = simd.registers(one, slots, 0), simd.registers(one, slots, 0)
-    first, second = simd.registers(one, slots, 0), simd.registers(one, slots, 0)
+    keys, values = bank(one, slots, 0), bank(one, slots, 0)
+    first, second = bank(one, slots, 0), bank(one, slots, 0)
     with_tail = found[LENGTH] > 0.0
     there = 0.0 * one
     for k in range(size):
         used = usable & (found[COUNT] > float(k)) & ((found[WEIGHT + k] > 0.0) | with_tail)
-        keys[k] = simd.select(used, phase_of(found[X + k], found[Y + k]), far)
-        values[k] = simd.select(used, found[WEIGHT + k] * scale, 0.0)
-        first[k] = simd.select(used, simd.sqrt(found[PHASE_VARIANCE + k]), nan)
-        second[k] = simd.select(used, simd.sqrt(found[WEIGHT_VARIANCE + k]) * scale, nan)
-        there = there + simd.select(used, one, 0.0)
+        keys[k] = select(used, phase_of(found[X + k], found[Y + k]), far)
+        values[k] = select(used, found[WEIGHT + k] * scale, 0.0)
+        first[k] = select(used, root(found[PHASE_VARIANCE + k]), nan)
+        second[k] = select(used, root(found[WEIGHT_VARIANCE + k]) * scale, nan)
+        there = there + select(used, one, 0.0)
     for i in range(size - 1):
         for k in range(size - 1 - i):
             swap = keys[k] > keys[k + 1]
-            low, high = simd.minimum(keys[k], keys[k + 1]), simd.maximum(keys[k], keys[k + 1])
+            low, high = smaller(keys[k], keys[k + 1]), larger(keys[k], keys[k + 1])
             keys[k], keys[k + 1] = low, high
             low, high = (
-                simd.select(swap, values[k + 1], values[k]),
-                simd.select(swap, values[k], values[k + 1]),
+                select(swap, values[k + 1], values[k]),
+                select(swap, values[k], values[k + 1]),
             )
             values[k], values[k + 1] = low, high
             low, high = (
-                simd.select(swap, first[k + 1], first[k]),
-                simd.select(swap, first[k], first[k + 1]),
+                select(swap, first[k + 1], first[k]),
+                select(swap, first[k], first[k + 1]),
             )
             first[k], first[k + 1] = low, high
             low, high = (
-                simd.select(swap, second[k + 1], second[k]),
-                simd.select(swap, second[k], second[k + 1]),
+                select(swap, second[k + 1], second[k]),
+                select(swap, second[k], second[k + 1]),
             )
             second[k], second[k + 1] = low, high
     for k in range(size):
-        simd.store(planes[k], p, simd.select(keys[k] < far, keys[k], nan))
+        simd.store(planes[k], p, select(keys[k] < far, keys[k], nan))
         simd.store(planes[size + k], p, values[k])
         simd.store(planes[2 * size + k], p, first[k])
         simd.store(planes[3 * size + k], p, second[k])
     tailed = usable & with_tail & (found[TAIL] > 0.0)
     delay = float(TAIL_SHAPE) * found[LENGTH]
     rest = 4 * size
-    simd.store(planes[rest], p, simd.select(tailed, found[TAIL] * scale, 0.0))
-    std = simd.sqrt(found[TAIL_VARIANCE]) * scale
-    simd.store(planes[rest + 1], p, simd.select(tailed, std, nan))
-    simd.store(planes[rest + 2], p, simd.select(tailed, delay, nan))
-    std = delay * simd.sqrt(found[LENGTH_VARIANCE])
-    simd.store(planes[rest + 3], p, simd.select(tailed, std, nan))
-    simd.store(planes[rest + 4], p, simd.select(usable, found[CHI_SQUARE], nan))
-    unknowns = simd.select(with_tail, 4.0 * one, 2.0 * found[COUNT])
-    simd.store(free, p, simd.select(usable, numbers - unknowns, 0.0))
+    simd.store(planes[rest], p, select(tailed, found[TAIL] * scale, 0.0))
+    std = root(found[TAIL_VARIANCE]) * scale
+    simd.store(planes[rest + 1], p, select(tailed, std, nan))
+    simd.store(planes[rest + 2], p, select(tailed, delay, nan))
+    std = delay * root(found[LENGTH_VARIANCE])
+    simd.store(planes[rest + 3], p, select(tailed, std, nan))
+    simd.store(planes[rest + 4], p, select(usable, found[CHI_SQUARE], nan))
+    unknowns = select(with_tail, 4.0 * one, 2.0 * found[COUNT])
+    simd.store(free, p, select(usable, numbers - unknowns, 0.0))
     simd.store(count, p, there)
 
 
 @njit(forceinline=True, error_model="numpy")
 def fit_one(
-    order: Any, turns: Any, b: Any, variance: Any, error: float, p: int, one: Any, data_r: Any,
-    data_i: Any, weight: Any, x: Any, y: Any, w: Any, pr: Any, pi: Any, rr: Any, ri: Any,
-    found: Any,
+    order: Length, turns: Reals, b: Complexes, variance: Reals, error: float, p: int, one: Plane,
+    data_r: Bank, data_i: Bank, weight: Bank, x: Bank, y: Bank, w: Bank, pr: Bank, pi: Bank,
+    rr: Bank, ri: Bank, found: Bank,
 ) -> Any:  # fmt: skip
     """Load pixels and put one return in `found`; return their scale, numbers, use and penalty."""
-    far = simd.infinity(one)
+    far = infinity(one)
     scale, numbers, usable = _prepare(order, b, variance, error, p, one, data_r, data_i, weight)
     penalty = logarithm(numbers) + MARGIN
     choice.nothing(one, far, found)
@@ -240,13 +257,13 @@ def fit_one(
 
 
 @njit(error_model="numpy")
-def vary(order: Any, weight: Any, found: Any) -> None:
+def vary(order: Length, weight: Bank, found: Bank) -> None:
     """Put the variances of what was chosen in `found`."""
-    if simd.some(choice.chosen((0,), found)):
+    if some(choice.chosen((0,), found)):
         choice.vary_returns(order, (0,), (0, 0), weight, found)
-    if simd.some(choice.chosen((0, 0), found)):
+    if some(choice.chosen((0, 0), found)):
         choice.vary_returns(order, (0, 0), (0, 0, 0, 0), weight, found)
-    if simd.some(choice.chosen((0, 0, 0), found)):
+    if some(choice.chosen((0, 0, 0), found)):
         choice.vary_returns(order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, found)
-    if simd.some(choice.has_tail(found)):
+    if some(choice.has_tail(found)):
         choice.vary_tail(order, (0, 0, 0), (0, 0, 0, 0), weight, PRIOR, found)

@@ -5,7 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from transientcam_compiled import Spread, at_once, empty
+from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import inputs, outputs
+from transientcam_moments._kernels.arrays import Complexes, Images, Reals
 from transientcam_moments._kernels.compiled_entry import (
     BYTES,
     IMAGES,
@@ -17,9 +20,6 @@ from transientcam_moments._kernels.compiled_entry import (
     real_arrays,
 )
 from transientcam_moments._kernels.padding import LEAST_WIDTH, normalisation, row_length
-from transientcam_moments._lanes.parallel import Spread, at_once
-from transientcam_moments._lanes.pool import empty
-from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
 _REAL, _COMPLEX = real_arrays("f"), complex_arrays("f")
@@ -66,7 +66,7 @@ def measure_lane(m: int, precision: str) -> Callable[..., Any]:
     order, run = (0,) * m, measure_entry(m)
     ones = np.ones((m + 1, LEAST_PIXELS), np.complex64)
 
-    def lane(images: Any, zeroth: str, *, spread: Spread = at_once) -> Any:
+    def lane(images: Images, zeroth: str, *, spread: Spread = at_once) -> Any:
         pixels = images[0].size
         raw = np.ascontiguousarray(images).reshape(len(images), pixels)
         moments, saturated = empty((m + 1, pixels), np.complex64), empty(pixels, np.uint8)
@@ -86,7 +86,7 @@ def smooth_lane(m: int, precision: str) -> Callable[..., Any]:
     """
     run = smooth_entry()
 
-    def lane(moments: Any, taps: Any, *, spread: Spread = at_once) -> Any:
+    def lane(moments: Complexes, taps: Reals, *, spread: Spread = at_once) -> Any:
         height, width = moments.shape[-2:]
         if width < LEAST_WIDTH or moments.ndim != 3:
             return None
@@ -110,7 +110,7 @@ def separate_lane(m: int, precision: str) -> Callable[..., Any]:
     """Compile the separation of direct and indirect light."""
     order, run = (0,) * m, separate_entry(m)
 
-    def lane(weight: Any, phase: Any, threshold: float, *, spread: Spread = at_once) -> Any:
+    def lane(weight: Reals, phase: Reals, threshold: float, *, spread: Spread = at_once) -> Any:
         shape, pixels = weight.shape[1:], weight[0].size
         angles = np.ascontiguousarray(phase).reshape(m, pixels)
         weights = np.ascontiguousarray(weight).reshape(m, pixels)

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Places, Reals
 from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
     PLACES,
@@ -15,7 +17,9 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._lanes.parallel import Spread, at_once
+from transientcam_moments._kernels.portable import bank, square_bank
+from transientcam_moments.arrays import Length
+from transientcam_moments.moment_problem import extension
 
 MOST_ODD = 31
 """The highest harmonic there is room for: b_0 .. b_31m in (m + 12)^2 registers."""
@@ -23,34 +27,29 @@ MOST_ODD = 31
 
 @njit(nogil=True, error_model="numpy")
 def _without_harmonics(
-    order: Any,
-    odd: Any,
-    given: Any,
-    current: Any,
-    polynomial: Any,
-    mixed: Any,
-    inverse: Any,
-    following: Any,
-    misfit: Any,
+    order: Length,
+    odd: Places,
+    given: Complexes,
+    current: Complexes,
+    polynomial: Complexes,
+    mixed: Complexes,
+    inverse: Complexes,
+    following: Complexes,
+    misfit: Reals,
     start: int,
     stop: int,
 ) -> None:
     m = len(order)
     one = simd.ones(misfit, 1)
     step = simd.width(one)
-    re, im = simd.matrix(one, order, 12), simd.matrix(one, order, 12)
-    ar, ai = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    re, im = square_bank(one, order, 12), square_bank(one, order, 12)
+    ar, ai = bank(one, order, 1), bank(one, order, 1)
     for left in range(start, stop, step):
         p = min(left, stop - step)
         for j in range(1, m + 1):
             re[j], im[j] = simd.load_complex(one, current[j], p)
             ar[j], ai[j] = simd.load_complex(one, polynomial[j], p)
-        for n in range(m + 1, m * odd[-1] + 1):  # `predicted`
-            sum_re, sum_im = one * 0.0, one * 0.0
-            for j in range(1, m + 1):
-                sum_re = sum_re + (ar[j] * re[n - j] - ai[j] * im[n - j])
-                sum_im = sum_im + (ar[j] * im[n - j] + ai[j] * re[n - j])
-            re[n], im[n] = -sum_re, -sum_im
+        extension.extend(order, m * odd[-1], ar, ai, re, im)
         x, y = simd.load_complex(one, given[0], p)
         simd.store_complex(following[0], p, x, y)
         distance = one * 0.0
@@ -59,11 +58,7 @@ def _without_harmonics(
             for i in range(len(odd)):
                 k = odd[i]
                 dr, di = simd.load_complex(one, mixed[i * m + j - 1], p)
-                hr, hi = re[k * j], im[k * j]
-                if k % 4 == 3:
-                    hi = -hi
-                x = x - (dr * hr - di * hi)
-                y = y - (dr * hi + di * hr)
+                x, y = extension.without_harmonic(k, dr, di, re[k * j], im[k * j], x, y)
             dr, di = simd.load_complex(one, inverse[j - 1], p)
             new_re, new_im = x * dr - y * di, x * di + y * dr
             simd.store_complex(following[j], p, new_re, new_im)
@@ -80,11 +75,11 @@ def harmonics_lane(m: int, precision: str) -> Callable[..., Any]:
     run = entry(_without_harmonics, order_type(m), PLACES, *planes, real[1], PIXELS, PIXELS)
 
     def lane(
-        given: Any,
-        current: Any,
-        polynomial: Any,
-        mixed: Any,
-        inverse: Any,
+        given: Complexes,
+        current: Complexes,
+        polynomial: Complexes,
+        mixed: Complexes,
+        inverse: Complexes,
         orders: tuple[int, ...],
         *,
         spread: Spread = at_once,

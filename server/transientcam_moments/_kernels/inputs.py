@@ -5,30 +5,33 @@ from typing import Any
 from numba import njit
 
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Flags, Images, Reals
+from transientcam_moments._kernels.portable import larger, root, select, some
+from transientcam_moments.arrays import Length, Plane
 
 LOW_FREQUENCY, ON_OFF, ESTIMATED = 0, 1, 2
 _ROWS = 8  # that are smoothed before they leave the caches
 
 
 @njit(forceinline=True, error_model="numpy")
-def _bucket(one: Any, images: Any, first: int, p: int) -> Any:
+def _bucket(one: Plane, images: Images, first: int, p: int) -> Any:
     """Return (I_0 - I_180) + i (I_90 - I_270) and the largest of the four."""
     i0, i90 = simd.load(one, images[first], p), simd.load(one, images[first + 1], p)
     i180, i270 = simd.load(one, images[first + 2], p), simd.load(one, images[first + 3], p)
-    largest = simd.maximum(simd.maximum(i0, i90), simd.maximum(i180, i270))
+    largest = larger(larger(i0, i90), larger(i180, i270))
     return i0 - i180, i90 - i270, largest
 
 
 @njit(nogil=True, error_model="numpy")
 def measure(
-    order: Any,
-    images: Any,
+    order: Length,
+    images: Images,
     zeroth: int,
-    inverse: Any,
+    inverse: Complexes,
     stride: int,
     full_scale: float,
-    moments: Any,
-    flags: Any,
+    moments: Complexes,
+    flags: Flags,
     start: int,
     stop: int,
 ) -> None:
@@ -46,25 +49,32 @@ def measure(
         x, largest = one * 0.0, one * 0.0
         if zeroth == LOW_FREQUENCY:
             x, y, largest = _bucket(one, images, 0, p)
-            x = simd.sqrt(x * x + y * y)
+            x = root(x * x + y * y)
         elif zeroth == ON_OFF:
             on, off = simd.load(one, images[0], p), simd.load(one, images[1], p)
-            x, largest, first = 2.0 * (on - off), simd.maximum(on, off), 2
+            x, largest, first = 2.0 * (on - off), larger(on, off), 2
         else:
             first = 0
         u, v = simd.load_complex(one, inverse[0], p * stride)
         simd.store_complex(moments[0], p, x * u, x * v)
         for j in range(1, len(order) + 1):
             x, y, here = _bucket(one, images, first + 4 * (j - 1), p)
-            largest = simd.maximum(largest, here)
+            largest = larger(largest, here)
             u, v = simd.load_complex(one, inverse[j], p * stride)
             simd.store_complex(moments[j], p, x * u - y * v, x * v + y * u)
-        simd.store(flags, p, simd.select(largest >= limit, 4.0 * one, 0.0))
+        simd.store(flags, p, select(largest >= limit, 4.0 * one, 0.0))
 
 
 @njit(nogil=True, error_model="numpy")
 def smooth(
-    moments: Any, taps: Any, weight: Any, rows: Any, out: Any, width: int, start: int, stop: int
+    moments: Reals,
+    taps: Reals,
+    weight: Reals,
+    rows: Reals,
+    out: Reals,
+    width: int,
+    start: int,
+    stop: int,
 ) -> bool:
     """Smooth rows start..stop of all planes (n, H * 2 W), real and imaginary parts interleaved.
 
@@ -97,14 +107,14 @@ def smooth(
                     total = total + taps[k] * simd.load(one, rows, x + 2 * k)
                 p = y * length + x
                 simd.store(smoothed, p, total * simd.load(one, weight, p))
-    return not simd.some(~(poison >= 0.0))
+    return not some(~(poison >= 0.0))
 
 
 @njit(nogil=True, error_model="numpy")
 def measure_and_smooth(
-    order: Any, images: Any, zeroth: int, inverse: Any, stride: int, full_scale: float,
-    moments: Any, flags: Any, taps: Any, weight: Any, rows: Any, planes: Any, out: Any, width: int,
-    start: int, stop: int,
+    order: Length, images: Images, zeroth: int, inverse: Complexes, stride: int, full_scale: float,
+    moments: Complexes, flags: Flags, taps: Reals, weight: Reals, rows: Reals, planes: Reals,
+    out: Reals, width: int, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the smoothed moments of rows, each few of them as soon as they are measured.
 

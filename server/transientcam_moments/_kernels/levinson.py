@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from transientcam_moments._kernels import simd, toeplitz
+from transientcam_compiled import Spread, at_once, empty
+from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Reals
 from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
     complex_arrays,
@@ -14,41 +16,43 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._lanes.parallel import Spread, at_once
-from transientcam_moments._lanes.pool import empty
+from transientcam_moments._kernels.moments import load_harmonics, load_zeroth
+from transientcam_moments._kernels.portable import bank
+from transientcam_moments.arrays import Length
+from transientcam_moments.moment_problem import toeplitz
 
 _INTERLEAVE = 2
 
 
 @njit(nogil=True, error_model="numpy")
 def _levinson(
-    order: Any,
-    b: Any,
-    zeroth: Any,
+    order: Length,
+    b: Complexes,
+    zeroth: Reals,
     apart: bool,
-    error: Any,
-    polynomial: Any,
-    reflection: Any,
+    error: Reals,
+    polynomial: Complexes,
+    reflection: Complexes,
     start: int,
     stop: int,
 ) -> None:
     """Write the coefficients of the pixels start..stop, b_0 from ``zeroth`` if it is ``apart``."""
-    m = len(order)
     one = simd.ones(error, _INTERLEAVE)
     step = simd.width(one)
-    re, im = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    ar, ai = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    gr, gi = simd.registers(one, order, 0), simd.registers(one, order, 0)
+    re, im = bank(one, order, 1), bank(one, order, 1)
+    ar, ai = bank(one, order, 1), bank(one, order, 1)
+    gr, gi = bank(one, order, 0), bank(one, order, 0)
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        b0 = simd.load(one, zeroth, p) if apart else toeplitz.load_zeroth(one, b, p)
-        scale = toeplitz.load_relative(order, b0, b, p, re, im)
+        re[0] = simd.load(one, zeroth, p) if apart else load_zeroth(one, b, p)
+        load_harmonics(order, one, b, p, re, im)
+        scale = toeplitz.relative(order, re, im)
         brightness = re[0] * scale
         toeplitz.physical(order, re, im)
         # a = E_m B^-1 e_0, what Eq. (2) is evaluated with (Theorem 1)
         simd.store(error, p, brightness * toeplitz.levinson(order, re, im, ar, ai, gr, gi))
         simd.store_complex(polynomial[0], p, one, one * 0.0)
-        for j in range(m):
+        for j in range(len(order)):
             simd.store_complex(polynomial[j + 1], p, ar[j + 1], ai[j + 1])
             simd.store_complex(reflection[j], p, gr[j], gi[j])
 
@@ -75,7 +79,9 @@ def levinson_lane(m: int, precision: str) -> Callable[..., Any]:
     order = (0,) * m
     run = levinson_entry(m, precision)
 
-    def lane(b: Any, brightness: Any = None, *, spread: Spread = at_once) -> tuple[Any, Any, Any]:
+    def lane(
+        b: Complexes, brightness: Reals | None = None, *, spread: Spread = at_once
+    ) -> tuple[Any, Any, Any]:
         shape, pixels = b.shape[1:], b[0].size
         planes = np.ascontiguousarray(b).reshape(m + 1, pixels)
         error = empty(pixels, precision)

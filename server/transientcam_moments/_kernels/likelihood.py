@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_compiled import Spread, at_once, empty
+from transientcam_moments._kernels.arrays import Complexes, Counts, Reals
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -33,15 +35,14 @@ from transientcam_moments._kernels.stages import (
     step_late,
     take_three,
 )
-from transientcam_moments._lanes.parallel import Spread, at_once
-from transientcam_moments._lanes.pool import empty
+from transientcam_moments.arrays import Length
 from transientcam_moments.likelihood import MOST_RETURNS, TAIL_SHAPE, choice
 
 
 @njit(nogil=True, error_model="numpy")
 def fit_returns(
-    order: Any, slots: Any, turns: Any, b: Any, variance: Any, error: float, planes: Any, free: Any,
-    count: Any, start: int, stop: int,
+    order: Length, slots: Length, turns: Reals, b: Complexes, variance: Reals, error: float,
+    planes: Reals, free: Counts, count: Counts, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; each model where simpler ones leave enough."""
     size = rows_of(order) * ROW
@@ -78,8 +79,8 @@ def likelihood_lane(m: int, precision: str) -> Callable[..., Any]:
     turns = choice.turns_of(m).astype(precision)
 
     def lane(
-        b: Any,
-        variance: Any,
+        b: Complexes,
+        variance: Reals,
         returns: int,
         tail_shape: int,
         error: float,

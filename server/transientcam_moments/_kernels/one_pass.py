@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from transientcam_compiled import BLOCK, Spread, empty
+from transientcam_moments._dispatch import LEAST_PIXELS
+from transientcam_moments._kernels.arrays import Booleans, Complexes, Images, Reals
 from transientcam_moments._kernels.padding import normalisation, row_length
 from transientcam_moments._kernels.refine import Found
-from transientcam_moments._lanes.parallel import BLOCK, Spread
-from transientcam_moments._lanes.pool import empty
-from transientcam_moments._lanes.registry import LEAST_PIXELS
 
 if TYPE_CHECKING:  # it brings along the compiler
     from transientcam_moments._kernels.wide import WideReturns
@@ -126,7 +126,7 @@ class OnePass:
         self._prepare_calibration(np.asarray(constants.inverse))
         self._idle: list[_Scratch] = []
 
-    def images(self, images: Any, saturated: Any, spread: Spread) -> Planes:
+    def images(self, images: Images, saturated: Booleans | bool | None, spread: Spread) -> Planes:
         """Reconstruct raw images (N, ...), uint16, of one take.
 
         ``saturated`` (...) replaces what the images themselves show to be saturated.
@@ -154,7 +154,7 @@ class OnePass:
             return self._analysed(smoothed, scratch, spread)
 
     def _measure(
-        self, raw: Any, calibrated: Any, scratch: "_Scratch", start: int, stop: int
+        self, raw: Images, calibrated: Complexes, scratch: "_Scratch", start: int, stop: int
     ) -> None:
         """Write the calibrated moments of some pixels, and which of them are saturated."""
         settings = self._constants.settings
@@ -163,7 +163,7 @@ class OnePass:
             settings.full_scale, calibrated, scratch.saturated, start, stop,
         )  # fmt: skip
 
-    def _smooth(self, smoothed: Any, scratch: "_Scratch", start: int, stop: int) -> None:
+    def _smooth(self, smoothed: Complexes, scratch: "_Scratch", start: int, stop: int) -> None:
         """Smooth rows of the calibrated moments."""
         self._stages.smooth(
             scratch.calibrated.view(np.float32), self._taps, self._weight, scratch.row(start),
@@ -171,7 +171,7 @@ class OnePass:
         )  # fmt: skip
 
     def _measure_and_smooth(
-        self, raw: Any, smoothed: Any, scratch: "_Scratch", start: int, stop: int
+        self, raw: Images, smoothed: Complexes, scratch: "_Scratch", start: int, stop: int
     ) -> None:
         """Write the smoothed moments of rows."""
         settings = self._constants.settings
@@ -182,7 +182,9 @@ class OnePass:
             self._shape[1], start, stop,
         )  # fmt: skip
 
-    def moments(self, smoothed: Any, saturated: Any, spread: Spread) -> Planes:
+    def moments(
+        self, smoothed: Complexes, saturated: Booleans | bool | None, spread: Spread
+    ) -> Planes:
         """Reconstruct calibrated and smoothed moments (m + 1, ...), complex64.
 
         ``saturated`` (...) is flagged, where it is given.
@@ -194,7 +196,7 @@ class OnePass:
             scratch.mark_saturated(False if saturated is None else saturated, self._shape)
             return self._analysed(planes, scratch, spread)
 
-    def _analysed(self, smoothed: Any, scratch: "_Scratch", spread: Spread) -> Planes:
+    def _analysed(self, smoothed: Complexes, scratch: "_Scratch", spread: Spread) -> Planes:
         s, constants, settings = self._stages, self._constants, self._constants.settings
         if self._estimated:
             smoothed[0] = 0
@@ -226,7 +228,7 @@ class OnePass:
         shaped = (a.reshape((*a.shape[:-1], *self._shape)) for a in planes[:-1])
         return Planes(*shaped)._replace(redone=sum(redone))
 
-    def _new_planes(self, smoothed: Any) -> Planes:
+    def _new_planes(self, smoothed: Complexes) -> Planes:
         """Return room for a result: an array a plane, none of which keeps another from the pool."""
         m, pixels = len(self._stages.order), self._pixels
         plane = (empty(pixels, np.float32) for _ in range(6))
@@ -255,7 +257,7 @@ class OnePass:
         finally:
             self._idle.append(scratch)
 
-    def _prepare_calibration(self, inverse: Any) -> None:
+    def _prepare_calibration(self, inverse: Complexes) -> None:
         """Prepare what to multiply with: a row of equal numbers, or one number a pixel.
 
         With smoothing, absent pixels count as nothing for their neighbours, and are NaN behind it.
@@ -277,7 +279,9 @@ class OnePass:
 class _Scratch:
     """Room for what one call computes on the way."""
 
-    def __init__(self, stages: Stages, pixels: int, shape: tuple[int, ...], taps: Any) -> None:
+    def __init__(
+        self, stages: Stages, pixels: int, shape: tuple[int, ...], taps: Reals | None
+    ) -> None:
         m = len(stages.order)
         self.saturated = np.empty(pixels, np.uint8)
         self.eigenvalue = np.empty(pixels, np.float32)
@@ -303,11 +307,11 @@ class _Scratch:
         except IndexError:
             return self._stages.wide.room(_ROOM)
 
-    def give_wide(self, room: Any) -> None:
+    def give_wide(self, room: tuple[Any, ...]) -> None:
         """Keep such room for another part."""
         self._wide.append(room)
 
-    def mark_saturated(self, saturated: Any, shape: tuple[int, ...]) -> None:
+    def mark_saturated(self, saturated: Booleans | bool, shape: tuple[int, ...]) -> None:
         """Take the flags of saturated pixels from a boolean array, or from one for all."""
         marked = np.broadcast_to(np.asarray(saturated, bool), shape).reshape(-1)
         np.multiply(marked, np.uint8(_SATURATED), out=self.saturated)

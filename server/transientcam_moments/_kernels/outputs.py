@@ -1,12 +1,21 @@
 """What a frame's pixels need besides coefficients and returns: flags, biasing, direct light."""
 
-from typing import Any
-
 import numpy as np
 from numba import njit
 
+from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import simd
-from transientcam_moments._lanes.registry import LEAST_PIXELS
+from transientcam_moments._kernels.arrays import Complexes, Counts, Flags, Places, Reals
+from transientcam_moments._kernels.portable import (
+    eps,
+    larger,
+    largest,
+    magnitude,
+    not_a_number,
+    select,
+    some,
+)
+from transientcam_moments.arrays import Length
 
 _INTERLEAVE = 2
 # transientcam_moments.Flags
@@ -15,15 +24,15 @@ _BIASED, _NO_SIGNAL, _SATURATED, _NON_FINITE = 1.0, 2.0, 4.0, 8.0
 
 @njit(nogil=True, error_model="numpy")
 def flag_and_bias(
-    order: Any,
+    order: Length,
     estimated: bool,
-    b: Any,
-    saturated: Any,
-    eigenvalue: Any,
-    brightness: Any,
-    uniform: Any,
-    validity: Any,
-    flags: Any,
+    b: Complexes,
+    saturated: Flags,
+    eigenvalue: Reals,
+    brightness: Reals,
+    uniform: Reals,
+    validity: Reals,
+    flags: Flags,
     epsilon: float,
     least: float,
     start: int,
@@ -43,37 +52,37 @@ def flag_and_bias(
         if estimated:
             b0, rest = smallest / (epsilon - 1.0), one * 0.0
             smallest = epsilon * b0
-        largest, poison = simd.absolute(b0), b0 * 0.0 + rest * 0.0
+        most, poison = magnitude(b0), b0 * 0.0 + rest * 0.0
         for j in range(1, m + 1):
             x, y = simd.load_complex(one, b[j], p)
-            largest = simd.maximum(largest, simd.maximum(simd.absolute(x), simd.absolute(y)))
+            most = larger(most, larger(magnitude(x), magnitude(y)))
             poison = poison + x * 0.0 + y * 0.0
         # so large a density would overflow
-        limit = simd.overflowing(b0) * (6.0 / (2.0 * m + 1.0))
-        finite = (poison >= 0.0) & (largest < limit)
+        limit = (largest(b0) * eps(b0)) * (6.0 / (2.0 * m + 1.0))
+        finite = (poison >= 0.0) & (most < limit)
         dark = finite & ~(b0 > least)
         # less by rounding doesn't count, see `ROUNDING` of `bias`
-        biased = smallest < (epsilon - 4.0 * (m + 1.0) * simd.eps(b0)) * b0
-        raised = simd.select(biased, (b0 - smallest) / (1.0 - epsilon), b0)
+        biased = smallest < (epsilon - 4.0 * (m + 1.0) * eps(b0)) * b0
+        raised = select(biased, (b0 - smallest) / (1.0 - epsilon), b0)
         flag = simd.load(one, saturated, p)
-        flag = flag + simd.select(finite, one * 0.0, _NON_FINITE)
-        flag = flag + simd.select(dark, _NO_SIGNAL * one, 0.0)
-        flag = flag + simd.select(biased, _BIASED * one, 0.0)
+        flag = flag + select(finite, one * 0.0, _NON_FINITE)
+        flag = flag + select(dark, _NO_SIGNAL * one, 0.0)
+        flag = flag + select(biased, _BIASED * one, 0.0)
         simd.store(flags, p, flag)
-        simd.store(validity, p, simd.select(b0 > 0.0, smallest / b0, simd.nan(one)))
+        simd.store(validity, p, select(b0 > 0.0, smallest / b0, not_a_number(one)))
         simd.store(brightness, p, raised)
         simd.store(uniform, p, smallest + (raised - b0))
 
 
 @njit(nogil=True, error_model="numpy")
 def separate(
-    order: Any,
-    phase: Any,
-    weight: Any,
-    flags: Any,
-    direct: Any,
-    indirect: Any,
-    range_m: Any,
+    order: Length,
+    phase: Reals,
+    weight: Reals,
+    flags: Flags,
+    direct: Reals,
+    indirect: Reals,
+    range_m: Reals,
     threshold: float,
     metres: float,
     start: int,
@@ -87,26 +96,26 @@ def separate(
         strongest, total = one * 0.0, one * 0.0
         for i in range(len(order)):
             w = simd.load(one, weight[i], p)
-            strongest, total = simd.maximum(w, strongest), total + w
-        first, angle = one * 0.0, simd.nan(one)
+            strongest, total = larger(w, strongest), total + w
+        first, angle = one * 0.0, not_a_number(one)
         for i in range(len(order) - 1, -1, -1):
             w = simd.load(one, weight[i], p)
             enough = (w >= threshold * strongest) & (w > 0.0)
-            first = simd.select(enough, w, first)
-            angle = simd.select(enough, simd.load(one, phase[i], p), angle)
+            first = select(enough, w, first)
+            angle = select(enough, simd.load(one, phase[i], p), angle)
         flag = simd.load(one, flags, p)
         invalid = flag >= _NON_FINITE
-        flag = simd.select(flag >= _SATURATED, flag - _SATURATED, flag)
+        flag = select(flag >= _SATURATED, flag - _SATURATED, flag)
         invalid = invalid | (flag >= _NO_SIGNAL)
         simd.store(direct, p, first)
-        simd.store(indirect, p, simd.maximum(total - first, 0.0))
-        simd.store(range_m, p, simd.select(invalid, simd.nan(one), angle * metres))
+        simd.store(indirect, p, larger(total - first, 0.0))
+        simd.store(range_m, p, select(invalid, not_a_number(one), angle * metres))
 
 
 @njit(nogil=True, error_model="numpy")
 def gather(
-    order: Any, b: Any, brightness: Any, residual: Any, tolerance: float, ramp: Any, packed: Any,
-    wide: Any, where: Any, begin: int,
+    order: Length, b: Complexes, brightness: Reals, residual: Reals, tolerance: float, ramp: Reals,
+    packed: Reals, wide: Complexes, where: Places, begin: int,
 ) -> int:  # fmt: skip
     """Collect pixels from ``begin`` on whose residual is above the tolerance, until room ends.
 
@@ -121,7 +130,7 @@ def gather(
     left = begin
     while left + step <= pixels and found + step <= room:
         chosen = simd.load(one, residual, left) > limit
-        if simd.some(chosen):
+        if some(chosen):
             for i in range(simd.pack(packed, 0, chosen, simd.load(one, ramp, 0))):
                 where[found] = left + int(packed[i])
                 found += 1
@@ -142,8 +151,9 @@ def gather(
 
 @njit(nogil=True, error_model="numpy")
 def scatter(
-    order: Any, where: Any, found: int, wide_phase: Any, wide_weight: Any, wide_count: Any,
-    wide_residual: Any, phase: Any, weight: Any, count: Any, residual: Any,
+    order: Length, where: Places, found: int, wide_phase: Reals, wide_weight: Reals,
+    wide_count: Counts, wide_residual: Reals, phase: Reals, weight: Reals, count: Counts,
+    residual: Reals,
 ) -> None:  # fmt: skip
     """Put redone returns back where they came from."""
     for i in range(found):

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from transientcam_moments._lanes.registry import LEAST_PIXELS
+from transientcam_moments._dispatch import LEAST_PIXELS
+from transientcam_moments._kernels.arrays import Booleans, Reals
 
 LEAST_WIDTH = LEAST_PIXELS // 2  # of an image: its rows hold real and imaginary parts
 RAMP = np.arange(LEAST_PIXELS, dtype=np.float32)
@@ -17,7 +18,7 @@ def row_length(width: int, taps: int) -> int:
     return 2 * width + 2 * (taps - 1) + LEAST_PIXELS
 
 
-def normalisation(present: Any, taps: Any) -> Any:
+def normalisation(present: Booleans, taps: Reals) -> Any:
     """Return one over the weights that pixels which are there have, NaN for those that aren't."""
     if present.all():
         return _of_whole_images(*present.shape, taps.tobytes())
@@ -29,7 +30,7 @@ def _of_whole_images(height: int, width: int, taps: bytes) -> Any:
     return _inverse_share(np.ones((height, width), bool), np.frombuffer(taps))
 
 
-def _inverse_share(present: Any, taps: Any) -> Any:
+def _inverse_share(present: Booleans, taps: Reals) -> Any:
     share = present.astype(float)
     for axis in (0, 1):
         share = np.apply_along_axis(_blurred, axis, share, taps)
@@ -38,6 +39,6 @@ def _inverse_share(present: Any, taps: Any) -> Any:
     return np.repeat(weight.reshape(-1), 2).astype(np.float32)
 
 
-def _blurred(row: Any, taps: Any) -> Any:
+def _blurred(row: Reals, taps: Reals) -> Any:
     radius = taps.size // 2
     return np.convolve(row, taps)[radius : radius + row.size]

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Counts, Places, Reals
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -19,7 +21,8 @@ from transientcam_moments._kernels.compiled_entry import (
     sizes_type,
 )
 from transientcam_moments._kernels.fits import fit_one, portable, vary, write
-from transientcam_moments._lanes.parallel import Spread, at_once
+from transientcam_moments._kernels.portable import bank, infinity, larger, select, some, square_bank
+from transientcam_moments.arrays import Bank, Length, Mask, Plane
 from transientcam_moments.likelihood import (
     COINCIDE,
     COUNT,
@@ -42,7 +45,7 @@ __all__ = ["pairs_lane", "portable"]  # which gives the fits' arithmetic its mea
 
 @njit(error_model="numpy")
 def _project(
-    places: Any, turns: Any, data_r: Any, data_i: Any, share: Any, along: Any, alike: Any
+    places: Places, turns: Reals, data_r: Bank, data_i: Bank, share: Bank, along: Bank, alike: Bank
 ) -> Any:
     """Put the moments' projections on returns at the phases of the grid in `along`, twice over.
 
@@ -62,38 +65,38 @@ def _project(
             found = found + share[k] * (data_r[k] * c + data_i[k] * s)
             common = common + share[k] * c
         along[g], along[count + g] = found, found
-        most = simd.maximum(found, most)
+        most = larger(found, most)
         if g <= count // 2:
             alike[g] = common
-    return simd.maximum(LEAST_GAIN * squared, most * most)
+    return larger(LEAST_GAIN * squared, most * most)
 
 
 @njit(forceinline=True, error_model="numpy")
-def _fill_row(count: int, apart: int, along: Any, alike: Any, rows: Any) -> None:
+def _fill_row(count: int, apart: int, along: Bank, alike: Bank, rows: Bank) -> None:
     """Put what pairs so many steps apart explain in their row, by the first one's phase."""
     row = (apart % 3) * (count + 2) + 1
     s = alike[apart]
-    inverse = simd.select(s * s < COINCIDE, 1.0 / (1.0 - s * s), 0.0)
+    inverse = select(s * s < COINCIDE, 1.0 / (1.0 - s * s), 0.0)
     for g in range(count):
         a, b = along[g], along[g + apart]
         left_a, left_b = a - s * b, b - s * a  # in the signs of the weights
         explained = (a * left_a + b * left_b) * inverse
-        rows[row + g] = simd.select((left_a > 0.0) & (left_b > 0.0), explained, 0.0)
+        rows[row + g] = select((left_a > 0.0) & (left_b > 0.0), explained, 0.0)
     rows[row - 1], rows[row + count] = rows[row + count - 1], rows[row]
 
 
 @njit(forceinline=True, error_model="numpy")
-def _insert(gain: Any, pair: Any, gains: Any, pairs: Any, size: int) -> None:
+def _insert(gain: Plane, pair: Plane, gains: Bank, pairs: Bank, size: int) -> None:
     """Insert pairs in lists of the best ones, of so many each."""
     for k in range(size):
         better = gain > gains[k]
-        gain, gains[k] = simd.select(better, gains[k], gain), simd.select(better, gain, gains[k])
-        pair, pairs[k] = simd.select(better, pairs[k], pair), simd.select(better, pair, pairs[k])
+        gain, gains[k] = select(better, gains[k], gain), select(better, gain, gains[k])
+        pair, pairs[k] = select(better, pairs[k], pair), select(better, pair, pairs[k])
 
 
 @njit(forceinline=True, error_model="numpy")
 def _keep_peaks(
-    count: int, apart: int, rows: Any, row_gains: Any, row_pairs: Any, gains: Any, pairs: Any
+    count: int, apart: int, rows: Bank, row_gains: Bank, row_pairs: Bank, gains: Bank, pairs: Bank
 ) -> None:
     """Insert the best pairs of a row that explain more than those beside them.
 
@@ -107,25 +110,25 @@ def _keep_peaks(
     for g in range(count):
         gain = rows[row + g]
         peak = gain > row_gains[PEAKS - 1]
-        if not simd.some(peak):
+        if not some(peak):
             continue
         peak = peak & (gain >= rows[row + g + 1]) & (gain >= rows[row + g - 1])
         if apart > 1:
             peak = peak & (gain >= rows[before + g])
         if apart < count // 2:
             peak = peak & (gain >= rows[after + g])
-        if simd.some(peak):
+        if some(peak):
             pair = 0.0 * gain + float(apart * count + g)
-            _insert(simd.select(peak, gain, 0.0), pair, row_gains, row_pairs, PEAKS)
+            _insert(select(peak, gain, 0.0), pair, row_gains, row_pairs, PEAKS)
     for k in range(PEAKS):
-        if simd.some(row_gains[k] > gains[STARTS - 1]):
+        if some(row_gains[k] > gains[STARTS - 1]):
             _insert(row_gains[k], row_pairs[k], gains, pairs, STARTS)
 
 
 @njit(error_model="numpy")
 def _search(
-    places: Any, turns: Any, data_r: Any, data_i: Any, share: Any, along: Any, alike: Any,
-    rows: Any, row_gains: Any, row_pairs: Any, gains: Any, pairs: Any,
+    places: Places, turns: Reals, data_r: Bank, data_i: Bank, share: Bank, along: Bank, alike: Bank,
+    rows: Bank, row_gains: Bank, row_pairs: Bank, gains: Bank, pairs: Bank,
 ) -> None:  # fmt: skip
     """Put the pairs on the grid that explain most in `pairs`."""
     count = turns.shape[1]
@@ -141,7 +144,7 @@ def _search(
 
 
 @njit(forceinline=True, error_model="numpy")
-def _points(turns: Any, pair: Any, room: Any, x: Any, y: Any) -> None:
+def _points(turns: Reals, pair: Plane, room: Reals, x: Bank, y: Bank) -> None:
     """Put the points of the unit circle of a pair on the grid in `x` and `y`."""
     count = turns.shape[1]
     simd.store(room[0], 0, pair)
@@ -156,16 +159,16 @@ def _points(turns: Any, pair: Any, room: Any, x: Any, y: Any) -> None:
 
 @njit(error_model="numpy")
 def _polish(
-    places: Any, steps: int, data_r: Any, data_i: Any, weight: Any, share: Any, x: Any, y: Any,
-    w: Any, room: Any, active: Any,
+    places: Places, steps: int, data_r: Bank, data_i: Bank, weight: Bank, share: Bank, x: Bank,
+    y: Bank, w: Bank, room: tuple[Bank, ...], active: Mask,
 ) -> Any:  # fmt: skip
     """Take at most so many steps from two returns on; return chi-square."""
     pr, pi, tx, ty, tw, tr, ti = room
     cost = pair_fit.begin(places, data_r, data_i, weight, share, x, y, w, pr, pi)
-    far = simd.infinity(cost)
+    far = infinity(cost)
     damping = pair_fit.first_damping(active, cost)
     for _ in range(steps):
-        if not simd.some(damping < sharp.SETTLED):
+        if not some(damping < sharp.SETTLED):
             break
         cost, damping = pair_fit.step(
             places, data_r, data_i, weight, share, x, y, w, pr, pi, tx, ty, tw, tr, ti, cost,
@@ -175,30 +178,30 @@ def _polish(
 
 
 @njit(forceinline=True, error_model="numpy")
-def _keep_finalist(cost: Any, x: Any, y: Any, costs: Any, points: Any) -> None:
+def _keep_finalist(cost: Plane, x: Bank, y: Bank, costs: Bank, points: Bank) -> None:
     """Insert a fit in the list of the best ones; each has four coordinates in `points`."""
     a, b, c, d = x[0], y[0], x[1], y[1]
     for k in range(FINALISTS):
         better = cost < costs[k]
-        cost, costs[k] = simd.select(better, costs[k], cost), simd.select(better, cost, costs[k])
+        cost, costs[k] = select(better, costs[k], cost), select(better, cost, costs[k])
         i = 4 * k
-        a, points[i] = simd.select(better, points[i], a), simd.select(better, a, points[i])
+        a, points[i] = select(better, points[i], a), select(better, a, points[i])
         i += 1
-        b, points[i] = simd.select(better, points[i], b), simd.select(better, b, points[i])
+        b, points[i] = select(better, points[i], b), select(better, b, points[i])
         i += 1
-        c, points[i] = simd.select(better, points[i], c), simd.select(better, c, points[i])
+        c, points[i] = select(better, points[i], c), select(better, c, points[i])
         i += 1
-        d, points[i] = simd.select(better, points[i], d), simd.select(better, d, points[i])
+        d, points[i] = select(better, points[i], d), select(better, d, points[i])
 
 
 @njit(error_model="numpy")
 def _choose(
-    places: Any, same: float, data_r: Any, data_i: Any, weight: Any, share: Any, costs: Any,
-    points: Any, x: Any, y: Any, w: Any, bx: Any, by: Any, bw: Any, directs: Any, room: Any,
-    active: Any,
+    places: Places, same: float, data_r: Bank, data_i: Bank, weight: Bank, share: Bank,
+    costs: Bank, points: Bank, x: Bank, y: Bank, w: Bank, bx: Bank, by: Bank, bw: Bank,
+    directs: Bank, room: tuple[Bank, ...], active: Mask,
 ) -> Any:  # fmt: skip
     """Polish the finalists, put the best one in `bx`, `by`, `bw`; return its cost and lead."""
-    far = simd.infinity(weight[0])
+    far = infinity(weight[0])
     best, bx_direct, by_direct = far, 0.0 * weight[0], 0.0 * weight[0]
     for f in range(FINALISTS):
         for k in range(2):
@@ -209,26 +212,27 @@ def _choose(
         dx, dy = pair_fit.direct(x, y, w)
         costs[f], directs[2 * f], directs[2 * f + 1] = cost, dx, dy
         better = cost < best
-        best = simd.select(better, cost, best)
+        best = select(better, cost, best)
         bx_direct, by_direct = (
-            simd.select(better, dx, bx_direct),
-            simd.select(better, dy, by_direct),
+            select(better, dx, bx_direct),
+            select(better, dy, by_direct),
         )
         for k in range(2):
-            bx[k] = simd.select(better, x[k], bx[k]) if f > 0 else x[k]
-            by[k] = simd.select(better, y[k], by[k]) if f > 0 else y[k]
-            bw[k] = simd.select(better, w[k], bw[k]) if f > 0 else w[k]
+            bx[k] = select(better, x[k], bx[k]) if f > 0 else x[k]
+            by[k] = select(better, y[k], by[k]) if f > 0 else y[k]
+            bw[k] = select(better, w[k], bw[k]) if f > 0 else w[k]
     second = far
     for f in range(FINALISTS):
         other = directs[2 * f] * bx_direct + directs[2 * f + 1] * by_direct < same
-        second = simd.select(other & (costs[f] < second), costs[f], second)
+        second = select(other & (costs[f] < second), costs[f], second)
     return best, second - best
 
 
 @njit(nogil=True, error_model="numpy")
 def fit_pairs(
-    order: Any, lists: Any, places: Any, first_turns: Any, same: float, turns: Any, b: Any,
-    variance: Any, error: float, planes: Any, free: Any, count: Any, start: int, stop: int,
+    order: Length, lists: tuple[Length, ...], places: Places, first_turns: Reals, same: float,
+    turns: Reals, b: Complexes, variance: Reals, error: float, planes: Reals, free: Counts,
+    count: Counts, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; two returns where one leaves enough.
 
@@ -236,27 +240,27 @@ def fit_pairs(
     `FINALISTS`, and four times that.
     """
     one = simd.ones(variance, 1)
-    step, far = simd.width(one), simd.infinity(one)
-    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    pr, pi = simd.registers(one, order, 0), simd.registers(one, order, 0)
-    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
-    kr, ki = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    kw, share = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    x, y, w = simd.registers(one, (), 2), simd.registers(one, (), 2), simd.registers(one, (), 2)
-    bx, by, bw = simd.registers(one, (), 2), simd.registers(one, (), 2), simd.registers(one, (), 2)
+    step, far = simd.width(one), infinity(one)
+    data_r, data_i = bank(one, order, 1), bank(one, order, 1)
+    rr, ri = bank(one, order, 1), bank(one, order, 1)
+    pr, pi = bank(one, order, 0), bank(one, order, 0)
+    weight, found = bank(one, order, 1), bank(one, (), 22)
+    kr, ki = bank(one, order, 1), bank(one, order, 1)
+    kw, share = bank(one, order, 1), bank(one, order, 1)
+    x, y, w = bank(one, (), 2), bank(one, (), 2), bank(one, (), 2)
+    bx, by, bw = bank(one, (), 2), bank(one, (), 2), bank(one, (), 2)
     room = (
-        simd.registers(one, lists[0], 0), simd.registers(one, lists[0], 0),
-        simd.registers(one, (), 2), simd.registers(one, (), 2), simd.registers(one, (), 2),
-        simd.registers(one, lists[0], 0), simd.registers(one, lists[0], 0),
+        bank(one, lists[0], 0), bank(one, lists[0], 0),
+        bank(one, (), 2), bank(one, (), 2), bank(one, (), 2),
+        bank(one, lists[0], 0), bank(one, lists[0], 0),
     )  # fmt: skip
     # 8 m phases, or 24: (m + 8)^2 are enough for two turns, and (m + 12)^2 for three rows
-    along, alike = simd.matrix(one, order, 8), simd.matrix(one, order, 4)
-    rows = simd.matrix(one, order, 12)
-    gains, pairs = simd.registers(one, lists[1], 0), simd.registers(one, lists[1], 0)
-    row_gains, row_pairs = simd.registers(one, lists[2], 0), simd.registers(one, lists[2], 0)
-    costs, directs = simd.registers(one, lists[3], 0), simd.registers(one, lists[4], 0)
-    points = simd.registers(one, lists[4], 0)
+    along, alike = square_bank(one, order, 8), square_bank(one, order, 4)
+    rows = square_bank(one, order, 12)
+    gains, pairs = bank(one, lists[1], 0), bank(one, lists[1], 0)
+    row_gains, row_pairs = bank(one, lists[2], 0), bank(one, lists[2], 0)
+    costs, directs = bank(one, lists[3], 0), bank(one, lists[4], 0)
+    points = bank(one, lists[4], 0)
     scalars = np.empty((4, step), turns.dtype)
     for left in range(start, stop, step):
         p = min(left, stop - step)
@@ -266,7 +270,7 @@ def fit_pairs(
         )  # fmt: skip
         lead = far
         more = (found[SCORE] > 4.0 * penalty) & (numbers >= 4.0)
-        if simd.some(more):
+        if some(more):
             total = 0.0 * one
             for k in range(len(places)):
                 j = places[k]
@@ -289,7 +293,7 @@ def fit_pairs(
                 more,
             )  # fmt: skip
             choice.offer_returns((0, 0), bx, by, bw, cost, penalty, more, found)
-            lead = simd.select(found[COUNT] == 2.0, lead, far)
+            lead = select(found[COUNT] == 2.0, lead, far)
         vary(order, weight, found)
         write((0, 0), found, scale, numbers, usable, p, planes, free, count)
         simd.store(planes[13], p, lead)
@@ -310,7 +314,9 @@ def pairs_lane(m: int, precision: str) -> Callable[..., Any]:
     phase, same = grid(m), least_alike(m)
     turns = np.stack([np.cos(phase), np.sin(phase)]).astype(precision)
 
-    def lane(b: Any, variance: Any, error: float, *, spread: Spread = at_once) -> tuple[Any, ...]:
+    def lane(
+        b: Complexes, variance: Reals, error: float, *, spread: Spread = at_once
+    ) -> tuple[Any, ...]:
         pixels = b.shape[1]
         moments, noise = np.ascontiguousarray(b), np.ascontiguousarray(variance)
         places = np.array([j for j, plane in enumerate(noise) if plane.any()], np.int64)

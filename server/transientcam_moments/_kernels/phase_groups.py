@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numba import njit
 
+from transientcam_moments._kernels.arrays import Places, Reals
 from transientcam_moments._kernels.compiled_entry import (
     PIXELS,
     TABLE,
@@ -15,6 +16,7 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
+from transientcam_moments.arrays import Length
 
 ANY: Final = 0
 MIRRORED: Final = 1
@@ -48,7 +50,7 @@ class Groups(NamedTuple):
 
 
 @njit(nogil=True, error_model="numpy")
-def _kind(phase_rad: Any) -> int:
+def _kind(phase_rad: Reals) -> int:
     """Say how equidistant phases are, but for the rounding of their own digits."""
     phases = phase_rad.shape[0]
     if phases < _LEAST_EQUIDISTANT:
@@ -65,7 +67,7 @@ def _kind(phase_rad: Any) -> int:
 
 @njit(nogil=True, error_model="numpy")
 def _group(
-    order: Any, phase_rad: Any, alike: int, rows: Any, waves: Any, turn: Any
+    order: Length, phase_rad: Reals, alike: int, rows: Places, waves: Reals, turn: Reals
 ) -> tuple[int, int]:
     """Fill the arrays of `Groups`; return how many groups there are, and of which kind."""
     m, phases = len(order), phase_rad.shape[0]
@@ -111,7 +113,7 @@ def grouping(m: int, precision: str) -> Callable[[Any, int], Groups]:
     real = real_arrays(precision)
     run = entry(_group, order_type(m), real_arrays("d")[1], PIXELS, TABLE, real[2], real[1])
 
-    def grouped(phase_rad: Any, alike: int) -> Groups:
+    def grouped(phase_rad: Reals, alike: int) -> Groups:
         rows = np.zeros((phase_rad.size, 4), np.int64)
         waves = np.empty((phase_rad.size, 4 * m), precision)
         centre = np.empty(2 * m, precision)
@@ -122,7 +124,7 @@ def grouping(m: int, precision: str) -> Callable[[Any, int], Groups]:
     def before(phase_rad: bytes, alike: int) -> Groups:
         return grouped(np.frombuffer(phase_rad), alike)
 
-    def remembered(phase_rad: Any, alike: int) -> Groups:
+    def remembered(phase_rad: Reals, alike: int) -> Groups:
         if phase_rad.size > _REMEMBERED:
             return grouped(np.ascontiguousarray(phase_rad), alike)
         return before(phase_rad.tobytes(), alike)  # frames in a row have the same phases

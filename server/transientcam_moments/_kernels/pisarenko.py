@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from transientcam_moments._kernels.circle import half_turns
+from transientcam_compiled import Spread, at_once, blocks, empty
+from transientcam_moments._kernels.arrays import Complexes, Reals
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.refine import Found, redo
 from transientcam_moments._kernels.returns import returns_entry, usual_steps
 from transientcam_moments._kernels.wide import WideReturns
-from transientcam_moments._lanes.parallel import Spread, at_once, blocks
-from transientcam_moments._lanes.pool import empty
+from transientcam_moments.moment_problem import half_turns
 
 _ROOM = 256  # pixels that are redone in double precision at a time
 
@@ -24,8 +24,8 @@ def pisarenko_lane(m: int, precision: str) -> Callable[..., Any]:
     wide = WideReturns(m) if precision == "f" else None
 
     def lane(
-        b: Any,
-        eigenvalue: Any = None,
+        b: Complexes,
+        eigenvalue: Reals | None = None,
         *,
         noise: float | None = None,
         spread: Spread = at_once,

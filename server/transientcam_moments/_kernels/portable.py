@@ -1,10 +1,12 @@
-"""What the fits of `likelihood` need beyond + - * /, for vectors of pixels.
+"""The words of `arrays`, and all that is stated with them, for vectors of pixels.
 
-The functions of `transientcam_moments.likelihood` are compiled as they stand there: the arithmetic
-that they call has its meaning for lanes here.
+Statements are compiled as they stand: kernels take words and statements alike from here or from
+where they are stated, once this module has been imported.
 """
 
+import inspect
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -13,8 +15,75 @@ from numba import types as numba_types
 from numba.core import cgutils as numba_cgutils
 
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.simd import Lanes, Mask, Registers, extending, templates
-from transientcam_moments.likelihood import arithmetic, choice, linear, pair_fit, sharp, tail
+from transientcam_moments._kernels.simd import (
+    Lanes,
+    Mask,
+    Operands,
+    Registers,
+    extending,
+    templates,
+)
+from transientcam_moments.arrays import (
+    arctangent_ratio,
+    arithmetic,
+    bank,
+    close,
+    eps,
+    infinity,
+    large,
+    larger,
+    largest,
+    least,
+    logarithm,
+    lost_by_squaring,
+    magnitude,
+    not_a_number,
+    product_bank,
+    repeat,
+    root,
+    root_eps,
+    rounding,
+    select,
+    small,
+    smaller,
+    some,
+    square_bank,
+    tiny,
+)
+from transientcam_moments.likelihood import choice, linear, pair_fit, sharp, tail
+from transientcam_moments.moment_problem import (
+    circle,
+    eigenvalue,
+    extension,
+    maxima,
+    sorting,
+    toeplitz,
+)
+
+__all__ = [
+    "arctangent_ratio",
+    "bank",
+    "close",
+    "eps",
+    "infinity",
+    "large",
+    "larger",
+    "largest",
+    "least",
+    "logarithm",
+    "lost_by_squaring",
+    "magnitude",
+    "not_a_number",
+    "product_bank",
+    "repeat",
+    "root",
+    "select",
+    "small",
+    "smaller",
+    "some",
+    "square_bank",
+    "tiny",
+]
 
 types: Any = numba_types
 cgutils: Any = numba_cgutils
@@ -33,7 +102,7 @@ def _room(function: Callable[..., Any], size: Callable[[int, Any], int | None]) 
             return templates.signature(Registers(like, count), like, length, further)
 
     @extending.lower_builtin(function, Lanes, types.Any, types.Any)
-    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def _lower(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         item = context.get_value_type(sig.return_type.item)
         return cgutils.alloca_once(builder, item, size=sig.return_type.size)
 
@@ -47,43 +116,80 @@ def _squared(length: int, number: Any) -> int | None:
     return None if total is None else total**2
 
 
-_room(arithmetic.bank, _more)
-_room(arithmetic.square_bank, _squared)
-_room(arithmetic.product_bank, lambda length, other: length * len(other))
+_room(bank, _more)
+_room(square_bank, _squared)
+_room(product_bank, lambda length, other: length * len(other))
 
 
-def _same(vector: Any) -> Any:
-    return vector
+def _limits(x: ir.Value) -> Any:
+    return np.finfo(np.float32 if isinstance(x.type.element, ir.FloatType) else np.float64)
 
 
-def _root(builder: Any, x: Any) -> Any:
-    kind = ir.FunctionType(x.type, [x.type])
-    name = f"llvm.sqrt.v{x.type.count}f{32 if isinstance(x.type.element, ir.FloatType) else 64}"
-    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [x])
+def _vector(x: ir.Value, value: float) -> ir.Constant:
+    """Return a number in every pixel of a vector of the type of `x`."""
+    return ir.Constant(x.type, [value] * x.type.count)
 
 
-def _constant(value: Callable[[Any], float]) -> Callable[[Any, Any], Any]:
-    """Return what gives a number depending on the precision of its argument."""
+def _word(
+    word: Callable[..., Any],
+    operands: int,
+    emit: Callable[..., ir.Value],
+    result: Callable[[Lanes], Any] = lambda lanes: lanes,
+    of: type = Lanes,
+) -> None:
+    simd.define(word, of, operands, emit, result)
 
-    def emit(builder: Any, x: Any) -> Any:
-        limits = np.finfo(np.float32 if isinstance(x.type.element, ir.FloatType) else np.float64)
-        return ir.Constant(x.type, [value(limits)] * x.type.count)
+
+def _constant(word: Callable[[Any], Any]) -> None:
+    """Give a number that depends on the precision of a plane its meaning."""
+
+    def emit(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
+        return _vector(x, float(word(np.empty(0, _limits(x).dtype))))
+
+    _word(word, 1, emit)
+
+
+def _llvm(name: str) -> Callable[..., ir.Value]:
+    """Return what calls LLVM's vector intrinsic ``name``."""
+
+    def emit(builder: ir.IRBuilder, *operands: ir.Value) -> ir.Value:
+        vector = operands[0].type
+        kind = ir.FunctionType(vector, [vector] * len(operands))
+        full = f"llvm.{name}.v{vector.count}f{_limits(operands[0]).bits}"
+        callee = cgutils.get_or_insert_function(builder.module, kind, full)
+        return builder.call(callee, operands)
 
     return emit
 
 
-simd.define(
-    arithmetic.larger, Lanes, 2, lambda b, x, y: b.select(b.fcmp_ordered(">", x, y), x, y), _same
-)
-simd.define(
-    arithmetic.smaller, Lanes, 2, lambda b, x, y: b.select(b.fcmp_ordered("<", x, y), x, y), _same
-)
-simd.define(arithmetic.root, Lanes, 1, _root, _same)
-simd.define(arithmetic.least, Lanes, 1, _constant(lambda limits: float(limits.tiny) ** 0.5), _same)
-simd.define(arithmetic.rounding, Lanes, 1, _constant(lambda limits: 8 * float(limits.eps)), _same)
+def _of_two(code: str) -> Callable[..., ir.Value]:
+    return lambda builder, x, y: builder.select(builder.fcmp_ordered(code, x, y), x, y)
 
 
-@templates.infer_global(arithmetic.select)
+def _lost_by_squaring(builder: ir.IRBuilder, x: ir.Value, square: ir.Value) -> ir.Value:
+    return _llvm("fma")(builder, x, x, builder.fneg(square))
+
+
+def _some(builder: ir.IRBuilder, mask: ir.Value) -> ir.Value:
+    bits = ir.IntType(mask.type.count)
+    return builder.icmp_unsigned("!=", builder.bitcast(mask, bits), bits(0))
+
+
+# Of a NaN and a number both return their second argument.
+_word(larger, 2, _of_two(">"))
+_word(smaller, 2, _of_two("<"))
+_word(root, 1, _llvm("sqrt"))
+_word(magnitude, 1, _llvm("fabs"))
+_word(lost_by_squaring, 2, _lost_by_squaring)
+_word(some, 1, _some, lambda mask: types.boolean, Mask)
+for _number in (
+    rounding, least, eps, root_eps, close, tiny, largest, infinity, not_a_number, large,
+    small,
+):  # fmt: skip
+    _constant(_number)
+
+
+@templates.infer_global(select)
 class _Select(templates.AbstractTemplate):  # type: ignore[misc]  # numba is untyped
     def generic(self, args: Any, kws: Any) -> Any:
         lanes = args[1] if isinstance(args[1], Lanes) else args[2]
@@ -91,53 +197,44 @@ class _Select(templates.AbstractTemplate):  # type: ignore[misc]  # numba is unt
         return templates.signature(lanes, args[0], lanes, lanes) if fits else None
 
 
-@extending.lower_builtin(arithmetic.select, Mask, Lanes, Lanes)
-def _select(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+@extending.lower_builtin(select, Mask, Lanes, Lanes)
+def _select(context: Any, builder: ir.IRBuilder, sig: Any, args: Any) -> Any:
     return builder.select(*args)
 
 
-for _function in (
-    arithmetic.logarithm,
-    linear.decompose,
-    linear.solve,
-    linear.variances,
-    sharp.chi_square,
-    sharp.powers,
-    sharp.remains,
-    sharp.weigh_what_is_left,
-    sharp.judge,
-    sharp.overlaps,
-    sharp.four_sums,
-    sharp.kept,
-    sharp.try_phases,
-    sharp.information,
-    sharp.gradient,
-    sharp.weigh,
-    sharp.turned,
-    sharp.step,
-    pair_fit.powers,
-    pair_fit.weigh,
-    pair_fit.chi_square,
-    pair_fit.turns,
-    pair_fit.begin,
-    pair_fit.step,
-    pair_fit.first_damping,
-    pair_fit.direct,
-    sharp.deviations,
-    tail.shape,
-    tail.turn_back,
-    tail.weigh,
-    tail.remains,
-    tail.information,
-    tail.step,
-    tail.deviations,
-    choice.nothing,
-    choice.offer_returns,
-    choice.start_of_tail,
-    choice.offer_tail,
-    choice.chosen,
-    choice.has_tail,
-    choice.vary_returns,
-    choice.vary_tail,
-):
-    extending.register_jitable(error_model="numpy")(_function)
+def _arctangent_ratio(builder: ir.IRBuilder, square: ir.Value) -> ir.Value:
+    terms = arithmetic.arctangent_terms(_limits(square).dtype)
+    total = _vector(square, terms[-1])
+    for term in reversed(terms[:-1]):
+        product = builder.fmul(total, square, flags=simd.FUSE)
+        total = builder.fadd(product, _vector(square, term), flags=simd.FUSE)
+    return total
+
+
+_word(arctangent_ratio, 1, _arctangent_ratio)
+
+
+@extending.overload(repeat, jit_options={"error_model": "numpy", "forceinline": True})
+def _repeat(body: Any, steps: Any, fixed: Any, given: Any, state: Any) -> Callable[..., Any]:
+    def run(body: Any, steps: Any, fixed: Any, given: Any, state: Any) -> Any:
+        for step in range(steps):
+            state = body(step == 0, fixed, given, state)
+            if not some(state[0]):
+                break
+        return state
+
+    return run
+
+
+def _compile_statements(module: ModuleType, *, inline: bool) -> None:
+    """Let kernels call what a module states."""
+    for function in vars(module).values():
+        if inspect.isfunction(function) and function.__module__ == module.__name__:
+            extending.register_jitable(error_model="numpy", forceinline=inline)(function)
+
+
+extending.register_jitable(error_model="numpy")(logarithm)
+for _module in (choice, linear, pair_fit, sharp, tail):
+    _compile_statements(_module, inline=False)
+for _module in (toeplitz, eigenvalue, circle, extension, maxima, sorting):
+    _compile_statements(_module, inline=True)

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 from transientcam_moments._kernels.analysis import analysis_entry
-from transientcam_moments._kernels.circle import half_turns
 from transientcam_moments._kernels.frames import (
     measure_and_smooth_entry,
     measure_entry,
@@ -14,6 +13,7 @@ from transientcam_moments._kernels.frames import (
 from transientcam_moments._kernels.one_pass import Constants, OnePass, Stages
 from transientcam_moments._kernels.returns import usual_steps
 from transientcam_moments._kernels.wide import WideReturns
+from transientcam_moments.moment_problem import half_turns
 
 
 def reconstruct_lane(m: int, precision: str) -> Callable[..., Any]:

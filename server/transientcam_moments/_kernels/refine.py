@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from transientcam_moments._kernels.arrays import Complexes, Places
 from transientcam_moments.arrays import in_turn
 from transientcam_moments.moment_problem import polish
 
@@ -21,7 +22,7 @@ class Found(NamedTuple):
     residual: Any
 
 
-def redo(planes: Any, found: tuple[Any, ...], ill: Any, noise: float) -> None:
+def redo(planes: Complexes, found: tuple[Any, ...], ill: Places, noise: float) -> None:
     """Redo pixels whose returns don't reproduce their moments, with more digits or more care.
 
     Parameters

@@ -1,7 +1,6 @@
 """Pisarenko's returns for one register of pixels at a time, expanded into the kernels.
 
-``order`` is a tuple of length m; banks of registers are taken and filled. Points of the unit circle
-are kept as half angles (see `circle`).
+``order`` is a tuple of length m; banks of registers are taken and filled.
 """
 
 from collections.abc import Callable
@@ -10,8 +9,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from transientcam_moments._kernels import simd, toeplitz
-from transientcam_moments._kernels.circle import circle_roots
+from transientcam_moments._dispatch import LEAST_PIXELS
+from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Counts, Reals
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -21,7 +21,19 @@ from transientcam_moments._kernels.compiled_entry import (
     order_type,
     real_arrays,
 )
-from transientcam_moments._lanes.registry import LEAST_PIXELS
+from transientcam_moments._kernels.moments import load_harmonics, load_zeroth
+from transientcam_moments._kernels.portable import (
+    bank,
+    eps,
+    infinity,
+    magnitude,
+    not_a_number,
+    root,
+    select,
+    some,
+)
+from transientcam_moments.arrays import Length
+from transientcam_moments.moment_problem import circle, sort, toeplitz
 
 _INTERLEAVE = 2
 _FAINT = 1024.0  # times what rounding makes of nothing
@@ -30,81 +42,18 @@ MOST_STEPS = 24
 """Of the iteration for roots, for pixels that need more than the others."""
 
 
-@njit(forceinline=True, error_model="numpy")
-def phase_of(x: Any, y: Any) -> Any:
-    """Return the angle of a point of the unit circle, in [0, 2 pi)."""
-    ax, ay = simd.absolute(x), simd.absolute(y)
-    t = simd.minimum(ax, ay) / (1.0 + simd.maximum(ax, ay))  # tan of half the angle to an axis
-    angle = 2.0 * t * simd.arctangent_ratio(t * t)
-    angle = simd.select(ay > ax, 0.5 * np.pi - angle, angle)
-    angle = simd.select(x < 0.0, np.pi - angle, angle)
-    angle = simd.select(y < 0.0, 2.0 * np.pi - angle, angle)
-    return simd.select(angle >= 2.0 * np.pi, 0.0, angle)
-
-
-@njit(forceinline=True, error_model="numpy")
-def singular(
-    order: Any, re: Any, im: Any, ar: Any, ai: Any, gr: Any, gi: Any, inverse: Any, floor: Any
-) -> Any:
-    """Run Levinson's recursion on a singular matrix with b_0 = 1, up to |g_m| = 1 (Theorem 2).
-
-    Fills the eigenvector a, g_1 .. g_m and 1 / E_0 .. 1 / E_{m-1}; returns where a smaller block is
-    singular already, but for ``floor``.
-    """
-    m = len(order)
-    error = re[0]
-    fewer = error < error
-    for k in range(1, m + 1):
-        inverse[k - 1] = 1.0 / error
-        x, y = toeplitz.reflect(k, re, im, ar, ai, inverse[k - 1])
-        if k < m:
-            error = error * toeplitz.below_one(x, y)
-            fewer = fewer | ~(error > floor)
-        else:  # E_m = 0: a is the eigenvector of the smallest eigenvalue (Sec. 5.1)
-            unit = 1.0 / simd.sqrt(x * x + y * y)
-            x, y = x * unit, y * unit
-        toeplitz.step_up(k, ar, ai, x, y)
-        gr[k - 1], gi[k - 1] = x, y
-    return fewer
-
-
-@njit(forceinline=True, error_model="numpy")
-def weigh(order: Any, gr: Any, gi: Any, inverse: Any, x: Any, y: Any) -> Any:
-    """Return the weight of a return at a half angle, and that half angle corrected.
-
-    w = 1 / sum_k |Phi_k(z)|^2 / E_k, k < m. With S_k = z^(-k/2) Phi_k the
-    recursion is t = conj(omega) S, S = t + conj(g t), and the argument of t turns with phi at the
-    rate that the same sum says (Christoffel, Darboux), which is Newton's step for free.
-    """
-    m = len(order)
-    sr, si = x * 0.0 + 1.0, y * 0.0
-    total = inverse[0]
-    for k in range(1, m):
-        tr, ti = x * sr + y * si, x * si - y * sr
-        sr = tr + gr[k - 1] * tr - gi[k - 1] * ti
-        si = ti - gr[k - 1] * ti - gi[k - 1] * tr
-        total = total + (sr * sr + si * si) * inverse[k]
-    tr, ti = x * sr + y * si, x * si - y * sr
-    a, b = gr[m - 1], gi[m - 1]
-    er, ei = simd.select(a >= 0.0, 1.0 + a, -b), simd.select(a >= 0.0, -b, 1.0 - a)
-    real, imag = er * tr + ei * ti, er * ti - ei * tr  # conj(eta) t, imaginary at a root
-    w = 1.0 / total
-    turn = -(real / imag) * (tr * tr + ti * ti) * inverse[m - 1] * w
-    return w, x - y * turn, y + x * turn
-
-
 @njit(nogil=True, error_model="numpy")
 def _returns(
-    order: Any,
-    turns: Any,
-    b: Any,
-    zeroth: Any,
+    order: Length,
+    turns: Reals,
+    b: Complexes,
+    zeroth: Reals,
     apart: int,
-    uniform: Any,
-    phase: Any,
-    weight: Any,
-    count: Any,
-    residual: Any,
+    uniform: Reals,
+    phase: Reals,
+    weight: Reals,
+    count: Counts,
+    residual: Reals,
     noise: float,
     steps: int,
     start: int,
@@ -114,50 +63,49 @@ def _returns(
     m = len(order)
     one = simd.ones(uniform, _INTERLEAVE)
     step = simd.width(one)
-    re, im = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    ar, ai = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    gr, gi = simd.registers(one, order, 0), simd.registers(one, order, 0)
-    hr, hi = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    wr, wi = simd.registers(one, order, 0), simd.registers(one, order, 0)
-    inverse, move = simd.registers(one, order, 0), simd.registers(one, order, 0)
+    re, im = bank(one, order, 1), bank(one, order, 1)
+    ar, ai = bank(one, order, 1), bank(one, order, 1)
+    gr, gi = bank(one, order, 0), bank(one, order, 0)
+    inverse, weights, phases = bank(one, order, 0), bank(one, order, 0), bank(one, order, 0)
     floor = simd.spread(one, 4.0 * m * noise)
     tolerance = simd.spread(one, 16.0 * (m + 1) * noise)
     ill = 0
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        b0 = simd.load(one, zeroth, p) if apart else toeplitz.load_zeroth(one, b, p)
+        b0 = simd.load(one, zeroth, p) if apart else load_zeroth(one, b, p)
         total = b0 - simd.load(one, uniform, p)
-        lit = total > 4.0 * simd.eps(one) * simd.absolute(b0)  # less is rounding
+        lit = total > 4.0 * eps(one) * magnitude(b0)  # less is rounding
         factor = 1.0 / total
-        re[0], im[0] = one, one * 0.0
+        re[0] = one
+        load_harmonics(order, one, b, p, re, im)
         for k in range(1, m + 1):
-            re[k], im[k] = simd.load_complex(one, b[k], p)
             re[k], im[k] = re[k] * factor, im[k] * factor
-        fewer = lit & singular(order, re, im, ar, ai, gr, gi, inverse, floor)
+        degree = toeplitz.singular(order, re, im, floor, ar, ai, gr, gi, inverse)
+        fewer = lit & (degree < float(m))
         least, doubtful = floor, fewer & ~fewer
-        if simd.some(fewer):
+        if some(fewer):
             # a little more in the diagonal makes all smaller blocks definite: the surplus returns
             # become as faint as that, wherever they are
-            least = simd.select(fewer, 4.0 * floor, floor)
-            factor = simd.select(fewer, 1.0 - 2.0 * floor, 1.0)
+            least = select(fewer, 4.0 * floor, floor)
+            factor = select(fewer, 1.0 - 2.0 * floor, 1.0)
             for k in range(1, m + 1):
                 re[k], im[k] = re[k] * factor, im[k] * factor
-            singular(order, re, im, ar, ai, gr, gi, inverse, floor)
+            toeplitz.singular(order, re, im, floor, ar, ai, gr, gi, inverse)
             for k in range(1, m + 1):
                 re[k], im[k] = re[k] / factor, im[k] / factor
-        circle_roots(order, ar, ai, turns, hr, hi, wr, wi, move, steps)
+        _, wr, wi = circle.circle_roots(order, turns, steps, ar, ai)
         found = one * 0.0
         for i in range(m):
-            w, x, y = weigh(order, gr, gi, inverse, wr[i], wi[i])
-            zr, zi = x * x - y * y, 2.0 * x * y
+            w, x, y = circle.weigh(order, gr, gi, inverse, wr[i], wi[i])
+            zr, zi = circle.doubled(x, y)
             used = lit & (w > least) & (w * total > 0.0)
             # a surplus return next to one of the others takes a share of that one's weight
             doubtful = doubtful | (fewer & used & (w < _FAINT * floor))
-            found = found + simd.select(used, one, 0.0)
-            move[i] = simd.select(used, w, 0.0)
-            wr[i] = simd.select(used, phase_of(zr, zi), simd.infinity(one))
+            found = found + select(used, one, 0.0)
+            weights[i] = select(used, w, 0.0)
+            phases[i] = select(used, circle.phase_of(zr, zi), infinity(one))
             # what the returns leave of the moments
-            ur, ui = move[i], im[0]
+            ur, ui = weights[i], im[0]
             re[0] = re[0] - ur
             for k in range(1, m + 1):
                 ur, ui = ur * zr - ui * zi, ur * zi + ui * zr
@@ -165,31 +113,31 @@ def _returns(
         worst = re[0] * re[0]
         for k in range(1, m + 1):
             worst = worst + re[k] * re[k] + im[k] * im[k]  # NaN stays, as in no maximum
-        worst = simd.select((worst < 1.0) & ~doubtful, simd.sqrt(worst), simd.infinity(one))
-        worst = simd.select(lit, worst, 0.0)
+        worst = select((worst < 1.0) & ~doubtful, root(worst), infinity(one))
+        worst = select(lit, worst, 0.0)
         simd.store(residual, p, worst)
         ill += simd.count(worst > tolerance)
-        sort(order, wr, move)
+        sort(order, phases, weights)
         simd.store(count, p, found)
         for i in range(m):
-            unused = wr[i] > 7.0
-            simd.store(phase[i], p, simd.select(unused, simd.nan(one), wr[i]))
-            simd.store(weight[i], p, simd.select(unused, 0.0, move[i] * total))
+            unused = phases[i] > 7.0
+            simd.store(phase[i], p, select(unused, not_a_number(one), phases[i]))
+            simd.store(weight[i], p, select(unused, 0.0, weights[i] * total))
     return ill
 
 
 @njit(nogil=True, error_model="numpy")
 def find_returns(
-    order: Any,
-    turns: Any,
-    b: Any,
-    zeroth: Any,
+    order: Length,
+    turns: Reals,
+    b: Complexes,
+    zeroth: Reals,
     apart: int,
-    uniform: Any,
-    phase: Any,
-    weight: Any,
-    count: Any,
-    residual: Any,
+    uniform: Reals,
+    phase: Reals,
+    weight: Reals,
+    count: Counts,
+    residual: Reals,
     noise: float,
     steps: int,
     start: int,
@@ -247,19 +195,6 @@ def find_returns(
             for k in range(m):
                 phase[k, p], weight[k, p] = late_phase[k, i], late_weight[k, i]
     return ill
-
-
-@njit(forceinline=True, error_model="numpy")
-def sort(order: Any, keys: Any, values: Any) -> None:
-    """Sort two banks by the first, ascending."""
-    m = len(order)
-    for i in range(m - 1):
-        for k in range(m - 1 - i):
-            swap = keys[k] > keys[k + 1]
-            low, high = simd.minimum(keys[k], keys[k + 1]), simd.maximum(keys[k], keys[k + 1])
-            first = simd.select(swap, values[k + 1], values[k])
-            second = simd.select(swap, values[k], values[k + 1])
-            keys[k], keys[k + 1], values[k], values[k + 1] = low, high, first, second
 
 
 def usual_steps(m: int, precision: str) -> int:

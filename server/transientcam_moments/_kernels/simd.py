@@ -10,10 +10,9 @@ sum into one rounding, so NaN and infinities behave as in NumPy. Comparisons wit
 """
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
 from llvmlite import binding, ir  # type: ignore[import-untyped]  # it has no annotations
 from numba import extending as numba_extending, types as numba_types
 from numba.core import cgutils as numba_cgutils
@@ -28,7 +27,8 @@ types: Any = numba_types
 intrinsic = extending.intrinsic
 
 _INDEX = ir.IntType(32)
-_FUSE = ("contract",)
+FUSE = ("contract",)
+Operands = Sequence[ir.Value]
 
 
 _FEATURES = binding.get_host_cpu_features()
@@ -93,7 +93,7 @@ class _RegistersModel(extending.models.PrimitiveModel):  # type: ignore[misc]  #
         super().__init__(dmm, fe_type, item.as_pointer())
 
 
-def _spread(builder: Any, vector: Any, scalar: Any) -> Any:
+def _spread(builder: ir.IRBuilder, vector: Any, scalar: Any) -> Any:
     first = builder.insert_element(ir.Constant(vector, ir.Undefined), scalar, _INDEX(0))
     zeros = ir.Constant(ir.VectorType(_INDEX, vector.count), [0] * vector.count)
     return builder.shuffle_vector(first, ir.Constant(vector, ir.Undefined), zeros)
@@ -101,7 +101,7 @@ def _spread(builder: Any, vector: Any, scalar: Any) -> Any:
 
 @extending.lower_cast(types.Float, Lanes)
 @extending.lower_cast(types.Integer, Lanes)
-def _cast(context: Any, builder: Any, fromty: Any, toty: Any, val: Any) -> Any:
+def _cast(context: Any, builder: ir.IRBuilder, fromty: Any, toty: Any, val: Any) -> Any:
     scalar = context.cast(builder, val, fromty, toty.element)
     return _spread(builder, context.get_value_type(toty), scalar)
 
@@ -123,7 +123,7 @@ def define(op: Any, kind: type, count: int, emit: Callable[..., Any], result: An
             return templates.signature(result(vector), *(vector,) * count)
 
     @extending.lower_builtin(op, *(kind,) * count)
-    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def _lower(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         return emit(builder, *args)
 
 
@@ -139,9 +139,9 @@ def _compare(code: str) -> Callable[..., Any]:
     return lambda builder, x, y: builder.fcmp_ordered(code, x, y)
 
 
-define(operator.add, Lanes, 2, lambda b, x, y: b.fadd(x, y, flags=_FUSE), _same)
-define(operator.sub, Lanes, 2, lambda b, x, y: b.fsub(x, y, flags=_FUSE), _same)
-define(operator.mul, Lanes, 2, lambda b, x, y: b.fmul(x, y, flags=_FUSE), _same)
+define(operator.add, Lanes, 2, lambda b, x, y: b.fadd(x, y, flags=FUSE), _same)
+define(operator.sub, Lanes, 2, lambda b, x, y: b.fsub(x, y, flags=FUSE), _same)
+define(operator.mul, Lanes, 2, lambda b, x, y: b.fmul(x, y, flags=FUSE), _same)
 define(operator.truediv, Lanes, 2, lambda b, x, y: b.fdiv(x, y), _same)
 define(operator.neg, Lanes, 1, lambda b, x: b.fneg(x), _same)
 define(operator.lt, Lanes, 2, _compare("<"), _truth)
@@ -171,37 +171,14 @@ class _Set(templates.AbstractTemplate):  # type: ignore[misc]  # numba is untype
 
 
 @extending.lower_builtin(operator.getitem, Registers, types.Integer)
-def _getitem(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+def _getitem(context: Any, builder: ir.IRBuilder, sig: Any, args: Any) -> Any:
     return builder.load(builder.gep(args[0], [args[1]]))
 
 
 @extending.lower_builtin(operator.setitem, Registers, types.Integer, types.Any)
-def _setitem(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+def _setitem(context: Any, builder: ir.IRBuilder, sig: Any, args: Any) -> Any:
     builder.store(args[2], builder.gep(args[0], [args[1]]))
     return context.get_dummy_value()
-
-
-def _room(size: Callable[[int, int], int]) -> Any:
-    """Return an intrinsic ``(like, order, extra)`` that makes room for ``size(m, extra)`` lanes."""
-
-    @intrinsic
-    def function(typingctx: Any, like: Any, order: Any, extra: Any) -> Any:
-        if not isinstance(extra, types.IntegerLiteral):
-            return None
-        bank = Registers(like, size(len(order), extra.literal_value))
-
-        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            return cgutils.alloca_once(builder, context.get_value_type(like), size=bank.size)
-
-        return bank(like, order, extra), codegen
-
-    return function
-
-
-# Room for lanes of the type of ``like``; ``order`` is a tuple of length m and ``extra`` a literal,
-# so that all sizes are known when compiled.
-registers = _room(lambda m, extra: m + extra)
-matrix = _room(lambda m, extra: (m + extra) * (m + extra))
 
 
 @intrinsic
@@ -215,7 +192,7 @@ def ones(typingctx: Any, array: Any, interleave: Any) -> Any:
     real = getattr(array.dtype, "underlying_float", array.dtype)
     lanes = Lanes(real, interleave.literal_value * REGISTER_BYTES // (real.bitwidth // 8))
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         return ir.Constant(context.get_value_type(lanes), [1.0] * lanes.count)
 
     return lanes(array, interleave), codegen
@@ -225,7 +202,7 @@ def ones(typingctx: Any, array: Any, interleave: Any) -> Any:
 def width(typingctx: Any, like: Any) -> Any:
     """Return how many pixels there are in lanes of the type of ``like``."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         return context.get_constant(types.intp, like.count)
 
     return types.intp(like), codegen
@@ -235,14 +212,14 @@ def width(typingctx: Any, like: Any) -> Any:
 def spread(typingctx: Any, like: Any, value: Any) -> Any:
     """Return a number in every lane."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         return args[1]
 
     return like(like, like), codegen
 
 
 def _pointer(
-    context: Any, builder: Any, array_type: Any, array: Any, index: Any, vector: Any
+    context: Any, builder: ir.IRBuilder, array_type: Any, array: Any, index: Any, vector: Any
 ) -> Any:
     """Address of element ``index`` of the contiguous array ``array``, as vectors."""
     struct = cgutils.create_struct_proxy(array_type)(context, builder, array)
@@ -253,7 +230,7 @@ def _pointer(
 def load(typingctx: Any, like: Any, array: Any, index: Any) -> Any:
     """Return the pixels from ``index`` on, converted to the type of ``like``."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         stored = context.get_value_type(array.dtype)
         vector = ir.VectorType(stored, like.count)
         pointer = _pointer(context, builder, array, args[1], args[2], vector)
@@ -269,7 +246,7 @@ def load(typingctx: Any, like: Any, array: Any, index: Any) -> Any:
 def store(typingctx: Any, array: Any, index: Any, value: Any) -> Any:
     """Write the pixels from ``index`` on; into an array of integers, truncated."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         stored = context.get_value_type(array.dtype)
         vector = ir.VectorType(stored, value.count)
         pointer = _pointer(context, builder, array, args[0], args[1], vector)
@@ -289,7 +266,7 @@ def pack(typingctx: Any, array: Any, index: Any, mask: Any, value: Any) -> Any:
     What lies behind them, as far as all pixels would have reached, may be overwritten.
     """
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         element = context.get_value_type(value.element)
         pointer = _pointer(context, builder, array, args[0], args[1], args[3].type)
         pointer = builder.bitcast(pointer, element.as_pointer())
@@ -311,7 +288,7 @@ def pack(typingctx: Any, array: Any, index: Any, mask: Any, value: Any) -> Any:
     return types.int64(array, types.intp, mask, value), codegen
 
 
-def _pack_register(builder: Any, part: Any, chosen: Any, target: Any) -> None:
+def _pack_register(builder: ir.IRBuilder, part: Any, chosen: Any, target: Any) -> None:
     name = f"llvm.x86.avx512.mask.compress.{_suffix(part.type)}"
     kind = ir.FunctionType(part.type, [part.type, part.type, chosen.type])
     callee = cgutils.get_or_insert_function(builder.module, kind, name)
@@ -320,7 +297,7 @@ def _pack_register(builder: Any, part: Any, chosen: Any, target: Any) -> None:
     builder.store(packed, where, align=64 // part.type.count)
 
 
-def _pack_in_memory(builder: Any, part: Any, chosen: Any, target: Any) -> None:
+def _pack_in_memory(builder: ir.IRBuilder, part: Any, chosen: Any, target: Any) -> None:
     name = f"llvm.masked.compressstore.{_suffix(part.type)}"
     kind = ir.FunctionType(ir.VoidType(), [part.type, target.type, chosen.type])
     builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [part, target, chosen])
@@ -334,7 +311,7 @@ def _suffix(vector: Any) -> str:
 def unpack(typingctx: Any, array: Any, index: Any, mask: Any, value: Any) -> Any:
     """Return lanes whose pixels of a mask are those that `pack` wrote; the others are as before."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         vector = args[3].type
         pointer = _pointer(context, builder, array, args[0], args[1], vector)
         pointer = builder.bitcast(pointer, vector.element.as_pointer())
@@ -350,7 +327,7 @@ def unpack(typingctx: Any, array: Any, index: Any, mask: Any, value: Any) -> Any
 def stream(typingctx: Any, array: Any, index: Any, value: Any) -> Any:
     """Write pixels past the caches, for results larger than these; aligned to a register."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         vector = context.get_value_type(value)
         pointer = _pointer(context, builder, array, args[0], args[1], vector)
         instruction = builder.store(args[2], pointer, align=REGISTER_BYTES)
@@ -364,7 +341,7 @@ def stream(typingctx: Any, array: Any, index: Any, value: Any) -> Any:
 def load_within(typingctx: Any, bank: Any, index: Any) -> Any:
     """Return the lanes from element ``index`` of a bank of registers on."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         vector = context.get_value_type(bank.item)
         elements = builder.bitcast(args[0], vector.element.as_pointer())
         pointer = builder.bitcast(builder.gep(elements, [args[1]]), vector.as_pointer())
@@ -377,7 +354,7 @@ def load_within(typingctx: Any, bank: Any, index: Any) -> Any:
 def store_within(typingctx: Any, bank: Any, index: Any, value: Any) -> Any:
     """Write lanes from element ``index`` of a bank of registers on."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         vector = context.get_value_type(bank.item)
         elements = builder.bitcast(args[0], vector.element.as_pointer())
         pointer = builder.bitcast(builder.gep(elements, [args[1]]), vector.as_pointer())
@@ -391,7 +368,7 @@ def store_within(typingctx: Any, bank: Any, index: Any, value: Any) -> Any:
 def before_boundary(typingctx: Any, array: Any, index: Any) -> Any:
     """Return how many elements from ``index`` on lie before the next line of memory."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         size = array.dtype.bitwidth // 8
         struct = cgutils.create_struct_proxy(array)(context, builder, args[0])
         word = ir.IntType(64)
@@ -406,14 +383,14 @@ def before_boundary(typingctx: Any, array: Any, index: Any) -> Any:
 def fence(typingctx: Any) -> Any:
     """Wait until what was written past the caches is seen by other threads."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         builder.fence("seq_cst")
         return context.get_dummy_value()
 
     return types.void(), codegen
 
 
-def _shuffle(builder: Any, x: Any, y: Any, order: list[int]) -> Any:
+def _shuffle(builder: ir.IRBuilder, x: Any, y: Any, order: list[int]) -> Any:
     return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(_INDEX, len(order)), order))
 
 
@@ -422,7 +399,7 @@ def load_complex(typingctx: Any, like: Any, array: Any, index: Any) -> Any:
     """Return real and imaginary lanes of the complex pixels from ``index`` on."""
     pair = types.UniTuple(like, 2)
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         vector = context.get_value_type(like)
         pointer = _pointer(context, builder, array, args[1], args[2], vector)
         align = like.element.bitwidth // 8
@@ -439,7 +416,7 @@ def load_complex(typingctx: Any, like: Any, array: Any, index: Any) -> Any:
 def store_complex(typingctx: Any, array: Any, index: Any, re: Any, im: Any) -> Any:
     """Write complex pixels from ``index`` on."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         count = re.count
         zipped = [part for lane in range(count) for part in (lane, count + lane)]
         pointer = _pointer(context, builder, array, args[0], args[1], args[2].type)
@@ -452,123 +429,12 @@ def store_complex(typingctx: Any, array: Any, index: Any, re: Any, im: Any) -> A
     return types.void(array, types.intp, re, re), codegen
 
 
-def _llvm(name: str, operands: int) -> Any:
-    """Return LLVM's vector intrinsic ``name``."""
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        vector = args[0].type
-        kind = ir.FunctionType(vector, [vector] * operands)
-        full = f"llvm.{name}.v{vector.count}f{sig.args[0].element.bitwidth}"
-        callee = cgutils.get_or_insert_function(builder.module, kind, full)
-        return builder.call(callee, args)
-
-    if operands == 1:
-        return intrinsic(lambda typingctx, x: (x(x), codegen))
-    return intrinsic(lambda typingctx, x, y, z: (x(x, x, x), codegen))
-
-
-sqrt = _llvm("sqrt", 1)
-absolute = _llvm("fabs", 1)
-fma = _llvm("fma", 3)  # x y + z, rounded once
-
-
-@intrinsic
-def select(typingctx: Any, mask: Any, x: Any, y: Any) -> Any:
-    """Return ``x`` where the mask is true, else ``y``."""
-    lanes = x if isinstance(x, Lanes) else y
-    if not isinstance(lanes, Lanes):
-        return None
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return builder.select(*args)
-
-    return lanes(mask, lanes, lanes), codegen
-
-
-def _smaller(code: str) -> Any:
-    @intrinsic
-    def function(typingctx: Any, x: Any, y: Any) -> Any:
-        lanes = x if isinstance(x, Lanes) else y
-
-        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            return builder.select(builder.fcmp_ordered(code, *args), *args)
-
-        return lanes(lanes, lanes), codegen
-
-    return function
-
-
-# Of a NaN and a number both return their second argument.
-minimum = _smaller("<")
-maximum = _smaller(">")
-
-
-@intrinsic
-def some(typingctx: Any, mask: Any) -> Any:
-    """Return whether the mask is true for at least one pixel."""
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        bits = ir.IntType(mask.count)
-        return builder.icmp_unsigned("!=", builder.bitcast(args[0], bits), bits(0))
-
-    return types.boolean(mask), codegen
-
-
 @intrinsic
 def count(typingctx: Any, mask: Any) -> Any:
     """Return for how many pixels the mask is true."""
 
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def codegen(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
         packed = builder.bitcast(args[0], ir.IntType(mask.count))
         return builder.zext(builder.ctpop(packed), ir.IntType(64))
 
     return types.int64(mask), codegen
-
-
-def _constant(value: Callable[[Any], float]) -> Any:
-    """Return an intrinsic that gives a number depending on the precision of its argument."""
-
-    @intrinsic
-    def function(typingctx: Any, like: Any) -> Any:
-        limits = np.finfo(np.float32 if like.element.bitwidth == 32 else np.float64)
-
-        def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            vector = context.get_value_type(like)
-            return ir.Constant(vector, [float(value(limits))] * like.count)
-
-        return like(like), codegen
-
-    return function
-
-
-eps = _constant(lambda limits: limits.eps)
-tiny = _constant(lambda limits: limits.tiny)
-overflowing = _constant(lambda limits: limits.max * limits.eps)
-nan = _constant(lambda limits: np.nan)
-infinity = _constant(lambda limits: np.inf)
-# A step this small leaves an error of rounding where it converges with the third power.
-nearly = _constant(lambda limits: limits.eps**0.5)
-# A step this small that shrinks no more is what close roots are known to.
-close = _constant(lambda limits: float(limits.eps) ** (2 / 3))
-largest = _constant(lambda limits: limits.max)
-# The powers of two between which a number and its reciprocal are far from the ends of the range.
-large = _constant(lambda limits: 2.0 ** (limits.maxexp * 3 // 4))
-small = _constant(lambda limits: 2.0 ** -(limits.maxexp * 3 // 4))
-
-
-@intrinsic
-def arctangent_ratio(typingctx: Any, square: Any) -> Any:
-    """Return arctan(t) / t of ``square`` = t^2, for 0 <= t <= tan(pi / 8), by its power series."""
-    terms = 9 if square.element.bitwidth == 32 else 21  # tan(pi / 8)^(2 terms) below rounding
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        vector = args[0].type
-        total = None
-        for k in reversed(range(terms)):
-            term = ir.Constant(vector, [(-1.0) ** k / (2 * k + 1)] * vector.count)
-            if total is not None:
-                term = builder.fadd(builder.fmul(total, args[0], flags=_FUSE), term, flags=_FUSE)
-            total = term
-        return total
-
-    return square(square), codegen

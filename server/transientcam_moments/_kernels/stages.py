@@ -5,6 +5,7 @@ from typing import Any, Final
 from numba import njit
 
 from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import Complexes, Counts, Reals
 from transientcam_moments._kernels.fits import (
     DAMPING,
     fit,
@@ -15,6 +16,8 @@ from transientcam_moments._kernels.fits import (
     write,
 )
 from transientcam_moments._kernels.packing import ROW, pack, put, take, unpack
+from transientcam_moments._kernels.portable import bank, infinity, product_bank, select, some
+from transientcam_moments.arrays import Bank, Length, Mask, Plane
 from transientcam_moments.likelihood import (
     FITTED,
     PLANES,
@@ -23,7 +26,6 @@ from transientcam_moments.likelihood import (
     STEPS,
     TAIL_STEPS,
     choice,
-    product_bank,
     sharp,
 )
 
@@ -41,13 +43,15 @@ _DATA: Final = _PENALTY + 4
 
 
 @njit(forceinline=True, error_model="numpy")
-def rows_of(order: Any) -> int:
+def rows_of(order: Length) -> int:
     """Return how many rows a room has; the last ones hold the data, then their weights."""
     return _DATA + 3 * (len(order) + 1)
 
 
 @njit(forceinline=True, error_model="numpy")
-def _put_data(order: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: int) -> None:
+def _put_data(
+    order: Length, data_r: Bank, data_i: Bank, weight: Bank, room: Reals, at: int
+) -> None:
     size = len(order) + 1
     for j in range(size):
         simd.store(room, (_DATA + j) * ROW + at, data_r[j])
@@ -57,7 +61,7 @@ def _put_data(order: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: 
 
 @njit(forceinline=True, error_model="numpy")
 def _take_data(
-    order: Any, like: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: int
+    order: Length, like: Plane, data_r: Bank, data_i: Bank, weight: Bank, room: Reals, at: int
 ) -> None:
     size = len(order) + 1
     for j in range(size):
@@ -68,7 +72,7 @@ def _take_data(
 
 @njit(forceinline=True, error_model="numpy")
 def _pack_data(
-    order: Any, mask: Any, data_r: Any, data_i: Any, weight: Any, room: Any, at: int
+    order: Length, mask: Mask, data_r: Bank, data_i: Bank, weight: Bank, room: Reals, at: int
 ) -> None:
     size = len(order) + 1
     for j in range(size):
@@ -79,8 +83,8 @@ def _pack_data(
 
 @njit(error_model="numpy")
 def fit_first(
-    order: Any, turns: Any, b: Any, variance: Any, error: float, first: int, last: int, end: int,
-    all_rooms: Any, rooms: Any,
+    order: Length, turns: Reals, b: Complexes, variance: Reals, error: float, first: int, last: int,
+    end: int, all_rooms: Reals, rooms: Reals,
 ) -> int:  # fmt: skip
     """Fit one return to the pixels first..last; pack and count those that it leaves something of.
 
@@ -88,12 +92,12 @@ def fit_first(
     """
     one = simd.ones(variance, 1)
     step = simd.width(one)
-    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    pr, pi = simd.registers(one, order, 0), simd.registers(one, order, 0)
-    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
-    points = simd.registers(one, (), 6)
-    x, y, w = simd.registers(one, (), 1), simd.registers(one, (), 1), simd.registers(one, (), 1)
+    data_r, data_i = bank(one, order, 1), bank(one, order, 1)
+    rr, ri = bank(one, order, 1), bank(one, order, 1)
+    pr, pi = bank(one, order, 0), bank(one, order, 0)
+    weight, found = bank(one, order, 1), bank(one, (), 22)
+    points = bank(one, (), 6)
+    x, y, w = bank(one, (), 1), bank(one, (), 1), bank(one, (), 1)
     count = 0
     for left in range(first, last, step):
         scale, numbers, usable, penalty = fit_one(
@@ -106,9 +110,9 @@ def fit_first(
         simd.store(all_rooms, _SCALE * ROW + at, scale)
         simd.store(all_rooms, _NUMBERS * ROW + at, numbers)
         simd.store(all_rooms, _PENALTY * ROW + at, penalty)
-        simd.store(all_rooms, _USABLE * ROW + at, simd.select(usable, one, 0.0))
+        simd.store(all_rooms, _USABLE * ROW + at, select(usable, one, 0.0))
         more = found[SCORE] > 4.0 * penalty
-        if simd.some(more):
+        if some(more):
             points[0], points[1], points[2] = x[0], y[0], w[0]
             pack(more, points, (0, 0, 0), rooms, _POINTS, count)
             pack(more, found, _FOUND, rooms, 0, count)
@@ -120,15 +124,15 @@ def fit_first(
 
 
 @njit(error_model="numpy")
-def fit_second(order: Any, turns: Any, rooms: Any, count: int, late: Any) -> int:
+def fit_second(order: Length, turns: Reals, rooms: Reals, count: int, late: Reals) -> int:
     """Fit two returns, and first steps of a tail; pack and count the pixels that need more."""
     one = simd.ones(rooms, 1)
-    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    data_r, data_i = bank(one, order, 1), bank(one, order, 1)
+    rr, ri = bank(one, order, 1), bank(one, order, 1)
     pr, pi = product_bank(one, order, (0, 0)), product_bank(one, order, (0, 0))
-    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
-    points, state = simd.registers(one, (), 6), simd.registers(one, (), 8)
-    x, y, w = simd.registers(one, (), 2), simd.registers(one, (), 2), simd.registers(one, (), 2)
+    weight, found = bank(one, order, 1), bank(one, (), 22)
+    points, state = bank(one, (), 6), bank(one, (), 8)
+    x, y, w = bank(one, (), 2), bank(one, (), 2), bank(one, (), 2)
     moving = 0
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
@@ -140,7 +144,7 @@ def fit_second(order: Any, turns: Any, rooms: Any, count: int, late: Any) -> int
         x[0], y[0], w[0] = points[0], points[1], points[2]
         cost = fit(
             order, (0, 0), (0, 0, 0, 0), STEPS[1], turns, data_r, data_i, weight, x, y, w, pr, pi,
-            rr, ri, active, simd.infinity(one),
+            rr, ri, active, infinity(one),
         )  # fmt: skip
         allowed = active & (numbers >= 4.0)
         choice.offer_returns((0, 0), x, y, w, cost, penalty, allowed, found)
@@ -161,12 +165,12 @@ def fit_second(order: Any, turns: Any, rooms: Any, count: int, late: Any) -> int
 
 @njit(forceinline=True, error_model="numpy")
 def _pack_moving(
-    order: Any, one: Any, data_r: Any, data_i: Any, weight: Any, state: Any, bar: Any, late: Any,
-    at: int,
+    order: Length, one: Plane, data_r: Bank, data_i: Bank, weight: Bank, state: Bank, bar: Plane,
+    late: Reals, at: int,
 ) -> Any:  # fmt: skip
     """Pack and count the pixels whose tail has not settled."""
     more = state[DAMPING] < sharp.SETTLED
-    if not simd.some(more):
+    if not some(more):
         return 0
     pack(more, state, _STATE, late, _TAIL, at)
     _pack_data(order, more, data_r, data_i, weight, late, at)
@@ -174,11 +178,11 @@ def _pack_moving(
 
 
 @njit(error_model="numpy")
-def step_late(order: Any, steps: int, rooms: Any, count: int, late: Any) -> int:
+def step_late(order: Length, steps: int, rooms: Reals, count: int, late: Reals) -> int:
     """Take further steps of tails; pack and count the pixels that need more."""
     one = simd.ones(rooms, 1)
-    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    weight, state = simd.registers(one, order, 1), simd.registers(one, (), 8)
+    data_r, data_i = bank(one, order, 1), bank(one, order, 1)
+    weight, state = bank(one, order, 1), bank(one, (), 8)
     moving = 0
     for at in range(0, count, simd.width(one)):
         take(state, _STATE, one, rooms, _TAIL, at)
@@ -192,10 +196,10 @@ def step_late(order: Any, steps: int, rooms: Any, count: int, late: Any) -> int:
 
 
 @njit(error_model="numpy")
-def bring_back(rooms: Any, count: int, late: Any) -> None:
+def bring_back(rooms: Reals, count: int, late: Reals) -> None:
     """Put the states of the tails that went on in `late` back among all."""
     one = simd.ones(rooms, 1)
-    state = simd.registers(one, (), 8)
+    state = bank(one, (), 8)
     done = 0
     for at in range(0, count, simd.width(one)):
         take(state, _STATE, one, rooms, _TAIL, at)
@@ -206,12 +210,12 @@ def bring_back(rooms: Any, count: int, late: Any) -> None:
 
 
 @njit(error_model="numpy")
-def offer_tails(order: Any, rooms: Any, count: int, third: Any) -> int:
+def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
     """Choose tails where they are better; pack and count the pixels that leave something then."""
     one = simd.ones(rooms, 1)
-    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
-    points, state = simd.registers(one, (), 6), simd.registers(one, (), 8)
+    data_r, data_i = bank(one, order, 1), bank(one, order, 1)
+    weight, found = bank(one, order, 1), bank(one, (), 22)
+    points, state = bank(one, (), 6), bank(one, (), 8)
     packed = 0
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
@@ -225,7 +229,7 @@ def offer_tails(order: Any, rooms: Any, count: int, third: Any) -> int:
         )  # fmt: skip
         put(found, _FOUND, rooms, 0, at)
         more = _needs_three(found, penalty, numbers)
-        if len(order) >= 3 and simd.some(more):
+        if len(order) >= 3 and some(more):
             take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
             _take_data(order, one, data_r, data_i, weight, rooms, at)
             pack(more, points, (0, 0, 0, 0, 0, 0), third, _POINTS, packed)
@@ -237,20 +241,20 @@ def offer_tails(order: Any, rooms: Any, count: int, third: Any) -> int:
 
 
 @njit(forceinline=True, error_model="numpy")
-def _needs_three(found: Any, penalty: Any, numbers: Any) -> Any:
+def _needs_three(found: Bank, penalty: Plane, numbers: Plane) -> Any:
     return (penalty > 0.0) & (found[SCORE] > 6.0 * penalty) & (numbers >= 6.0)
 
 
 @njit(error_model="numpy")
-def fit_third(order: Any, turns: Any, rooms: Any, count: int) -> None:
+def fit_third(order: Length, turns: Reals, rooms: Reals, count: int) -> None:
     """Fit three returns, and choose them where they are better."""
     one = simd.ones(rooms, 1)
-    data_r, data_i = simd.registers(one, order, 1), simd.registers(one, order, 1)
-    rr, ri = simd.registers(one, order, 1), simd.registers(one, order, 1)
+    data_r, data_i = bank(one, order, 1), bank(one, order, 1)
+    rr, ri = bank(one, order, 1), bank(one, order, 1)
     pr, pi = product_bank(one, order, (0, 0, 0)), product_bank(one, order, (0, 0, 0))
-    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
-    points = simd.registers(one, (), 6)
-    x, y, w = simd.registers(one, (), 3), simd.registers(one, (), 3), simd.registers(one, (), 3)
+    weight, found = bank(one, order, 1), bank(one, (), 22)
+    points = bank(one, (), 6)
+    x, y, w = bank(one, (), 3), bank(one, (), 3), bank(one, (), 3)
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
         take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
@@ -268,10 +272,10 @@ def fit_third(order: Any, turns: Any, rooms: Any, count: int) -> None:
 
 
 @njit(error_model="numpy")
-def take_three(rooms: Any, count: int, third: Any) -> None:
+def take_three(rooms: Reals, count: int, third: Reals) -> None:
     """Put what was found with three returns back among all that were fitted with two."""
     one = simd.ones(rooms, 1)
-    found = simd.registers(one, (), 22)
+    found = bank(one, (), 22)
     done = 0
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
@@ -285,8 +289,8 @@ def take_three(rooms: Any, count: int, third: Any) -> None:
 
 @njit(error_model="numpy")
 def finish(
-    order: Any, slots: Any, all_rooms: Any, rooms: Any, first: int, last: int, end: int,
-    planes: Any, free: Any, count: Any,
+    order: Length, slots: Length, all_rooms: Reals, rooms: Reals, first: int, last: int, end: int,
+    planes: Reals, free: Counts, count: Counts,
 ) -> None:  # fmt: skip
     """Write what was found of the pixels first..last, with its deviations.
 
@@ -294,7 +298,7 @@ def finish(
     """
     one = simd.ones(planes, 1)
     step = simd.width(one)
-    weight, found = simd.registers(one, order, 1), simd.registers(one, (), 22)
+    weight, found = bank(one, order, 1), bank(one, (), 22)
     size = len(order) + 1
     done = 0
     for left in range(first, last, step):
@@ -304,7 +308,7 @@ def finish(
             found[i] = 0.0 * one
         penalty = simd.load(one, all_rooms, _PENALTY * ROW + at)
         more = found[SCORE] > 4.0 * penalty
-        if len(order) >= 2 and simd.some(more):
+        if len(order) >= 2 and some(more):
             unpack(more, found, _FOUND, rooms, 0, done)
             done += simd.count(more)
         for j in range(size):

@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import outputs
-from transientcam_moments._kernels.circle import half_turns
+from transientcam_moments._kernels.arrays import Complexes, Reals
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -20,7 +21,7 @@ from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.padding import RAMP
 from transientcam_moments._kernels.refine import Found, redo
 from transientcam_moments._kernels.returns import MOST_STEPS, returns_entry
-from transientcam_moments._lanes.registry import LEAST_PIXELS
+from transientcam_moments.moment_problem import half_turns
 
 _EPS = float(np.finfo(np.float32).eps)
 
@@ -63,7 +64,13 @@ class WideReturns:
         )
 
     def __call__(
-        self, b: Any, brightness: Any, found: Found, room: tuple[Any, ...], start: int, stop: int
+        self,
+        b: Complexes,
+        brightness: Reals,
+        found: Found,
+        room: tuple[Any, ...],
+        start: int,
+        stop: int,
     ) -> int:
         """Redo what is wrong among the pixels start..stop; return how many were.
 

@@ -1,91 +1,126 @@
 """Iterations over planes: NumPy stops early and lets finished pixels go, JAX runs a while loop."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 
-from transientcam_moments.arrays._planes import Array, namespace
+from transientcam_moments.arrays._planes import namespace
 
-State = tuple[Array, ...]
+State = tuple[Any, ...]
+"""Planes and banks of planes."""
 
-# After these applications finished pixels are let go. The steps are the same for all pixels, so
-# that the result of none depends on how its neighbours fare.
+Step = Callable[[bool, State, State, State], State]
+
+# After these steps finished pixels are let go.
 _RELEASES = frozenset((4, 5, 6, 7, 8, 10, 12, 14, 17, 20, 24, 29, 35, 42, 50, 60, 80, 100))
 
 
 def repeat(
-    body: Callable[[State], State],
+    body: Step,
+    steps: int,
+    fixed: State,
+    given: State,
     state: State,
-    *,
-    times: int,
-    done: Callable[[State], Array],
 ) -> State:
-    """Apply `body` until every pixel is done, at most `times` times.
+    """Apply ``state = body(first, fixed, given, state)`` until no pixel moves.
 
     Parameters
     ----------
     body : callable
-        Takes and returns the state, a tuple of planes, pixel by pixel.
-    state : tuple of array, shape (P)
-        What it starts from.
-    times : int
+        A step, pixel by pixel; ``first`` says whether it is the first one. It must leave a pixel
+        as it is that does not move: how long its neighbours take decides how often it is applied.
+        It may change the banks of the state.
+    steps : int
         Most applications.
-    done : callable
-        Takes the state, returns a boolean plane. A pixel that is done may or may not be iterated
-        further; its result must stay valid if it is.
+    fixed : tuple
+        What is no plane of pixels: lengths, tables.
+    given : tuple
+        Planes, and banks of planes, that stay as they are.
+    state : tuple
+        What it starts from: the mask of the pixels that move, then planes and banks. The banks may
+        be changed.
 
     Returns
     -------
-    tuple of array
-        The state of every pixel after its last application.
+    tuple
+        The state after the last step.
     """
-    if isinstance(state[-1], np.ndarray):
-        return _repeat_numpy(body, state, times, done)
-    if namespace(state[-1]).__name__ == "jax.numpy":
-        return _repeat_jax(body, state, times, done)
-    for _ in range(times):
-        state = body(state)
-        if bool(done(state).all()):
+    if isinstance(state[0], np.ndarray):
+        return _repeat_numpy(body, steps, fixed, given, state)
+    if namespace(state[0]).__name__ == "jax.numpy":
+        return _repeat_jax(body, steps, fixed, given, state)
+    for step in range(steps):
+        state = body(step == 0, fixed, given, state)
+        if not bool(state[0].any()):
             break
     return state
 
 
 def _repeat_numpy(
-    body: Callable[[State], State], state: State, times: int, done: Callable[[State], Array]
+    body: Step,
+    steps: int,
+    fixed: State,
+    given: State,
+    state: State,
 ) -> State:
     results: list[np.ndarray[Any, Any]] = []
     active: Any = slice(None)
-    for step in range(1, times + 1):
-        state = body(state)
-        if step != times and step not in _RELEASES:
+    for step in range(1, steps + 1):
+        state = body(step == 1, fixed, given, state)
+        if step != steps and step not in _RELEASES:
             continue
-        finished = done(state)
-        if step != times and not finished.any():
+        moving = state[0]
+        if step != steps and moving.all():
             continue
+        planes = list(_planes(state))
         if not results:  # all pixels are still there
-            results = [np.array(part) for part in state]
-        for result, part in zip(results, state, strict=True):
-            result[active] = part
-        keep = np.flatnonzero(~finished)
+            results = [np.array(plane) for plane in planes]
+        for result, plane in zip(results, planes, strict=True):
+            result[active] = plane
+        keep = np.flatnonzero(moving)
         if not keep.size:
             break
         active = keep if isinstance(active, slice) else active[keep]
-        state = tuple(part[keep] for part in state)
-    return tuple(results)
+        given, state = _of_pixels(given, keep), _of_pixels(state, keep)
+    return _with(state, iter(results))
+
+
+def _planes(state: Any) -> Iterator[Any]:
+    """Yield the planes of a state, those of its banks in their places."""
+    for part in state:
+        if isinstance(part, list):
+            yield from part
+        else:
+            yield part
+
+
+def _with(state: State, planes: Iterator[Any]) -> State:
+    """Return a state of the same form with other planes."""
+    return tuple(
+        [next(planes) for _ in part] if isinstance(part, list) else next(planes) for part in state
+    )
+
+
+def _of_pixels(state: State, pixels: Any) -> State:
+    return _with(state, (plane[pixels] for plane in _planes(state)))
 
 
 def _repeat_jax(
-    body: Callable[[State], State], state: State, times: int, done: Callable[[State], Array]
+    body: Step,
+    steps: int,
+    fixed: State,
+    given: State,
+    state: State,
 ) -> State:
     from jax import lax
 
     def more(carry: tuple[Any, State]) -> Any:
         step, inner = carry
-        return (step < times) & ~done(inner).all()
+        return (step < steps) & inner[0].any()
 
     def advance(carry: tuple[Any, State]) -> tuple[Any, State]:
         step, inner = carry
-        return step + 1, body(inner)
+        return step + 1, body(False, fixed, given, inner)
 
-    return lax.while_loop(more, advance, (0, state))[1]
+    return lax.while_loop(more, advance, (1, body(True, fixed, given, state)))[1]

@@ -17,7 +17,7 @@ Array: TypeAlias = Any
 """A NumPy, JAX or CuPy array; the array API gives no common type to check against."""
 
 MAX_HARMONICS = 32
-_BLOCK_PIXELS = 8192
+BLOCK_PIXELS = 8192
 
 
 def namespace(array: Array) -> Any:
@@ -112,7 +112,7 @@ def chosen(field: str, value: str, allowed: Sequence[str]) -> str:
 
 
 def by_blocks(
-    function: Callable[..., tuple[Array, ...]], *arrays: Array, pixels: int = _BLOCK_PIXELS
+    function: Callable[..., tuple[Array, ...]], *arrays: Array, pixels: int = BLOCK_PIXELS
 ) -> tuple[Array, ...]:
     """Apply a planar function to blocks of pixels and put its results together.
 
@@ -147,30 +147,12 @@ def squared(z: Array) -> Array:
     return z.real * z.real + z.imag * z.imag
 
 
-def below_one(g: Array) -> Array:
-    """Return 1 - |g|^2 with an error relative to itself, also where |g| is close to 1.
-
-    Notes
-    -----
-    Squares are split into their rounded value and its rounding error (Dekker 1971). Computed
-    naively the difference has the absolute error of |g|^2, which close to the border of the disc
-    is all of it: errors and polynomials of the recursion would no longer belong to each other.
-    """
-    re, re_error = _square(g.real)
-    im, im_error = _square(g.imag)
-    larger, smaller = namespace(g).maximum(re, im), namespace(g).minimum(re, im)
-    rest = 1 - larger
-    return (rest - smaller) + (((1 - rest) - larger) - (re_error + im_error))
-
-
-def _square(x: Array) -> tuple[Array, Array]:
-    """Return x^2 rounded and what rounding took away."""
-    digits = np.finfo(x.dtype).nmant + 1
-    shifted = x * float(2 ** ((digits + 1) // 2) + 1)
-    high = shifted - (shifted - x)
-    low = x - high
-    square = x * x
-    return square, ((high * high - square) + 2 * (high * low)) + low * low
+def parts(b: Array) -> tuple[list[Array], list[Array]]:
+    """Return real and imaginary parts of complex planes, each contiguous in NumPy."""
+    if namespace(b) is not np:
+        return [plane.real for plane in b], [plane.imag for plane in b]
+    real, imag = np.ascontiguousarray(b.real), np.ascontiguousarray(b.imag)
+    return list(real), list(imag)
 
 
 def in_turn(angle: Array) -> Array:
@@ -188,17 +170,6 @@ def to_complex(real: Array, imag: Array) -> Array:
     out.real = real
     out.imag = imag
     return out
-
-
-def root_and_inverse(square: Array) -> tuple[Array, Array]:
-    """Return sqrt(square) and its reciprocal where it is positive, else 1 and 1.
-
-    What a branch is not taken for must be finite there, too: the derivative of both branches of
-    `where` is computed, and 0 times infinity is NaN.
-    """
-    xp = namespace(square)
-    root = xp.sqrt(xp.where(square > 0, square, xp.ones_like(square)))
-    return root, 1 / root
 
 
 def some(mask: Array) -> bool:

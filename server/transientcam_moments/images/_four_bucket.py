@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
+from transientcam_moments._dispatch import accelerated
 from transientcam_moments.arrays import (
     MAX_HARMONICS,
     Array,

@@ -24,14 +24,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import Spread, at_once
-from transientcam_moments.arrays import Array, by_blocks, moment_planes, namespace, squared
+from transientcam_compiled import Spread, at_once
+from transientcam_moments._dispatch import accelerated
+from transientcam_moments.arrays import (
+    Array,
+    bank,
+    by_blocks,
+    moment_planes,
+    namespace,
+    parts,
+    to_complex,
+)
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.images._calibration import inverse_gains
 from transientcam_moments.images._smoothing import smooth
 from transientcam_moments.images._sweep import odd_orders
-from transientcam_moments.moment_problem import bias, estimate_zeroth, levinson, predicted
+from transientcam_moments.moment_problem import bias, estimate_zeroth, extension, levinson
 
 ROUNDS = 3
 """Of the iteration; the third changes moments by 1e-4 b_0 where harmonics have 3 % (docs)."""
@@ -239,16 +247,21 @@ def _unmixed(
     mixed: Array,
     inverse: Array,
 ) -> tuple[Array, Array]:
-    m = len(given) - 1
-    known = list(current)
-    for n in range(m + 1, m * orders[-1] + 1):
-        known.append(predicted(polynomial, known, n))
-    planes, misfit = [given[0]], 0 * given[0].real
+    order = (0,) * (len(given) - 1)
+    m = len(order)
+    xr, xi = parts(given)
+    re, im = (bank(xr[0], (0,) * (m * orders[-1]), 1) for _ in range(2))
+    re[: m + 1], im[: m + 1] = parts(current)
+    extension.extend(order, m * orders[-1], *parts(polynomial), re, im)
+    (dr, di), (sr, si) = parts(mixed), parts(inverse)
+    misfit = 0 * xr[0]
     for j in range(1, m + 1):
-        rest = given[j]
+        x, y = xr[j], xi[j]
         for i, k in enumerate(orders):
-            higher = known[k * j].conj() if k % 4 == 3 else known[k * j]
-            rest = rest - mixed[i * m + j - 1] * higher
-        planes.append(rest * inverse[j - 1])
-        misfit = misfit + squared(planes[j] - current[j])
-    return namespace(given).stack(planes), misfit
+            at = i * m + j - 1
+            x, y = extension.without_harmonic(k, dr[at], di[at], re[k * j], im[k * j], x, y)
+        x, y = x * sr[j - 1] - y * si[j - 1], x * si[j - 1] + y * sr[j - 1]
+        xr[j], xi[j] = x, y
+        misfit = misfit + ((x - re[j]) * (x - re[j]) + (y - im[j]) * (y - im[j]))
+    xp = namespace(given)
+    return to_complex(xp.stack(xr), xp.stack(xi)), misfit

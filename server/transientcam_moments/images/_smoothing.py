@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
+from transientcam_moments._dispatch import accelerated
 from transientcam_moments.arrays import Array, as_array, in_range, namespace, real_type
 from transientcam_moments.errors import ShapeError
 

@@ -1,14 +1,12 @@
 """Few-parameter likelihood estimates of returns, from moments whose noise is known."""
 
 from transientcam_moments.likelihood import (
-    _arithmetic as arithmetic,
     _choice as choice,
     _linear as linear,
     _pair_fit as pair_fit,
     _sharp as sharp,
     _tail as tail,
 )
-from transientcam_moments.likelihood._arithmetic import logarithm, product_bank
 from transientcam_moments.likelihood._chi_square import SIGNIFICANCE, chi_square_quantile
 from transientcam_moments.likelihood._choice import (
     CHI_SQUARE,
@@ -90,7 +88,6 @@ __all__ = [
     "Unwrapped",
     "X",
     "Y",
-    "arithmetic",
     "assumed_noise",
     "chi_square_quantile",
     "choice",
@@ -100,11 +97,9 @@ __all__ = [
     "least_alike",
     "likelihood",
     "linear",
-    "logarithm",
     "merge_returns",
     "pair_fit",
     "places_of",
-    "product_bank",
     "sharp",
     "tail",
     "two_returns",

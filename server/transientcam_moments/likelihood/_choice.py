@@ -8,9 +8,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_moments.arrays import Array
-from transientcam_moments.likelihood import _sharp as sharp, _tail as tail
-from transientcam_moments.likelihood._arithmetic import (
+from transientcam_moments.arrays import (
+    Array,
     Bank,
     Length,
     bank,
@@ -20,6 +19,7 @@ from transientcam_moments.likelihood._arithmetic import (
     select,
     smaller,
 )
+from transientcam_moments.likelihood import _sharp as sharp, _tail as tail
 
 MOST_RETURNS: Final = 3
 X, Y, WEIGHT = 0, 3, 6

@@ -5,8 +5,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import Spread, on_threads
+from transientcam_compiled import Spread
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments.arrays import (
     MAX_HARMONICS,
     Array,
@@ -14,13 +14,13 @@ from transientcam_moments.arrays import (
     by_blocks,
     in_range,
     in_turn,
+    logarithm,
     moment_planes,
     namespace,
     summary,
 )
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.likelihood import _choice as choice
-from transientcam_moments.likelihood._arithmetic import logarithm
 from transientcam_moments.likelihood._chi_square import (
     SIGNIFICANCE,
     ambiguous,
@@ -351,7 +351,8 @@ def prepared(b: Array, variance: Array, error: float) -> tuple[Data, Array, Arra
     std = xp.minimum(xp.maximum(std, rounding), 1 / rounding)
     weight = xp.where(usable, xp.where(seen, 1 / (std * std + error**2), 0), 1)
     numbers = xp.where(usable, (2 * seen).sum(axis=0) - seen[0], 1).astype(size.dtype)
-    penalty = (logarithm(numbers) + MARGIN).astype(size.dtype)
+    unlikely: Array = logarithm(numbers)
+    penalty = (unlikely + MARGIN).astype(size.dtype)
     re, im, weight = (part.astype(size.dtype) for part in (re, im, weight))
     data = Data(re, im, weight, penalty, numbers)
     return data, scale, usable

@@ -4,7 +4,7 @@ A matrix is L D L^T: L with 1 on its diagonal, D diagonal. Roots and quotients t
 long as products, and this takes one quotient an unknown.
 """
 
-from transientcam_moments.likelihood._arithmetic import Bank, Length, larger, least
+from transientcam_moments.arrays import Bank, Length, larger, least
 
 
 def decompose(unknowns: Length, a: Bank) -> None:

@@ -10,8 +10,7 @@ Powers z^j of both returns are in one bank, those of the second behind those of 
 
 from typing import Any
 
-from transientcam_moments.arrays import Array
-from transientcam_moments.likelihood._arithmetic import Bank, larger, least, rounding, select
+from transientcam_moments.arrays import Array, Bank, larger, least, rounding, select
 from transientcam_moments.likelihood._sharp import FIRST_DAMPING, REACH, SETTLED, judge, turned
 
 DIRECT_SHARE = 0.1

@@ -12,8 +12,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import Spread, on_threads
+from transientcam_compiled import Spread
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments.arrays import Array, by_blocks, in_range, moment_planes, namespace
 from transientcam_moments.likelihood import _pair_fit as pair_fit
 from transientcam_moments.likelihood._choice import COUNT, PLANES, SCORE, nothing

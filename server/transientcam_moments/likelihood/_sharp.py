@@ -13,8 +13,8 @@ moments. Sums are written so that each product fuses with the sum so far.
 
 from typing import Any
 
-from transientcam_moments.arrays import Array
-from transientcam_moments.likelihood._arithmetic import (
+from transientcam_moments.arrays import (
+    Array,
     Bank,
     Length,
     bank,

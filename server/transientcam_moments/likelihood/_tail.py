@@ -10,8 +10,8 @@ exp(-i j phi), in ``ur`` and ``ui``, which changes no weighted sum of squares; t
 tail are then in ``qr`` and ``qi``, and 1 / (1 + (j d)^2) in ``lag``.
 """
 
-from transientcam_moments.arrays import Array
-from transientcam_moments.likelihood._arithmetic import (
+from transientcam_moments.arrays import (
+    Array,
     Bank,
     Length,
     bank,

@@ -4,6 +4,14 @@ Levinson's recursion, biasing, maximum entropy and Pisarenko's estimate (section
 paper), with the bounds on what moments leave open.
 """
 
+from transientcam_moments.moment_problem import (
+    _circle as circle,
+    _eigenvalue as eigenvalue,
+    _extension as extension,
+    _maxima as maxima,
+    _sorting as sorting,
+    _toeplitz as toeplitz,
+)
 from transientcam_moments.moment_problem._biasing import (
     EPSILON,
     Biased,
@@ -12,6 +20,7 @@ from transientcam_moments.moment_problem._biasing import (
     smallest_eigenvalue,
 )
 from transientcam_moments.moment_problem._bounds import bounds, smoothed_density
+from transientcam_moments.moment_problem._circle import half_turns, phase_of
 from transientcam_moments.moment_problem._cumulative import cumulative
 from transientcam_moments.moment_problem._levinson import (
     Coefficients,
@@ -19,7 +28,6 @@ from transientcam_moments.moment_problem._levinson import (
     from_reflection,
     levinson,
     moments_of,
-    predicted,
 )
 from transientcam_moments.moment_problem._maximum_entropy import density
 from transientcam_moments.moment_problem._peaks import Peaks, peaks
@@ -33,6 +41,7 @@ from transientcam_moments.moment_problem._pisarenko import (
     separate,
 )
 from transientcam_moments.moment_problem._polishing import polish
+from transientcam_moments.moment_problem._sorting import sort
 
 __all__ = [
     "DIRECT_THRESHOLD",
@@ -44,20 +53,28 @@ __all__ = [
     "Separation",
     "bias",
     "bounds",
+    "circle",
     "cumulative",
     "density",
+    "eigenvalue",
     "estimate_zeroth",
     "extend",
+    "extension",
     "first_returns",
     "from_reflection",
+    "half_turns",
     "improved_returns",
     "levinson",
+    "maxima",
     "moments_of",
     "peaks",
+    "phase_of",
     "pisarenko",
     "polish",
-    "predicted",
     "separate",
     "smallest_eigenvalue",
     "smoothed_density",
+    "sort",
+    "sorting",
+    "toeplitz",
 ]

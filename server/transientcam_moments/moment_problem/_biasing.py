@@ -1,28 +1,25 @@
 """The smallest eigenvalue of the Toeplitz matrix, and the corrections that rest on it (Sec. 4.3).
 
 The smallest eigenvalue lambda of B is the strength of the uniform part of the signal, negative
-where the moments contradict each other (Prop. 1). It is found by bisection: B - mu I is positive
-definite exactly when Levinson's recursion at mu keeps all its errors positive. The polynomial of
-each trial comes with a Rayleigh quotient, which is never below lambda and converges like Newton's
-method, so that eight trials do for what pure bisection needs fifty.
+where the moments contradict each other (Prop. 1).
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
+from transientcam_moments._dispatch import accelerated
 from transientcam_moments.arrays import (
+    BLOCK_PIXELS,
     Array,
     by_blocks,
     chosen,
     in_range,
     moment_planes,
     namespace,
-    repeat,
-    squared,
     summary,
 )
+from transientcam_moments.moment_problem import _eigenvalue as eigenvalue
 from transientcam_moments.moment_problem._levinson import normalised
 
 EPSILON = 4e-3
@@ -31,7 +28,7 @@ EPSILON = 4e-3
 ROUNDING = 4.0
 """An eigenvalue counts as smaller than epsilon b_0 by more than this many eps a moment, b_0 = 1."""
 
-_TRIALS = 110  # a few finish most pixels; every second one halves the bracket at worst
+_BLOCK_NUMBERS = 1 << 19
 
 
 class Biased(NamedTuple):
@@ -75,8 +72,7 @@ def smallest_eigenvalue(b: Array) -> Array:
 
     Notes
     -----
-    Sec. 4.3 and 5.1; trials and Rayleigh quotients after Cybenko and Van Loan (1986), whom the
-    paper cites.
+    Sec. 4.3 and 5.1; Householder's reflections, then Laguerre's iteration.
     """
     planes, trailing = moment_planes(b)
     return _eigenvalues(planes).reshape(trailing)
@@ -181,83 +177,14 @@ def _bias(b: Array, eigenvalue: Array, epsilon: float, keep: str) -> tuple[Array
 
 @accelerated("smallest_eigenvalue")
 def _eigenvalues(b: Array) -> Array:
-    return by_blocks(lambda part: (_smallest_eigenvalue(part),), b)[0]
+    # a matrix of planes stays in the caches
+    pixels = min(BLOCK_PIXELS, max(256, _BLOCK_NUMBERS // b.shape[0] ** 2))
+    return by_blocks(lambda part: (_smallest_eigenvalue(part),), b, pixels=pixels)[0]
 
 
 def _smallest_eigenvalue(b: Array) -> Array:
-    """Planar statement of `smallest_eigenvalue`: b (m + 1, P) to (P)."""
+    """Do as `smallest_eigenvalue` does with planes: b (m + 1, P) to (P)."""
+    order = (0,) * (b.shape[0] - 1)
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
-        planes, scale = normalised(b)
-        return search(planes) * scale
-
-
-def search(b: list[Array]) -> Array:
-    """Find the smallest eigenvalue of planes whose largest moment is 1."""
-    xp = namespace(b[1])
-    tolerance = 2 * float(np.finfo(b[0].dtype).eps)
-    largest = xp.zeros_like(b[0])
-    total = xp.zeros_like(b[0])
-    for plane in b[1:]:
-        size = xp.sqrt(squared(plane))
-        largest = xp.maximum(largest, size)
-        total = total + size
-    # an upper bound of lambda, from the 2 x 2 minors; for m = 1 that is all there is
-    high = b[0] - largest
-    if len(b) == 2:
-        return high
-    low = b[0] - 2 * total - tolerance  # Gershgorin
-
-    def trial(state: tuple[Array, ...]) -> tuple[Array, ...]:
-        low, high, mu = state[:3]
-        planes = state[3:]
-        definite, quotient = _probe(planes, mu)
-        new_low = xp.where(definite, mu, low)
-        # NaN never enters the bracket through these comparisons
-        new_high = xp.where(quotient < high, quotient, high)
-        new_high = xp.where(~definite & (mu < new_high), mu, new_high)
-        new_high = xp.maximum(new_high, new_low)
-        width = new_high - new_low
-        ahead = xp.minimum(width / 4, 16 * width * width)
-        ahead = new_high - xp.maximum(ahead, tolerance)
-        middle = (new_low + new_high) / 2
-        # just below the quotient when it converges, the middle when it does not
-        stuck = ~definite & (high - new_high < width / 4)
-        mu = xp.where(stuck, middle, ahead)
-        return (new_low, new_high, xp.maximum(mu, new_low), *planes)
-
-    def done(state: tuple[Array, ...]) -> Array:
-        return ~(state[1] - state[0] > 2 * tolerance)
-
-    start = xp.minimum(xp.zeros_like(high), (low + 3 * high) / 4)
-    state = repeat(trial, (low, high, start, *b), times=_TRIALS, done=done)
-    return state[1] + 0 * total  # an invalid pixel is NaN
-
-
-def _probe(b: tuple[Array, ...], mu: Array) -> tuple[Array, Array]:
-    """Run Levinson's recursion on B - mu I.
-
-    Returns
-    -------
-    definite : boolean plane
-        Whether all errors stay positive.
-    quotient : real plane
-        A Rayleigh quotient of B: with B_mu a = E e_0 it is mu + E / |a|^2. Where the recursion
-        meets a negative error, that of the leading block in which it does.
-    """
-    xp = namespace(b[1])
-    error = b[0] - mu
-    alive = error > 0
-    a: list[Array] = []
-    for k in range(1, len(b)):
-        inner = b[k]
-        for j in range(1, k):
-            inner = inner + a[j - 1] * b[k - j]
-        # Levinson: g_k = -(b_k + sum_{0<j<k} a_j b_{k-j}) / E_{k-1}
-        g = inner * xp.where(alive, -1 / error, 0.0).astype(error.dtype)
-        a = [a[j - 1] + g * a[k - j - 1].conj() for j in range(1, k)] + [g]
-        error = error * (1 - squared(g))  # E_k = E_{k-1} (1 - |g_k|^2)
-        alive = alive & (error > 0)
-    norm = 1 + squared(a[0])
-    for plane in a[1:]:
-        norm = norm + squared(plane)
-    return alive, mu + error / norm
+        re, im, scale = normalised(b)
+        return scale * eigenvalue.smallest_eigenvalue(order, re, im)

@@ -84,7 +84,7 @@ def _closed_form(coefficients: Coefficients, phase: Array) -> tuple[Array, Array
     with np.errstate(all="ignore"):
         b = moments_of(coefficients)
         b0 = b[0].real
-        poles = disc_roots(list(a[1:]))
+        poles = disc_roots(a)
         shares, error = _shares(poles, coefficients, b)
         # whole turns are separated first: close to a sharp peak 2 pi + x isn't quite x
         turns = xp.floor(phase / (2 * np.pi))
@@ -164,7 +164,7 @@ def _quadrature(coefficients: Coefficients, phase: Array) -> Array:
     """Integrate by Gauss-Legendre rules on intervals that halve towards the angle of each pole."""
     a = coefficients.polynomial
     with np.errstate(all="ignore"):
-        angles = np.angle(np.stack(disc_roots(list(a[1:])))) % (2 * np.pi)
+        angles = np.angle(np.stack(disc_roots(a))) % (2 * np.pi)
     steps = np.pi * 0.5 ** np.arange(_LEVELS)
     offsets = np.concatenate([-steps, [0.0], steps[::-1]])
     marks = (angles[:, None] + offsets[:, None]).reshape(-1, a.shape[1]) % (2 * np.pi)

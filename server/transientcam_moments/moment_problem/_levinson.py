@@ -7,28 +7,27 @@ closer to its border than rounding resolves, g is projected back onto the disc a
 ends there: what comes out is always a valid positive density, and `flags` marks the pixel.
 """
 
-from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import on_threads
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments.arrays import (
     MAX_HARMONICS,
     Array,
     as_array,
-    below_one,
+    bank,
     by_blocks,
     moment_planes,
     namespace,
+    parts,
     real_type,
-    root_and_inverse,
-    some,
-    squared,
     summary,
+    to_complex,
 )
 from transientcam_moments.errors import ParameterError, ShapeError
+from transientcam_moments.moment_problem import _extension as extension, _toeplitz as toeplitz
+from transientcam_moments.moment_problem._toeplitz import below_one, physical, relative, step_up
 
 
 class Coefficients(NamedTuple):
@@ -57,29 +56,8 @@ class Coefficients(NamedTuple):
         """b_0 = E / prod (1 - |g_k|^2), shape (...), in the unit of b_0."""
         scale = self.error
         for g in self.reflection:
-            scale = scale / below_one(g)
+            scale = scale / below_one(g.real, g.imag)
         return scale
-
-
-class Recursion(NamedTuple):
-    """What Levinson's recursion returns for one block of pixels with b_0 = 1.
-
-    Attributes
-    ----------
-    errors : list of m + 1 real planes
-        E_0 .. E_m.
-    polynomial : list of m complex planes
-        a_1 .. a_m (a_0 = 1 is not stored).
-    reflection : list of m complex planes
-        g_1 .. g_m.
-    order : integer plane
-        The order at which the border was met, 0 where there is no light, m where it never was.
-    """
-
-    errors: list[Array]
-    polynomial: list[Array]
-    reflection: list[Array]
-    order: Array
 
 
 def levinson(
@@ -153,11 +131,12 @@ def from_reflection(b0: Array, reflection: Array) -> Coefficients:
         raise ShapeError("b0", f"of shape {tuple(b0.shape)}", expected)
     xp = namespace(reflection)
     error = b0.astype(real_type(reflection))
-    a: list[Array] = []
-    for g in reflection:
-        a = _step_up(a, g)
-        error = error * below_one(g)
-    return Coefficients(error, xp.stack([xp.ones_like(reflection[0]), *a]), reflection)
+    ar, ai = [xp.ones_like(error)], [xp.zeros_like(error)]
+    for k, g in enumerate(reflection, start=1):
+        ar, ai = [*ar, g.real], [*ai, g.imag]
+        step_up(k, ar, ai, g.real, g.imag)
+        error = error * below_one(g.real, g.imag)
+    return Coefficients(error, to_complex(xp.stack(ar), xp.stack(ai)), reflection)
 
 
 def extend(coefficients: Coefficients, n: int) -> Array:
@@ -181,16 +160,17 @@ def extend(coefficients: Coefficients, n: int) -> Array:
 
     Notes
     -----
-    b_k = -sum_j a_j b_{k-j}: the density of Eq. (2) is that of an autoregressive process.
+    See `moment_problem.extension`.
     """
-    a = coefficients.polynomial
-    m = a.shape[0] - 1
+    m = coefficients.polynomial.shape[0] - 1
     if n <= m:
         raise ParameterError("n", n, f"above the order m = {m}")
-    b = _moments(coefficients)
-    for k in range(m + 1, n + 1):
-        b.append(predicted(a, b, k))
-    return namespace(a).stack(b[m + 1 :])
+    re, im = parts(moments_of(coefficients))
+    more = bank(re[0], (0,) * (n - m), 0)
+    re, im = [*re, *more], [*im, *more]
+    extension.extend((0,) * m, n, *parts(coefficients.polynomial), re, im)
+    xp = namespace(coefficients.polynomial)
+    return to_complex(xp.stack(re[m + 1 :]), xp.stack(im[m + 1 :]))
 
 
 def moments_of(coefficients: Coefficients) -> Array:
@@ -202,21 +182,14 @@ def _moments(coefficients: Coefficients) -> list[Array]:
     """Undo the recursion: at order k, b_k = -sum_{0<j<k} a_j b_{k-j} - g_k E_{k-1}."""
     error = coefficients.brightness
     b = [error + 0 * coefficients.polynomial[0]]
-    a: list[Array] = []
+    ar, ai = [error], [error]  # a_0 is in none of the sums
     for k, g in enumerate(coefficients.reflection, start=1):
-        inner = sum((a[j - 1] * b[k - j] for j in range(1, k)), start=g * error)
+        inner = sum((to_complex(ar[j], ai[j]) * b[k - j] for j in range(1, k)), start=g * error)
         b.append(-inner)
-        a = _step_up(a, g)
-        error = error * below_one(g)
+        ar, ai = [*ar, g.real], [*ai, g.imag]
+        step_up(k, ar, ai, g.real, g.imag)
+        error = error * below_one(g.real, g.imag)
     return b
-
-
-def predicted(a: Array, b: list[Array], k: int) -> Array:
-    """Return b_k from b_{k-m} .. b_{k-1} and the polynomial a of order m, see `extend`."""
-    total = a[1] * b[k - 1]
-    for j in range(2, a.shape[0]):
-        total = total + a[j] * b[k - j]
-    return -total
 
 
 def _flat(brightness: Array, trailing: tuple[int, ...]) -> Array:
@@ -233,146 +206,29 @@ def _coefficients(b: Array, *brightness: Array) -> tuple[Array, ...]:
 
 
 def _levinson(b: Array, *brightness: Array) -> tuple[Array, Array, Array]:
-    """Planar statement of `levinson`: b (m + 1, P) to error, polynomial, reflection."""
-    xp = namespace(b)
-    if brightness:
-        b = xp.concatenate([brightness[0][None].astype(b.dtype), b[1:]])
+    """Do as `levinson` does with planes: b (m + 1, P) to error, polynomial, reflection."""
+    xp, order = namespace(b), (0,) * (b.shape[0] - 1)
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
-        relative, scale = normalised(b)
-        floor = 4 * float(np.finfo(scale.dtype).eps)
-        result = recursion(_physical(relative), [floor] * (len(b) - 1), into_disc(floor))
-        error = result.errors[-1] * (relative[0] * scale)
-    one = xp.ones_like(b[0])
-    return error, xp.stack([one, *result.polynomial]), xp.stack(result.reflection)
+        re, im, scale = normalised(b, *brightness)
+        total = re[0] * scale
+        physical(order, re, im)
+        ar, ai = bank(re[0], order, 1), bank(re[0], order, 1)
+        gr, gi = bank(re[0], order, 0), bank(re[0], order, 0)
+        error = total * toeplitz.levinson(order, re, im, ar, ai, gr, gi)
+    ar[0], ai[0] = xp.ones_like(error), xp.zeros_like(error)
+    return (
+        error,
+        to_complex(xp.stack(ar), xp.stack(ai)),
+        to_complex(xp.stack(gr), xp.stack(gi)),
+    )
 
 
-def normalised(b: Array) -> tuple[list[Array], Array]:
-    """Divide moments by the largest of them, which is b_0 for every physical pixel.
+def normalised(b: Array, *brightness: Array) -> tuple[list[Array], list[Array], Array]:
+    """Return the parts of moments (m + 1, P) as `relative` leaves them, and what it returns.
 
-    Returns
-    -------
-    planes : list of m + 1 planes
-        The first one is real: 1, or less where b_0 is not the largest moment.
-    scale : real plane
-        What the planes have to be multiplied with; 0 where everything is 0.
-
-    Notes
-    -----
-    Tiny and huge pixels are brought into the middle of the exponent range first: the reciprocal
-    of either would leave it.
+    b_0 is real; a brightness takes its place.
     """
-    xp = namespace(b)
-    limits = np.finfo(real_type(b))
-    middle = 2.0 ** (limits.maxexp * 3 // 4)
-    # an infinity or a NaN anywhere makes all of the pixel NaN
-    scale = abs(b[0].real) + 0 * b[0].imag
-    for plane in b[1:]:
-        scale = xp.maximum(scale, xp.maximum(abs(plane.real), abs(plane.imag)))
-    scale = scale + 0 * scale
-    planes = [b[0].real, *b[1:]]
-    near = scale
-    outside = (scale < 1 / middle) | (scale > middle)
-    if some(outside):
-        lift = xp.where(scale < 1 / middle, middle, xp.where(outside, 1 / middle, 1.0))
-        lift = lift.astype(scale.dtype)
-        planes = [plane * lift for plane in planes]
-        near = scale * lift
-    lit = near > 0
-    inverse = xp.where(
-        lit, 1 / xp.where(lit, near, xp.ones_like(near)), near
-    )  # 0 and NaN stay what they are
-    return [plane * inverse for plane in planes], scale
-
-
-def _physical(b: list[Array]) -> list[Array]:
-    """Divide by b_0 and bring moments larger than 2 b_0 back to that, so that nothing overflows.
-
-    |b_k| <= b_0 for every density; a pixel that breaks this is projected onto the border of the
-    cone anyway, and only the direction of b_k still counts.
-    """
-    xp = namespace(b[1])
-    b0 = b[0]
-    broken = ~(b0 >= 1)
-    if not some(broken):
-        return b
-    tiny = 4 * float(np.finfo(b0.dtype).tiny)
-    lit = b0 > tiny
-    inverse = xp.where(lit, 1 / xp.where(lit, b0, xp.ones_like(b0)), 0 * b0)
-    planes = [b0 * inverse]
-    for plane in b[1:]:
-        square = squared(plane)
-        size, reciprocal = root_and_inverse(square)
-        factor = xp.where((square > 0) & (size > 2 * b0), 2 * reciprocal, inverse)
-        planes.append(plane * xp.where(planes[0] > 0, factor, 0 * b0))
-    return planes
-
-
-Border = Callable[[Array, Array], tuple[Array, Array]]
-"""Takes g_k / |g_k| and E_{k-1} at the border of the cone; returns g_k and E_k there."""
-
-
-def recursion(b: list[Array], floors: Sequence[float], border: Border) -> Recursion:
-    """Run Levinson's recursion over planes with b_0 = 1, or 0 where there is no light (Theorem 1).
-
-    Parameters
-    ----------
-    b : list of m + 1 planes
-        The first one real.
-    floors : sequence of m float
-        The border of the cone is where E_k falls to the k-th of them: less than rounding leaves of
-        it. From there on all reflection coefficients are zero.
-    border : callable
-        What becomes of g_k at the border: `into_disc` for densities, `onto_circle` for returns.
-    """
-    xp = namespace(b[1])
-    error = b[0]  # E_0 = b_0
-    errors = [error]
-    a: list[Array] = []
-    reflection: list[Array] = []
-    alive = error > 0
-    order = xp.where(alive, len(b) - 1, 0)
-    for k, floor in enumerate(floors, start=1):
-        # Levinson: g_k = -(b_k + sum_{0<j<k} a_j b_{k-j}) / E_{k-1}
-        inner = b[k]
-        for j in range(1, k):
-            inner = inner + a[j - 1] * b[k - j]
-        divisor = xp.where(alive, error, xp.ones_like(error)) if some(~alive) else error
-        g = inner * (-1 / divisor)
-        remaining = error * below_one(g)  # E_k = E_{k-1} (1 - |g_k|^2)
-        ends = alive & ~(remaining > floor)
-        if some(ends | ~alive):
-            square = squared(g)
-            unit = xp.where(square > 0, g * root_and_inverse(square)[1], xp.ones_like(g))
-            at_border = border(unit, divisor)
-            # NaN belongs to an invalid pixel, which keeps it; what comes after the border is zero
-            g = xp.where(alive, xp.where(ends, at_border[0], g), 0 * b[k])
-            remaining = xp.where(alive, xp.where(ends, at_border[1], remaining), error)
-            order = xp.where(ends, k, order)
-            alive = alive & ~ends
-        a = _step_up(a, g)
-        error = remaining
-        errors.append(error)
-        reflection.append(g)
-    return Recursion(errors, a, reflection, order.astype(np.int32))
-
-
-def into_disc(floor: float) -> Border:
-    """Project g_k into the unit disc so that E_k is ``floor``: the density stays positive."""
-
-    def border(unit: Array, error: Array) -> tuple[Array, Array]:
-        rest = 1 - floor / error
-        g = unit * namespace(unit).where(rest > 0, root_and_inverse(rest)[0], 0 * rest)
-        return g, error * below_one(g)  # E_k that belongs to the rounded g_k
-
-    return border
-
-
-def onto_circle(unit: Array, error: Array) -> tuple[Array, Array]:
-    """Project g_k onto the unit circle: k sharp returns (Theorem 2), whose E_k = 0 is not used."""
-    return unit, error
-
-
-def _step_up(a: list[Array], g: Array) -> list[Array]:
-    """Raise the order by one (Durbin): a_j + g conj(a_{k-j}), a_k = g."""
-    k = len(a) + 1
-    return [a[j - 1] + g * a[k - j - 1].conj() for j in range(1, k)] + [g]
+    re, im = parts(b)
+    re[0] = brightness[0].astype(re[0].dtype) if brightness else re[0] + 0 * im[0]
+    im[0] = 0 * re[0]
+    return re, im, relative((0,) * (len(re) - 1), re, im)

@@ -4,18 +4,18 @@ from collections.abc import Callable
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import on_threads
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments.arrays import (
     Array,
-    below_one,
     chosen,
     flat_planes,
     namespace,
+    parts,
     phases,
     real_type,
 )
 from transientcam_moments.moment_problem._levinson import Coefficients
+from transientcam_moments.moment_problem._toeplitz import least_modulus
 
 _BLOCK_VALUES = 1 << 18
 
@@ -78,11 +78,8 @@ def _by_series(a: Array, reflection: Array, error: Array, phase: Array) -> Array
 
 
 def modulus_floor(reflection: Array) -> Array:
-    """Return the smallest squared modulus above rounding: eps prod (1 - |g_k|^2)."""
-    product = below_one(reflection[0])
-    for g in reflection[1:]:
-        product = product * below_one(g)
-    return float(np.finfo(product.dtype).eps) * product
+    """Return the smallest squared modulus above rounding."""
+    return least_modulus((0,) * reflection.shape[0], *parts(reflection))
 
 
 def _by_blocks(

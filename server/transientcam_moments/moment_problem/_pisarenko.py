@@ -1,33 +1,30 @@
 """Pisarenko's estimate: a uniform part and at most m sharp returns (Sec. 5.1, Theorem 2)."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
-from transientcam_moments._lanes.parallel import on_threads
+from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments.arrays import (
     Array,
+    bank,
     by_blocks,
     in_range,
     in_turn,
     moment_planes,
     namespace,
-    squared,
+    some,
     summary,
 )
-from transientcam_moments.moment_problem._biasing import search
-from transientcam_moments.moment_problem._levinson import (
-    Recursion,
-    normalised,
-    onto_circle,
-    recursion,
-)
+from transientcam_moments.moment_problem import _circle as circle, _toeplitz as toeplitz
+from transientcam_moments.moment_problem._eigenvalue import smallest_eigenvalue
+from transientcam_moments.moment_problem._levinson import normalised
 from transientcam_moments.moment_problem._polishing import polish, residual, size
-from transientcam_moments.moment_problem._roots import circle_roots
 
 DIRECT_THRESHOLD = 0.1
 """A return is the direct one when it is the first with this share of the strongest."""
+_STEPS = 80  # towards the roots; ten are usual, clusters need more
 
 
 class Returns(NamedTuple):
@@ -188,13 +185,13 @@ def first_returns(
     it isn't that of their type.
     """
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
-        planes, scale = normalised(b)
+        re, im, scale = normalised(b)
         if uniform is None:
-            uniform = search(planes)
+            uniform = _raised(re, im, smallest_eigenvalue((0,) * (len(re) - 1), re, im))
         else:
             uniform = namespace(b).where(scale > 0, uniform / scale, 0 * scale)
-        floor = 4 * len(planes[1:]) * (noise or float(np.finfo(scale.dtype).eps))
-        phase, weight, count = _returns(planes, uniform, scale, floor)
+        floor = 4 * (len(re) - 1) * (noise or float(np.finfo(scale.dtype).eps))
+        phase, weight, count = _returns(re, im, uniform, scale, floor)
         return phase, weight, uniform * scale, count
 
 
@@ -245,53 +242,94 @@ def _take_if_better(b: Array, found: tuple[Array, ...], noise: float, tolerance:
 
 
 def _returns(
-    b: list[Array], uniform: Array, scale: Array, floor: float
+    re: list[Array], im: list[Array], uniform: Array, scale: Array, floor: float
 ) -> tuple[Array, Array, Array]:
-    """Find the returns of planes whose largest moment is 1, with a singular B - uniform I.
+    """Find the returns of moments of which the largest is 1, with a singular B - uniform I.
 
     Prediction errors and weights below `floor`, relative to the brightness, are rounding. Weights
     are multiplied with `scale`.
     """
-    xp = namespace(b[1])
-    total = b[0] - uniform  # "using b_0 - lambda_m in place of b_0" (Sec. 5.1)
-    inverse = xp.where(total > 0, 1 / total, 0 * total)
-    block = [xp.where(total > 0, 1, 0).astype(total.dtype)] + [part * inverse for part in b[1:]]
-    # the recursion ends at order m wherever it has not before: B - lambda I is singular
-    floors = [floor] * (len(b) - 2) + [np.inf]
-    singular = recursion(block, floors, onto_circle)
-    last = singular.reflection[0]
-    for k, g in enumerate(singular.reflection[1:], start=2):
-        last = xp.where(singular.order == k, g, last)
-    phases, weights = [], []
-    # roots of c* s(phi) (Theorem 2), c = a; weights of Eq. (4) without its linear system
-    for index, u in enumerate(circle_roots(singular.polynomial, singular.order, last)):
-        share = 1 / _christoffel(singular, u)
-        weight = share * total * scale
-        used = (singular.order > index) & (share > floor) & (weight > 0)
-        angle = xp.arctan2(-u.imag, u.real)  # z = 1 / u
-        phases.append(xp.where(used, in_turn(angle), np.nan).astype(total.dtype))
-        weights.append(xp.where(used, weight, 0).astype(total.dtype))
+    xp, m = namespace(scale), len(re) - 1
+    order = (0,) * m
+    total = re[0] - uniform  # "using b_0 - lambda_m in place of b_0" (Sec. 5.1)
+    lit = total > 0
+    inverse = xp.where(lit, 1 / xp.where(lit, total, 1), 0)
+    re = [xp.ones_like(total), *(part * inverse for part in re[1:])]
+    im = [part * inverse for part in im]
+    ar, ai = bank(total, order, 1), bank(total, order, 1)
+    gr, gi = bank(total, order, 0), bank(total, order, 0)
+    inverse_errors = bank(total, order, 0)
+    # c of Theorem 2 is a; smaller blocks are singular where there are fewer returns than harmonics
+    degree: Array = toeplitz.singular(
+        order, re, im, xp.full_like(total, floor), ar, ai, gr, gi, inverse_errors
+    )
+    phases = [xp.full_like(total, np.nan)] * m
+    weights = [xp.zeros_like(total)] * m
+    for count in range(1, m + 1):
+        at = lit & (degree == count)
+        if not some(at):
+            continue
+        light, unit = _of(at, [total, scale])
+        steps = (_of(at, planes) for planes in (ar, ai, gr, gi, inverse_errors))
+        for k, (phase, share) in enumerate(_roots(count, *steps)):
+            weight = share * light * unit
+            used = (share > floor) & (weight > 0)
+            phases[k] = _put(phases[k], at, xp.where(used, phase, np.nan))
+            weights[k] = _put(weights[k], at, xp.where(used, weight, 0))
     phase, weight = xp.stack(phases), xp.stack(weights)
-    order = xp.argsort(phase, axis=0)  # NaN comes last
+    ascending = xp.argsort(phase, axis=0)  # NaN comes last
     return (
-        xp.take_along_axis(phase, order, axis=0),
-        xp.take_along_axis(weight, order, axis=0),
+        xp.take_along_axis(phase, ascending, axis=0),
+        xp.take_along_axis(weight, ascending, axis=0),
         (weight > 0).sum(axis=0).astype(np.int32),
     )
 
 
-def _christoffel(singular: Recursion, u: Array) -> Array:
-    """Return s* T^-1 s = sum_{k < order} |Phi_k(z)|^2 / E_k at z = 1 / u on the unit circle.
+def _raised(re: list[Array], im: list[Array], eigenvalue: Array) -> Array:
+    """Return an eigenvalue at which Levinson's recursion finds B singular, despite its rounding.
 
-    On the circle |Phi_k(z)| = |A_k(u)| for the predictor polynomial A_k, which goes up with its
-    reversed B_k(u) = u^k conj(A_k): A_k = A_{k-1} + g_k u B_{k-1}, u B_k = u (u B_{k-1} +
-    conj(g_k) A_{k-1}).
+    With (B - mu I) a = E e_0, mu + E / |a|^2 is a Rayleigh quotient, which is never too low. Where
+    the eigenvalue is, blocks smaller than B that are singular as well might not seem so.
     """
-    xp = namespace(u)
-    forward = xp.ones_like(u)
-    backward = u
-    total = squared(forward)
-    for k, g in enumerate(singular.reflection[:-1], start=1):
-        forward, backward = forward + g * backward, u * (backward + g.conj() * forward)
-        total = total + xp.where(singular.order > k, squared(forward) / singular.errors[k], 0)
-    return total
+    order = (0,) * (len(re) - 1)
+    total = re[0] - eigenvalue
+    inverse = 1 / total
+    ar, ai = bank(total, order, 1), bank(total, order, 1)
+    gr, gi = bank(total, order, 0), bank(total, order, 0)
+    unit = [part * inverse for part in re], [part * inverse for part in im]
+    unit[0][0] = 1 + 0 * total
+    error = toeplitz.levinson(order, *unit, ar, ai, gr, gi)
+    norm = 1 + sum(ar[k] * ar[k] + ai[k] * ai[k] for k in range(1, len(re)))
+    quotient = eigenvalue + total * error / norm
+    return namespace(total).where(total > 0, quotient, eigenvalue)
+
+
+def _roots(
+    count: int,
+    ar: list[Array],
+    ai: list[Array],
+    gr: list[Array],
+    gi: list[Array],
+    inverse: list[Array],
+) -> Iterator[tuple[Array, Array]]:
+    """Yield phase and share of so many returns, of pixels that have as many."""
+    order = (0,) * count
+    turns = circle.half_turns(count, inverse[0].dtype)
+    _, wr, wi = circle.circle_roots(order, turns, _STEPS, ar[: count + 1], ai[: count + 1])
+    for x, y in zip(wr, wi, strict=True):
+        share, x, y = circle.weigh(order, gr, gi, inverse, x, y)
+        yield circle.phase_of(*circle.doubled(x, y)), share
+
+
+def _of(mask: Array, planes: list[Array]) -> list[Array]:
+    """Return the pixels of a mask; in NumPy alone, where their number may depend on values."""
+    return [plane[mask] for plane in planes] if isinstance(mask, np.ndarray) else planes
+
+
+def _put(plane: Array, mask: Array, values: Array) -> Array:
+    """Return a plane with the pixels of a mask as `_of` gave them, changed."""
+    if not isinstance(mask, np.ndarray):
+        return namespace(plane).where(mask, values, plane)
+    plane = plane.copy()
+    plane[mask] = values
+    return plane

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from transientcam_moments._lanes import accelerated
+from transientcam_moments._dispatch import accelerated
 from transientcam_moments.arrays import Array, by_blocks
 
 _BLOCK_PIXELS = 1024

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from transientcam_moments._lanes import lookup
+from transientcam_moments._dispatch import lookup
 from transientcam_moments.arrays import Array, in_range, namespace, summary
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, Returns
 from transientcam_moments.noise._cramer_rao import COINCIDE_RAD, CramerRao, cramer_rao

@@ -6,7 +6,7 @@ from html import escape
 
 import numpy as np
 
-from transientcam_moments._lanes.parallel import Spread, at_once
+from transientcam_compiled import Spread, at_once
 from transientcam_moments.arrays import Array, in_turn, map_html, namespace
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
 from transientcam_moments.errors import ParameterError, UnlabelledImages

@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from functools import cached_property
 
+from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels.one_pass import Planes
-from transientcam_moments._lanes.parallel import Spread, at_once
 from transientcam_moments.arrays import Array
 from transientcam_moments.images import Repair
 from transientcam_moments.moment_problem import Coefficients, Returns, levinson
+from transientcam_moments.reconstruction import Reconstruction
 from transientcam_moments.reconstruction._flags import Flags
-from transientcam_moments.reconstruction._lazy import Reconstruction
 from transientcam_moments.reconstruction._settings import Settings
 
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from transientcam_moments import _lanes
+from transientcam_compiled import Spread, at_once
+from transientcam_moments._dispatch import lookup, on_threads
 from transientcam_moments._kernels.one_pass import Constants, OnePass
 from transientcam_moments._kernels.padding import LEAST_WIDTH
-from transientcam_moments._lanes.parallel import Spread, at_once, on_threads
 from transientcam_moments.arrays import Array, as_array
 from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.images import (
@@ -348,7 +348,7 @@ class Reconstructor:
     def _pass(self, m: int, shape: tuple[int, ...]) -> OnePass | None:
         usual = self.settings.keep == "harmonics" and self.settings.consecutive
         usual = usual and self.settings.estimator in _BY_THE_PASS
-        prepare = _lanes.lookup("reconstruct", m, math.prod(shape))
+        prepare = lookup("reconstruct", m, math.prod(shape))
         masked = self._bad is None or np.shape(self._bad) == shape
         if not usual or prepare is None or not masked:
             return None

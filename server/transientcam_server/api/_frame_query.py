@@ -204,7 +204,7 @@ def _headers(product: Product, encoding: Encoding, view: View, frame: Frame) -> 
     """Return the headers of a product that has been computed, with what is known of its frame."""
     headers = {"Cache-Control": "no-store", "Vary": "Accept"}
     if encoding is not MSGPACK:  # which holds it
-        meta = frame.meta() | view.crop.to_meta(*frame.shape)
+        meta = view.crop.with_meta(frame.meta())
         headers |= {
             "Transientcam-Frame": str(frame.number),
             "Transientcam-Unit": _unit(product, encoding),

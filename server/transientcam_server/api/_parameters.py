@@ -6,14 +6,15 @@ of frequencies, it is the limit while those stay as they are.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from functools import cache
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 from pydantic import BaseModel
 
 from transientcam_driver import Capabilities, Sequence, SequenceError
 from transientcam_server.api._documents.camera import AcquisitionRequest
+from transientcam_server.api._documents.parameters import Access, ParameterDocument
 from transientcam_server.api._documents.sequence import SequenceDocument, SubPhasesDocument
 from transientcam_server.errors import Problem
 from transientcam_server.imaging import require_estimator
@@ -23,7 +24,6 @@ from transientcam_server.settings import (
     RecordingSettings,
 )
 
-Access = Literal["read-write", "read-only"]
 _UNITS: Final = {
     "_hz": "Hz",
     "_s": "s",
@@ -34,40 +34,9 @@ _UNITS: Final = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Parameter:
-    """One value, and what it may be.
-
-    Attributes
-    ----------
-    resource, pointer
-        Whose document it stands in, and where: a JSON pointer (RFC 6901).
-    min, max
-        Of a number, both allowed; None without a limit.
-    allowed
-        Every value it may have; None where there are more than can be listed.
-    """
-
-    name: str
-    resource: str
-    pointer: str
-    value: object
-    type: str
-    unit: str | None
-    min: float | None
-    max: float | None
-    allowed: tuple[object, ...] | None
-    access: Access
-    description: str
-
-    def to_document(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
-        return asdict(self)
-
-
 def of_sequence(
     sequence: Sequence, capabilities: Capabilities, *, least_harmonics: int, access: Access
-) -> Iterator[Parameter]:
+) -> Iterator[ParameterDocument]:
     """Describe what a camera may be set to, one value at a time from the present sequence.
 
     ``least_harmonics`` are those that the reconstruction needs.
@@ -103,18 +72,18 @@ def of_sequence(
             1 if sequence.sub_phases.scheme == "none" else capabilities.max_sub_phases,
         ),
     }
-    lists: dict[str, tuple[object, ...]] = {
-        "zeroth": tuple(
+    lists: dict[str, list[object]] = {
+        "zeroth": [
             each
             for each in capabilities.zeroths
             if accepts(lambda: replace(sequence, zeroth=each))  # noqa: B023 - called now
-        ),
-        "take_order": capabilities.take_orders,
-        "sub_phases.scheme": tuple(
+        ],
+        "take_order": list(capabilities.take_orders),
+        "sub_phases.scheme": [
             each
             for each in capabilities.schemes
             if accepts(lambda: with_sub_phases(scheme=each))  # noqa: B023 - called now
-        ),
+        ],
     }
     described = {
         **_described(SequenceDocument, leave_out=("sub_phases", "sampling")),
@@ -124,7 +93,7 @@ def of_sequence(
     values = {**document, **{f"sub_phases.{k}": v for k, v in document["sub_phases"].items()}}
     for name, schema in described.items():
         least, most = ranges.get(name, (None, None))
-        yield Parameter(
+        yield ParameterDocument(
             name=f"sequence.{name}",
             resource="/api/v1/sequence",
             pointer="/" + name.replace(".", "/"),
@@ -139,14 +108,17 @@ def of_sequence(
         )
 
 
-def of_reconstruction(settings: ReconstructionSettings, sequence: Sequence) -> Iterator[Parameter]:
+def of_reconstruction(
+    settings: ReconstructionSettings, sequence: Sequence
+) -> Iterator[ParameterDocument]:
     """Describe the settings of the reconstruction, for the frequencies of a sequence."""
     described = _of_model(
         "reconstruction", "/api/v1/reconstruction", ReconstructionSettings, settings.model_dump()
     )
     for each in described:
         if each.name == "reconstruction.estimator" and each.allowed is not None:
-            yield replace(each, allowed=tuple(_estimators(settings, each.allowed, sequence)))
+            allowed = list(_estimators(settings, each.allowed, sequence))
+            yield each.model_copy(update={"allowed": allowed})
         else:
             yield each
 
@@ -162,13 +134,13 @@ def _estimators(
             yield name
 
 
-def of_acquisition(*, running: bool) -> Iterator[Parameter]:
+def of_acquisition(*, running: bool) -> Iterator[ParameterDocument]:
     """Describe whether frames are captured."""
     values = {"running": running}
     return _of_model("acquisition", "/api/v1/acquisition", AcquisitionRequest, values)
 
 
-def of_history(settings: HistorySettings) -> Iterator[Parameter]:
+def of_history(settings: HistorySettings) -> Iterator[ParameterDocument]:
     """Describe how long frames can still be had."""
     return _of_model(
         "history",
@@ -180,7 +152,7 @@ def of_history(settings: HistorySettings) -> Iterator[Parameter]:
     )
 
 
-def of_recordings(settings: RecordingSettings) -> Iterator[Parameter]:
+def of_recordings(settings: RecordingSettings) -> Iterator[ParameterDocument]:
     """Describe when recordings end by themselves."""
     limits = ("max_duration_s", "max_bytes", "min_free_bytes")
     return _of_model(
@@ -201,11 +173,11 @@ def _of_model(
     *,
     pointers: Mapping[str, str] | None = None,
     access: Access = "read-write",
-) -> Iterator[Parameter]:
+) -> Iterator[ParameterDocument]:
     """Describe the fields of a model, whose schema is what validates them."""
     for name, schema in _described(model).items():
         if name in values:
-            yield Parameter(
+            yield ParameterDocument(
                 name=f"{prefix}.{name}",
                 resource=resource,
                 pointer=(pointers or {}).get(name, f"/{name}"),
@@ -214,7 +186,7 @@ def _of_model(
                 unit=_unit(name),
                 min=schema.get("minimum"),
                 max=schema.get("maximum"),
-                allowed=tuple(schema["enum"]) if "enum" in schema else None,
+                allowed=schema.get("enum"),
                 access=access,
                 description=schema["description"],
             )

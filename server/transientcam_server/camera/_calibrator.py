@@ -82,14 +82,6 @@ class Drift:
     invalid_share_at_capture: float | None
     frame: int
 
-    def to_document(self) -> dict[str, Any]:
-        """Return the drift as JSON."""
-        return {
-            "invalid_share": self.invalid_share,
-            "invalid_share_at_capture": self.invalid_share_at_capture,
-            "frame": self.frame,
-        }
-
 
 class Calibrator:
     """Measures, activates and deletes calibrations; on the event loop, slow work on workers.

@@ -19,7 +19,6 @@ import httpx
 import transientcam_moments as tm
 from transientcam.errors import TransientcamError
 from transientcam.transport import translated
-from transientcam_moments import cache_directory, digest_of_sources
 from transientcam_server.daemon._configuration import load_settings
 from transientcam_server.daemon._server import listen
 from transientcam_server.errors import AddressUnavailable, SettingsError
@@ -78,7 +77,7 @@ def _kernels() -> Reported:
     if not tm.kernels.state()["enabled"]:
         message = "off (TRANSIENTCAM_KERNELS): NumPy computes everything, several times slower"
         return "warning", "kernels", message, "unset TRANSIENTCAM_KERNELS"
-    directory = cache_directory(os.environ, digest_of_sources())
+    directory = tm.kernels.cache_directory()
     if directory is None:
         message = "there is nowhere to keep them: each start compiles them anew, for minutes"
         return "warning", "kernels", message, "set NUMBA_CACHE_DIR to a directory to write into"

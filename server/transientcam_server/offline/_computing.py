@@ -2,15 +2,15 @@
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam import Frame as ProductFrame
+from transientcam.documents import FrameDocument
 from transientcam.errors import ParameterError
-from transientcam.frame import FrameMeta
 from transientcam_driver import RawFrame
 from transientcam_server.imaging import (
     DEFAULT_BINS,
@@ -81,7 +81,7 @@ class ComputedFrame:
         return self._found(FIRST)
 
     @property
-    def meta(self) -> dict[str, Any]:
+    def meta(self) -> FrameDocument:
         """Its metadata, as the daemon's frames have them; the frame's number counts from 1."""
         return frame_meta(self.index + 1, self.raw_frame, self.recipe, self._computed, None)
 
@@ -127,12 +127,11 @@ class ComputedFrame:
         array = product.compute(self.recipe, given, view)
         if not product.cropped:
             array = view.crop.apply(array, product.description.axes)
-        height, width = self.raw.shape[1:]
         return ProductFrame(
             product.name,
             product.description.unit,
             product.description.axes,
-            cast("FrameMeta", self.meta | view.crop.to_meta(height, width)),
+            view.crop.with_meta(self.meta),
             np.asarray(array, dtype=product.description.dtype, order="C"),
             extra=product.with_fields(self.recipe, self.raw_frame, view),
         )

@@ -8,13 +8,12 @@ from typing import Any, Final
 
 from transientcam_driver import AppliedSequence, Sequence
 from transientcam_server.imaging import Frame, Workers
-from transientcam_server.planning._looks import Looks
+from transientcam_server.planning._looks import CACHED_S, Looks
 from transientcam_server.planning._planner import Planner, range_error
 from transientcam_server.planning._process.progress import Progress
 from transientcam_server.planning._process.queue import PlanningQueue
 from transientcam_server.planning._search.goal import Goal
 
-KEPT_S: Final = 10.0
 _WIDE: Final = 1e9  # a target that every sequence reaches: it only requests the prediction
 
 
@@ -67,7 +66,7 @@ class FrontCache:
             made_with = frame.raw.epoch, frame.recipe.settings_version
             if cached is None or cached.made_with != made_with or self._clock() > cached.until_s:
                 document = await self._predicted(frame, by, looking, shown)
-                cached = _CachedFront(made_with, frame.number, self._clock() + KEPT_S, document)
+                cached = _CachedFront(made_with, frame.number, self._clock() + CACHED_S, document)
                 self._cached[by] = cached
         return around | {"scene_of_frame": cached.frame} | cached.document
 

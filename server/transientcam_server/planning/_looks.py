@@ -11,16 +11,16 @@ from transientcam_server.imaging import Frame, Workers
 from transientcam_server.planning._planner import Planner
 from transientcam_server.planning._process.progress import Progress
 from transientcam_server.planning._process.queue import PlanningQueue
-from transientcam_server.planning._scene.look import LookedThrough, look_of_frame
+from transientcam_server.planning._scene.look import FrameSource, look_of_frame
 from transientcam_server.planning._scene.scene import SceneStatistics
 
-KEPT_S: Final = 10.0
+CACHED_S: Final = 10.0
 
 
 class Twin(Protocol):
     """A simulated camera before the same scene, in virtual time; it is pickled."""
 
-    def open(self) -> AbstractContextManager[LookedThrough]:
+    def open(self) -> AbstractContextManager[FrameSource]:
         """Open it."""
         ...
 
@@ -46,7 +46,7 @@ class Looks:
         self._queue = queue
         self._twin = twin
         self._clock = clock
-        self._kept: tuple[Sequence, float | None, float, SceneStatistics] | None = None
+        self._cached: tuple[Sequence, float | None, float, SceneStatistics] | None = None
         self._looking = asyncio.Lock()
 
     @property
@@ -67,8 +67,12 @@ class Looks:
         assert self._twin is not None  # noqa: S101 - callers look at `needs_frame`
         self._planner.require_possible()
         async with self._looking:
-            kept = self._kept
-            if kept is None or kept[:2] != (base, ambient_dn_per_s) or self._clock() > kept[2]:
+            cached = self._cached
+            if (
+                cached is None
+                or cached[:2] != (base, ambient_dn_per_s)
+                or self._clock() > cached[2]
+            ):
                 scene = await self._queue.run(
                     look_through,
                     self._planner,
@@ -77,8 +81,8 @@ class Looks:
                     ambient_dn_per_s,
                     progress=progress,
                 )
-                kept = self._kept = (base, ambient_dn_per_s, self._clock() + KEPT_S, scene)
-            return kept[3]
+                cached = self._cached = (base, ambient_dn_per_s, self._clock() + CACHED_S, scene)
+            return cached[3]
 
     async def of_frame(self, frame: Frame, ambient_dn_per_s: float | None) -> SceneStatistics:
         """Return the scene as far as one frame resolves it.
@@ -97,7 +101,7 @@ class Looks:
 
     def forget(self) -> None:
         """Drop what was seen, as when the scene is another one."""
-        self._kept = None
+        self._cached = None
 
 
 def look_through(

@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Callable
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,13 +11,14 @@ from transientcam_driver import Capabilities, Sequence, Truth
 from transientcam_server.planning._prediction.prediction import Predictor
 from transientcam_server.planning._prediction.timing import timer_of
 from transientcam_server.planning._process.progress import Progress
-from transientcam_server.planning._scene.look import STEPS, LookedThrough, look_at
+from transientcam_server.planning._scene.look import STEPS, FrameSource, look_at
 from transientcam_server.planning._scene.scene import SceneStatistics
+from transientcam_server.planning._search.candidates import ComputingTime, curves
 from transientcam_server.planning._search.choice import Choice
 from transientcam_server.planning._search.families import Family, families, require_plannable
 from transientcam_server.planning._search.goal import Goal
-from transientcam_server.planning._search.plan import Plan, in_a_sentence, plan
-from transientcam_server.planning._search.search import Line, Search, Timed
+from transientcam_server.planning._search.plan import Plan, plan
+from transientcam_server.planning._search.tradeoff import fronts, lines, tradeoff_document
 from transientcam_server.settings import ReconstructionSettings
 
 
@@ -51,7 +51,7 @@ class Planner:
 
     def look(
         self,
-        camera: LookedThrough,
+        camera: FrameSource,
         base: Sequence,
         *,
         ambient_dn_per_s: float | None = None,
@@ -78,13 +78,8 @@ class Planner:
         """Recommend a sequence; see `planning.plan`. What is raised by ``progress`` ends it."""
         progress = progress or Progress()
         predictor = self._predictor(scene, progress)
-        return plan(
-            goal,
-            predictor,
-            self._capabilities,
-            timed=self._timed(goal, progress),
-            progress=progress,
-        )
+        timed = self._computing_time(goal, progress)
+        return plan(goal, predictor, self._capabilities, timed=timed, progress=progress)
 
     def plan_document(
         self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
@@ -107,19 +102,19 @@ class Planner:
         progress = progress or Progress()
         predictor = self._predictor(scene, progress)
         found = families(goal, predictor, self._capabilities)
-        search = Search(goal, found, predictor, self._timed(goal, progress))
+        candidates = curves(found, goal, predictor, self._computing_time(goal, progress))
         choices: list[Choice] = []
-        for choices in search.fronts(goal.leading, progress.part(0.0, 0.8)):
-            progress.show(_front_document(choices, [], scene))
+        for choices in fronts(candidates, goal.leading, progress.part(0.0, 0.8)):
+            progress.show(tradeoff_document(choices, [], scene))
         progress.at(0.8, "lines")
-        return _front_document(choices, search.lines(choices), scene)
+        return tradeoff_document(choices, lines(candidates, choices), scene)
 
     def _predictor(
         self, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
     ) -> Predictor:
         return Predictor(scene, self._sensor, self._settings, go_on=go_on)
 
-    def _timed(self, goal: Goal, progress: Progress) -> Timed:
+    def _computing_time(self, goal: Goal, progress: Progress) -> ComputingTime:
         """Return what times frames; a budget of computing time needs kernels that are compiled."""
         timer = timer_of(self._capabilities, self._settings)
         if goal.computing_share is None:
@@ -133,24 +128,6 @@ class Planner:
             return timer.once_compiled(sequence, estimator)
 
         return compiled
-
-
-def _front_document(
-    choices: list[Choice], lines: list[Line], scene: SceneStatistics
-) -> dict[str, Any]:
-    return {
-        "front": [choice.to_document() for choice in choices],
-        "lines": [
-            {
-                "estimator": line.estimator,
-                "harmonics": line.sequence.harmonics,
-                "base_frequency_hz": line.sequence.base_frequency_hz,
-                "points": [asdict(point) for point in line.points],
-            }
-            for line in lines
-        ],
-        "summary": in_a_sentence(choices, scene),
-    }
 
 
 def range_error(found: tm.Reconstruction, truth: Truth) -> dict[str, float] | None:

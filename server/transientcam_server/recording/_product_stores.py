@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 FORMAT: Final = "transientcam products"
 """What the attribute ``format`` of every store and file of products is."""
@@ -52,6 +52,11 @@ class ProductStore:
     frames: int
     reconstruction: Mapping[str, Any]
     complete: bool
+
+    @property
+    def state(self) -> Literal["complete", "unfinished"]:
+        """Whether all frames are in it, in a word."""
+        return "complete" if self.complete else "unfinished"
 
     def file(self, key: str) -> Path | None:
         """Return the file that stands at a key, such as ``range/c/3/0/0``; None without one.

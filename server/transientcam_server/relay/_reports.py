@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from transientcam.frame import FrameMeta
+from transientcam.documents import FrameMeta
 from transientcam_driver import Status
 from transientcam_driver.camera import DeviceState, Hop, StatusFlag
 

@@ -2,15 +2,16 @@
 
 import pytest
 
-from benchmarks import reference
+from benchmarks.common.records import DOCS
+from benchmarks.pages import reference
 from transientcam import cli
 
-_REMEDY = "run: python -m benchmarks.reference --write"
+_REMEDY = "run: python -m benchmarks reference --write"
 
 
 @pytest.mark.parametrize("name", ["command-line.md", "settings.md"])
 def test_a_reference_page_is_what_would_be_generated_now(name: str) -> None:
-    path = reference.DOCS / name
+    path = DOCS / name
     written = path.read_text("utf-8").splitlines()
     wanted = reference.pages()[path].splitlines()
 
@@ -26,7 +27,7 @@ def test_every_verb_prints_json_where_it_is_asked_to(verb: str) -> None:
 
 
 def test_every_exit_code_is_documented() -> None:
-    page = (reference.DOCS / "command-line.md").read_text("utf-8")
+    page = (DOCS / "command-line.md").read_text("utf-8")
 
     for code in (0, cli.FAILED, 2, cli.INTERRUPTED):
         assert f"\n| {code} | " in page
@@ -38,4 +39,4 @@ def test_every_exit_code_is_documented() -> None:
 )
 def test_the_page_names_variables_as_they_are_read(setting: str, variable: str) -> None:
     assert reference.variable(setting) == variable
-    assert variable in (reference.DOCS / "settings.md").read_text("utf-8")
+    assert variable in (DOCS / "settings.md").read_text("utf-8")

@@ -11,10 +11,9 @@ import pytest
 
 import transientcam_moments as tm
 from tests.moments import kernel_lanes
-from tests.moments.kernel_lanes import lanes, without_lanes
-from transientcam_moments import _lanes, cache_directory
-from transientcam_moments._lanes import registry
-from transientcam_moments._lanes.registry import REGISTRY, Key, Registry
+from tests.moments.kernel_lanes import find, lanes, without_lanes
+from transientcam_compiled import Kernels
+from transientcam_moments._dispatch import CACHE, KERNELS, LEAST_PIXELS, Key, accelerated
 
 
 @pytest.fixture(autouse=True)
@@ -66,21 +65,21 @@ def test_kernels_can_be_turned_off() -> None:
 
 @pytest.mark.parametrize("setting", ["off", "OFF", " 0 ", "no", "false"])
 def test_several_words_turn_kernels_off(setting: str) -> None:
-    assert not Registry({"TRANSIENTCAM_KERNELS": setting}).enabled
+    assert not Kernels[Key]({"TRANSIENTCAM_KERNELS": setting}, CACHE).enabled
 
 
 @pytest.mark.parametrize("environ", [{}, {"TRANSIENTCAM_KERNELS": "on"}])
 def test_kernels_are_on_otherwise(environ: dict[str, str]) -> None:
-    assert Registry(environ).enabled
+    assert Kernels[Key](environ, CACHE).enabled
 
 
 def test_a_lane_is_compiled_where_nothing_can_be_written() -> None:
     code = (
         "import transientcam_moments as tm\n"
-        "from transientcam_moments._kernels.compiler import compile_lane\n"
-        "from transientcam_moments._lanes.registry import Key\n"
+        "from transientcam_moments._kernels.compiler import compile_kernel\n"
+        "from transientcam_moments._dispatch import Key\n"
         "import numpy as np\n"
-        "lane = compile_lane(Key('smallest_eigenvalue', 1, 'f'))\n"
+        "lane = compile_kernel(Key('smallest_eigenvalue', 1, 'f'))\n"
         "print(lane(np.full((2, 64), 3 + 0j, np.complex64))[0])"
     )
     nowhere = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null", "NUMBA_CACHE_DIR": ""}
@@ -91,62 +90,15 @@ def test_a_lane_is_compiled_where_nothing_can_be_written() -> None:
 def test_the_second_process_loads_what_the_first_compiled(tmp_path: Path) -> None:
     code = (
         "from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue as kernel\n"
-        "from transientcam_moments._kernels.compiler import compile_lane\n"
-        "from transientcam_moments._lanes.registry import Key\n"
-        "compile_lane(Key('smallest_eigenvalue', 1, 'f'))\n"
+        "from transientcam_moments._kernels.compiler import compile_kernel\n"
+        "from transientcam_moments._dispatch import Key\n"
+        "compile_kernel(Key('smallest_eigenvalue', 1, 'f'))\n"
         "print(sum(kernel.stats.cache_hits.values()), sum(kernel.stats.cache_misses.values()))"
     )
     environ = {"NUMBA_CACHE_DIR": str(tmp_path)}
 
     assert in_fresh_process(code, **environ) == "0 1"
     assert in_fresh_process(code, **environ) == "1 0"
-
-
-def test_the_users_choice_of_a_cache_comes_first(tmp_path: Path) -> None:
-    environ = {"NUMBA_CACHE_DIR": str(tmp_path / "chosen"), "XDG_CACHE_HOME": str(tmp_path / "xdg")}
-
-    assert cache_directory(environ, "d") == tmp_path / "chosen" / "d"
-    assert not (tmp_path / "xdg").exists()
-
-
-def test_the_cache_is_below_the_users_cache_directory(tmp_path: Path) -> None:
-    xdg, home = tmp_path / "xdg", tmp_path / "home"
-
-    in_xdg = cache_directory({"XDG_CACHE_HOME": str(xdg), "HOME": str(home)}, "d")
-    at_home = cache_directory({"HOME": str(home)}, "d")
-
-    assert in_xdg == xdg / "transientcam" / "kernels" / "d"
-    assert at_home == home / ".cache" / "transientcam" / "kernels" / "d"
-    assert in_xdg.is_dir()
-    assert at_home.is_dir()
-
-
-def test_a_cache_that_cannot_be_written_is_passed_over(tmp_path: Path) -> None:
-    environ = {"XDG_CACHE_HOME": "/dev/null", "HOME": str(tmp_path)}
-
-    assert cache_directory(environ, "d") == tmp_path / ".cache" / "transientcam" / "kernels" / "d"
-    assert cache_directory({"NUMBA_CACHE_DIR": "/dev/null"}, "d") is None
-    assert cache_directory({}, "d") is None
-
-
-def test_what_compiled_code_is_kept_for_changes_with_every_source_file() -> None:
-    code = (
-        "import pathlib, shutil, sys, tempfile\n"
-        "from transientcam_moments._kernels import cache\n"
-        "before = cache.digest_of_sources()\n"
-        "with tempfile.TemporaryDirectory() as copy:\n"
-        "    root = pathlib.Path(cache.__file__).parents[1]\n"
-        "    for part in ('_kernels', '_lanes', 'likelihood'):\n"
-        "        shutil.copytree(root / part, pathlib.Path(copy) / part)\n"
-        "    cache.__file__ = copy + '/_kernels/cache.py'\n"
-        "    digests = [before, cache.digest_of_sources()]\n"
-        "    for name in ('_kernels/simd.py', 'likelihood/sharp.py'):\n"
-        "        with open(copy + '/' + name, 'a') as file: file.write('# changed')\n"
-        "        digests.append(cache.digest_of_sources())\n"
-        "    print(digests[0] == digests[1], len(set(digests)))"
-    )
-
-    assert in_fresh_process(code) == "True 3"
 
 
 def test_progress_names_every_lane_and_ends_at_the_total() -> None:
@@ -170,7 +122,7 @@ def test_compiling_in_the_background_ends_with_the_lanes_in_use() -> None:
         assert thread.name == "transientcam-compile"
         thread.join()
 
-        assert _lanes.find("levinson", np.ones((4, 64), np.complex64)) is not None
+        assert find("levinson", np.ones((4, 64), np.complex64)) is not None
         state = tm.kernels.state()
         assert (state["compiling"], state["failed"]) == (None, [])
 
@@ -179,7 +131,7 @@ def test_the_pairs_that_a_camera_of_gapped_frequencies_waits_for_are_compiled_fi
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked: list[Key] = []
-    monkeypatch.setattr(tm.kernels, "_compile", lambda keys, *_: asked.extend(keys))
+    monkeypatch.setattr(KERNELS, "make_ready", lambda key, **_: asked.append(key))
 
     tm.kernels.compile_in_background([15, 3], also="pairs").join()
 
@@ -196,9 +148,9 @@ def test_a_lane_that_cannot_be_compiled_leaves_numpy_and_the_other_lanes(
     def broken(m: int, precision: str) -> None:
         raise RuntimeError("no such processor\nand a long story")
 
-    monkeypatch.setattr(REGISTRY, "failed", {})
+    monkeypatch.setattr(KERNELS, "failed", {})
     with lanes():
-        monkeypatch.setitem(compiler.LANES, "levinson", broken)
+        monkeypatch.setitem(compiler.COMPILERS, "levinson", broken)
         tm.kernels.compile(harmonics=[3], precisions=["float32"])
 
         state = tm.kernels.state()
@@ -212,8 +164,8 @@ def test_background_compiling_stops_when_the_program_ends() -> None:
         "import transientcam_moments as tm\n"
         "from transientcam_moments._kernels import compiler\n"
         "import threading, time\n"
-        "for name in compiler.LANES:\n"
-        "    compiler.LANES[name] = lambda m, precision: print(m, flush=True) or time.sleep(0.2)\n"
+        "slow = lambda m, precision: print(m, flush=True) or time.sleep(0.2)\n"
+        "compiler.COMPILERS.update(dict.fromkeys(compiler.COMPILERS, slow))\n"
         "tm.kernels.compile_in_background(harmonics=range(1, 33))\n"
     )
 
@@ -226,20 +178,20 @@ def test_several_threads_compile_each_lane_once(monkeypatch: pytest.MonkeyPatch)
     from transientcam_moments._kernels import compiler
 
     made: list[tuple[str, int, str]] = []
-    for name in compiler.LANES:
+    for name in compiler.COMPILERS:
 
         def make(m: int, precision: str, name: str = name) -> object:
             made.append((name, m, precision))
             return lambda: None
 
-        monkeypatch.setitem(compiler.LANES, name, make)
+        monkeypatch.setitem(compiler.COMPILERS, name, make)
 
     threads = [tm.kernels.compile_in_background(harmonics=[3, 5]) for _ in range(4)]
     for thread in threads:
         thread.join()
 
     assert len(made) == len(set(made))
-    in_background = set(compiler.LANES) - set(tm.kernels.WHEN_NEEDED)
+    in_background = set(compiler.COMPILERS) - set(tm.kernels.WHEN_NEEDED)
     expected = {(name, m) for name in in_background for m in (3, 5)} | {("likelihood", 3)}
     assert {(name, m) for name, m, _ in made} == expected
 
@@ -265,23 +217,23 @@ def test_orders_and_precisions_out_of_range_are_refused(
 def test_every_public_lane_has_its_compiler() -> None:
     from transientcam_moments._kernels import compiler
 
-    assert set(compiler.LANES) == set(tm.kernels.LANES)
+    assert set(compiler.COMPILERS) == set(tm.kernels.LANES)
 
 
 def test_lanes_are_found_by_name_order_and_precision() -> None:
-    REGISTRY.compiled[Key("levinson", 3, "f")] = found = lambda b: b
+    KERNELS.compiled[Key("levinson", 3, "f")] = found = lambda b: b
 
-    assert _lanes.find("levinson", np.ones((4, 64), np.complex64)) is found
-    assert _lanes.find("levinson", np.ones((4, 8, 8), np.complex64)) is found
-    assert _lanes.find("levinson", np.ones((4, 64), np.complex128)) is None
-    assert _lanes.find("levinson", np.ones((5, 64), np.complex64)) is None
-    assert _lanes.find("density", np.ones((4, 64), np.complex64)) is None
+    assert find("levinson", np.ones((4, 64), np.complex64)) is found
+    assert find("levinson", np.ones((4, 8, 8), np.complex64)) is found
+    assert find("levinson", np.ones((4, 64), np.complex128)) is None
+    assert find("levinson", np.ones((5, 64), np.complex64)) is None
+    assert find("density", np.ones((4, 64), np.complex64)) is None
 
 
 @pytest.mark.parametrize(
     "planes",
     [
-        np.ones((4, registry.LEAST_PIXELS - 1), np.complex64),
+        np.ones((4, LEAST_PIXELS - 1), np.complex64),
         np.ones((4, 0), np.complex64),
         np.ones((4, 64), np.int32),
         np.ones((), np.complex64),
@@ -289,15 +241,20 @@ def test_lanes_are_found_by_name_order_and_precision() -> None:
         None,
     ],
 )
-def test_what_no_lane_takes_finds_none(planes: object) -> None:
-    REGISTRY.compiled[Key("levinson", 3, "f")] = lambda b: b
+def test_what_no_kernel_takes_is_left_to_numpy(planes: object) -> None:
+    KERNELS.compiled[Key("levinson", 3, "f")] = lambda b: "of the kernel"
 
-    assert _lanes.find("levinson", planes) is None
+    @accelerated("levinson")
+    def planar(planes: object) -> str:
+        return "of NumPy"
+
+    assert planar(np.ones((4, LEAST_PIXELS), np.complex64)) == "of the kernel"
+    assert planar(planes) == "of NumPy"
 
 
 def test_a_lane_is_ready_once_it_is_compiled() -> None:
     assert not tm.kernels.ready("likelihood", 4)
-    REGISTRY.compiled[Key("likelihood", 4, "f")] = lambda b: b
+    KERNELS.compiled[Key("likelihood", 4, "f")] = lambda b: b
     assert tm.kernels.ready("likelihood", 4)
     assert not tm.kernels.ready("likelihood", 3)
 

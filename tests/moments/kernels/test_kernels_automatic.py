@@ -12,12 +12,18 @@ import pytest
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from tests.moments.kernel_lanes import CACHE, lanes, without_lanes
-from transientcam_moments._lanes import accelerated, automatic, parallel, registry
-from transientcam_moments._lanes.helper import Helper
-from transientcam_moments._lanes.parallel import _cores, on_threads
-from transientcam_moments._lanes.pool import Pool
-from transientcam_moments._lanes.registry import HEAVY_PIXELS, REGISTRY, Key
+from tests.moments.kernel_lanes import CACHE, lanes
+from transientcam_compiled import Kernels, _kernels, _spread
+from transientcam_compiled._memory import Pool
+from transientcam_moments import _dispatch
+from transientcam_moments._dispatch import (
+    HEAVY_PIXELS,
+    KERNELS,
+    LEAST_PIXELS,
+    Key,
+    accelerated,
+    on_threads,
+)
 
 
 def moments(m: int, pixels: int = HEAVY_PIXELS) -> NDArray[np.complex64]:
@@ -37,7 +43,7 @@ class Compiler:
         self.go_on = threading.Event()
         self.keys: list[Key] = []
 
-    def __call__(self, key: Key, helper: Helper | None = None) -> None:
+    def __call__(self, key: Key, *, elsewhere: bool = False) -> None:
         assert self.go_on.wait(10)
         self.keys.append(key)
 
@@ -45,20 +51,25 @@ class Compiler:
         """Let it do everything, and return what that was."""
         self.go_on.set()
         for thread in threading.enumerate():
-            if thread.name == automatic.THREAD:
+            if thread.name == tm.kernels.THREAD:
                 thread.join()
         return self.keys
 
 
 @pytest.fixture
-def compiler(monkeypatch: pytest.MonkeyPatch) -> Iterator[Compiler]:
+def anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have nothing compiled, and nothing wanted before."""
+    fresh: Kernels[Key] = Kernels({}, _dispatch.CACHE, takes_long=lambda key: key.takes_long)
+    for name, value in vars(fresh).items():
+        monkeypatch.setattr(KERNELS, name, value)
+
+
+@pytest.fixture
+def compiler(anew: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[Compiler]:
     made = Compiler()
-    monkeypatch.setattr(automatic, "_WANTED", automatic._Wanted())
-    monkeypatch.setattr(automatic, "compile_one", made)
-    monkeypatch.setattr(REGISTRY, "automatic", True)
-    with without_lanes():
-        yield made
-        made.finish()
+    monkeypatch.setattr(KERNELS, "make_ready", made)
+    yield made
+    made.finish()
 
 
 def test_a_heavy_call_returns_while_its_lane_is_being_compiled(compiler: Compiler) -> None:
@@ -86,7 +97,7 @@ def test_an_order_that_has_no_lane_is_left_to_numpy(compiler: Compiler) -> None:
 
 def test_what_takes_long_to_compile_comes_last(compiler: Compiler) -> None:
     for name in ("levinson", "reconstruct", "density", "smooth"):
-        automatic.want(Key(name, 3, "f"))
+        KERNELS.want(Key(name, 3, "f"))
 
     # the first may have begun before the others were wanted
     assert [key.name for key in compiler.finish()] == [
@@ -101,9 +112,9 @@ def test_a_process_may_note_what_calls_want_and_make_it_ready_later(compiler: Co
     compiler.go_on.set()
 
     with tm.kernels.only_note():
-        tm.levinson(moments(3, registry.LEAST_PIXELS))
-        tm.levinson(moments(4, registry.LEAST_PIXELS - 1))
-    assert automatic.THREAD not in {thread.name for thread in threading.enumerate()}
+        tm.levinson(moments(3, LEAST_PIXELS))
+        tm.levinson(moments(4, LEAST_PIXELS - 1))
+    assert tm.kernels.THREAD not in {thread.name for thread in threading.enumerate()}
     tm.kernels.make_ready()
 
     assert compiler.finish() == [Key("levinson", 3, "f")]
@@ -112,20 +123,18 @@ def test_a_process_may_note_what_calls_want_and_make_it_ready_later(compiler: Co
 def test_lanes_are_settled_once_those_there_are_serve_or_have_failed(
     compiler: Compiler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(REGISTRY, "failed", {})
-
     assert not tm.kernels.settled(["levinson", "pisarenko"], 3)
-    REGISTRY.compiled[Key("levinson", 3, "f")] = lambda b: b
+    KERNELS.compiled[Key("levinson", 3, "f")] = lambda b: b
     assert not tm.kernels.settled(["levinson", "pisarenko"], 3)
-    REGISTRY.failed[Key("pisarenko", 3, "f")] = "no compiler"
+    KERNELS.failed[Key("pisarenko", 3, "f")] = "no compiler"
     assert tm.kernels.settled(["levinson", "pisarenko"], 3)
     assert tm.kernels.settled(["pisarenko"], 9), "there is none for so many"
-    monkeypatch.setattr(REGISTRY, "automatic", False)
+    monkeypatch.setattr(KERNELS, "automatic", False)
     assert tm.kernels.settled(["levinson"], 4), "nothing changes by itself"
 
 
 def test_one_line_says_so_once(compiler: Compiler, caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.INFO, "transientcam_moments"):
+    with caplog.at_level(logging.INFO, "transientcam_compiled"):
         for m in (3, 4):
             tm.density(tm.levinson(moments(m)), [0.0])
 
@@ -144,7 +153,7 @@ def test_loading_begins_when_the_first_call_has_returned(
             waits.set()
             return super().wait(None)
 
-    monkeypatch.setattr(automatic._WANTED, "may_load", Noticed())
+    monkeypatch.setattr(KERNELS, "_may_load", Noticed())
     compiler.go_on.set()
     loaded_meanwhile: list[Key] = []
 
@@ -161,26 +170,24 @@ def test_loading_begins_when_the_first_call_has_returned(
 
 
 def test_memory_for_the_results_of_the_next_call_is_there_with_its_lane(
+    anew: None,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     pool, loaded = Pool(), threading.Event()
 
-    def make(key: Key, helper: Helper | None) -> Callable[..., object]:
+    def load(key: Key) -> Callable[..., object]:
         assert loaded.wait(10)
         return lambda *planes: None  # leaves everything to NumPy
 
-    monkeypatch.setattr(automatic, "_WANTED", automatic._Wanted())
-    monkeypatch.setattr(automatic, "POOL", pool)
-    monkeypatch.setattr(REGISTRY, "automatic", True)
-    monkeypatch.setattr(REGISTRY, "make", make)
+    monkeypatch.setattr(_kernels, "POOL", pool)
+    monkeypatch.setattr(KERNELS, "load", load)
     b = moments(3, 20_000)
-    with without_lanes():
-        first = tm.levinson(b)
-        loaded.set()
-        for thread in threading.enumerate():
-            if thread.name == automatic.THREAD:
-                thread.join()
-        assert tm.kernels.state()["compiled"] == ["levinson m=3 float32"]
+    first = tm.levinson(b)
+    loaded.set()
+    for thread in threading.enumerate():
+        if thread.name == tm.kernels.THREAD:
+            thread.join()
+    assert tm.kernels.state()["compiled"] == ["levinson m=3 float32"]
 
     assert pool.size_bytes == first.error.nbytes + first.polynomial.nbytes + first.reflection.nbytes
 
@@ -191,7 +198,7 @@ def in_fresh_process(setting: str) -> str:
         "b = np.ones((2, 4096), np.complex64); b[0] = 3\n"
         "before = tm.levinson(b)\n"
         "[each.join() for each in threading.enumerate() if each.name == 'transientcam-compile']\n"
-        "shared = sum(e.name.startswith('transientcam-lane') for e in threading.enumerate())\n"
+        "shared = sum(e.name.startswith('transientcam-kernel') for e in threading.enumerate())\n"
         "after = tm.levinson(b)\n"
         "assert np.allclose(before.polynomial, after.polynomial, rtol=1e-6)\n"
         "print(tm.kernels.state()['compiled'], 'numba' in sys.modules, shared)\n"
@@ -210,7 +217,7 @@ def in_fresh_process(setting: str) -> str:
 def test_a_fresh_process_changes_over_by_itself_with_its_threads_running() -> None:
     lanes, loaded, shared = in_fresh_process("on").rsplit(" ", 2)
     assert (lanes, loaded) == ("['levinson m=1 float32']", "True")
-    assert (int(shared) > 0) == (_cores() > 1)
+    assert (int(shared) > 0) == (_spread._cores() > 1)
 
 
 @pytest.mark.parametrize("setting", ["off", "manual"])
@@ -220,7 +227,7 @@ def test_where_it_is_not_wanted_nothing_is_compiled(setting: str) -> None:
 
 def test_orders_and_precisions_are_given_by_position(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Key] = []
-    monkeypatch.setattr(tm.kernels, "compile_one", lambda key, helper: asked.append(key))
+    monkeypatch.setattr(KERNELS, "make_ready", asked.append)
 
     tm.kernels.compile([3, 4], ["float32"])
 
@@ -268,7 +275,7 @@ def test_a_worker_uses_no_other_thread_unless_it_says_so(monkeypatch: pytest.Mon
         tm.kernels.use_one_thread()
         found.extend((on_threads(None), on_threads(3)))
         with tm.kernels.use_all_cores():
-            monkeypatch.setattr(parallel, "_cores", lambda: 3)
+            monkeypatch.setattr(_spread, "_cores", lambda: 3)
             found.append(on_threads(None))
         found.append(on_threads(None))
 
@@ -285,11 +292,11 @@ def test_a_worker_uses_no_other_thread_unless_it_says_so(monkeypatch: pytest.Mon
 def test_a_lane_that_is_not_ready_is_made_ready_once_the_compiler_is_free(
     compiler: Compiler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(REGISTRY, "compiling", Key("levinson", 4, "f"))
+    monkeypatch.setattr(KERNELS, "compiling", Key("levinson", 4, "f"))
     assert not tm.kernels.ready("likelihood", 4)
     assert compiler.finish() == []
 
-    monkeypatch.setattr(REGISTRY, "compiling", None)
+    monkeypatch.setattr(KERNELS, "compiling", None)
     assert not tm.kernels.ready("likelihood", 4)
     assert not tm.kernels.ready("likelihood", 9), "no lane of this order is offered"
     assert compiler.finish() == [Key("likelihood", 4, "f")]

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from tests.moments.kernel_lanes import FEW, lanes, without_lanes
-from transientcam_moments import _lanes
+from tests.moments.kernel_lanes import FEW, find, lanes, without_lanes
+from transientcam_compiled import BLOCK, Part, blocks
+from transientcam_compiled._spread import LARGE
 from transientcam_moments._kernels import density as density_module, phase_groups
-from transientcam_moments._lanes.parallel import BLOCK, LARGE, Part, blocks
 from transientcam_moments.moment_problem._levinson import _levinson
 from transientcam_moments.moment_problem._polishing import residual, size
 
@@ -40,7 +40,7 @@ def compiled() -> Iterator[None]:
 
 
 def lane(name: str, planes: Array) -> Any:
-    found = _lanes.find(name, planes)
+    found = find(name, planes)
     assert found is not None
     return found
 

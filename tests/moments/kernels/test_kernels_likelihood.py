@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import transientcam_moments as tm
-from tests.moments.kernel_lanes import lanes, without_lanes
+from tests.moments.kernel_lanes import find, lanes, without_lanes
 from tests.moments.oracles import moments_of_returns
-from transientcam_moments._lanes import find
 
 M = 3
 

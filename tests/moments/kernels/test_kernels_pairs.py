@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import transientcam_moments as tm
-from tests.moments.kernel_lanes import lanes, without_lanes
+from tests.moments.kernel_lanes import find, lanes, without_lanes
 from tests.moments.oracles import around
-from transientcam_moments._lanes import find
 
 MULTIPLES = (1, 3, 4)
 STD = 0.01

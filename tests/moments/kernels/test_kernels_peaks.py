@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from tests.moments.kernel_lanes import lanes, without_lanes
-from transientcam_moments import _lanes
-from transientcam_moments._lanes.parallel import over
+from tests.moments.kernel_lanes import find, lanes, without_lanes
+from transientcam_compiled import over
 from transientcam_moments.moment_problem._peaks import PEAK_THRESHOLD
 
 ORDERS = [1, 3, 4, 12]
@@ -27,7 +26,7 @@ def compiled() -> Iterator[None]:
 
 
 def found_by_lane(c: tm.Coefficients, threshold: float, **how: Any) -> tuple[Array, ...]:
-    lane = _lanes.find("peaks", c.polynomial)
+    lane = find("peaks", c.polynomial)
     assert lane is not None
     found: tuple[Array, ...] = lane(c.polynomial, c.reflection, c.error, threshold, **how)
     return found

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from tests.moments.kernel_lanes import lanes, without_lanes
-from transientcam_moments._lanes.registry import REGISTRY
+from transientcam_moments._dispatch import KERNELS
 from transientcam_moments.images import harmonics_of
 from transientcam_moments.reconstruction._one_pass import PassedReconstruction
 
@@ -37,14 +37,14 @@ def settings_of(**changes: Any) -> tm.Settings:
 @contextmanager
 def stage_by_stage() -> Iterator[None]:
     """Leave out the pass inside, and keep all other kernels."""
-    before = dict(REGISTRY.compiled)
+    before = dict(KERNELS.compiled)
     for key in before:
         if key.name == "reconstruct":
-            del REGISTRY.compiled[key]
+            del KERNELS.compiled[key]
     try:
         yield
     finally:
-        REGISTRY.compiled.update(before)
+        KERNELS.compiled.update(before)
 
 
 def raw_images(

@@ -1,12 +1,13 @@
 """Sharp returns."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from transientcam_moments.moment_problem._levinson import into_disc, recursion
-from transientcam_moments.moment_problem._pisarenko import _christoffel
+from transientcam_moments.moment_problem import circle, toeplitz
 
 ORDERS = [1, 2, 3, 4, 8, 16, 32]
 
@@ -167,18 +168,46 @@ def test_a_known_eigenvalue_is_not_searched_for_again() -> None:
     assert np.allclose(reported.uniform, found.uniform)
 
 
-def test_christoffel_function_is_the_quadratic_form_of_the_inverse() -> None:
-    b = oracles.random_moments(np.random.default_rng(7), 3, 1)
+def test_weights_are_quadratic_forms_of_the_inverse_of_the_leading_block() -> None:
+    b = oracles.random_moments(np.random.default_rng(7), 3, 1)[:, 0]
     b /= b[0].real
-    planes = [b[0].real, *b[1:]]
-    steps = recursion(planes, [0.0] * 3, into_disc(0.0))
+    order = (0,) * 3
+    room: list[Any] = [np.zeros(1) for _ in range(4)]
+    re: list[Any] = [np.array([x]) for x in b.real]
+    im: list[Any] = [np.array([x]) for x in b.imag]
+    ar, ai, gr, gi, inverse = (list(room) for _ in range(5))
+    toeplitz.singular(order, re, im, room[0], ar, ai, gr, gi, inverse)
     phi = 1.234
     s = np.exp(1j * np.arange(3) * phi)
-    block = oracles.toeplitz(b[:3])[0]
+    block = oracles.toeplitz(b[:3, None])[0]
 
-    found = _christoffel(steps, np.array([np.exp(-1j * phi)]))
+    x: Any = np.array([np.cos(phi / 2)])
+    y: Any = np.array([np.sin(phi / 2)])
+    found: Any = circle.weigh(order, gr, gi, inverse, x, y)[0]
 
-    assert found[0] == pytest.approx((s.conj() @ np.linalg.solve(block, s)).real)
+    assert 1 / found[0] == pytest.approx((s.conj() @ np.linalg.solve(block, s)).real)
+
+
+@pytest.mark.parametrize("m", [1, 2, 3, 8])
+def test_a_corrected_half_angle_has_the_square_of_the_error(m: int) -> None:
+    phase, weight = oracles.random_returns(
+        np.random.default_rng(m), returns=m, pixels=20, apart_rad=4 / m
+    )
+    b = oracles.moments_of_returns(phase, weight, m)
+    b /= b[0].real
+    order = (0,) * m
+    room: list[Any] = [np.zeros(20) for _ in range(m + 1)]
+    floor: Any = np.full(20, 1e-12)
+    ar, ai, gr, gi, inverse = (list(room) for _ in range(5))
+    toeplitz.singular(order, list(b.real), list(b.imag), floor, ar, ai, gr, gi, inverse)
+
+    for true in phase:
+        x: Any = np.cos(true / 2 + 1e-5)
+        y: Any = np.sin(true / 2 + 1e-5)
+        _, x, y = circle.weigh(order, gr, gi, inverse, x, y)
+        found: Any = circle.phase_of(*circle.doubled(x, y))
+        error = oracles.around(found - true).max()
+        assert error < 2 * (m * 2e-5) ** 2
 
 
 def test_direct_light_is_the_first_return_above_the_threshold() -> None:

@@ -13,7 +13,7 @@ from tests.server.fuzzing.damage import lookup3
 from tests.server.fuzzing.recordings import KINDS, MEMORY_BYTES, in_memory
 
 CASES = 70 * len(KINDS)
-"""`python -m benchmarks.fuzz_recordings` tries as many as there is time for."""
+"""`python -m benchmarks fuzz_recordings` tries as many as there is time for."""
 
 
 @pytest.mark.timeout(900)

@@ -142,7 +142,7 @@ def test_the_page_of_estimators_says_what_the_techniques_say() -> None:
     page = (Path(__file__).parents[3] / "docs" / "estimators.md").read_text(encoding="utf-8")
 
     for technique in tm.comparisons.TECHNIQUES.values():
-        assert f"**{technique.name}**, {technique.label}\n" in page
+        assert f"**{technique.name}**, {technique.label}. " in page
         for words in (technique.assumptions, technique.cost, technique.failure):
             assert words in page
     named = [name for name in get_args(Estimator) if name != "automatic"]

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from benchmarks.by_hand import MODES, Mode, differences, example, recorded
+from benchmarks.recordings.by_hand import MODES, Mode, differences, example, recorded
 from tests.serving import serving
 from transientcam import Camera
 

@@ -15,10 +15,6 @@ def pid(progress: Progress) -> int:
     return os.getpid()
 
 
-def niceness(progress: Progress) -> int:
-    return os.nice(0)
-
-
 def steps(count: int, progress: Progress) -> int:
     """Report each of these steps many times, and show it."""
     for k in range(count):

@@ -20,6 +20,7 @@ NO_NOISE = {"shot-noise": "off", "read-noise": "off"}
 @pytest.fixture(autouse=True)
 def no_lanes_afterwards() -> Iterator[None]:
     yield
+    LANES.kernels.compiled.clear()
     LANES._ready = {}
 
 

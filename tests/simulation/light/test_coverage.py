@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from transientcam_simulation.light._coverage import covered, covered_among, overlapped
+from transientcam_simulation.light._compiled_overlaps import overlapped
+from transientcam_simulation.light._coverage import covered
 
 FINE = 64  # places a side of a pixel
 
@@ -30,7 +31,7 @@ def share_of(places: NDArray[np.bool_]) -> NDArray[np.float64]:
 @pytest.mark.parametrize("angle_rad", [0.0, 0.4, 1.1, 2.5])
 @pytest.mark.parametrize("bent", [0.0, -0.08])
 def test_a_border_covers_the_share_that_many_places_find(angle_rad: float, bent: float) -> None:
-    share, _root = covered(half_plane(angle_rad, 0.13, bent=bent), rooted=False)
+    share = covered(half_plane(angle_rad, 0.13, bent=bent))
 
     expected = share_of(half_plane(angle_rad, 0.13, fine=True, bent=bent) > 0)
     inner = (slice(1, 4), slice(1, 4))  # at the edge of the image slopes are from one side
@@ -45,7 +46,7 @@ def test_two_shapes_overlap_in_a_pixel_as_their_borders_lie(
     turned_rad: float, offset: float, within: float
 ) -> None:
     borders = [(0.1, 0.1), (0.1 + turned_rad, offset)]
-    one, other = (covered(half_plane(*border), rooted=False)[0] for border in borders)
+    one, other = (covered(half_plane(*border)) for border in borders)
 
     both = overlapped(one, other)
 
@@ -54,21 +55,20 @@ def test_two_shapes_overlap_in_a_pixel_as_their_borders_lie(
     assert both[inner] == pytest.approx(share_of(first & second)[inner], abs=within)
 
 
-def test_scattered_pixels_are_covered_as_those_of_an_image() -> None:
-    inside = half_plane(0.4, 0.13, bent=-0.08)
-    place = np.full((7, 7), 25)
-    place[1:-1, 1:-1] = np.arange(25).reshape(5, 5)
-    around = np.array([place[:-2, 1:-1], place[2:, 1:-1], place[1:-1, :-2], place[1:-1, 2:]])
+@pytest.mark.parametrize("shape", [(9, 11), (1, 11), (9, 1), (1, 1), (2, 2), (0, 5)])
+def test_shares_are_all_or_nothing_away_from_borders_up_to_the_edge(
+    shape: tuple[int, int],
+) -> None:
+    y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
+    inside = (3.0 - np.hypot(x - 4.2, y - 3.7)).astype(np.float32)
+    inside[(x + 2 * y) % 7 == 0] = np.nan
 
-    share = covered_among(inside.ravel(), around.reshape(4, -1)).reshape(5, 5)
+    share = covered(inside)
+    both = overlapped(share, (x > 3).astype(np.float32))
 
-    inner = (slice(1, 4), slice(1, 4))  # beyond the edge of the image there is nothing
-    assert share[inner] == pytest.approx(covered(inside, rooted=False)[0][inner], abs=1e-6)
-
-
-def test_a_pixel_without_neighbours_is_covered_or_not() -> None:
-    nowhere = np.full((4, 2), 2)
-
-    share = covered_among(np.array([0.7, -0.2], dtype=np.float32), nowhere)
-
-    assert share.tolist() == [1, 0]
+    padded = np.pad(inside > 0, 1, mode="edge" if inside.size else "constant")
+    beside = (padded[:-2, 1:-1], padded[2:, 1:-1], padded[1:-1, :-2], padded[1:-1, 2:])
+    alike = np.logical_and.reduce([each == (inside > 0) for each in beside])
+    assert (share[alike] == (inside > 0)[alike]).all()
+    assert ((share >= 0) & (share <= 1)).all()
+    assert (both == np.where(x > 3, share, 0)).all()

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from transientcam_simulation.emulated import find_scene
 from transientcam_simulation.light._layers import MovingResponses
-from transientcam_simulation.light._moving import MovingLight, still_scene
+from transientcam_simulation.light._moving import MovingLight
 from transientcam_simulation.light._paths import light_rays
 from transientcam_simulation.light._rays import camera_rays, rays_through
 from transientcam_simulation.light._still import StillLight
 from transientcam_simulation.light._time_interpolation import Steps
+from transientcam_simulation.light._variants import still_scene
 from transientcam_simulation.scene import (
     Ellipsoid,
     Light,

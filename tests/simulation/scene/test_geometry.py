@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from transientcam_simulation.light import _compiled_tiles as compiled_tiles
+from transientcam_simulation.light._shares import axes_of
 from transientcam_simulation.scene import Ellipsoid, Rectangle
 
 
@@ -114,11 +116,16 @@ def test_tangents_are_those_of_the_outermost_points(shape: Ellipsoid | Rectangle
     points = _many_points(shape) - apex
     tangents = points @ across / (points @ middle)
 
-    assert shape.tangents(apex, middle, across) == pytest.approx(
-        (tangents.min(), tangents.max()), abs=2e-4
-    )
-    assert shape.tangents(apex, -middle, across) == (-np.inf, np.inf)  # it lies behind the apex
-    assert shape.tangents(shape.centre, middle, across) == (-np.inf, np.inf)
+    def found(apex: NDArray[np.float64], middle: NDArray[np.float64]) -> tuple[float, float]:
+        if isinstance(shape, Rectangle):
+            return shape.tangents(apex, middle, across)
+        frame = np.array([middle, across, np.cross(middle, across)])
+        low, high = compiled_tiles.tangents(axes_of([shape]), apex, frame)[0, 0]
+        return low, high
+
+    assert found(apex, middle) == pytest.approx((tangents.min(), tangents.max()), abs=2e-4)
+    assert found(apex, -middle) == (-np.inf, np.inf)  # it lies behind the apex
+    assert found(shape.centre, middle) == (-np.inf, np.inf)
 
 
 def _many_points(shape: Ellipsoid | Rectangle) -> NDArray[np.float64]:

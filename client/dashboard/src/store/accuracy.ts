@@ -1,16 +1,16 @@
 import { computed, signal } from "@preact/signals";
 
-import type { Choice, Problem, Tradeoff } from "../stream/protocol";
+import type { ChoiceDocument, JobDocument, PlanRequest, TradeoffDocument } from "../stream/documents";
+import type { Problem } from "../stream/protocol";
 import { type Api, RequestError } from "./api";
-import type { Goal, JobDocument } from "./documents";
 import { followed } from "./jobs";
 
 /** What accuracy costs in time on the scene before the camera, and the choice that is looked at; null while there is none. */
 export class Accuracy {
   /** With the points that there are so far, while it is predicted. */
-  readonly tradeoff = signal<Tradeoff | null>(null);
+  readonly tradeoff = signal<TradeoffDocument | null>(null);
   /** A point of the front or a plan that is looked at, and not set. */
-  readonly looked = signal<Choice | null>(null);
+  readonly looked = signal<ChoiceDocument | null>(null);
   /** What the service computes for this page. */
   readonly job = signal<JobDocument | null>(null);
   /** Why the last question had no answer. */
@@ -32,7 +32,7 @@ export class Accuracy {
     await this.#ask(
       () => this.#api.startTradeoff(),
       ({ result }) => {
-        const soFar = result as Tradeoff | null;
+        const soFar = result as TradeoffDocument | null;
         if (soFar === null || soFar.front.length === 0) return;
         this.#predicted.value = scene;
         this.tradeoff.value = soFar;
@@ -41,12 +41,12 @@ export class Accuracy {
   }
 
   /** Looks for a sequence for a goal. */
-  async plan(goal: Goal): Promise<void> {
+  async plan(goal: PlanRequest): Promise<void> {
     this.looked.value = null; // it would seem to answer this question
     await this.#ask(
       () => this.#api.startPlan(goal),
       ({ result }) => {
-        if (result !== null) this.looked.value = result as unknown as Choice;
+        if (result !== null) this.looked.value = result as unknown as ChoiceDocument;
       },
     );
   }

@@ -1,30 +1,36 @@
 /** The REST side of the service: requests, and problems in plain words. */
 
-import { frameUrl } from "../stream/frameUrl";
-import type { AppliedSequence, CameraDocument, PixelDocument, Problem, SequenceDocument } from "../stream/protocol";
-import { Credentials } from "./credentials";
 import type {
   AcquisitionDocument,
+  Answers,
+  AppliedDocument,
+  Bodies,
   CalibrationDocument,
   CalibrationRequest,
   CalibrationsDocument,
   CallerDocument,
-  EffectChoice,
+  CameraDocument,
   ExplanationDocument,
-  Fault,
-  Goal,
-  GrantedLease,
+  FaultRequest,
+  GrantedLeaseDocument,
   JobDocument,
   LeaseDocument,
   LeaseRequest,
   ParameterDocument,
+  PixelDocument,
+  PlanRequest,
   ReconstructionDocument,
+  ReconstructionRequest,
   RecordingDocument,
   RecordingRequest,
   RecordingsDocument,
   SimulationDocument,
+  SimulationRequest,
   TimelineDocument,
-} from "./documents";
+} from "../stream/documents";
+import { frameUrl } from "../stream/frameUrl";
+import type { Problem, SequenceRequest } from "../stream/protocol";
+import { Credentials } from "./credentials";
 
 /** The service refused a request (RFC 9457), or could not be asked at all. */
 export class RequestError extends Error {
@@ -52,8 +58,12 @@ export function kindOf(problem: Problem): string {
 
 type Fetch = typeof fetch;
 
-interface RequestDetails {
-  readonly body?: unknown;
+type Operation = keyof Answers;
+
+interface RequestDetails<Body = unknown> {
+  /** Where, if the path of the operation has a gap or the request a query. */
+  readonly at?: string;
+  readonly body?: Body;
   readonly signal?: AbortSignal;
   /** Goes out even if the page is closed meanwhile. */
   readonly keepalive?: boolean;
@@ -87,131 +97,129 @@ export class Api {
 
   /** Who the service takes this page for. */
   async caller(): Promise<CallerDocument> {
-    return ((await this.#json("GET", "/info")) as { caller: CallerDocument }).caller;
+    return (await this.#json("GET /info")).caller;
   }
 
   /** Why frames do not have some products, by their names. */
   async absentProducts(): Promise<Readonly<Record<string, string>>> {
-    const { absent_products: absent } = (await this.#json("GET", "/info")) as { absent_products: readonly { name: string; reason: string }[] };
+    const { absent_products: absent } = await this.#json("GET /info");
     return Object.fromEntries(absent.map(({ name, reason }) => [name, reason]));
   }
 
   camera(): Promise<CameraDocument> {
-    return this.#json("GET", "/camera") as Promise<CameraDocument>;
+    return this.#json("GET /camera");
   }
 
   setAcquisition(running: boolean): Promise<AcquisitionDocument> {
-    return this.#json("PUT", "/acquisition", { body: { running } }) as Promise<AcquisitionDocument>;
+    return this.#json("PUT /acquisition", { body: { running } });
   }
 
   /** Stops the capture and switches the light off, whichever client controls the camera. */
   safeOff(): Promise<AcquisitionDocument> {
-    return this.#json("POST", "/acquisition/safe-off") as Promise<AcquisitionDocument>;
+    return this.#json("POST /acquisition/safe-off");
   }
 
   /** The number of a frame after `frame`, as soon as there is one; the service waits for it some seconds. */
   async frameAfter(frame: number, wait_s: number): Promise<number> {
-    const meta = await this.#json("GET", `${LIVE}?after=${frame}&wait_s=${wait_s}`);
-    return (meta as { frame: number }).frame;
+    return (await this.#json("GET /frames/{frame}", { at: `${LIVE}?after=${frame}&wait_s=${wait_s}` })).frame;
   }
 
   /** The number of the newest frame; null before the first. */
   async newestFrame(): Promise<number | null> {
-    return ((await this.#json("GET", "/frames")) as { last?: number | null }).last ?? null;
+    return (await this.#json("GET /frames")).last;
   }
 
   /** Everything about one pixel of a frame but its curves, which the page computes itself. */
   pixel(x: number, y: number, frame: string = LIVE): Promise<PixelDocument> {
-    return this.#json("GET", frameUrl(frame, `pixel?x=${x}&y=${y}&bins=1`)) as Promise<PixelDocument>;
+    return this.#json("GET /frames/{frame}/pixel", { at: frameUrl(frame, `pixel?x=${x}&y=${y}&bins=1`) });
   }
 
   // -- the sequence ------------------------------------------------------------------------------
 
-  /** Begins to predict what accuracy costs on the scene before the camera: the result is a `Tradeoff`, so far while it runs. */
+  /** Begins to predict what accuracy costs on the scene before the camera: the result is a `TradeoffDocument`, so far while it runs. */
   startTradeoff(): Promise<JobDocument> {
-    return this.#json("POST", "/tradeoff/jobs", { body: { by: "range_error_m" } }) as Promise<JobDocument>;
+    return this.#json("POST /tradeoff/jobs", { body: { by: "range_error_m" } });
   }
 
-  /** Begins to look for the quickest sequence that reaches the target, or the most accurate within the budget: a `Choice`. */
-  startPlan(goal: Goal): Promise<JobDocument> {
-    return this.#json("POST", "/plan/jobs", { body: goal }) as Promise<JobDocument>;
+  /** Begins to look for the quickest sequence that reaches the target, or the most accurate within the budget: a `ChoiceDocument`. */
+  startPlan(goal: PlanRequest): Promise<JobDocument> {
+    return this.#json("POST /plan/jobs", { body: goal });
   }
 
-  validate(sequence: SequenceDocument, signal?: AbortSignal): Promise<AppliedSequence> {
-    return this.#json("POST", "/sequence/validate", { body: sequence, ...(signal === undefined ? {} : { signal }) }) as Promise<AppliedSequence>;
+  validate(sequence: SequenceRequest, signal?: AbortSignal): Promise<AppliedDocument> {
+    return this.#json("POST /sequence/validate", { body: sequence, ...(signal === undefined ? {} : { signal }) });
   }
 
-  setSequence(sequence: SequenceDocument): Promise<AppliedSequence> {
-    return this.#json("PUT", "/sequence", { body: sequence }) as Promise<AppliedSequence>;
+  setSequence(sequence: SequenceRequest): Promise<AppliedDocument> {
+    return this.#json("PUT /sequence", { body: sequence });
   }
 
   // -- control -----------------------------------------------------------------------------------
 
   lease(): Promise<LeaseDocument> {
-    return this.#json("GET", "/lease") as Promise<LeaseDocument>;
+    return this.#json("GET /lease");
   }
 
-  takeLease(wanted: LeaseRequest): Promise<GrantedLease> {
-    return this.#json("POST", "/lease", { body: wanted }) as Promise<GrantedLease>;
+  takeLease(wanted: LeaseRequest): Promise<GrantedLeaseDocument> {
+    return this.#json("POST /lease", { body: wanted });
   }
 
-  renewLease(): Promise<GrantedLease> {
-    return this.#json("PUT", "/lease", { body: {} }) as Promise<GrantedLease>;
+  renewLease(): Promise<GrantedLeaseDocument> {
+    return this.#json("PUT /lease", { body: {} });
   }
 
   releaseLease(keepalive = false): Promise<LeaseDocument> {
-    return this.#json("DELETE", "/lease", { keepalive }) as Promise<LeaseDocument>;
+    return this.#json("DELETE /lease", { keepalive });
   }
 
   // -- recordings --------------------------------------------------------------------------------
 
   recordings(): Promise<RecordingsDocument> {
-    return this.#json("GET", "/recordings") as Promise<RecordingsDocument>;
+    return this.#json("GET /recordings");
   }
 
   recording(id: string): Promise<RecordingDocument> {
-    return this.#json("GET", recordingPath(id)) as Promise<RecordingDocument>;
+    return this.#json("GET /recordings/{recording}", { at: recordingPath(id) });
   }
 
   /** Which frames a recording holds, and when they were captured. */
   timeline(id: string): Promise<TimelineDocument> {
-    return this.#json("GET", `${recordingPath(id)}/frames`) as Promise<TimelineDocument>;
+    return this.#json("GET /recordings/{recording}/frames", { at: `${recordingPath(id)}/frames` });
   }
 
   startRecording(wanted: RecordingRequest): Promise<RecordingDocument> {
-    return this.#json("POST", "/recordings", { body: wanted }) as Promise<RecordingDocument>;
+    return this.#json("POST /recordings", { body: wanted });
   }
 
   stopRecording(id: string): Promise<RecordingDocument> {
-    return this.#json("POST", `${recordingPath(id)}/stop`) as Promise<RecordingDocument>;
+    return this.#json("POST /recordings/{recording}/stop", { at: `${recordingPath(id)}/stop` });
   }
 
   annotateRecording(id: string, annotations: Readonly<Record<string, unknown>>): Promise<RecordingDocument> {
-    return this.#json("PATCH", recordingPath(id), { body: { annotations } }) as Promise<RecordingDocument>;
+    return this.#json("PATCH /recordings/{recording}", { at: recordingPath(id), body: { annotations } });
   }
 
   deleteRecording(id: string): Promise<RecordingDocument> {
-    return this.#json("DELETE", recordingPath(id)) as Promise<RecordingDocument>;
+    return this.#json("DELETE /recordings/{recording}", { at: recordingPath(id) });
   }
 
   // -- reconstruction and parameters -------------------------------------------------------------
 
   /** How frames are computed, with the tag of this version. */
   async reconstruction(): Promise<Tagged<ReconstructionDocument>> {
-    const answer = await this.#ask("GET", "/reconstruction", {});
-    await this.#refuse(answer);
+    const answer = await this.#answer("GET", "/reconstruction");
     return { document: (await answer.json()) as ReconstructionDocument, tag: answer.headers.get("ETag") };
   }
 
   /** Changes how frames are computed, unless another client has since the version with `tag`. */
   setReconstruction(settings: Readonly<Record<string, unknown>>, tag: string | null): Promise<ReconstructionDocument> {
     const headers = tag === null ? {} : { "If-Match": tag };
-    return this.#json("PUT", "/reconstruction", { body: settings, headers }) as Promise<ReconstructionDocument>;
+    return this.#json("PUT /reconstruction", { body: settings as ReconstructionRequest, headers });
   }
 
   /** What can be set in the document at a path, and within which limits; by its name in that document. */
   async parameters(path: string): Promise<ParameterDocument[]> {
-    const { parameters } = (await this.#json("GET", "/parameters")) as { parameters: ParameterDocument[] };
+    const { parameters } = await this.#json("GET /parameters");
     const ours = parameters.filter(({ resource, access }) => resource === `/api/v1${path}` && access === "read-write");
     return ours.map((parameter) => ({ ...parameter, name: parameter.pointer.slice(1) }));
   }
@@ -219,80 +227,85 @@ export class Api {
   // -- calibrations ------------------------------------------------------------------------------
 
   calibrations(): Promise<CalibrationsDocument> {
-    return this.#json("GET", "/calibrations") as Promise<CalibrationsDocument>;
+    return this.#json("GET /calibrations");
   }
 
   /** Starts measuring a calibration; the job says how far it is. */
   measureCalibration(wanted: CalibrationRequest): Promise<JobDocument> {
-    return this.#json("POST", "/calibrations", { body: wanted }) as Promise<JobDocument>;
+    return this.#json("POST /calibrations", { body: wanted });
   }
 
   /** One that was not measured on a diffusor is refused without force. */
   activateCalibration(id: string, force: boolean): Promise<unknown> {
-    return this.#json("PUT", "/calibrations/active", { body: { id, force } });
+    return this.#json("PUT /calibrations/active", { body: { id, force } });
   }
 
   /** Returns to the calibration that was active before. */
   restoreCalibration(): Promise<unknown> {
-    return this.#json("POST", "/calibrations/active/undo");
+    return this.#json("POST /calibrations/active/undo");
   }
 
   importCalibration(file: Blob): Promise<CalibrationDocument> {
-    return this.#json("POST", "/calibrations/import", { body: file }) as Promise<CalibrationDocument>;
+    return this.#json("POST /calibrations/import", { body: file });
   }
 
   deleteCalibration(id: string): Promise<CalibrationDocument> {
-    return this.#json("DELETE", calibrationPath(id)) as Promise<CalibrationDocument>;
+    return this.#json("DELETE /calibrations/{calibration}", { at: calibrationPath(id) });
   }
 
   // -- the simulated world -----------------------------------------------------------------------
 
   simulation(): Promise<SimulationDocument> {
-    return this.#json("GET", "/simulation") as Promise<SimulationDocument>;
+    return this.#json("GET /simulation");
   }
 
   /** What the scene and the sequence call for. */
   explanation(): Promise<ExplanationDocument> {
-    return this.#json("GET", "/simulation/explain") as Promise<ExplanationDocument>;
+    return this.#json("GET /simulation/explain");
   }
 
   /** Answered once the scene is prepared. */
-  setSimulation(wanted: { scene?: string; definition?: string; diffusor?: boolean; effects?: Readonly<Record<string, EffectChoice>> }): Promise<SimulationDocument> {
-    return this.#json("PUT", "/simulation", { body: wanted }) as Promise<SimulationDocument>;
+  setSimulation(wanted: SimulationRequest): Promise<SimulationDocument> {
+    return this.#json("PUT /simulation", { body: wanted });
   }
 
-  cause(fault: Fault): Promise<SimulationDocument> {
-    return this.#json("POST", "/simulation/faults", { body: { fault } }) as Promise<SimulationDocument>;
+  cause(fault: FaultRequest["fault"]): Promise<SimulationDocument> {
+    return this.#json("POST /simulation/faults", { body: { fault } });
   }
 
   // -- jobs --------------------------------------------------------------------------------------
 
   async jobs(): Promise<readonly JobDocument[]> {
-    return ((await this.#json("GET", "/jobs")) as { jobs: readonly JobDocument[] }).jobs;
+    return (await this.#json("GET /jobs")).jobs;
   }
 
   job(id: string): Promise<JobDocument> {
-    return this.#json("GET", `/jobs/${encodeURIComponent(id)}`) as Promise<JobDocument>;
+    return this.#json("GET /jobs/{job}", { at: `/jobs/${encodeURIComponent(id)}` });
   }
 
   cancelJob(id: string): Promise<JobDocument> {
-    return this.#json("POST", `/jobs/${encodeURIComponent(id)}/cancel`) as Promise<JobDocument>;
+    return this.#json("POST /jobs/{job}/cancel", { at: `/jobs/${encodeURIComponent(id)}/cancel` });
   }
 
   // -- files -------------------------------------------------------------------------------------
 
   /** A file of the service, as the browser keeps large ones: not in memory. */
   async file(path: string): Promise<File> {
-    const answer = await this.#ask("GET", path, {});
-    await this.#refuse(answer);
+    const answer = await this.#answer("GET", path);
     const [, name = ""] = /filename="([^"]*)"/.exec(answer.headers.get("Content-Disposition") ?? "") ?? [];
     return new File([await answer.blob()], name);
   }
 
-  async #json(method: string, path: string, details: RequestDetails = {}): Promise<unknown> {
+  /** What the service answers an operation of its interface; no more is checked than that it did not refuse. */
+  async #json<Name extends Operation>(operation: Name, details: RequestDetails<Name extends keyof Bodies ? Bodies[Name] : unknown> = {}): Promise<Answers[Name]> {
+    const [method, path] = operation.split(" ");
+    return (await this.#answer(method, details.at ?? path, details)).json() as Promise<Answers[Name]>;
+  }
+
+  async #answer(method: string, path: string, details: RequestDetails = {}): Promise<Response> {
     const answer = await this.#ask(method, path, details);
     await this.#refuse(answer);
-    return answer.json();
+    return answer;
   }
 
   async #ask(method: string, path: string, { body, signal, keepalive, headers }: RequestDetails): Promise<Response> {

@@ -1,7 +1,6 @@
 import { signal } from "@preact/signals";
-
+import type { CalibrationRequest, CalibrationsDocument, JobDocument, VerdictDocument } from "../stream/documents";
 import { type Api, plainWords, RequestError } from "./api";
-import type { CalibrationRequest, CalibrationsDocument, JobDocument, VerdictDocument } from "./documents";
 import { followed, hasEnded } from "./jobs";
 
 /** How often drift is looked at while the list is in sight. */

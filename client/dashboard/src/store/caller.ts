@@ -1,7 +1,6 @@
 import { computed, signal } from "@preact/signals";
-
+import type { CallerDocument } from "../stream/documents";
 import { type Api, RequestError } from "./api";
-import type { CallerDocument } from "./documents";
 
 /** Who the service takes this page for, by its token. */
 export class Caller {

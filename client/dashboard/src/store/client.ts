@@ -1,7 +1,8 @@
 /** Between the worker and the store: takes what arrives into the store once an animation frame. */
 import { effect } from "@preact/signals";
+import type { AppliedDocument, CameraDocument } from "../stream/documents";
 import { Fluency } from "../stream/fluency";
-import type { AppliedSequence, CameraDocument, ErrorMessage, Hello, Notice, Problem } from "../stream/protocol";
+import type { ErrorMessage, Hello, Notice, Problem } from "../stream/protocol";
 import type { FrameReport } from "../stream/summary";
 import type { Command, Report } from "../stream/worker";
 import type { AnimationLoop } from "./animation";
@@ -238,7 +239,7 @@ export class StreamClient {
     }
   }
 
-  #takeSequence(sequence: AppliedSequence | null): void {
+  #takeSequence(sequence: AppliedDocument | null): void {
     if (sequence !== null) this.#store.sequence.value = sequence;
   }
 
@@ -327,7 +328,7 @@ export class StreamClient {
 }
 
 /** Whether two sequences measure with the same; each time one is set it gets another number. */
-function sameSequence(one: AppliedSequence, other: AppliedSequence | null): boolean {
+function sameSequence(one: AppliedDocument, other: AppliedDocument | null): boolean {
   return other !== null && JSON.stringify({ ...one, sequence_id: 0 }) === JSON.stringify({ ...other, sequence_id: 0 });
 }
 

@@ -1,6 +1,6 @@
 import { effect, type ReadonlySignal, signal, untracked } from "@preact/signals";
 
-import type { PixelDocument } from "../stream/protocol";
+import type { PixelDocument } from "../stream/documents";
 import { type Api, LIVE, liveFrame, RequestError } from "./api";
 import type { Frame } from "./frames";
 import type { Pixel } from "./pixel";

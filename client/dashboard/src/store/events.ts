@@ -1,7 +1,8 @@
 /** What happened, for people: notices of the service and what this page noticed, the newest last. */
 import { signal } from "@preact/signals";
 import { engineering, grouped } from "../scales/format";
-import type { AppliedSequence, Notice } from "../stream/protocol";
+import type { AppliedDocument } from "../stream/documents";
+import type { Notice } from "../stream/protocol";
 
 export type EventTone = "plain" | "good" | "bad";
 
@@ -134,12 +135,12 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
   }
 }
 
-export function sequenceWords({ harmonics, exposure_s, images, base_frequency_hz }: AppliedSequence): string {
+export function sequenceWords({ harmonics, exposure_s, images, base_frequency_hz }: AppliedDocument): string {
   return `The sequence changed: ${engineering(base_frequency_hz, "Hz")}, m = ${harmonics}, ${engineering(exposure_s, "s")}, ${images} images.`;
 }
 
 /** Names the change to a sequence, of which service and page both know. */
-export function sequenceKey({ sequence_id }: AppliedSequence): string {
+export function sequenceKey({ sequence_id }: AppliedDocument): string {
   return `sequence-${sequence_id}`;
 }
 

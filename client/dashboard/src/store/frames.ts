@@ -2,7 +2,7 @@ import { computed, type Signal, signal } from "@preact/signals";
 
 import type { Coefficients } from "../physics/maximumEntropy";
 import type { Numbers } from "../stream/compact";
-import type { FrameMeta } from "../stream/protocol";
+import type { FrameDocument, FrameMeta } from "../stream/documents";
 import { coefficientsOf, type FrameReport, type LightSummary, type MapSummary } from "../stream/summary";
 import { LIVE } from "./api";
 
@@ -42,7 +42,7 @@ export class Frames {
   sceneSince_s = 0;
 
   /** A name of the scene that a frame is of: what is measured over frames begins anew with another one. */
-  sceneOf({ host_time_s, capture_s }: FrameMeta): string {
+  sceneOf({ host_time_s, capture_s }: FrameDocument): string {
     return `${host_time_s - capture_s < this.sceneSince_s ? "before" : "since"} ${this.sceneSince_s}`;
   }
 

@@ -1,6 +1,7 @@
 /** Long work of the service, followed to its end. */
+
+import type { JobDocument } from "../stream/documents";
 import { type Api, RequestError } from "./api";
-import type { JobDocument } from "./documents";
 
 /** How often a job is asked how far it is. */
 const LOOK_S = 0.4;

@@ -1,4 +1,6 @@
 /** Where the views stand: rows of panels and of stacks of panels, each with its share of the space. */
+import type { Setting } from "./settings";
+import { VIEW_NAMES } from "./viewNames";
 
 export interface Slot {
   readonly view: string;
@@ -58,9 +60,9 @@ export const OVERVIEW = LAYOUTS.Overview;
 export const SPACE = LAYOUTS.Space;
 
 /** Whether a remembered value is a layout of known views, each at most once. */
-export function isLayout(value: unknown, known: readonly string[]): value is Layout {
+export function isLayout(value: unknown): value is Layout {
   const share = (part: unknown): boolean => typeof part === "number" && part > 0 && Number.isFinite(part);
-  const isSlot = (part: unknown): boolean => isPart(part) && share(part.share) && typeof part.view === "string" && known.includes(part.view);
+  const isSlot = (part: unknown): boolean => isPart(part) && share(part.share) && typeof part.view === "string" && (VIEW_NAMES as readonly string[]).includes(part.view);
   const isGroup = (part: unknown, isInside: (each: unknown) => boolean): boolean =>
     isPart(part) && share(part.share) && Array.isArray(part.slots) && part.slots.length > 0 && part.slots.length <= MOST_SLOTS && part.slots.every(isInside);
   const isPlace = (part: unknown): boolean => isSlot(part) || isGroup(part, isSlot);
@@ -151,6 +153,36 @@ function withRowBelow(above: Row, wanted: string): Row[] {
     { share: above.share * 0.4, slots: [{ view: wanted, share: 1 }] },
   ];
 }
+
+/**
+ * Where the views stand now.
+ *
+ * As "2:transient.1,2_map.1_points.1/1:response.2": each row's share, then its views with theirs; views of a stack follow its share.
+ */
+export const LAYOUT: Setting<Layout> = {
+  key: "layout",
+  link: "layout",
+  initial: OVERVIEW,
+  accepts: isLayout,
+  text: (layout) => {
+    const short = (share: number): string => String(Number(share.toPrecision(3)));
+    const slotText = ({ view, share }: Slot): string => `${view}.${short(share)}`;
+    const placeText = (place: Slot | Stack): string => (isStack(place) ? [short(place.share), ...place.slots.map(slotText)].join("_") : slotText(place));
+    return layout.map(({ share, slots }) => `${short(share)}:${slots.map(placeText).join(",")}`).join("/");
+  },
+  parse: (text) => {
+    const slotOf = (slot: string): Slot => ({ view: slot.split(".")[0], share: Number(slot.slice(slot.indexOf(".") + 1)) });
+    const placeOf = (place: string): Slot | Stack => {
+      const [share, ...slots] = place.split("_");
+      return slots.length === 0 ? slotOf(place) : { share: Number(share), slots: slots.map(slotOf) };
+    };
+    const rows = text.split("/").map((row) => {
+      const [share, slots = ""] = row.split(":");
+      return { share: Number(share), slots: slots.split(",").map(placeOf) };
+    });
+    return isLayout(rows) ? rows : undefined;
+  },
+};
 
 /** Two neighbours' shares after the splitter between them stands at `place`, 0 to 1 of both. */
 export function split<T extends { readonly share: number }>(parts: readonly T[], at: number, place: number): T[] {

@@ -2,8 +2,7 @@
 import { computed, effect, type Signal, signal, untracked } from "@preact/signals";
 
 import { isLayout, type Layout } from "./layout";
-import { remembered, type Shelf } from "./settings";
-import { VIEW_NAMES } from "./viewNames";
+import type { Settings } from "./settings";
 
 /** Changes that can be undone, the last first. */
 const MOST_STEPS = 50;
@@ -20,10 +19,10 @@ export class Layouts {
   readonly #former = signal<readonly Layout[]>([]);
   #last: Layout;
 
-  constructor(shelf: Shelf | null, current: Signal<Layout>) {
+  constructor(settings: Settings, current: Signal<Layout>) {
     this.#current = current;
     this.#last = current.peek();
-    this.named = remembered<Named>(shelf, "layouts", {}, isNamed);
+    this.named = settings.of<Named>({ key: "layouts", initial: {}, accepts: isNamed });
     effect(() => {
       const [before, now] = [this.#last, current.value];
       this.#last = now;
@@ -65,5 +64,5 @@ function placesOf(layout: Layout): string {
 }
 
 function isNamed(value: unknown): value is Named {
-  return typeof value === "object" && value !== null && Object.values(value).every((each) => isLayout(each, VIEW_NAMES));
+  return typeof value === "object" && value !== null && Object.values(value).every((each) => isLayout(each));
 }

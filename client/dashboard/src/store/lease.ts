@@ -1,7 +1,6 @@
 import { computed, effect, signal, untracked } from "@preact/signals";
-
+import type { LeaseDocument } from "../stream/documents";
 import { type Api, RequestError } from "./api";
-import type { LeaseDocument } from "./documents";
 
 /** Who controls the camera; times are of this page's clock. */
 export type Control =

@@ -3,7 +3,7 @@ import { COLOUR_MAPS, type ColourMapName } from "../scales/colourMaps";
 import type { Tone, ToneKind } from "../scales/tone";
 import { TONES } from "../scales/tone";
 import type { Frame } from "./frames";
-import { aBoolean, aNumber, oneOf, remembered, type Shelf } from "./settings";
+import { aBoolean, aNumber, oneOf, type Setting, type Settings } from "./settings";
 
 /** Light as it comes, what came within the last nanosecond, or all that has come so far. */
 export const PLAYS = ["density", "gate", "cumulative"] as const;
@@ -19,14 +19,11 @@ export function gateStart_rad(phase_rad: number, period_s: number): number {
   return Math.max(0, phase_rad - (2 * Math.PI * GATE_S) / period_s);
 }
 
-/** What of the look of light is set by hand; travels in a link. */
-export interface LightChoice {
-  readonly play: Play;
-  readonly colours: ColourMapName;
-  readonly tone: ToneKind;
-  readonly stops: number;
-  readonly backdrop: boolean;
-}
+const PLAY: Setting<Play> = { key: "transient.play", initial: "density", ...oneOf(PLAYS) };
+const COLOURS: Setting<ColourMapName> = { key: "transient.colours", initial: "inferno", ...oneOf(COLOUR_MAPS) };
+const TONE: Setting<ToneKind> = { key: "transient.tone", initial: "root", ...oneOf(TONES) };
+const STOPS: Setting<number> = { key: "transient.stops", initial: 0, ...aNumber(-99, 99) };
+const BACKDROP: Setting<boolean> = { key: "transient.backdrop", initial: true, ...aBoolean("scene", "black") };
 
 /** How light in flight is shown. */
 export class TransientLook {
@@ -41,25 +38,14 @@ export class TransientLook {
   readonly white: ReadonlySignal<number>;
   #metered: number | null = null;
 
-  constructor(frame: ReadonlySignal<Frame | null>, shelf: Shelf | null) {
-    this.colours = remembered<ColourMapName>(shelf, "transient.colours", "inferno", oneOf(COLOUR_MAPS));
-    this.tone = remembered<ToneKind>(shelf, "transient.tone", "root", oneOf(TONES));
-    this.stops = remembered(shelf, "transient.stops", 0, aNumber);
-    this.backdrop = remembered(shelf, "transient.backdrop", true, aBoolean);
-    this.play = remembered<Play>(shelf, "transient.play", "density", oneOf(PLAYS));
+  constructor(frame: ReadonlySignal<Frame | null>, settings: Settings) {
+    settings.together("light", [PLAY, COLOURS, TONE, STOPS, BACKDROP]);
+    this.play = settings.of(PLAY);
+    this.colours = settings.of(COLOURS);
+    this.tone = settings.of(TONE);
+    this.stops = settings.of(STOPS);
+    this.backdrop = settings.of(BACKDROP);
     this.white = computed(() => this.#meter(frame.value?.light?.peak ?? NaN) / 2 ** this.stops.value);
-  }
-
-  get choice(): LightChoice {
-    return { play: this.play.peek(), colours: this.colours.peek(), tone: this.tone.peek(), stops: this.stops.peek(), backdrop: this.backdrop.peek() };
-  }
-
-  set choice({ play, colours, tone, stops, backdrop }: LightChoice) {
-    this.play.value = play;
-    this.colours.value = colours;
-    this.tone.value = tone;
-    this.stops.value = stops;
-    this.backdrop.value = backdrop;
   }
 
   get toneNow(): Tone {

@@ -7,18 +7,10 @@ import type { Frame, Frames } from "./frames";
 import { MAP_PRODUCTS, type MapProduct } from "./mapCatalogue";
 import { mapFrame } from "./mapFrames";
 import type { Noises } from "./noise";
-import { oneOf, remembered, type Shelf } from "./settings";
+import { type Kind, oneOf, type Setting, type Settings } from "./settings";
 
 /** Where the ends of a scale stand before anything was measured. */
 const EMPTY: Span = { low: 0, high: 1 };
-
-/** What of a look is set by hand; travels in a link. */
-export interface LookChoice {
-  readonly colours: ColourMapName;
-  readonly kind: ScaleKind;
-  /** Null while the limits follow the data. */
-  readonly limits: Span | null;
-}
 
 /** How one map is shown: its colours, its scale, and limits that follow the data or were set. */
 export class Look {
@@ -33,12 +25,14 @@ export class Look {
   constructor(
     readonly product: MapProduct,
     readonly frame: ReadonlySignal<Frame | null>,
-    shelf: Shelf | null,
+    settings: Settings,
   ) {
     const key = (what: string): string => `map.${product.product}.${what}`;
-    this.colours = remembered(shelf, key("colours"), product.colours, oneOf(COLOUR_MAPS));
-    this.kind = remembered(shelf, key("scale"), product.scale, oneOf<ScaleKind>(["linear", "logarithmic"]));
-    this.manual = remembered<Span | null>(shelf, key("limits"), null, isLimits);
+    const colours: Setting<ColourMapName> = { key: key("colours"), initial: product.colours, ...oneOf(COLOUR_MAPS) };
+    const kind: Setting<ScaleKind> = { key: key("scale"), initial: product.scale, ...oneOf<ScaleKind>(["linear", "logarithmic"]) };
+    const manual: Setting<Span | null> = { key: key("limits"), initial: null, ...LIMITS };
+    settings.together("look", [colours, kind, manual], { of: product.product });
+    [this.colours, this.kind, this.manual] = [settings.of(colours), settings.of(kind), settings.of(manual)];
     this.scale = computed(() => {
       const { low, high } = this.manual.value ?? this.#follow(frame.value?.map ?? null);
       const kind = this.kind.value;
@@ -47,21 +41,6 @@ export class Look {
       if (last.low !== low || last.high !== high || last.kind !== kind) this.#last = { low, high, kind };
       return this.#last;
     });
-  }
-
-  get choice(): LookChoice {
-    return { colours: this.colours.peek(), kind: this.kind.peek(), limits: this.manual.peek() };
-  }
-
-  set choice({ colours, kind, limits }: LookChoice) {
-    this.colours.value = colours;
-    this.kind.value = kind;
-    this.manual.value = limits;
-  }
-
-  /** Whether anything was chosen that the map does not begin with. */
-  get chosen(): boolean {
-    return this.manual.peek() !== null || this.colours.peek() !== this.product.colours || this.kind.peek() !== this.product.scale;
   }
 
   #follow(span: Span | null): Span {
@@ -73,12 +52,11 @@ export class Look {
 /** The looks of all maps, and which of them share their limits. */
 export class Looks {
   /** Maps of one unit keep the same limits, so that they can be compared. */
-  readonly locked: Signal<boolean>;
+  readonly locked = signal(false);
   readonly #all: ReadonlyMap<string, Look>;
 
-  constructor(frames: Frames, noises: Noises, shelf: Shelf | null) {
-    this.#all = new Map(MAP_PRODUCTS.map((shown) => [shown.product, new Look(shown, mapFrame(frames, noises, shown), shelf)]));
-    this.locked = signal(false);
+  constructor(frames: Frames, noises: Noises, settings: Settings) {
+    this.#all = new Map(MAP_PRODUCTS.map((shown) => [shown.product, new Look(shown, mapFrame(frames, noises, shown), settings)]));
   }
 
   of(product: string): Look {
@@ -99,17 +77,23 @@ export class Looks {
     this.locked.value = locked;
   }
 
-  /** All looks by the names of their products. */
-  get all(): ReadonlyMap<string, Look> {
-    return this.#all;
-  }
-
   #kin({ product: { unit } }: Look): Look[] {
     return [...this.#all.values()].filter(({ product }) => product.unit === unit);
   }
 }
 
-export function isLimits(value: unknown): value is Span | null {
+/** As "1,3.5". */
+const LIMITS: Kind<Span | null> = {
+  accepts: isLimits,
+  text: (limits) => (limits === null ? "" : [limits.low, limits.high].map((end) => Number(end.toPrecision(6))).join()),
+  parse: (text) => {
+    const [low, high, ...more] = text.split(",").map(Number);
+    const limits = text === "" ? null : { low, high };
+    return isLimits(limits) && more.length === 0 ? limits : undefined;
+  },
+};
+
+function isLimits(value: unknown): value is Span | null {
   if (value === null) return true;
   const { low, high } = (value ?? {}) as Partial<Span>;
   return typeof low === "number" && typeof high === "number" && high > low;

@@ -1,7 +1,8 @@
 /** What is measured in the pictures by hand: pixels that are kept, and a region. */
-import { signal } from "@preact/signals";
+import type { Signal } from "@preact/signals";
 
-import type { Pixel } from "./pixel";
+import { type Pixel, pixelOf, pixelText } from "./pixel";
+import type { Settings } from "./settings";
 
 /** The names of pins, and their colours in all views: distinct for colour-blind eyes too (after Okabe and Ito). */
 export const PIN_NAMES = ["A", "B", "C"] as const;
@@ -23,12 +24,46 @@ export interface Region {
   readonly corners?: readonly Pixel[];
 }
 
+/** Corners of a polygon that a link may say. */
+const MOST_CORNERS = 32;
+
 /** Half the width of a region that is made around a pixel by a key. */
 const REACH = 10;
 
 export class Measures {
-  readonly pins = signal<readonly Pin[]>([]);
-  readonly region = signal<Region | null>(null);
+  readonly pins: Signal<readonly Pin[]>;
+  readonly region: Signal<Region | null>;
+
+  constructor(settings: Settings) {
+    // As "A30,40/B120,70".
+    this.pins = settings.of<readonly Pin[]>({
+      link: "pins",
+      initial: [],
+      text: (pins) => pins.map((pin) => pin.name + pixelText(pin)).join("/"),
+      parse: (text) => {
+        const pins = text.split("/").flatMap((each) => {
+          const [name, place] = [PIN_NAMES.find((known) => each.startsWith(known)), pixelOf(each.slice(1))];
+          return name === undefined || place === undefined ? [] : [{ name, ...place }];
+        });
+        return pins.length === 0 ? undefined : pins;
+      },
+    });
+    // As its two corners, "50,40/69,54", or as three or more of a polygon.
+    this.region = settings.of<Region | null>({
+      link: "region",
+      initial: null,
+      text: (region) => {
+        if (region === null) return "";
+        const { x0, y0, x1, y1, corners } = region;
+        return corners?.map(pixelText).join("/") ?? `${x0},${y0}/${x1},${y1}`;
+      },
+      parse: (text) => {
+        const corners = text.split("/").flatMap((corner) => pixelOf(corner) ?? []);
+        if (corners.length < 2 || corners.length > MOST_CORNERS) return undefined;
+        return corners.length === 2 ? regionOf(corners[0], corners[1]) : polygonOf(corners);
+      },
+    });
+  }
 
   /** Keeps a pixel under the first free name, the last name where none is free; a pixel that is kept already is let go. */
   pin({ x, y }: Pixel): void {

@@ -4,6 +4,16 @@ export interface Pixel {
   readonly y: number;
 }
 
+/** As "81,20". */
+export function pixelText({ x, y }: Pixel): string {
+  return `${x},${y}`;
+}
+
+export function pixelOf(text: string): Pixel | undefined {
+  const found = /^(\d{1,5}),(\d{1,5})$/.exec(text);
+  return found === null ? undefined : { x: Number(found[1]), y: Number(found[2]) };
+}
+
 const STEPS: Readonly<Record<string, readonly [number, number] | undefined>> = {
   ArrowLeft: [-1, 0],
   ArrowRight: [1, 0],

@@ -1,7 +1,7 @@
 /** How far the range of the median pixel is off, as one figure for the whole page. */
 import { computed, effect, type ReadonlySignal, signal, untracked } from "@preact/signals";
 
-import type { FrameMeta } from "../stream/protocol";
+import type { FrameMeta } from "../stream/documents";
 import { LIVE, RequestError } from "./api";
 import type { Frames } from "./frames";
 import type { FrameLoader } from "./replay";

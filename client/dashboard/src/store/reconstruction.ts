@@ -1,7 +1,6 @@
 import { signal } from "@preact/signals";
-
+import type { ParameterDocument, ReconstructionDocument } from "../stream/documents";
 import { type Api, RequestError, type Tagged } from "./api";
-import type { ParameterDocument, ReconstructionDocument } from "./documents";
 
 /** How frames are computed, and what can be set of it within which limits. */
 export class Reconstruction {

@@ -1,7 +1,6 @@
 import { computed, effect, signal, untracked } from "@preact/signals";
-
+import type { RecordingDocument, RecordingRequest, RecordingsDocument } from "../stream/documents";
 import { type Api, RequestError } from "./api";
-import type { RecordingDocument, RecordingRequest, RecordingsDocument } from "./documents";
 
 /** How often one that runs is looked at. */
 const LOOK_MS = 1000;

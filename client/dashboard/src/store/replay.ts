@@ -1,10 +1,9 @@
 /** A recording on the page: its frames take the place of the camera's, for all views alike. */
 import { batch, computed, effect, signal, untracked } from "@preact/signals";
-
+import type { RecordingDocument, TimelineDocument } from "../stream/documents";
 import { LEAST_PRODUCTS } from "../stream/protocol";
 import type { FrameReport } from "../stream/summary";
 import { type Api, RequestError, recordingPath } from "./api";
-import type { RecordingDocument, TimelineDocument } from "./documents";
 import { type Frames, frameOf } from "./frames";
 import type { Status } from "./status";
 

@@ -1,6 +1,7 @@
 import { computed, type Signal, signal } from "@preact/signals";
 
-import type { AppliedSequence, Choice, SequenceDocument } from "../stream/protocol";
+import type { AppliedDocument, ChoiceDocument } from "../stream/documents";
+import type { SequenceRequest } from "../stream/protocol";
 import { type Api, RequestError } from "./api";
 import { type Events, sequenceKey, sequenceWords } from "./events";
 
@@ -8,7 +9,7 @@ import { type Events, sequenceKey, sequenceWords } from "./events";
 interface Before {
   /** The sequence that the change led to. */
   readonly sequence_id: number;
-  readonly sequence: SequenceDocument;
+  readonly sequence: SequenceRequest;
   readonly estimator: string | null;
 }
 
@@ -21,21 +22,21 @@ export class Sequencing {
   readonly #before = signal<Before | null>(null);
   readonly #api: Api;
   readonly #events: Events;
-  readonly #current: Signal<AppliedSequence | null>;
+  readonly #current: Signal<AppliedDocument | null>;
 
-  constructor(api: Api, events: Events, current: Signal<AppliedSequence | null>) {
+  constructor(api: Api, events: Events, current: Signal<AppliedDocument | null>) {
     this.#api = api;
     this.#events = events;
     this.#current = current;
   }
 
   /** Sets a sequence; raises RequestError where it is refused. */
-  async set(sequence: SequenceDocument): Promise<void> {
+  async set(sequence: SequenceRequest): Promise<void> {
     await this.#set(sequence, null);
   }
 
   /** Sets the sequence of a choice, and takes the range from what it was predicted for. */
-  async apply({ sequence, estimator }: Choice): Promise<void> {
+  async apply({ sequence, estimator }: ChoiceDocument): Promise<void> {
     await this.#set(sequence, AUTOMATIC.includes(estimator) ? "automatic" : estimator);
   }
 
@@ -54,7 +55,7 @@ export class Sequencing {
     }
   }
 
-  async #set(sequence: SequenceDocument, estimator: string | null): Promise<void> {
+  async #set(sequence: SequenceRequest, estimator: string | null): Promise<void> {
     const before = this.#current.peek();
     const applied = await this.#api.setSequence(sequence);
     this.#current.value = applied;

@@ -1,7 +1,9 @@
 import { signal } from "@preact/signals";
-
+import type { ExplanationDocument, FaultRequest, SimulationDocument } from "../stream/documents";
 import { type Api, RequestError } from "./api";
-import type { EffectChoice, ExplanationDocument, Fault, SimulationDocument } from "./documents";
+
+export type EffectChoice = SimulationDocument["effects"][string];
+export type Fault = FaultRequest["fault"];
 
 /** The world that a simulated camera stands before, and what it calls for. */
 export class Simulation {

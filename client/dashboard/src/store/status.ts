@@ -1,7 +1,8 @@
 import { computed, signal } from "@preact/signals";
 
 import type { Decision } from "../stream/connection";
-import type { CameraState, FrameMeta } from "../stream/protocol";
+import type { FrameMeta } from "../stream/documents";
+import type { CameraState } from "../stream/protocol";
 
 /** How this page stands with the service. */
 export type Connection =

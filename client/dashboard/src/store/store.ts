@@ -2,7 +2,7 @@ import { computed, effect, type Signal, signal } from "@preact/signals";
 import { createContext } from "preact";
 import { useContext } from "preact/hooks";
 
-import type { AppliedSequence, CameraDocument } from "../stream/protocol";
+import type { AppliedDocument, CameraDocument } from "../stream/documents";
 import { Accuracy } from "./accuracy";
 import { Api, kindOf } from "./api";
 import { Calibrations } from "./calibrations";
@@ -11,7 +11,7 @@ import { Credentials } from "./credentials";
 import { Details } from "./details";
 import { Events } from "./events";
 import { Frames } from "./frames";
-import { isLayout, type Layout, OVERVIEW, SPACE } from "./layout";
+import { LAYOUT, type Layout, OVERVIEW, SPACE, viewsOf } from "./layout";
 import { Layouts } from "./layouts";
 import { Lease } from "./lease";
 import { TransientLook } from "./lightLook";
@@ -19,15 +19,14 @@ import { Looks } from "./looks";
 import { MAP_PRODUCTS } from "./mapCatalogue";
 import { Measures } from "./measures";
 import { Noises } from "./noise";
-import type { Pixel } from "./pixel";
-import { SIDES, type Side } from "./pixelSides";
+import { type Pixel, pixelOf, pixelText } from "./pixel";
 import { Player } from "./player";
 import { RangeErrors } from "./rangeErrors";
 import { Reconstruction } from "./reconstruction";
 import { Recordings } from "./recordings";
 import { Replay } from "./replay";
 import { Sequencing } from "./sequencing";
-import { aBoolean, aNumber, browserShelf, oneOf, remembered, type Shelf, sessionShelf } from "./settings";
+import { aBoolean, browserShelf, oneOf, Settings, type Shelf } from "./settings";
 import { Simulation } from "./simulation";
 import { Status } from "./status";
 import { Theme } from "./theme";
@@ -58,9 +57,9 @@ export class Store {
   readonly trends: Trends;
   /** What happened. */
   readonly events = new Events();
-  readonly shelf: Shelf | null;
+  readonly settings: Settings;
   /** The sequence in use, by the service; null until it is known. */
-  readonly sequence = signal<AppliedSequence | null>(null);
+  readonly sequence = signal<AppliedDocument | null>(null);
   /** Changes it. */
   readonly sequencing: Sequencing;
   /** What accuracy costs in time. */
@@ -70,15 +69,15 @@ export class Store {
   /** The page keeps the frame it shows although newer ones exist. */
   readonly held = signal(false);
   /** The pixel whose impulse response is shown. */
-  readonly selected = signal<Pixel | null>(null);
+  readonly selected: Signal<Pixel | null>;
   /** Which part of the picture is shown. */
-  readonly viewport = new Viewport();
+  readonly viewport: Viewport;
   /** That part in pixels: column and row of the first, width and height; null for the whole. */
   readonly sight = computed(() => sightOf(this.viewport.view.value, this.camera.value));
   /** Less is asked for where link or page are too slow for all. */
   readonly adapts: Signal<boolean>;
   /** Pixels that are kept, and a region. */
-  readonly measures = new Measures();
+  readonly measures: Measures;
   /** The pixel under the pointer, in whichever view. */
   readonly pointed = signal<Pixel | null>(null);
   /** Time after which a flight repeats, by the frame on screen. */
@@ -91,15 +90,11 @@ export class Store {
   readonly calibrating = computed(() => this.status.cameraState.value === "calibrating" || this.calibrations.job.value?.state === "running");
   /** How light in flight is shown. */
   readonly light: TransientLook;
-  /** What is shown of the selected pixel. */
-  readonly side: Signal<Side>;
   /** What only the service knows of the selected pixel. */
   readonly details: Details;
   readonly theme: Theme;
   /** How much pixels scatter from frame to frame. */
   readonly noises = new Noises(this.frames);
-  /** Horizontal field of view, used where the service does not know where its camera looks. */
-  readonly field_deg: Signal<number>;
   /** How maps are shown. */
   readonly looks: Looks;
   /** The product that the map view shows. */
@@ -121,11 +116,12 @@ export class Store {
   /** Whether a name for the layout is asked for. */
   readonly asksForLayout = signal(false);
   /** The one view that is shown alone; null while all are. */
-  readonly alone = signal<string | null>(null);
+  readonly alone: Signal<string | null>;
 
-  constructor({ api = new Api(undefined, new Credentials(sessionShelf())), shelf = browserShelf() }: { api?: Api; shelf?: Shelf | null } = {}) {
+  constructor({ api = new Api(undefined, new Credentials(browserShelf("sessionStorage"))), shelf = browserShelf("localStorage") }: { api?: Api; shelf?: Shelf | null } = {}) {
     this.api = api;
-    this.shelf = shelf;
+    const settings = new Settings(shelf);
+    this.settings = settings;
     this.caller = new Caller(api);
     this.lease = new Lease(api);
     this.recordings = new Recordings(api);
@@ -142,21 +138,24 @@ export class Store {
       if (problem.status === 401) this.asksForToken.value = true;
     };
     this.details = new Details(api);
-    this.light = new TransientLook(this.frames.of("coefficients"), shelf);
-    this.side = remembered<Side>(shelf, "response.side", "bounds", oneOf(SIDES.map(({ value }) => value)));
     const aMap = oneOf(MAP_PRODUCTS.map(({ product }) => product));
-    this.mapProduct = remembered(shelf, "map.product", "range", aMap);
-    this.secondMapProduct = remembered(shelf, "second-map.product", "indirect", aMap);
-    this.field_deg = remembered(shelf, "points.field_deg", 45, isField);
-    this.looks = new Looks(this.frames, this.noises, shelf);
-    this.layout = remembered<Layout>(shelf, "layout", OVERVIEW, (value): value is Layout => isLayout(value, VIEW_NAMES));
+    const secondMap = (map: string): string => (viewsOf(this.layout.value).includes("second-map") ? map : "");
+    this.mapProduct = settings.of({ key: "map.product", link: "map", followed: true, initial: "range", ...aMap });
+    this.secondMapProduct = settings.of({ key: "second-map.product", link: "map2", followed: true, initial: "indirect", ...aMap, text: secondMap });
+    this.selected = settings.of<Pixel | null>({ link: "pixel", followed: true, initial: null, text: (pixel) => (pixel === null ? "" : pixelText(pixel)), parse: pixelOf });
+    this.alone = settings.of<string | null>({ link: "view", followed: true, initial: null, ...oneOf<string>(VIEW_NAMES) });
+    this.layout = settings.of(LAYOUT);
     effect(() => {
       const seesLight = this.frames.absent.value.coefficients === undefined;
       if (!seesLight && JSON.stringify(this.layout.peek()) === JSON.stringify(OVERVIEW)) this.layout.value = SPACE;
     });
-    this.layouts = new Layouts(shelf, this.layout);
-    this.adapts = remembered(shelf, "link.adapts", true, aBoolean);
-    this.theme = new Theme(shelf, systemScheme());
+    this.layouts = new Layouts(settings, this.layout);
+    this.looks = new Looks(this.frames, this.noises, settings);
+    this.light = new TransientLook(this.frames.of("coefficients"), settings);
+    this.measures = new Measures(settings);
+    this.viewport = new Viewport(settings);
+    this.adapts = settings.of({ key: "link.adapts", initial: true, ...aBoolean() });
+    this.theme = new Theme(settings, systemScheme());
   }
 
   /** Shows all views of a layout. */
@@ -166,14 +165,9 @@ export class Store {
   }
 }
 
-/** Whether a value is a field of view that a camera may have, in degrees. */
-export function isField(value: unknown): value is number {
-  return aNumber(value) && value >= 5 && value <= 150;
-}
-
 function sightOf(view: View, camera: CameraDocument | null): readonly number[] | null {
   const { width, height } = camera?.capabilities ?? {};
-  return view === WHOLE || !aNumber(width) || !aNumber(height) ? null : pixelsOf(view, width, height);
+  return view === WHOLE || typeof width !== "number" || typeof height !== "number" ? null : pixelsOf(view, width, height);
 }
 
 /** Whether the system is dark, by the browser; null outside of one. */

@@ -1,6 +1,6 @@
 import { computed, effect, type ReadonlySignal, type Signal, signal } from "@preact/signals";
 
-import { oneOf, remembered, type Shelf } from "./settings";
+import { oneOf, type Settings } from "./settings";
 
 export const THEMES = ["auto", "light", "dark"] as const;
 export type ThemeChoice = (typeof THEMES)[number];
@@ -10,8 +10,8 @@ export class Theme {
   readonly choice: Signal<ThemeChoice>;
   readonly dark: ReadonlySignal<boolean>;
 
-  constructor(shelf: Shelf | null, system: MediaQueryList | null) {
-    this.choice = remembered<ThemeChoice>(shelf, "theme", "auto", oneOf(THEMES));
+  constructor(settings: Settings, system: MediaQueryList | null) {
+    this.choice = settings.of<ThemeChoice>({ key: "theme", initial: "auto", ...oneOf(THEMES) });
     const systemDark = signal(system?.matches ?? false);
     system?.addEventListener("change", ({ matches }) => (systemDark.value = matches));
     this.dark = computed(() => (this.choice.value === "auto" ? systemDark.value : this.choice.value === "dark"));

@@ -1,5 +1,7 @@
 /** Which part of the picture all views of the sensor show. */
-import { signal } from "@preact/signals";
+import type { Signal } from "@preact/signals";
+
+import type { Settings } from "./settings";
 
 /** A part of the picture: `zoom` times as large, its left and top end in shares of the whole. */
 export interface View {
@@ -19,7 +21,20 @@ const MOST_ZOOM = 40;
 
 /** The part that is shown of all pictures of the sensor alike. */
 export class Viewport {
-  readonly view = signal<View>(WHOLE);
+  readonly view: Signal<View>;
+
+  constructor(settings: Settings) {
+    // As "4,0.25,0.1": how many times larger, its left and top end in shares.
+    this.view = settings.of<View>({
+      link: "sight",
+      initial: WHOLE,
+      text: (view) => (view === WHOLE ? "" : [view.zoom, view.left, view.top].map((each) => Number(each.toPrecision(4))).join()),
+      parse: (text) => {
+        const numbers = text.split(",").map(Number);
+        return numbers.length === 3 && numbers.every(Number.isFinite) && numbers[0] > 1 ? windowAt(numbers[0], numbers[1], numbers[2]) : undefined;
+      },
+    });
+  }
 
   /** Makes the picture larger by a factor around a place in what is seen; that place stays where it is. */
   zoomAt(at: Point, factor: number): void {

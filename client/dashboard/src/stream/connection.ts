@@ -6,21 +6,10 @@
 import { Announced, type Announcement } from "./announced";
 import { codesFor } from "./compact";
 import { type Demand, DemandControl, EVERYTHING } from "./demand";
+import type { CameraDocument } from "./documents";
 import type { FluencyReport } from "./fluency";
 import { PaceControl } from "./pace";
-import {
-  ANNOUNCING,
-  type CameraDocument,
-  decodeMessage,
-  encodeAck,
-  encodeSubscribe,
-  type Hello,
-  LEAST_PRODUCTS,
-  ProtocolError,
-  type ServerMessage,
-  SUBPROTOCOL,
-  type Subscription,
-} from "./protocol";
+import { ANNOUNCING, decodeMessage, encodeAck, encodeSubscribe, type Hello, LEAST_PRODUCTS, ProtocolError, type ServerMessage, SUBPROTOCOL, type Subscription } from "./protocol";
 
 /** What of a WebSocket is used. */
 export interface Socket {

@@ -6,6 +6,7 @@
 import { decode, encode } from "@msgpack/msgpack";
 
 import { decodeReflection16, decodeU16, type Numbers, whole } from "./compact";
+import type { AppliedDocument, CameraDocument, FrameMeta, ProblemDocument, SequenceDocument, Notice as StatedNotice } from "./documents";
 
 export const SUBPROTOCOL = "transientcam.v1.msgpack";
 
@@ -18,148 +19,14 @@ export interface NdArray {
   readonly data: Numbers;
 }
 
-/** What every frame says about itself; the JSON of `GET /frames/latest`. */
-export interface FrameMeta {
-  readonly frame: number;
-  readonly sequence_id: number;
-  readonly calibration_id: string;
-  readonly device_time_s: number;
-  readonly host_time_s: number;
-  readonly capture_s: number;
-  readonly reconstruct_s: number | null;
-  readonly base_frequency_hz: number;
-  readonly harmonics: number;
-  readonly zeroth: string;
-  readonly exposure_s: number;
-  readonly takes: number;
-  readonly width: number;
-  readonly height: number;
-  readonly temperature_c: number;
-  readonly lost_images: number;
-  /** Which pixels of the frame were sent, and every how many of them. */
-  readonly region?: readonly [x: number, y: number, width: number, height: number];
-  readonly decimation?: number;
-  readonly pixels: Readonly<Record<string, number>> | null;
-  /** Standard deviation that the sensor's noise gives the range, in m; null until the range was computed. */
-  readonly predicted_range_std_m?: { readonly median: number; readonly p90: number } | null;
-  /** Errors of the range that the frame knows of, in m; null until range_error was computed, and of bias where m = 1. */
-  readonly accuracy?: { readonly range_error_m: number | null } | null;
-}
-
-/** A sequence as it was really set, with the figures that follow from it. */
-export interface AppliedSequence extends SequenceDocument {
-  readonly sequence_id: number;
-  readonly images: number;
-  readonly capture_s: number;
-  readonly frame_rate_hz: number;
-  readonly unambiguous_range_m: number;
-  readonly data_rate_bytes_s: number;
-}
-
-export type Zeroth = "low-frequency" | "on-off" | "estimated";
-
-export interface SequenceDocument {
-  readonly base_frequency_hz: number;
-  readonly harmonics: number;
-  readonly zeroth: Zeroth;
-  readonly exposure_s: number;
-  readonly takes: number;
-  /** In which order takes follow each other. */
-  readonly take_order?: string;
-  readonly sub_phases: { readonly scheme: string; readonly n: number };
-}
-
 /** What the camera is doing, in the service's words. */
-export type CameraState = "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
+export type CameraState = CameraDocument["state"];
 
-/** What `GET /api/v1/camera` answers. */
-export interface CameraDocument {
-  readonly state: CameraState;
-  /** Why it is lost. */
-  readonly reason: string | null;
-  readonly simulated: boolean;
-  readonly capabilities: Readonly<Record<string, unknown>>;
-  /** Where its pixels look, in pixels, and by which source; of the whole frame. */
-  readonly intrinsics?: Intrinsics;
-}
+/** A sequence as it is asked for; what is absent takes its default. */
+export type SequenceRequest = Partial<SequenceDocument>;
 
-/** A pinhole camera: pixel (x, y) looks along ((x - cx) / fx, (y - cy) / fy, 1), y down. */
-export interface Intrinsics {
-  readonly fx: number;
-  readonly fy: number;
-  readonly cx: number;
-  readonly cy: number;
-  readonly width: number;
-  readonly height: number;
-  /** "assumed" where it is unknown. */
-  readonly source: string;
-}
-
-/** Light that came back after one time of flight; its weight in units of b_0. */
-export interface Return {
-  readonly time_s: number;
-  readonly weight: number;
-}
-
-/** What `GET /api/v1/frames/latest/pixel` answers, as far as the page reads it. */
-export interface PixelDocument {
-  readonly meta: FrameMeta;
-  readonly x: number;
-  readonly y: number;
-  readonly range_m: number | null;
-  readonly direct: number;
-  readonly indirect: number;
-  readonly brightness: number;
-  readonly uniform: number;
-  readonly validity: number | null;
-  readonly flags: readonly string[];
-  readonly returns: readonly Return[];
-  /** What the simulated scene holds there; null for a real camera. */
-  readonly truth: {
-    readonly kind: string;
-    readonly range_m: number | null;
-    readonly brightness: number;
-    readonly returns: readonly Return[];
-  } | null;
-}
-
-/** A sequence and what is predicted of it. */
-export interface Choice {
-  /** The body for `PUT /sequence`. */
-  readonly sequence: SequenceDocument;
-  /** What the range is to be taken from. */
-  readonly estimator: string;
-  readonly capture_s: number;
-  readonly frame_rate_hz: number;
-  /** Processor time of one frame; null as long as its kernels are not compiled. */
-  readonly reconstruct_s: number | null;
-  readonly predicted: {
-    /** Noise and bias together, and the interval of what is measured. */
-    readonly range_error_m: { readonly median: number; readonly low: number; readonly high: number; readonly p90: number };
-    readonly range_std_m: { readonly median: number };
-    readonly range_bias_m: number;
-    /** If light begins where the moments of the look only just allow it. */
-    readonly range_bias_most_m: number;
-    /** Whether the look tells the bias. */
-    readonly bias_known: boolean;
-    readonly outlier_share: number;
-  };
-}
-
-/** What accuracy costs on the scene before the camera. */
-export interface Tradeoff {
-  readonly scene_of_frame: number;
-  readonly current: {
-    readonly meta: FrameMeta;
-    readonly sequence: SequenceDocument;
-    readonly capture_s: number;
-    readonly range_error_m: { readonly median: number; readonly rms: number } | null;
-  };
-  /** By rising capture time and falling error. */
-  readonly front: readonly Choice[];
-  /** From where on bias rules, in a sentence. */
-  readonly summary: string;
-}
+export type Zeroth = SequenceDocument["zeroth"];
+export type TakeOrder = SequenceDocument["take_order"];
 
 /** What the frames of one subscription are like. */
 export interface Channel {
@@ -172,7 +39,7 @@ export interface Hello {
   readonly channels?: readonly Channel[];
   readonly session: string;
   readonly server: { readonly name: string; readonly version: string };
-  readonly sequence: AppliedSequence | null;
+  readonly sequence: AppliedDocument | null;
   readonly camera: { readonly state: CameraState };
 }
 
@@ -186,56 +53,18 @@ export interface FrameMessage {
   readonly array: NdArray;
 }
 
-export type Notice =
-  | {
-      readonly type: "notice";
-      readonly kind: "dropped";
-      readonly channel: number;
-      readonly count: number;
-      readonly total: number;
-      /** How many of `count` were left out because earlier ones were not acknowledged; a service of before does not say. */
-      readonly unacknowledged?: number;
-    }
-  | { readonly type: "notice"; readonly kind: "lost-images"; readonly count: number }
-  | { readonly type: "notice"; readonly kind: "camera-lost"; readonly reason?: string }
-  | { readonly type: "notice"; readonly kind: "camera-back" }
-  | { readonly type: "notice"; readonly kind: "light-held"; readonly reason?: string }
-  | { readonly type: "notice"; readonly kind: "light-released" }
-  | { readonly type: "notice"; readonly kind: "sequence-changed"; readonly sequence: AppliedSequence }
-  | {
-      readonly type: "notice";
-      readonly kind: "lease-changed";
-      readonly change: "granted" | "released" | "lapsed" | "taken-over";
-      readonly holder: string | null;
-      readonly from?: string | null;
-    }
-  | { readonly type: "notice"; readonly kind: "calibration-changed"; readonly calibration_id: string; readonly reason?: string | null }
-  | { readonly type: "notice"; readonly kind: "reconstruction-changed" }
-  | { readonly type: "notice"; readonly kind: "simulation-changed"; readonly scene: string; readonly effects: Readonly<Record<string, string>> }
-  | { readonly type: "notice"; readonly kind: "recording-started"; readonly recording: string }
-  | { readonly type: "notice"; readonly kind: "recording-dropped"; readonly count: number; readonly total: number }
-  | {
-      readonly type: "notice";
-      readonly kind: "recording-stopped";
-      readonly recording: string;
-      readonly reason: string | null;
-      readonly problem?: string | null;
-    };
+type SequenceChanged = Extract<StatedNotice, { kind: "sequence-changed" }>;
+
+/** An event; the sequence in it is the document that REST answers. */
+export type Notice = Exclude<StatedNotice, SequenceChanged> | (Omit<SequenceChanged, "sequence"> & { readonly sequence: AppliedDocument });
 
 export interface ErrorMessage {
   readonly type: "error";
   readonly problem: Problem;
 }
 
-/** RFC 9457, with the extensions of this service. */
-export interface Problem {
-  readonly type?: string;
-  readonly title?: string;
-  readonly status?: number;
-  readonly detail?: string;
-  readonly field?: string;
-  readonly value?: unknown;
-  readonly limit?: unknown;
+/** RFC 9457, with the extensions of this service; what the page itself finds wrong has fewer fields. */
+export interface Problem extends Partial<ProblemDocument> {
   /** Of a plan for a camera of fixed frequencies: what takes give. */
   readonly takes?: readonly { readonly takes: number; readonly capture_s: number; readonly range_std_m: number }[];
 }

@@ -2,9 +2,10 @@
 
 import type { Announcement } from "./announced";
 import { type ConnectionEvent, FrameGone, StreamConnection } from "./connection";
+import type { CameraDocument } from "./documents";
 import type { FluencyReport } from "./fluency";
 import { frameUrl } from "./frameUrl";
-import { type CameraDocument, decodeMessage, type Problem, ProtocolError } from "./protocol";
+import { decodeMessage, type Problem, ProtocolError } from "./protocol";
 import { type FrameReport, summarised } from "./summary";
 
 /** From the page to the worker. */

@@ -1,6 +1,7 @@
 import { useId, useRef } from "preact/hooks";
 
 import { placeBeside } from "./popover";
+import "./ActionMenu.css";
 
 export interface Action {
   readonly text: string;

@@ -5,6 +5,7 @@ import { beyond, type ColourMapName, colourTable, LEVELS, levelOf } from "../sca
 import { fixed, significant, withUnit } from "../scales/format";
 import { decimalsFor, fraction, histogram, niceStep, type Scale, type Span, ticks, valueAt } from "../scales/scale";
 import { useDrawing } from "./hooks";
+import "./ColourBar.css";
 
 /** Share of the scale's length that the bar goes on beyond either end: for what lies there, and for handles to be drawn to. */
 const MARGIN = 0.1;

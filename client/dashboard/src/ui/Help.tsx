@@ -1,6 +1,7 @@
 import { useStore } from "../store/store";
 import { SwitchedDialog } from "./Dialog";
 import { SHORTCUTS } from "./shortcuts";
+import "./Help.css";
 
 /** The keys of the page, over the page. */
 export function Help() {

@@ -2,6 +2,7 @@ import { useSignal } from "@preact/signals";
 import type { Span } from "../scales/scale";
 import type { Look, Looks } from "../store/looks";
 import { Check } from "./controls";
+import "./LimitFields.css";
 
 /** Limits with one end typed anew, or why they make no sense. */
 export function typed({ low, high }: Span, end: keyof Span, text: string): Span | string {

@@ -5,6 +5,7 @@ import { PIN_COLOURS } from "../store/measures";
 import type { Pixel } from "../store/pixel";
 import { useStore } from "../store/store";
 import { type Point, seenAt } from "../store/viewport";
+import "./Marks.css";
 
 /** What is marked in a picture of the sensor of this size: over the picture, as large at any zoom. */
 export function Marks({ width, height }: { width: number; height: number }) {

@@ -2,6 +2,7 @@ import { type ComponentChildren, createContext } from "preact";
 import { useContext } from "preact/hooks";
 
 import { type Action, type ActionGroup, ActionMenu } from "./ActionMenu";
+import "./Panel.css";
 
 interface PanelProps {
   readonly name: string;

@@ -2,6 +2,8 @@ import type { ComponentChildren } from "preact";
 import { useId, useRef } from "preact/hooks";
 
 import { placeBeside } from "./popover";
+import "./ActionMenu.css";
+import "./PopoverButton.css";
 
 interface PopoverButtonProps {
   /** What stands on the button. */

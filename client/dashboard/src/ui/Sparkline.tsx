@@ -1,4 +1,5 @@
 import type { PlotPoint } from "../store/trends";
+import "./Sparkline.css";
 
 interface SparklineProps {
   /** Lines over the unit square. */

@@ -7,6 +7,7 @@ import { type Pixel, stepped } from "../store/pixel";
 import { useStore } from "../store/store";
 import { type Point, placeIn, WHOLE } from "../store/viewport";
 import { Marks } from "./Marks";
+import "./Stage.css";
 
 interface StageProps {
   /** Size of the picture in pixels of the sensor. */

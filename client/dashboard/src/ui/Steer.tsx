@@ -2,6 +2,7 @@ import type { ComponentChildren } from "preact";
 
 import { useStore } from "../store/store";
 import type { Task } from "./useTask";
+import "./Steer.css";
 
 interface SteerProps {
   readonly onClick?: () => void;

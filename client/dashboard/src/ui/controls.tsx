@@ -1,4 +1,5 @@
 import type { ComponentChildren } from "preact";
+import "./controls.css";
 
 interface ChoiceProps<T extends string | number> {
   readonly label: string;
@@ -11,7 +12,7 @@ interface ChoiceProps<T extends string | number> {
 export function Choice<T extends string | number>({ label, value, options, onChange }: ChoiceProps<T>) {
   return (
     <label class="choice">
-      <span class="quiet choice-label">{label}</span>
+      <span class="quiet choice-label unseen">{label}</span>
       <select
         value={String(value)}
         onChange={(event) => {

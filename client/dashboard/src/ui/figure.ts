@@ -3,7 +3,7 @@
 import { type ColourMapName, colourTable, LEVELS, levelOf } from "../scales/colourMaps";
 import { engineering, fixed, significant, withUnit } from "../scales/format";
 import { decimalsFor, fraction, niceStep, type Scale, ticks } from "../scales/scale";
-import type { FrameMeta } from "../stream/protocol";
+import type { FrameMeta } from "../stream/documents";
 
 export interface Figure {
   /** The picture as an address that stands in the file; null leaves its place empty. */

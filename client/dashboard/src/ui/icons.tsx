@@ -1,3 +1,5 @@
+import "./icons.css";
+
 /** Icons drawn on a grid of 16. They are decoration: whatever carries one also carries words. */
 
 function Icon({ path, fill = false }: { path: string; fill?: boolean }) {

@@ -5,6 +5,7 @@ import { below, beside, closed, isStack, type Layout, type Row, replaced, type S
 import { type Store, useStore } from "../store/store";
 import { DRAGGED, Panel, SlotContext } from "../ui/Panel";
 import { VIEWS } from "./registry";
+import "./Arrangement.css";
 
 /** The views in their places, with splitters between them. */
 export function Arrangement() {

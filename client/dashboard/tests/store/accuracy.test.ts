@@ -2,7 +2,7 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 
 import { Accuracy } from "../../src/store/accuracy";
 import { type Api, RequestError } from "../../src/store/api";
-import type { JobDocument } from "../../src/store/documents";
+import type { JobDocument } from "../../src/stream/documents";
 
 const job = (state: JobDocument["state"], more: Partial<JobDocument> = {}): JobDocument => ({
   id: "j",
@@ -12,6 +12,8 @@ const job = (state: JobDocument["state"], more: Partial<JobDocument> = {}): JobD
   step: "…",
   result: null,
   problem: null,
+  created_at: 0,
+  finished_at: null,
   ...more,
 });
 const front = (...times_s: number[]): JobDocument["result"] => ({ front: times_s.map((capture_s) => ({ capture_s })), summary: "So far." });

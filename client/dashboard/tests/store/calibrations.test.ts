@@ -2,7 +2,7 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 
 import { type Api, RequestError } from "../../src/store/api";
 import { Calibrations } from "../../src/store/calibrations";
-import type { JobDocument } from "../../src/store/documents";
+import type { JobDocument } from "../../src/stream/documents";
 
 const job = (state: JobDocument["state"], more: Partial<JobDocument> = {}): JobDocument => ({
   id: "j",
@@ -12,6 +12,8 @@ const job = (state: JobDocument["state"], more: Partial<JobDocument> = {}): JobD
   step: "capturing",
   result: null,
   problem: null,
+  created_at: 0,
+  finished_at: null,
   ...more,
 });
 

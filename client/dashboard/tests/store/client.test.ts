@@ -2,9 +2,9 @@ import { beforeEach, describe, expect, test, vi } from "vitest";
 import { AnimationLoop } from "../../src/store/animation";
 import { Api } from "../../src/store/api";
 import { StreamClient, type WorkerPort } from "../../src/store/client";
-import type { RecordingDocument } from "../../src/store/documents";
 import { Store } from "../../src/store/store";
-import type { AppliedSequence, FrameMessage, FrameMeta, Hello } from "../../src/stream/protocol";
+import type { AppliedDocument, FrameMeta, RecordingDocument } from "../../src/stream/documents";
+import type { FrameMessage, Hello } from "../../src/stream/protocol";
 import { type FrameReport, summarised } from "../../src/stream/summary";
 import type { Command, Report } from "../../src/stream/worker";
 
@@ -179,8 +179,8 @@ describe("between worker and store", () => {
   test("drops, lost images and what could not be read are counted and shown", () => {
     page.receives(
       { type: "message", message: { type: "notice", kind: "dropped", channel: 1, count: 2, total: 9 } },
-      { type: "message", message: { type: "notice", kind: "lost-images", count: 3 } },
-      { type: "message", message: { type: "notice", kind: "lost-images", count: 1 } },
+      { type: "message", message: { type: "notice", kind: "lost-images", count: 3, frame: 8 } },
+      { type: "message", message: { type: "notice", kind: "lost-images", count: 1, frame: 9 } },
       { type: "message", message: { type: "error", problem: { title: "No such product" } } },
     );
     expect(page.store.status.dropped.value).toBe(9);
@@ -238,14 +238,14 @@ describe("between worker and store", () => {
 
   test("notices become what happened", () => {
     page.receives({ type: "message", message: { type: "notice", kind: "lease-changed", change: "granted", holder: "bench 2" } });
-    page.receives({ type: "message", message: { type: "notice", kind: "lost-images", count: 2 } });
+    page.receives({ type: "message", message: { type: "notice", kind: "lost-images", count: 2, frame: 9 } });
     expect(page.store.events.all.value.map(({ words }) => words)).toEqual(["bench 2 has taken control.", expect.stringMatching(/^2 images did not arrive intact/)]);
   });
 
   test("a sequence that was set anew and is what it was is no news", () => {
     const sequence = { sequence_id: 1, harmonics: 4, base_frequency_hz: 23e6, exposure_s: 1e-3, images: 20 };
     const changed = (change: object): void =>
-      page.receives({ type: "message", message: { type: "notice", kind: "sequence-changed", sequence: { ...sequence, ...change } as unknown as AppliedSequence } });
+      page.receives({ type: "message", message: { type: "notice", kind: "sequence-changed", channels: [], sequence: { ...sequence, ...change } as unknown as AppliedDocument } });
     changed({});
     changed({ sequence_id: 2 });
     expect(page.store.events.all.value).toHaveLength(1);

@@ -1,7 +1,8 @@
 import { describe, expect, test } from "vitest";
 
 import { Events, inWords, lossWords } from "../../src/store/events";
-import type { AppliedSequence, Notice } from "../../src/stream/protocol";
+import type { AppliedDocument } from "../../src/stream/documents";
+import type { Notice } from "../../src/stream/protocol";
 
 const words = (notice: Record<string, unknown>): string | undefined => inWords({ type: "notice", ...notice } as unknown as Notice)?.words;
 
@@ -27,7 +28,7 @@ describe("what happened", () => {
   });
 
   test("to the sequence is said with its figures", () => {
-    const sequence = { base_frequency_hz: 23e6, harmonics: 4, exposure_s: 5e-4, images: 20 } as AppliedSequence;
+    const sequence = { base_frequency_hz: 23e6, harmonics: 4, exposure_s: 5e-4, images: 20 } as AppliedDocument;
     expect(words({ kind: "sequence-changed", sequence })).toBe("The sequence changed: 23.0\u202fMHz, m = 4, 500\u202fµs, 20 images.");
   });
 

@@ -1,11 +1,10 @@
 import { describe, expect, test } from "vitest";
 
 import { below, beside, closed, isLayout, LAYOUTS, type Layout, OVERVIEW, replaced, split, viewsOf } from "../../src/store/layout";
-import { VIEW_NAMES } from "../../src/store/viewNames";
 
 describe("a layout", () => {
   test("is accepted back from the shelf, and nothing else is", () => {
-    for (const layout of Object.values(LAYOUTS)) expect(isLayout(JSON.parse(JSON.stringify(layout)), VIEW_NAMES)).toBe(true);
+    for (const layout of Object.values(LAYOUTS)) expect(isLayout(JSON.parse(JSON.stringify(layout)))).toBe(true);
     const slot = { view: "map", share: 1 };
     for (const broken of [
       null,
@@ -20,7 +19,7 @@ describe("a layout", () => {
       [{ share: 1, slots: [{ share: 1, slots: [{ share: 1, slots: [slot] }] }] }],
       [{ share: 1, slots: [slot, { share: 1, slots: [slot] }] }],
     ]) {
-      expect(isLayout(broken, VIEW_NAMES)).toBe(false);
+      expect(isLayout(broken)).toBe(false);
     }
   });
 

@@ -2,12 +2,13 @@ import { signal } from "@preact/signals";
 import { describe, expect, test } from "vitest";
 import { closed, LAYOUTS, type Layout, OVERVIEW, split } from "../../src/store/layout";
 import { Layouts } from "../../src/store/layouts";
+import { Settings } from "../../src/store/settings";
 import { Store } from "../../src/store/store";
 
 describe("changes of the layout", () => {
   test("are undone one by one, and undoing is none", () => {
     const current = signal<Layout>(OVERVIEW);
-    const layouts = new Layouts(null, current);
+    const layouts = new Layouts(new Settings(null), current);
     expect(layouts.undoable.value).toBe(false);
     const three = closed(OVERVIEW, "sequence");
     current.value = three;
@@ -23,7 +24,7 @@ describe("changes of the layout", () => {
 
   test("by a splitter are one, however far it was drawn", () => {
     const current = signal<Layout>(OVERVIEW);
-    const layouts = new Layouts(null, current);
+    const layouts = new Layouts(new Settings(null), current);
     for (const place of [0.4, 0.5, 0.6]) current.value = current.value.map((row) => ({ ...row, slots: split(row.slots, 0, place) }));
     layouts.undo();
     expect(current.value).toBe(OVERVIEW);

@@ -1,10 +1,10 @@
 import { describe, expect, test } from "vitest";
-
 import { figuresOf, holds, Measures, polygonOf, regionOf } from "../../src/store/measures";
+import { Settings } from "../../src/store/settings";
 
 describe("pins", () => {
   test("take the first free name, and are let go by pinning them again", () => {
-    const measures = new Measures();
+    const measures = new Measures(new Settings(null));
     for (const x of [1, 2, 3]) measures.pin({ x, y: 0 });
     measures.pin({ x: 2, y: 0 });
     measures.pin({ x: 9, y: 9 });
@@ -16,7 +16,7 @@ describe("pins", () => {
   });
 
   test("of which there are three already give up the last", () => {
-    const measures = new Measures();
+    const measures = new Measures(new Settings(null));
     for (const x of [1, 2, 3, 4]) measures.pin({ x, y: 0 });
     expect(measures.pins.value.map(({ name, x }) => `${name}${x}`)).toEqual(["A1", "B2", "C4"]);
   });
@@ -54,7 +54,7 @@ describe("a region", () => {
   });
 
   test("grows by corners, each taken away by setting it again, and takes the place of a rectangle", () => {
-    const measures = new Measures();
+    const measures = new Measures(new Settings(null));
     measures.region.value = regionOf({ x: 0, y: 0 }, { x: 9, y: 9 });
     const [a, b, c] = [
       { x: 1, y: 1 },

@@ -5,7 +5,7 @@ import { LIVE, RequestError } from "../../src/store/api";
 import { Frames } from "../../src/store/frames";
 import { RangeErrors } from "../../src/store/rangeErrors";
 import { Status } from "../../src/store/status";
-import type { FrameMeta } from "../../src/stream/protocol";
+import type { FrameMeta } from "../../src/stream/documents";
 import type { FrameReport } from "../../src/stream/summary";
 
 beforeEach(() => vi.useFakeTimers());

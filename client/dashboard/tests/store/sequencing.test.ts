@@ -4,18 +4,18 @@ import { expect, test } from "vitest";
 import { type Api, RequestError } from "../../src/store/api";
 import { Events } from "../../src/store/events";
 import { Sequencing } from "../../src/store/sequencing";
-import type { AppliedSequence, Choice } from "../../src/stream/protocol";
+import type { AppliedDocument, ChoiceDocument } from "../../src/stream/documents";
 
-const sequence = (harmonics: number, sequence_id: number): AppliedSequence =>
-  ({ base_frequency_hz: 23e6, harmonics, exposure_s: 1e-3, images: 4 * harmonics, sequence_id }) as AppliedSequence;
-const choice = (harmonics: number, estimator: string): Choice => ({ sequence: sequence(harmonics, 0), estimator }) as unknown as Choice;
+const sequence = (harmonics: number, sequence_id: number): AppliedDocument =>
+  ({ base_frequency_hz: 23e6, harmonics, exposure_s: 1e-3, images: 4 * harmonics, sequence_id }) as AppliedDocument;
+const choice = (harmonics: number, estimator: string): ChoiceDocument => ({ sequence: sequence(harmonics, 0), estimator }) as unknown as ChoiceDocument;
 
 /** A service that sets what it is sent, unless it refuses. */
 function service() {
   const state = { estimator: "automatic", smoothing_px: 2, refusal: null as RequestError | null, sets: 0 };
-  const current = signal<AppliedSequence | null>(sequence(3, 1));
+  const current = signal<AppliedDocument | null>(sequence(3, 1));
   const api = {
-    setSequence: ({ harmonics }: AppliedSequence) => {
+    setSequence: ({ harmonics }: AppliedDocument) => {
       if (state.refusal !== null) return Promise.reject(state.refusal);
       state.sets += 1;
       return Promise.resolve(sequence(harmonics, 1 + state.sets));

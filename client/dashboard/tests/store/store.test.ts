@@ -4,9 +4,9 @@ import { describe, expect, test } from "vitest";
 import { Api, RequestError } from "../../src/store/api";
 import { type Frame, Frames } from "../../src/store/frames";
 import { Player } from "../../src/store/player";
-import { oneOf, remembered, type Shelf } from "../../src/store/settings";
+import { aBoolean, aNumber, oneOf, type Setting, Settings, type Shelf } from "../../src/store/settings";
 import { Status } from "../../src/store/status";
-import type { FrameMeta } from "../../src/stream/protocol";
+import type { FrameMeta } from "../../src/stream/documents";
 
 const meta = (frame: number, host_time_s = 0): FrameMeta => ({ frame, host_time_s }) as FrameMeta;
 const frame = (product: string, number: number): Frame => ({ product, meta: meta(number) }) as Frame;
@@ -173,29 +173,66 @@ describe("settings", () => {
       this.items.set(key, value);
     }
   }
-  const accepts = oneOf(["linear", "root"]);
+  const TONE: Setting<string> = { key: "tone", link: "tone", initial: "linear", ...oneOf(["linear", "root"]) };
+  const kept = (items: Record<string, string>): MemoryShelf => {
+    const shelf = new MemoryShelf();
+    for (const [key, text] of Object.entries(items)) shelf.items.set(key, text);
+    return shelf;
+  };
 
   test("are found again", () => {
     const shelf = new MemoryShelf();
-    remembered(shelf, "tone", "linear", accepts).value = "root";
-    expect(remembered(shelf, "tone", "linear", accepts).value).toBe("root");
+    new Settings(shelf).of(TONE).value = "root";
+    expect(new Settings(shelf).of(TONE).value).toBe("root");
+    expect(shelf.items).toEqual(new Map([["transientcam.tone", '"root"']]));
   });
 
-  test("that are damaged, or of another version, are as if they were not there", () => {
-    const shelf = new MemoryShelf();
-    for (const damaged of ['"cubic"', "{", "null"]) {
-      shelf.items.set("transientcam.tone", damaged);
-      expect(remembered(shelf, "tone", "linear", accepts).value).toBe("linear");
-    }
+  test("have one value, whoever asks", () => {
+    const settings = new Settings(null);
+    expect(settings.of(TONE)).toBe(settings.of(TONE));
+  });
+
+  test.each(['"cubic"', "{", "null"])("that are damaged, or of another version, are as if they were not there: %s", (damaged) => {
+    expect(new Settings(kept({ "transientcam.tone": damaged })).of(TONE).value).toBe("linear");
   });
 
   test("work where the browser keeps nothing", () => {
     const refuse = (): never => {
       throw new Error("denied");
     };
-    const setting = remembered({ getItem: refuse, setItem: refuse }, "tone", "linear", accepts);
-    setting.value = "root";
-    expect(setting.value).toBe("root");
+    const tone = new Settings({ getItem: refuse, setItem: refuse }).of(TONE);
+    tone.value = "root";
+    expect(tone.value).toBe("root");
+  });
+
+  test("follow a link before they are declared and after, and keep what it does not say or says wrong", () => {
+    const settings = new Settings(kept({ "transientcam.tone": '"root"' }));
+    settings.follow("#tone=linear");
+    const tone = settings.of(TONE);
+    expect(tone.value).toBe("linear");
+    for (const hash of ["#tone=root", "#tone=cubic", "#tone=", "", "#other=linear"]) {
+      settings.follow(hash);
+      expect(tone.value).toBe("root");
+    }
+  });
+
+  test("stand in a copied link, and in the page's own address where that follows them", () => {
+    const settings = new Settings(null);
+    settings.of(TONE);
+    settings.of<number | null>({ link: "row", followed: true, initial: null, text: (row) => (row === null ? "" : String(row)), parse: Number }).value = 7;
+    expect([settings.hash(true), settings.hash(false)]).toEqual(["#tone=linear&row=7", "#row=7"]);
+    expect(new Settings(null).hash(true)).toBe("");
+  });
+
+  test("that stand together in a link are taken over together or not at all", () => {
+    const settings = new Settings(null);
+    const GAIN: Setting<number> = { initial: 1, ...aNumber(0, 10) };
+    const LIT: Setting<boolean> = { initial: false, ...aBoolean("lit", "dark") };
+    settings.together("look", [TONE, GAIN, LIT]);
+    settings.follow("#look=root,2.5,lit");
+    expect([TONE, GAIN, LIT].map((each) => settings.of<unknown>(each).value)).toEqual(["root", 2.5, true]);
+    for (const wrong of ["linear,3", "linear,11,dark", "linear,,dark", "cubic,3,dark", "linear,3,dark,more"]) settings.follow(`#look=${wrong}`);
+    expect(settings.hash(true)).toBe("#tone=root&look=root,2.5,lit");
   });
 });
 

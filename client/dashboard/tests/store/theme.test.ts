@@ -1,5 +1,6 @@
 import { expect, test } from "vitest";
 
+import { Settings } from "../../src/store/settings";
 import { Theme } from "../../src/store/theme";
 
 function system(matches: boolean) {
@@ -13,7 +14,7 @@ function system(matches: boolean) {
 
 test("the page is as dark as the system until the user chooses", () => {
   const { list, change } = system(true);
-  const theme = new Theme(null, list);
+  const theme = new Theme(new Settings(null), list);
   const root = { dataset: {} as Record<string, string> } as unknown as HTMLElement;
   const end = theme.show(root);
   expect(root.dataset.theme).toBe("dark");

@@ -1,10 +1,11 @@
 import { describe, expect, test } from "vitest";
 
+import { Settings } from "../../src/store/settings";
 import { placeIn, seenAt, Viewport, WHOLE } from "../../src/store/viewport";
 
 describe("the part of the picture that is shown", () => {
   test("grows around the pointer: what lies there stays there", () => {
-    const viewport = new Viewport();
+    const viewport = new Viewport(new Settings(null));
     for (const [at, factor] of [
       [{ x: 0.8, y: 0.3 }, 3],
       [{ x: 0.1, y: 0.9 }, 1.7],
@@ -19,7 +20,7 @@ describe("the part of the picture that is shown", () => {
   });
 
   test("never shows what lies beside the picture, and the whole picture at most", () => {
-    const viewport = new Viewport();
+    const viewport = new Viewport(new Settings(null));
     viewport.zoomAt({ x: 0, y: 0 }, 4);
     viewport.pan({ x: 9, y: 9 });
     expect(viewport.view.value).toEqual({ zoom: 4, left: 0, top: 0 });
@@ -30,7 +31,7 @@ describe("the part of the picture that is shown", () => {
   });
 
   test("moves with the pointer, and is whole again when it is reset", () => {
-    const viewport = new Viewport();
+    const viewport = new Viewport(new Settings(null));
     viewport.zoomAt({ x: 0.5, y: 0.5 }, 2);
     const under = placeIn(viewport.view.value, { x: 0.4, y: 0.4 });
     viewport.pan({ x: 0.1, y: -0.1 });

@@ -1,7 +1,8 @@
 import { decode, encode } from "@msgpack/msgpack";
 import { beforeEach, describe, expect, test } from "vitest";
 import { type ConnectionEvent, CREDITS, FrameGone, type Socket, StreamConnection } from "../../src/stream/connection";
-import type { CameraDocument, CameraState } from "../../src/stream/protocol";
+import type { CameraDocument } from "../../src/stream/documents";
+import type { CameraState } from "../../src/stream/protocol";
 
 class FakeSocket implements Socket {
   binaryType: BinaryType = "blob";
@@ -32,7 +33,7 @@ class FakeSocket implements Socket {
   }
 }
 
-const camera = (state: CameraState): CameraDocument => ({ state, reason: null, simulated: true, capabilities: {} });
+const camera = (state: CameraState): CameraDocument => ({ state, reason: null, simulated: true, capabilities: {} }) as CameraDocument;
 
 /** A world in which time passes on command. */
 class World {

@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import type { FrameMeta } from "../../src/stream/protocol";
+import type { FrameMeta } from "../../src/stream/documents";
 import { captionOf, type Figure, figureLayout, figureSvg } from "../../src/ui/figure";
 
 const FIGURE: Figure = {

@@ -1,19 +1,19 @@
 import { describe, expect, test } from "vitest";
 
-import type { AppliedSequence, Choice, FrameMeta, Tradeoff } from "../../src/stream/protocol";
+import type { AppliedDocument, ChoiceDocument, FrameMeta, TradeoffDocument } from "../../src/stream/documents";
 import { goalWords } from "../../src/views/sequence/goals";
 import { endsOf, marksOf, nearest, placeOf, sameSequence, standingOf, stepOf } from "../../src/views/sequence/place";
 
-const choice = (capture_s: number, median: number): Choice =>
-  ({ capture_s, sequence: { takes: capture_s }, predicted: { range_error_m: { median, low: 0.9 * median, high: 1.1 * median, p90: 2 * median } } }) as unknown as Choice;
+const choice = (capture_s: number, median: number): ChoiceDocument =>
+  ({ capture_s, sequence: { takes: capture_s }, predicted: { range_error_m: { median, low: 0.9 * median, high: 1.1 * median, p90: 2 * median } } }) as unknown as ChoiceDocument;
 const TRADEOFF = {
   front: [choice(0.05, 0.04), choice(5, 0.0004)],
   current: { capture_s: 0.09, meta: { accuracy: { range_error_m: 0.011 } } },
-} as unknown as Tradeoff;
+} as unknown as TradeoffDocument;
 
 describe("the plot of accuracy against time", () => {
   test("holds the front with its uncertainty and where the camera stands", () => {
-    const ends = endsOf({ ...TRADEOFF, current: { capture_s: 20, meta: { accuracy: { range_error_m: 0.2 } } } } as unknown as Tradeoff);
+    const ends = endsOf({ ...TRADEOFF, current: { capture_s: 20, meta: { accuracy: { range_error_m: 0.2 } } } } as unknown as TradeoffDocument);
     for (const [capture_s, range_error_m] of [
       [0.05, 0.044],
       [5, 0.00036],
@@ -42,8 +42,8 @@ describe("the plot of accuracy against time", () => {
 
 describe("where the camera stands", () => {
   const meta = (sequence_id: number, range_error_m: number | null): FrameMeta => ({ sequence_id, accuracy: { range_error_m } }) as unknown as FrameMeta;
-  const inUse = (sequence_id: number, takes = 3): AppliedSequence => ({ sequence_id, takes, capture_s: 0.2 }) as AppliedSequence;
-  const tradeoff = { ...TRADEOFF, current: { capture_s: 0.09, meta: meta(1, 0.011) } } as Tradeoff;
+  const inUse = (sequence_id: number, takes = 3): AppliedDocument => ({ sequence_id, takes, capture_s: 0.2 }) as AppliedDocument;
+  const tradeoff = { ...TRADEOFF, current: { capture_s: 0.09, meta: meta(1, 0.011) } } as unknown as TradeoffDocument;
 
   test("is taken from the newest frame of the sequence in use", () => expect(standingOf(meta(2, 0.005), inUse(2), tradeoff)).toEqual({ capture_s: 0.2, range_error_m: 0.005 }));
 

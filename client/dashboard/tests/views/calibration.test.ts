@@ -12,7 +12,7 @@ test("drift is shown beside what it was, and called for only where it has grown"
 });
 
 test("only what was not measured on a diffusor is doubted", () => {
-  const verdict = { reason: null, block_px: 8, blocks: ["."] };
+  const verdict = { reason: null, block_px: 8, blocks: ["."], tests: [], reference: "nominal" };
   expect(doubtOf({ ...verdict, verdict: "diffusor" })).toBeNull();
   expect(doubtOf({ ...verdict, verdict: "in-doubt" })?.tag).toBe("in doubt");
   expect(doubtOf({ ...verdict, verdict: "scene" })?.tag).toBe("of a scene");

@@ -1,8 +1,8 @@
 import { describe, expect, test } from "vitest";
 
 import { Api } from "../../src/store/api";
-import type { RecordingDocument } from "../../src/store/documents";
 import { Store } from "../../src/store/store";
+import type { CameraDocument, RecordingDocument } from "../../src/stream/documents";
 import { type OpenedFile, openFile, recordingIn } from "../../src/views/files/openFile";
 
 const file = (name: string, text = ""): OpenedFile => Object.assign(new Blob([text]), { name });
@@ -32,7 +32,7 @@ describe("a file that is given to the page", () => {
         return Promise.resolve(new Response(JSON.stringify({ recordings: [] })));
       }),
     });
-    made.camera.value = { state: "streaming", reason: null, simulated, capabilities: {} };
+    made.camera.value = { state: "streaming", reason: null, simulated, capabilities: {} } as CameraDocument;
     return made;
   };
 

@@ -6,6 +6,7 @@ import { type Frame, Frames } from "../../src/store/frames";
 import { Look, Looks } from "../../src/store/looks";
 import { MAP_PRODUCTS } from "../../src/store/mapCatalogue";
 import { Noises } from "../../src/store/noise";
+import { Settings } from "../../src/store/settings";
 import { drawn, onBar } from "../../src/ui/ColourBar";
 import { typed } from "../../src/ui/LimitFields";
 import { paint } from "../../src/ui/paint";
@@ -29,7 +30,7 @@ describe("the look of a map", () => {
 
   test("follows the data until limits are set, and again when they are taken away", () => {
     const newest = signal<Frame | null>(frame(1, 4));
-    const look = new Look(MAP_PRODUCTS[0], newest, null);
+    const look = new Look(MAP_PRODUCTS[0], newest, new Settings(null));
     const followed = look.scale.value;
     expect(followed.low).toBeLessThanOrEqual(1);
     expect(followed.high).toBeGreaterThanOrEqual(4);
@@ -43,7 +44,7 @@ describe("the look of a map", () => {
 
   test("is the same value for a frame like the last", () => {
     const newest = signal<Frame | null>(frame(1, 4));
-    const look = new Look(MAP_PRODUCTS[0], newest, null);
+    const look = new Look(MAP_PRODUCTS[0], newest, new Settings(null));
     const before = look.scale.value;
     newest.value = frame(1.01, 3.99);
     expect(look.scale.value).toBe(before);
@@ -53,7 +54,7 @@ describe("the look of a map", () => {
 describe("looks", () => {
   const looks = (): Looks => {
     const frames = new Frames();
-    return new Looks(frames, new Noises(frames), null);
+    return new Looks(frames, new Noises(frames), new Settings(null));
   };
 
   test("that are locked keep the same limits within a unit, and each its own again afterwards", () => {

@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import type { ParameterDocument } from "../../src/store/documents";
+import type { ParameterDocument } from "../../src/stream/documents";
 import { draftOf, labelOf, readingOf, spanOf, unitOf } from "../../src/views/reconstruction/fields";
 
 const parameter = (name: string, value: unknown, more: Partial<ParameterDocument> = {}): ParameterDocument => ({

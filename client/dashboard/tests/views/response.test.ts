@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import type { PixelDocument } from "../../src/stream/protocol";
+import type { PixelDocument } from "../../src/stream/documents";
 import { FlagHistory, LOOKS } from "../../src/views/response/flagShares";
 import { richestPixel } from "../../src/views/response/interesting";
 import { linesOf, ReturnHistory, sifted } from "../../src/views/response/returns";
@@ -117,7 +117,7 @@ describe("stems of returns", () => {
     for (let frame = 0; frame < 10; frame++) {
       history.take({ x: 1, y: 2, returns: [at(frame % 2 === 0 ? 10 : 11, 300), at(30, 100)], meta: { frame } } as unknown as PixelDocument);
     }
-    const { found, truth } = stemsOf({ returns: [at(10.5, 300), at(30, 100)] }, { kind: "paths", range_m: 1.5, brightness: 400, returns: [at(10, 100)] }, history);
+    const { found, truth } = stemsOf({ returns: [at(10.5, 300), at(30, 100)] }, { kind: "paths", range_m: 1.5, direct: 100, brightness: 400, returns: [at(10, 100)] }, history);
     expect(found.map(({ share }) => share)).toEqual([0.75, 0.25]);
     expect(found[0].std_s).toBeCloseTo(Math.sqrt(10 / 9) * 0.5e-9, 15);
     expect(found[1].std_s).toBeCloseTo(0, 15);

@@ -1,21 +1,25 @@
 import { describe, expect, it } from "vitest";
 
-import type { EffectDocument } from "../../src/store/documents";
+import type { EffectDocument, ExplanationDocument } from "../../src/stream/documents";
 import { effectWords, ordered, possible, sizeShare, sizeWords } from "../../src/views/simulation/words";
 
 const effect = (name: string, relative: number, built: boolean): EffectDocument => ({
   effect: name,
+  what: "",
   choice: "auto",
   called_for: built,
   built,
   reason: "",
   relative,
+  size_dn: 0,
+  worst: 0,
+  cost_s: 0,
 });
 
 describe("the table of effects", () => {
   it("shows what is computed first, and the largest of these before all", () => {
     const effects = [effect("small", 0.2, true), effect("absent", 0, false), effect("suppressed", 5, false), effect("large", 3, true)];
-    const names = ordered({ noise_floor_dn: 20, called_above: 0.1, effects }).map((each) => each.effect);
+    const names = ordered({ effects } as unknown as ExplanationDocument).map((each) => each.effect);
     expect(names).toEqual(["large", "small", "suppressed", "absent"]);
   });
 

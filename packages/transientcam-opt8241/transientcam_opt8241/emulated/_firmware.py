@@ -9,7 +9,7 @@ from transientcam_opt8241 import (
     Field,
     PllSetting,
     Request,
-    registers as reg,
+    _registers as reg,
 )
 
 LEAST_QUAD_CLOCKS: Final = 50_000

@@ -9,7 +9,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 EXAMPLES_FILE: Final = Path(__file__).with_name("examples.json")
-"""What a simulated camera answered; ``python -m benchmarks.examples --write`` writes it."""
+"""What a simulated camera answered; ``python -m benchmarks examples --write`` writes it."""
 EXAMPLES: Final[dict[str, Any]] = json.loads(EXAMPLES_FILE.read_text(encoding="utf-8"))
 """An example of each document that is answered, by the name of its model."""
 
@@ -23,9 +23,12 @@ JsonInteger = Annotated[int, BeforeValidator(_whole)]
 
 
 class Document(BaseModel):
-    """A JSON document whose fields are described beside them, and whose example was captured."""
+    """A JSON document whose fields are described beside them, and whose example was captured.
 
-    model_config = ConfigDict(use_attribute_docstrings=True)
+    ``model_validate`` makes one of any value that has attributes of the same names.
+    """
+
+    model_config = ConfigDict(use_attribute_docstrings=True, from_attributes=True)
 
     @classmethod
     def __get_pydantic_json_schema__(

@@ -1,5 +1,7 @@
 """The JSON documents about frames."""
 
+from pydantic import AliasPath, Field
+
 from transientcam_server.api._documents.document import Document
 
 
@@ -123,9 +125,9 @@ class HistoryDocument(Document):
     last: int | None = None
     """Number of the latest frame."""
     count: int
-    bytes: int
+    bytes: int = Field(validation_alias="size_bytes")
     """That their raw images take."""
-    seconds: float
+    seconds: float = Field(validation_alias="span_s")
     """From the arrival of the first to that of the last."""
-    limit_bytes: int
-    limit_seconds: float
+    limit_bytes: int = Field(validation_alias=AliasPath("settings", "max_bytes"))
+    limit_seconds: float = Field(validation_alias=AliasPath("settings", "seconds"))

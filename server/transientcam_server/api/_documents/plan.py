@@ -147,7 +147,7 @@ class ChoiceDocument(Document):
     predicted: PredictedDocument
 
 
-class NeighbourDocument(ChoiceDocument):
+class PlanNeighbourDocument(ChoiceDocument):
     """Another choice on the front, beside the recommended one."""
 
     time_factor: float
@@ -183,9 +183,9 @@ class PlanDocument(ChoiceDocument):
     summary: str
     """Noise and bias in a sentence, what half the error costs, and why a bias is not known."""
     scene: SeenDocument
-    half_time: NeighbourDocument | None = None
+    half_time: PlanNeighbourDocument | None = None
     """What half the time gives; null where nothing is that quick."""
-    twice_accuracy: NeighbourDocument | None = None
+    twice_accuracy: PlanNeighbourDocument | None = None
     """What half the error costs; null where nothing is that accurate."""
 
 

@@ -2,8 +2,9 @@
 
 from typing import Any, Literal
 
+from pydantic import Field
+
 from transientcam_server.api._documents.document import Document
-from transientcam_server.recording import ProductStore
 
 
 class ProductStoreDocument(Document):
@@ -11,9 +12,9 @@ class ProductStoreDocument(Document):
 
     id: str
     """Name of the store, without `.zarr`."""
-    recording: str
+    recording: str = Field(validation_alias="recording_id")
     """Id of the recording whose products these are; it may have been deleted."""
-    name: str
+    name: str = Field(validation_alias="title")
     """What people call that."""
     state: Literal["complete", "unfinished"]
     """`unfinished`: frames are still computed, or an interrupted run was not gone on with."""
@@ -31,17 +32,3 @@ class ProductStoresDocument(Document):
     directory: str
     """Where they are, on the machine of the service: that of the recordings."""
     stores: list[ProductStoreDocument]
-
-
-def document(store: ProductStore) -> ProductStoreDocument:
-    """Return a store as its document."""
-    return ProductStoreDocument(
-        id=store.id,
-        recording=store.recording_id,
-        name=store.title,
-        state="complete" if store.complete else "unfinished",
-        frames=store.frames,
-        products=list(store.products),
-        bins=store.bins,
-        reconstruction=dict(store.reconstruction),
-    )

@@ -58,13 +58,4 @@ async def switch_off(service: ServiceOf) -> AcquisitionDocument:
 
 
 def _document(service: Service) -> AcquisitionDocument:
-    status = service.acquisition.status()
-    return AcquisitionDocument(
-        running=status.running,
-        state=status.state,
-        reason=status.reason,
-        rate_hz=status.rate_hz,
-        frames=status.frames,
-        frame_age_s=status.frame_age_s,
-        stalled=status.stalled,
-    )
+    return AcquisitionDocument.model_validate(service.acquisition.status())

@@ -288,5 +288,5 @@ def _document(
         verdict=VerdictDocument.model_validate(stored.verdict.to_document()),
         forced=stored.notes.get("forced") is True,
         harmonics=_harmonics(stored),
-        drift=DriftDocument(**drift.to_document()) if active and drift is not None else None,
+        drift=DriftDocument.model_validate(drift) if active and drift else None,
     )

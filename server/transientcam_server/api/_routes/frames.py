@@ -85,7 +85,7 @@ async def _chosen(
 @router.get("/frames", summary="Which frames can be had")
 async def read_frames(service: ServiceOf) -> HistoryDocument:
     """Return which frames are kept, and how much of them may be."""
-    return HistoryDocument(**service.history.to_document())
+    return HistoryDocument.model_validate(service.history)
 
 
 add_frame_routes(

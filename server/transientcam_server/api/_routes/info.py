@@ -46,7 +46,7 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
         caller=InfoDocument.CallerDocument.model_validate(
             {"name": principal.name, "role": str(principal.role)}
         ),
-        history=HistoryDocument(**service.history.to_document()),
+        history=HistoryDocument.model_validate(service.history),
         clients=service.hub.clients,
         kernels=dict(tm.kernels.state()),
         reconstruction=service.pipeline.reconstruction.settings.model_dump(),

@@ -9,7 +9,7 @@ from fastapi.responses import Response
 
 from transientcam_server.api import _downloads as downloads, _etags as etags
 from transientcam_server.api._dependencies import ServiceOf
-from transientcam_server.api._documents.product_stores import ProductStoresDocument, document
+from transientcam_server.api._documents.product_stores import ProductStoresDocument
 from transientcam_server.api._problems import documented
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.recording import METADATA, ProductStores
@@ -51,9 +51,7 @@ async def read_product_stores(service: ServiceOf) -> ProductStoresDocument:
     """
     directory = service.recordings.directory
     found = await asyncio.to_thread(ProductStores(directory).all)
-    return ProductStoresDocument(
-        directory=str(directory), stores=[document(store) for store in found]
-    )
+    return ProductStoresDocument.model_validate({"directory": str(directory), "stores": found})
 
 
 @router.get(

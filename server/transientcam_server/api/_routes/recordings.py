@@ -44,11 +44,7 @@ async def read_recordings(service: ServiceOf) -> RecordingsDocument:
         directory=str(library.directory),
         free_bytes=await asyncio.to_thread(library.free_bytes),
         active=library.active_id,
-        limits=RecordingLimitsDocument(
-            **service.settings.recordings.model_dump(
-                include=set(RecordingLimitsDocument.model_fields)
-            )
-        ),
+        limits=RecordingLimitsDocument.model_validate(service.settings.recordings),
         recordings=[document(each) for each in described],
     )
 

@@ -4,8 +4,8 @@ Through a diffusor every pixel sees one return at the same time (Sec. 4.2). Over
 phase of a frequency then is one number, up to a smooth field and a pattern that differs from pixel
 to pixel; the phases of all frequencies belong to one time, and no moment is weakened by a second
 return. All of it is tested on medians of blocks of pixels, which neither dirt nor single bad pixels
-move, and to which a pattern of the pixels adds little. docs/calibration-verdicts.md has the
-figures that the limits rest on.
+move, and to which a pattern of the pixels adds little. docs/measured/calibration-verdicts.md has
+the figures that the limits rest on.
 """
 
 from dataclasses import dataclass

@@ -17,6 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from transientcam.documents import RangeAccuracyDocument
 from transientcam_moments.reconstruction import least_harmonics
 from transientcam_server.imaging._errors_of_range.deviation import typical_deviation
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
@@ -67,7 +68,7 @@ class RangeAccuracy:
         """(H, W) root sum of squares of noise and bias."""
         return np.hypot(self.std_m, self.bias_m)
 
-    def to_document(self) -> dict[str, float | None]:
+    def to_document(self) -> RangeAccuracyDocument:
         """Return the errors of the median pixel with a range as a frame's metadata have them."""
         return {
             "range_error_m": _median(self.error_m),

@@ -1,7 +1,6 @@
 """The noise of frames: of their moments and of their range, and what it does not explain."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
@@ -9,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from transientcam.documents import PredictedStdDocument
 from transientcam_moments.noise import direct_phase_noise
 from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
 from transientcam_server.imaging._recipe.recipe import Recipe
@@ -26,34 +26,6 @@ _FEW: Final = 1 / 16
 """Share of the pixels up to which their neighbourhoods are quicker to average one by one."""
 
 
-@dataclass(frozen=True, slots=True)
-class RangeNoise:
-    """Predicted standard deviation of a frame's range between frames, by noise alone.
-
-    To first order, of the returns that the frame shows; `range_accuracy` draws noise.
-
-    Attributes
-    ----------
-    median_m, p90_m
-        Half of the pixels, and 90 % of them, are better.
-    first_order_share
-        Share of the pixels where first order holds, which with the likelihood is where its returns
-        explain the moments; that of the others is by the order of magnitude.
-    """
-
-    median_m: float
-    p90_m: float
-    first_order_share: float
-
-    def to_document(self) -> dict[str, float]:
-        """Return it as a frame's metadata have it."""
-        return {
-            "median": self.median_m,
-            "p90": self.p90_m,
-            "first_order_share": self.first_order_share,
-        }
-
-
 def moment_noise(recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoise:
     """Return the noise of a frame's smoothed moments (m + 1, H, W), of the recipe's sensor."""
     return tm.noise.smoothed_of(
@@ -64,12 +36,12 @@ def moment_noise(recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoi
     )
 
 
-def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
-    """Predict the deviation of a frame's range from its own returns.
+def range_noise(recipe: Recipe, found: tm.Reconstruction) -> PredictedStdDocument | None:
+    """Predict the standard deviation of a frame's range between frames, by noise alone.
 
-    None where no pixel has a range. That of `OF_ANY_MULTIPLES` is the estimate's own; of another
-    estimator it is that of Pisarenko's returns in a sample of pixels, which is cheap enough for
-    every frame.
+    None where no pixel has a range. That of `OF_ANY_MULTIPLES` is the estimate's own, and first
+    order holds where its returns explain the moments; of another estimator it is that of
+    Pisarenko's returns in a sample of pixels, which is cheap enough for every frame.
     """
     has_range = np.asarray(found.has_range)  # compared anew whenever it is read
     if not has_range.any():
@@ -83,7 +55,11 @@ def range_noise(recipe: Recipe, found: tm.Reconstruction) -> RangeNoise | None:
     if not known.size:
         return None
     median_m, p90_m = np.quantile(known, (0.5, 0.9)).tolist()
-    return RangeNoise(median_m, p90_m, float(first_order.mean()))
+    return {
+        "median": median_m,
+        "p90": p90_m,
+        "first_order_share": float(first_order.mean()),
+    }
 
 
 def _of_pisarenko(

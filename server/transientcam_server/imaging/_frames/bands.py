@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam.documents import FrameMeta
 from transientcam.wire import array_head, frame_document
 from transientcam_driver import AppliedSequence
 from transientcam_server.imaging._encodings.encoding import MSGPACK, NPY, Encoding
@@ -63,7 +64,7 @@ class Banded:
         """Size of the array."""
         return math.prod(self.shape) * np.dtype(self.product.description.dtype).itemsize
 
-    def head(self, meta: dict[str, Any], extra: dict[str, Any]) -> bytes:
+    def head(self, meta: FrameMeta, extra: dict[str, Any]) -> bytes:
         """Return what is sent before the data."""
         dtype = self.product.description.dtype
         if self.encoding is NPY:

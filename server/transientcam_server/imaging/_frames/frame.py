@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam import Frame as EncodedFrame
-from transientcam.frame import FrameMeta
+from transientcam.documents import FrameDocument
 from transientcam_driver import RawFrame, Truth
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging._encodings.encoding import Encoding
@@ -124,7 +124,7 @@ class Frame:
         """How long its reconstruction was computed so far, in s."""
         return self._reconstruct_s or 0.0
 
-    def meta(self) -> dict[str, Any]:
+    def meta(self) -> FrameDocument:
         """Return what is known of the frame, as the wire contract has it."""
         return frame_meta(
             self.number,
@@ -293,7 +293,7 @@ class Frame:
         with self._failure_of(product.name):
             found = await self._input(product)
         given = SimpleNamespace(**{name: getattr(found, name) for name in product.reads})
-        meta = self.meta() | view.crop.to_meta(*self.shape)
+        meta = view.crop.with_meta(self.meta())
         head = planned.head(meta, product.with_fields(self.recipe, self.raw, view))
         failure_of = partial(_failure_of, self._workers, self.number)
         return _banded(planned, head, self.recipe, given, self._workers, failure_of)
@@ -325,7 +325,7 @@ class Frame:
                 product.name,
                 product.description.unit,
                 product.description.axes,
-                cast("FrameMeta", self.meta() | view.crop.to_meta(*self.shape)),
+                view.crop.with_meta(self.meta()),
                 channel=channel,
                 extra=extra | dict(zip(encoding.beside, beside, strict=True)),
             )

@@ -7,7 +7,7 @@ import time
 from collections import OrderedDict, deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging._frames.frame import Frame
@@ -120,18 +120,6 @@ class History:
                 break
             found.append(kept.frame)
         return found[::-1]
-
-    def to_document(self) -> dict[str, Any]:
-        """Return what there is, and the limits."""
-        return {
-            "first": self.first,
-            "last": self.last,
-            "count": self.count,
-            "bytes": self.size_bytes,
-            "seconds": self.span_s,
-            "limit_bytes": self.settings.max_bytes,
-            "limit_seconds": self.settings.seconds,
-        }
 
     def _missing(self, number: int) -> Problem:
         first, last = self.first, self.last

@@ -1,9 +1,7 @@
 """What is known of a frame, as the wire contract has it."""
 
-from dataclasses import asdict
-from typing import Any
-
 import transientcam_moments as tm
+from transientcam.documents import FrameDocument
 from transientcam_driver import RawFrame
 from transientcam_server.imaging._errors_of_range.accuracy import RangeAccuracy
 from transientcam_server.imaging._frames.stages import Computed
@@ -19,10 +17,11 @@ def frame_meta(
     computed: Computed,
     reconstruct_s: float | None,
     accuracy: RangeAccuracy | None = None,
-) -> dict[str, Any]:
-    """Return the metadata of a frame, as far as it was computed; `FrameMeta` of the client."""
+) -> FrameDocument:
+    """Return the metadata of a frame, as far as it was computed."""
     sequence, found = recipe.applied.sequence, computed.reconstruction
     height, width = raw.images.shape[-2:]
+    rejected, repaired, unrepaired, filled = _of_images(raw, found)
     return {
         "frame": number,
         "sequence_id": raw.epoch,
@@ -42,8 +41,18 @@ def frame_meta(
         "height": height,
         "temperature_c": raw.temperature_c,
         "lost_images": raw.lost_images,
-        "hops": [asdict(hop) for hop in raw.hops],
-        **_of_images(raw, found),
+        "hops": [
+            {
+                "service_id": hop.service_id,
+                "latency_s": hop.latency_s,
+                "missed_frames": hop.missed_frames,
+            }
+            for hop in raw.hops
+        ],
+        "rejected_images": rejected,
+        "repaired_images": repaired,
+        "unrepaired_images": unrepaired,
+        "filled_images": filled,
         "corrected_pixels": None if found is None else found.corrected_pixels,
         "pixels": computed.pixels,
         "ambient_dn": computed.ambient_dn,
@@ -52,12 +61,14 @@ def frame_meta(
     }
 
 
-def _of_images(raw: RawFrame, found: tm.Reconstruction | None) -> dict[str, Any]:
-    """Return what was done to the images before they became moments."""
+def _of_images(
+    raw: RawFrame, found: tm.Reconstruction | None
+) -> tuple[int | None, int | None, int | None, list[int] | None]:
+    """Return what was done to the images before they became moments, as `OF_IMAGES` has it."""
     if isinstance(raw, MomentFrame):
-        return dict(raw.treated)
+        rejected, repaired, unrepaired, filled = (raw.treated[name] for name in OF_IMAGES)
+        return rejected, repaired, unrepaired, filled
     if found is None:
-        return dict.fromkeys(OF_IMAGES)
-    filled = [raw.index_of(take, place) for take, place in found.filled_images]
-    counts = found.rejected_images, found.repaired_images, found.unrepaired_images, filled
-    return dict(zip(OF_IMAGES, counts, strict=True))
+        return None, None, None, None
+    places = [raw.index_of(take, place) for take, place in found.filled_images]
+    return found.rejected_images, found.repaired_images, found.unrepaired_images, places

@@ -5,11 +5,12 @@ import math
 from collections.abc import Iterable
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 
 import transientcam_moments as tm
+from transientcam.documents import PixelCountsDocument, PredictedStdDocument
 from transientcam_driver import RawFrame
 from transientcam_server.imaging._errors_of_range.noise import contradictions, range_noise
 from transientcam_server.imaging._recipe.recipe import Recipe
@@ -51,9 +52,9 @@ class Computed:
 
     reconstruction: tm.Reconstruction | None = None
     failures: dict[str, Exception] = field(default_factory=dict)
-    pixels: dict[str, int] | None = None
+    pixels: PixelCountsDocument | None = None
     ambient_dn: float | None = None
-    range_noise: dict[str, float] | None = None
+    range_noise: PredictedStdDocument | None = None
 
 
 def compute(
@@ -112,15 +113,16 @@ def _read(found: tm.Reconstruction, stage: str) -> None:
         getattr(found, name)
 
 
-def pixel_counts(found: tm.Reconstruction) -> dict[str, int]:
+def pixel_counts(found: tm.Reconstruction) -> PixelCountsDocument:
     """Return how many pixels carry each flag."""
     flags = np.asarray(found.flags)
     there = np.bitwise_or.reduce(flags, axis=None)  # of most flags there are none
     counts = {"total": flags.size, "valid": flags.size - int(np.count_nonzero(flags))}
-    return counts | {
+    counts |= {
         name: int(np.count_nonzero(flags & bit)) if there & bit else 0
         for name, bit in _BITS.items()
     }
+    return cast("PixelCountsDocument", counts)
 
 
 def _ambient_dn(recipe: Recipe, found: tm.Reconstruction) -> float | None:
@@ -129,11 +131,12 @@ def _ambient_dn(recipe: Recipe, found: tm.Reconstruction) -> float | None:
     return 0.0 if found.ambient is None else float(np.median(found.ambient))
 
 
-def _range_noise(recipe: Recipe, found: tm.Reconstruction, number: int) -> dict[str, float] | None:
+def _range_noise(
+    recipe: Recipe, found: tm.Reconstruction, number: int
+) -> PredictedStdDocument | None:
     """Return the predicted deviation of the range; a failure of it spoils no range."""
     try:
-        predicted = range_noise(recipe, found)
+        return range_noise(recipe, found)
     except Exception:
         _log.exception("capture %d: predicting the deviation of the range failed", number)
         return None
-    return None if predicted is None else predicted.to_document()

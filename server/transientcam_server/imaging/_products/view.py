@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam.documents import FrameDocument, FrameMeta
 from transientcam.wire import MAX_DECIMATION
 from transientcam_server.errors import Problem, kinds
 
@@ -103,10 +104,10 @@ class Crop:
         _, _, columns, rows = self.region or (0, 0, width, height)
         return -(-rows // self.decimation), -(-columns // self.decimation)
 
-    def to_meta(self, height: int, width: int) -> dict[str, Any]:
-        """Return its entries in a frame's metadata, where ``region`` is always four numbers."""
-        region = self.region or (0, 0, width, height)
-        return {"region": list(region), "decimation": self.decimation}
+    def with_meta(self, meta: FrameDocument) -> FrameMeta:
+        """Return a frame's metadata with these pixels, where ``region`` is always four numbers."""
+        region = self.region or (0, 0, meta["width"], meta["height"])
+        return {**meta, "region": list(region), "decimation": self.decimation}
 
     def _slices(self) -> dict[str, slice]:
         if self.region is None:

@@ -5,7 +5,7 @@ of an error has two ends of its own: the error with the least bias that may be e
 with the most. Where the moments tell the bias, these are shares of the predicted one (`KNOWN`).
 Where they do not, the light may begin at any range that they do not contradict (`plausible`), and
 what is predicted of the bias is worth less (`UNKNOWN`). On random scenes
-``python -m benchmarks.accuracy.calibrating`` measures what both hold.
+``python -m benchmarks calibrating`` measures what both hold.
 """
 
 import math

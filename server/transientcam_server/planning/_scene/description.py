@@ -29,7 +29,7 @@ BRIGHT_SHARE: Final = 0.95
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class FrameAverages:
     """What frames of one sequence show.
 
     Attributes
@@ -93,17 +93,17 @@ class Seen:
 
 
 def describe(
-    seen: Seen,
+    averages: FrameAverages,
     settings: ReconstructionSettings,
     *,
-    coarse: Seen | None = None,
+    coarse: FrameAverages | None = None,
     ambient_dn_per_s: float | None = None,
 ) -> SceneStatistics | None:
     """Describe the scene that frames show.
 
     Parameters
     ----------
-    seen
+    averages
         The frames with the highest frequencies.
     settings
         Biasing and threshold.
@@ -117,16 +117,16 @@ def describe(
     SceneStatistics or None
         None where no pixel has light.
     """
-    lit = lit_pixels(seen)
+    lit = lit_pixels(averages)
     if coarse is not None:
         lit &= lit_pixels(coarse)
     if not lit.any():
         return None
     there = np.flatnonzero(lit)
-    pixels = there[typical_pixels(seen.at(there)[0], PIXELS)]
-    b, mean_dn = seen.at(pixels)
-    variance = seen.variance(mean_dn) / seen.frames
-    base_hz = seen.recipe.base_frequency_hz
+    pixels = there[typical_pixels(averages.at(there)[0], PIXELS)]
+    b, mean_dn = averages.at(pixels)
+    variance = averages.variance(mean_dn) / averages.frames
+    base_hz = averages.recipe.base_frequency_hz
     direct_m, uncertainty_m = direct_range(b, variance, base_hz, settings)
     earliest_m, latest_m = _plausible_by_kind(b, variance, base_hz, direct_m, uncertainty_m)
     light_dn = _brightness(b if coarse is None else coarse.at(pixels)[0], b)
@@ -136,7 +136,7 @@ def describe(
         earliest_m, latest_m = (each + direct_m - wrapped_m for each in (earliest_m, latest_m))
     if ambient_dn_per_s is None:
         # an image holds, on average over four phases, dark + ambient + b_0 / 2
-        ambient = np.maximum(mean_dn - light_dn / 2, 0.0) / seen.exposure_s
+        ambient = np.maximum(mean_dn - light_dn / 2, 0.0) / averages.exposure_s
     else:
         ambient = np.full(pixels.size, ambient_dn_per_s)
     relative = (b / light_dn).astype(np.complex64)
@@ -145,9 +145,9 @@ def describe(
     weight = np.asarray(returns.weight, dtype=float)
     phase = np.asarray(returns.phase_rad, dtype=float)
     return SceneStatistics(
-        brightness_dn_per_s=light_dn / seen.exposure_s,
+        brightness_dn_per_s=light_dn / averages.exposure_s,
         ambient_dn_per_s=ambient,
-        brightest_dn_per_s=seen.brightest_dn / seen.exposure_s,
+        brightest_dn_per_s=averages.brightest_dn / averages.exposure_s,
         direct_m=direct_m,
         uncertainty_m=uncertainty_m,
         earliest_m=earliest_m,
@@ -159,7 +159,7 @@ def describe(
         relative_noise=np.sqrt(variance[1]) / light_dn,
         lit_share=float(lit.mean()),
         dim_share=dim_share(light_dn, direct_m),
-        moving_share=moving_share(seen, lit),
+        moving_share=moving_share(averages, lit),
         ambiguity_checked=checked,
     )
 
@@ -178,7 +178,7 @@ def _plausible_by_kind(
     return earliest_m, latest_m
 
 
-def lit_pixels(seen: Seen) -> _Array:
+def lit_pixels(averages: FrameAverages) -> _Array:
     """Return which pixels (H, W) have modulated light that noise alone does not explain.
 
     The sum of squares of 2 m independent parts over their variance is chi-square; it must be above
@@ -186,13 +186,13 @@ def lit_pixels(seen: Seen) -> _Array:
     the light of neighbours into unlit pixels. A longer look lights no more of them: what a plan is
     for does not depend on how long the scene was looked at.
     """
-    b = seen.single[1:]
+    b = averages.single[1:]
     m = len(b)
-    left = tm.noise.smoothing_factor(seen.recipe.settings.smoothing_px)
-    variance = seen.variance(seen.mean_dn)[1:] / (left * min(seen.frames, LIT_FRAMES))
+    left = tm.noise.smoothing_factor(averages.recipe.settings.smoothing_px)
+    variance = averages.variance(averages.mean_dn)[1:] / (left * min(averages.frames, LIT_FRAMES))
     with np.errstate(invalid="ignore"):  # of pixels that are not finite
         power = (np.abs(b) ** 2 / variance).sum(axis=0)
-        lit: _Array = seen.usable & (power > 2 * m + LIT_DEVIATIONS * 2 * np.sqrt(m))
+        lit: _Array = averages.usable & (power > 2 * m + LIT_DEVIATIONS * 2 * np.sqrt(m))
     return lit
 
 
@@ -213,7 +213,9 @@ def _brightness(low: _Array, b: _Array) -> _Array:
     return np.maximum(size, 1e-9)
 
 
-def _unwrapped(direct_m: _Array, b: _Array, coarse: Seen, pixels: _Array, base_hz: float) -> _Array:
+def _unwrapped(
+    direct_m: _Array, b: _Array, coarse: FrameAverages, pixels: _Array, base_hz: float
+) -> _Array:
     """Add the periods that the mean of all light lies beyond, by the coarse frequency."""
     coarse_b, _ = coarse.at(pixels)
     coarse_hz = coarse.recipe.base_frequency_hz
@@ -228,12 +230,12 @@ def _unwrapped(direct_m: _Array, b: _Array, coarse: Seen, pixels: _Array, base_h
     return np.asarray(np.maximum(mean_m - before_m, 0.0))
 
 
-def moving_share(seen: Seen, lit: _Array) -> float:
+def moving_share(averages: FrameAverages, lit: _Array) -> float:
     """Return the share of lit pixels (H, W) whose first and last frame differ beyond noise."""
-    if seen.frames < 2:
+    if averages.frames < 2:
         return 0.0
-    apart = np.abs(seen.moved[1:]) ** 2
+    apart = np.abs(averages.moved[1:]) ** 2
     m = len(apart)
     with np.errstate(invalid="ignore"):
-        power = (apart / (2 * seen.variance(seen.mean_dn)[1:])).sum(axis=0)
+        power = (apart / (2 * averages.variance(averages.mean_dn)[1:])).sum(axis=0)
     return float((power > 2 * m + MOVED_DEVIATIONS * 2 * np.sqrt(m))[lit].mean())

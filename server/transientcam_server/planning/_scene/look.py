@@ -12,7 +12,7 @@ from transientcam_driver import AppliedSequence, Capabilities, RawFrame, Sequenc
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging import Recipe
 from transientcam_server.planning._scene.description import (
-    Seen,
+    FrameAverages,
     describe,
     lit_pixels,
     moving_share,
@@ -43,8 +43,8 @@ _SPARE_S: Final = 10.0
 _DARKER: Final = 8.0
 
 
-class LookedThrough(Protocol):
-    """What a look needs of a camera."""
+class FrameSource(Protocol):
+    """A camera, as far as a look needs it."""
 
     @property
     def capabilities(self) -> Capabilities:
@@ -68,8 +68,8 @@ class LookedThrough(Protocol):
         ...
 
 
-class _Seeing:
-    """Frames of one sequence, summed up as they come: no more than one of them is kept.
+class _FrameSums:
+    """Sums over frames of one sequence: no more than the first and the last one are kept.
 
     Parameters
     ----------
@@ -82,10 +82,10 @@ class _Seeing:
         self._frames = self._images = 0
         self._first: _Array
         self._last: _Array
-        self._single: _Array
-        self._moments: _Array
-        self._sum_dn: _Array
-        self._highest_dn: _Array
+        self._single: _Array = np.zeros((), np.complex64)
+        self._moments: _Array = np.zeros((), np.complex64)
+        self._sum_dn: _Array = np.zeros(())
+        self._highest_dn: _Array = np.zeros((), np.uint16)
 
     def add(self, raw: RawFrame, found: tm.Reconstruction | None = None) -> None:
         """Add a frame, and its reconstruction where there is one."""
@@ -93,24 +93,20 @@ class _Seeing:
         smoothing_px = self._recipe.settings.smoothing_px
         moments = tm.smooth(single, smoothing_px) if smoothing_px else single
         images = _modulated(raw)
-        sum_dn, highest_dn = images.sum(axis=0, dtype=float), images.max(axis=0)
-        if self._frames:
-            self._single += single
-            self._moments += moments
-            self._sum_dn += sum_dn
-            self._highest_dn = np.maximum(self._highest_dn, highest_dn)
-        else:
+        if not self._frames:
             self._first = moments
-            self._single, self._moments = single.copy(), moments.copy()
-            self._sum_dn, self._highest_dn = sum_dn, highest_dn
         self._last = moments
+        self._single = self._single + single
+        self._moments = self._moments + moments
+        self._sum_dn = self._sum_dn + images.sum(axis=0, dtype=float)
+        self._highest_dn = np.maximum(self._highest_dn, images.max(axis=0))
         self._frames += 1
         self._images += len(images)
 
-    def seen(self) -> Seen:
+    def averages(self) -> FrameAverages:
         """Return what the frames show so far, one at least."""
         sensor = self._sensor
-        return Seen(
+        return FrameAverages(
             recipe=self._recipe,
             sensor=sensor,
             frames=self._frames,
@@ -124,7 +120,7 @@ class _Seeing:
 
 
 def look_at(
-    camera: LookedThrough,
+    camera: FrameSource,
     sensor: tm.noise.Sensor,
     settings: ReconstructionSettings,
     *,
@@ -163,26 +159,28 @@ def look_at(
     base = base or Sequence()
     capabilities = camera.capabilities
 
-    def captured(sequence: Sequence, frames: int, stage: str, *, still_frames: int = 0) -> Seen:
+    def captured(
+        sequence: Sequence, frames: int, stage: str, *, still_frames: int = 0
+    ) -> FrameAverages:
         applied = camera.configure(capabilities.nearest(sequence))
         recipe = Recipe(applied, settings, float(sensor.highest_dn), sensor=sensor)
-        seeing = _Seeing(recipe, sensor)
+        sums = _FrameSums(recipe, sensor)
         spare_s = _SPARE_S + 4 / applied.frame_rate_hz
 
-        def take(count: int) -> Seen:
+        def take(count: int) -> FrameAverages:
             for _ in range(count):
                 go_on(stage)
-                seeing.add(camera.read_frame(timeout_s=spare_s))
-            return seeing.seen()
+                sums.add(camera.read_frame(timeout_s=spare_s))
+            return sums.averages()
 
         camera.start()
         try:
-            seen = take(frames)
-            if still_frames and _still(seen):
-                seen = take(still_frames - frames)
+            averages = take(frames)
+            if still_frames and _still(averages):
+                averages = take(still_frames - frames)
         finally:
             camera.stop()
-        return seen
+        return averages
 
     coarse_sequence = replace(
         base, base_frequency_hz=COARSE_HZ, harmonics=1, zeroth="estimated", takes=1
@@ -220,12 +218,7 @@ def look_at(
     )
     fine = captured(fine_sequence, FRAMES, "all frequencies", still_frames=STILL_FRAMES)
     go_on("direct range")
-    scene = describe(
-        fine,
-        settings,
-        coarse=coarse,
-        ambient_dn_per_s=ambient_dn_per_s,
-    )
+    scene = describe(fine, settings, coarse=coarse, ambient_dn_per_s=ambient_dn_per_s)
     if scene is None:
         raise no_light()
     return scene
@@ -262,18 +255,18 @@ def look_of_frame(
         ``target-unreachable`` where no pixel has light.
     """
     assert recipe.sensor is not None  # noqa: S101 - a planner has one
-    seeing = _Seeing(recipe, recipe.sensor)
-    seeing.add(raw, found)
-    scene = describe(seeing.seen(), recipe.settings, ambient_dn_per_s=ambient_dn_per_s)
+    sums = _FrameSums(recipe, recipe.sensor)
+    sums.add(raw, found)
+    scene = describe(sums.averages(), recipe.settings, ambient_dn_per_s=ambient_dn_per_s)
     if scene is None:
         raise no_light()
     return scene
 
 
-def _still(seen: Seen) -> bool:
+def _still(averages: FrameAverages) -> bool:
     """Whether nothing moves that frames show."""
-    lit = lit_pixels(seen)
-    return bool(lit.any()) and moving_share(seen, lit) <= STILL_SHARE
+    lit = lit_pixels(averages)
+    return bool(lit.any()) and moving_share(averages, lit) <= STILL_SHARE
 
 
 def _modulated(frame: RawFrame) -> _Array:

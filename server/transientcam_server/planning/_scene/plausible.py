@@ -45,8 +45,8 @@ _FINE_RAD: Final = 2 * np.pi * np.arange(-0.024, 0.0245, 0.001)
 
 
 @dataclass(frozen=True, eq=False)
-class _Turned:
-    """Moments (m, P) turned back to a phase that is near, and their weights.
+class _RotatedMoments:
+    """Moments (m, P) rotated back by a phase that is near, and their weights.
 
     Attributes
     ----------
@@ -86,11 +86,11 @@ class _Turned:
         one = np.maximum(sharp**2 / ww, late**2 / vv)
         return np.asarray(np.where((w > 0) & (v > 0), both, one))
 
-    def turned(self, phase: _Array) -> "_Turned":
-        """Return the moments turned back further, by a phase (P) of the highest harmonic."""
+    def rotated(self, phase: _Array) -> "_RotatedMoments":
+        """Return the moments rotated back further, by a phase (P) of the highest harmonic."""
         m = len(self.weighted)
         j = np.arange(1, m + 1)[:, None] / m
-        return _Turned(self.weighted * np.exp(-1j * j * phase), self.weight, self.total)
+        return _RotatedMoments(self.weighted * np.exp(-1j * j * phase), self.weight, self.total)
 
 
 def plausible_ranges(
@@ -125,7 +125,7 @@ def plausible_ranges(
     weight = 1.0 / variance[1:].astype(float)
     moments = b[1:].astype(complex)
     total = (weight * np.abs(moments) ** 2).sum(axis=0)
-    pixels = _Turned(weight * moments, weight, total).turned(near)
+    pixels = _RotatedMoments(weight * moments, weight, total).rotated(near)
     single, _ = _fitted(pixels, j, None, None)
     limit = chi_square_quantile(free, SIGNIFICANCE)
     least = single
@@ -143,7 +143,7 @@ def plausible_ranges(
     )
 
 
-def _families(pixels: _Turned, j: _Array) -> Iterator[tuple[_Array, _Array]]:
+def _families(pixels: _RotatedMoments, j: _Array) -> Iterator[tuple[_Array, _Array]]:
     """Yield the least chi-square (K, P) of tails of one form, and the phases at which they begin.
 
     Parameters
@@ -177,7 +177,7 @@ def _with_minima(chi_square: _Array, phase: _Array) -> tuple[_Array, _Array]:
 
 
 def _fitted(
-    pixels: _Turned, j: _Array, q: _Array | None, near: _Array | None
+    pixels: _RotatedMoments, j: _Array, q: _Array | None, near: _Array | None
 ) -> tuple[_Array, _Array]:
     """Return the least chi-square (P) of a shape, and at which phase (P) it begins.
 
@@ -189,5 +189,5 @@ def _fitted(
     if near is None:
         coarse = pixels.explained(np.exp(1j * j[:, None] * _COARSE_RAD), q)
         near = _COARSE_RAD[coarse.argmax(axis=0)]
-    fine = pixels.turned(near).explained(np.exp(1j * j[:, None] * _FINE_RAD), q)
+    fine = pixels.rotated(near).explained(np.exp(1j * j[:, None] * _FINE_RAD), q)
     return pixels.total - fine.max(axis=0), near + _FINE_RAD[fine.argmax(axis=0)]

@@ -1,15 +1,12 @@
 """One sequence and estimator with their predicted accuracy and cost."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any
 
 from transientcam_driver import AppliedSequence, Sequence
 from transientcam_server.planning._prediction.prediction import Prediction
-
-TARGETS: Final = ("range_error_m", "range_std_m", "separation_m", "bound_width")
-"""Accuracies that a goal may limit; choices are compared by the first by default."""
 
 
 def in_words(sequence: Sequence, estimator: str) -> str:
@@ -73,6 +70,19 @@ class Choice:
         if target == "range_std_m":
             return self.predicted.range_std.with_margin
         return self.error(target)
+
+    def relative_errors(self, targets: Mapping[str, float]) -> tuple[float, float]:
+        """Return the worst error, and the worst with margin, over the largest that targets allow.
+
+        Targets are reached where the latter is 1 at most.
+        """
+        return (
+            max((self.error(name) / limit for name, limit in targets.items()), default=0.0),
+            max(
+                (self.error_with_margin(name) / limit for name, limit in targets.items()),
+                default=0.0,
+            ),
+        )
 
     def to_document(self) -> dict[str, Any]:
         """Return the choice as JSON; ``sequence`` is the body of a PUT."""

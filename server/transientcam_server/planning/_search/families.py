@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -100,6 +101,15 @@ def families(goal: Goal, predictor: Predictor, capabilities: Capabilities) -> li
         raise _nothing(
             goal, f"it saturates at more than {longest_s:.3g} s of exposure", "exposure_s"
         )
+    unambiguous_m = _unambiguous_m(goal, capabilities, exposures_s[0])
+    if not unambiguous_m:
+        raise _nothing(goal, "the fixed fields exclude all", "fixed")
+    scene = predictor.scene
+    clear = [each for each, range_m in unambiguous_m.items() if not scene.ambiguous(range_m)]
+    if not clear:
+        far_m, most_m = float(scene.direct_m.max()), max(unambiguous_m.values())
+        reason = f"it is up to {far_m:.1f} m away, and ranges are unambiguous to {most_m:.1f} m"
+        raise _nothing(goal, reason, "base_frequency_hz")
     scales = {
         (each_s, zeroth): predictor.noise_scale(
             replace(goal.base, exposure_s=each_s, zeroth=zeroth, takes=1)
@@ -107,28 +117,10 @@ def families(goal: Goal, predictor: Predictor, capabilities: Capabilities) -> li
         for each_s in exposures_s
         for zeroth in _zeroths(goal)
     }
-    found, ambiguous_m = [], 0.0
-    for sequence, estimator in _frequencies(goal):
-        try:
-            unambiguous_m = capabilities.apply(
-                replace(sequence, exposure_s=exposures_s[0], takes=1)
-            ).unambiguous_range_m
-        except SequenceError:
-            continue
-        if predictor.scene.ambiguous(unambiguous_m):
-            ambiguous_m = max(ambiguous_m, unambiguous_m)
-            continue
-        members = tuple(_members(goal, sequence, scales, capabilities))
-        if members:
-            found.append(Family(estimator, sequence, members, capabilities))
-    if not found:
-        reason = "the fixed fields exclude all"
-        if ambiguous_m:
-            far_m = float(predictor.scene.direct_m.max())
-            reason = (
-                f"it is up to {far_m:.1f} m away, and ranges are unambiguous to {ambiguous_m:.1f} m"
-            )
-        raise _nothing(goal, reason, "base_frequency_hz" if ambiguous_m else "fixed")
+    found = [
+        Family(estimator, sequence, _members(goal, sequence, scales, capabilities), capabilities)
+        for sequence, estimator in clear
+    ]
     # short captures first: what they reach rules out most of the longer ones
     return sorted(found, key=lambda family: family.members[0].capture_s)
 
@@ -150,6 +142,19 @@ def _zeroths(goal: Goal) -> tuple[Any, ...]:
     if goal.bound_width is None:
         return ("estimated",)
     return ("estimated", "on-off", "low-frequency")
+
+
+def _unambiguous_m(
+    goal: Goal, capabilities: Capabilities, exposure_s: float
+) -> dict[tuple[Sequence, str], float]:
+    """Return the unambiguous range of all frequencies and estimators that the camera can run."""
+    takes = goal.base.takes if "takes" in goal.fixed else 1
+    ranges_m = {}
+    for sequence, estimator in _frequencies(goal):
+        with suppress(SequenceError):
+            applied = capabilities.apply(replace(sequence, exposure_s=exposure_s, takes=takes))
+            ranges_m[sequence, estimator] = applied.unambiguous_range_m
+    return ranges_m
 
 
 def _frequencies(goal: Goal) -> Iterator[tuple[Sequence, str]]:
@@ -177,7 +182,7 @@ def _members(
     sequence: Sequence,
     scales: dict[tuple[float, str], float],
     capabilities: Capabilities,
-) -> list[Member]:
+) -> tuple[Member, ...]:
     takes = (goal.base.takes,) if "takes" in goal.fixed else TAKES
     images = sequence.images_per_take
     most_takes = min(capabilities.max_takes, capabilities.max_images // images)
@@ -195,7 +200,7 @@ def _members(
             for each in takes
             if each <= most_takes
         ]
-    return front(members, cost=lambda each: each.capture_s, error=lambda each: each.scale)
+    return tuple(front(members, cost=lambda each: each.capture_s, error=lambda each: each.scale))
 
 
 def _nothing(goal: Goal, reason: str, field: str) -> Problem:

@@ -1,13 +1,15 @@
 """The goal of a plan: targets of accuracy, budgets of time."""
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from transientcam_driver import Sequence
 from transientcam_server.errors import Problem, kinds
-from transientcam_server.planning._search.choice import TARGETS, Choice
 
+TARGETS: Final = ("range_error_m", "range_std_m", "separation_m", "bound_width")
+"""Accuracies that a goal may limit; choices are compared by the first by default."""
 BUDGETS: Final = ("capture_s", "frame_rate_hz", "computing_share")
 
 
@@ -55,47 +57,49 @@ class Goal:
     @property
     def empty(self) -> bool:
         """Whether neither a target nor a budget is given."""
-        return all(getattr(self, name) is None for name in (*TARGETS, *BUDGETS))
+        return not self.targets and not self.budgets
 
     @property
     def leading(self) -> str:
         """The target that neighbours are compared by."""
-        return next((name for name in TARGETS if getattr(self, name) is not None), TARGETS[0])
+        return next(iter(self.targets), TARGETS[0])
 
-    def limit(self, target: str) -> float:
-        """Return the largest error that a target allows."""
-        if target == "separation_m":
-            return 1.0 - self.separation_share
-        return float(getattr(self, target))
+    @property
+    def limits(self) -> dict[str, float]:
+        """The largest error that each target allows."""
+        limits = {name: float(getattr(self, name)) for name in self.targets}
+        if "separation_m" in limits:
+            limits["separation_m"] = 1.0 - self.separation_share
+        return limits
 
     @property
     def targets(self) -> tuple[str, ...]:
         """The targets that are given."""
         return tuple(name for name in TARGETS if getattr(self, name) is not None)
 
-    def affords(self, choice: Choice) -> bool:
-        """Return whether a choice is within the budgets."""
-        return (
-            self.affords_time(choice.applied.capture_s)
-            and (self.frame_rate_hz is None or choice.applied.frame_rate_hz >= self.frame_rate_hz)
-            and self.affords_computing(choice.computing_share)
-        )
+    @property
+    def budgets(self) -> tuple[str, ...]:
+        """The budgets that are given."""
+        return tuple(name for name in BUDGETS if getattr(self, name) is not None)
 
-    def affords_computing(self, share: float | None) -> bool:
-        """Return whether a share of a core's time is within the budget; not where it is unknown."""
-        return self.computing_share is None or (share is not None and share <= self.computing_share)
+    def without_budgets(self) -> "Goal":
+        """Return the goal of the same targets, whatever they cost."""
+        return replace(self, capture_s=None, frame_rate_hz=None, computing_share=None)
 
-    def affords_time(self, capture_s: float) -> bool:
-        """Return whether captures of this length, back to back, are within the budgets."""
-        return (self.capture_s is None or capture_s <= self.capture_s) and (
-            self.frame_rate_hz is None or capture_s * self.frame_rate_hz <= 1 + 1e-9
-        )
+    def affords(self, capture_s: float, computing_s: Callable[[], float | None]) -> bool:
+        """Return whether captures of this length, back to back, are within the budgets.
 
-    def reached_by(self, choice: Choice) -> bool:
-        """Return whether a choice reaches all targets, with the margin of its intervals."""
-        return all(
-            choice.error_with_margin(target) <= self.limit(target) for target in self.targets
-        )
+        ``computing_s`` returns the computing time of a frame, if it is known; it is called where
+        that is limited.
+        """
+        if self.capture_s is not None and capture_s > self.capture_s:
+            return False
+        if self.frame_rate_hz is not None and capture_s * self.frame_rate_hz > 1 + 1e-9:
+            return False
+        if self.computing_share is None:
+            return True
+        reconstruct_s = computing_s()
+        return reconstruct_s is not None and reconstruct_s / capture_s <= self.computing_share
 
     def require_sensible(self) -> None:
         """Refuse a goal without target or budget, or with a value out of bounds.
@@ -113,21 +117,9 @@ class Goal:
                 value=None,
                 limit=f"at least one of {', '.join((*TARGETS, *BUDGETS))}",
             )
-        for name in (*TARGETS, *BUDGETS):
+        positive = [(name, math.inf, "a number above 0") for name in (*TARGETS, *BUDGETS)]
+        for name, most, limit in [*positive, ("separation_share", 1.0, "between 0 and 1")]:
             value = getattr(self, name)
-            if value is not None and not 0 < value < math.inf:
-                raise Problem(
-                    kinds.INVALID_REQUEST,
-                    f"{name} = {value!r} must be a number above 0.",
-                    field=name,
-                    value=value,
-                    limit="a number above 0",
-                )
-        if not 0 < self.separation_share < 1:
-            raise Problem(
-                kinds.INVALID_REQUEST,
-                f"separation_share = {self.separation_share!r} must be between 0 and 1.",
-                field="separation_share",
-                value=self.separation_share,
-                limit="between 0 and 1",
-            )
+            if value is not None and not 0 < value < most:
+                detail = f"{name} = {value!r} must be {limit}."
+                raise Problem(kinds.INVALID_REQUEST, detail, field=name, value=value, limit=limit)

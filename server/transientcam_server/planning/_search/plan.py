@@ -1,30 +1,27 @@
 """From a target accuracy or a budget of time to a sequence and an estimator.
 
-Of all that the camera can run within the budgets the quickest that reaches the targets with margin
-is recommended, or, without a target, the most accurate. Where bias rules, time that buys nothing is
-not spent: half of it will do as long as the error hardly grows, and stays below its target without
-the margin. Beside the recommended one stand what half the time gives, and what twice the accuracy
-costs.
+The stages, each from a value to a value: a goal becomes families of sequences; these become
+candidates, which are predicted as far as the search asks; what it recommends becomes a plan, and
+what falls short of the goal a refusal.
 """
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from transientcam.notebook import table_html
 from transientcam_driver import Capabilities
-from transientcam_server.planning._prediction.intervals import DISAGREEING
 from transientcam_server.planning._prediction.prediction import Predictor
 from transientcam_server.planning._process.progress import Progress
 from transientcam_server.planning._scene.scene import SceneStatistics
+from transientcam_server.planning._search.candidates import ComputingTime, curves
 from transientcam_server.planning._search.choice import Choice
 from transientcam_server.planning._search.families import families
+from transientcam_server.planning._search.finest import shortened
 from transientcam_server.planning._search.goal import Goal
-from transientcam_server.planning._search.pareto import flat_from
-from transientcam_server.planning._search.refusal import too_small, unreachable
-from transientcam_server.planning._search.search import Search, Timed
-
-HARDLY_MORE: Final = 1.05
-"""Growth of an error that half the time is taken for, where bias rules (decision 12)."""
+from transientcam_server.planning._search.refusal import refusal
+from transientcam_server.planning._search.search import best_choice, quickest
+from transientcam_server.planning._search.shortfall import shortfall
+from transientcam_server.planning._search.summary import summary
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -96,7 +93,7 @@ def plan(
     predictor: Predictor,
     capabilities: Capabilities,
     *,
-    timed: Timed,
+    timed: ComputingTime,
     progress: Progress | None = None,
 ) -> Plan:
     """Recommend a sequence and an estimator.
@@ -123,105 +120,20 @@ def plan(
     goal.require_sensible()
     progress = progress or Progress()
     progress.at(0.0, "sequences for the goal")
-    search = Search(goal, families(goal, predictor, capabilities), predictor, timed)
-    targets = {name: goal.limit(name) for name in goal.targets}
-    leading = goal.leading
-    best = search.quickest(targets) if targets else search.finest(leading)
-    if best is None:
-        best = search.finest(leading)
-        if best is None:
-            raise too_small(goal, search)
-        if not goal.reached_by(best):
-            raise unreachable(goal, search, best)
+    found = families(goal, predictor, capabilities)
+    candidates = curves(found, goal, predictor, timed)
+    unlimited = curves(found, goal.without_budgets(), predictor, timed)
+    targets, leading = goal.limits, goal.leading
+    best = best_choice(candidates, targets, leading)
+    if best is None or best.relative_errors(targets)[1] > 1:
+        missed = shortfall(goal, best, candidates, unlimited)
+        raise refusal(goal, missed)
     progress.at(0.7, "half the time")
-    half_time = search.finest(leading, best.applied.capture_s / 2)
-    while targets and half_time is not None and _as_good(half_time, best, goal):
-        best = half_time
-        half_time = search.finest(leading, best.applied.capture_s / 2)
+    best, half_time = shortened(best, candidates, targets, leading)
     progress.at(0.8, "twice the accuracy")
-    half = {leading: best.error(leading) / 2}
-    twice = search.without_budgets().quickest(half, contenders=1)
-    summary = _summary(best, twice) + doubt(best, predictor.scene)
-    return Plan(best, half_time, twice, leading, summary, predictor.scene)
-
-
-def _as_good(quicker: Choice, best: Choice, goal: Goal) -> bool:
-    """Return whether a quicker choice errs hardly more than one whose bias rules.
-
-    It has to reach the targets, too, but by what is expected of it: with margin it just misses one.
-    """
-    return (
-        "range_error_m" in goal.targets
-        and best.predicted.range_bias_m > best.predicted.range_std.median
-        and all(
-            quicker.error(target) <= goal.limit(target)
-            and quicker.error_with_margin(target) <= HARDLY_MORE * best.error_with_margin(target)
-            for target in goal.targets
-        )
-    )
-
-
-def doubt(choice: Choice, scene: SceneStatistics) -> str:
-    """Return a sentence, after a space, on why the bias of a choice is not known; or nothing."""
-    if choice.predicted.bias_known:
-        return ""
-    if scene.lit_in_part:
-        return (
-            f" Bias unknown: {scene.dim_share:.0%} of the lit pixels are so dim that other "
-            "surfaces may light them alone, and by how much that light is late does not show."
-        )
-    apart_m = scene.disagreement_m
-    if apart_m > DISAGREEING * choice.predicted.range_error.median:
-        return (
-            f" Bias unknown: two ways to tell direct from later light differ by {apart_m * 1e3:.2g}"
-            " mm even at all frequencies, and both may be further off."
-        )
-    return (
-        " Bias unknown: light that goes on coming, as out of wax or from other walls, would look "
-        f"the same, and put the range {choice.predicted.most_bias_m * 1e3:.2g} mm off."
-    )
-
-
-def in_a_sentence(front: list[Choice], scene: SceneStatistics) -> str:
-    """State from where on more time buys little, of choices by rising time; and any doubt."""
-    if not front:
-        return "Nothing reaches any accuracy on this scene."
-    finest = front[-1]
-    best = (
-        f"the best is {finest.predicted.range_error.median * 1e3:.3g} mm in "
-        f"{_time_in_words(finest.applied.capture_s)} ({finest.in_words()})"
-    )
-    flat = flat_from(
-        [
-            (
-                each.predicted.range_std.median,
-                each.predicted.range_bias_m,
-                each.predicted.range_error.median,
-            )
-            for each in front
-        ]
-    )
-    if flat is None:
-        return f"Noise rules everywhere: more time buys accuracy; {best}." + doubt(finest, scene)
-    since = _time_in_words(front[flat].applied.capture_s)
-    rules = f"From {since} on bias rules and more time buys little; {best}."
-    return rules + doubt(finest, scene)
-
-
-def _time_in_words(time_s: float) -> str:
-    return f"{time_s:.3g} s" if time_s >= 1 else f"{time_s * 1e3:.3g} ms"
-
-
-def _summary(best: Choice, twice: Choice | None) -> str:
-    predicted = best.predicted
-    noise_m, bias_m = predicted.range_std.median, predicted.range_bias_m
-    first = f"{noise_m * 1e3:.3g} mm noise, {bias_m * 1e3:.3g} mm off"
-    if twice is None:
-        what = "more frequencies or another estimator" if bias_m > noise_m else "a longer capture"
-        return f"{first}: nothing that this camera can capture halves the error, not even {what}."
-    factor = twice.applied.capture_s / best.applied.capture_s
-    error_m = twice.predicted.range_error.median
-    return f"{first}: {twice.in_words()} takes {factor:.2g} x as long for {error_m * 1e3:.3g} mm."
+    twice = quickest(unlimited, {leading: best.error(leading) / 2}, contenders=1)
+    scene = predictor.scene
+    return Plan(best, half_time, twice, leading, summary(best, twice, scene), scene)
 
 
 def _in_words(choice: Choice) -> str:

@@ -1,80 +1,25 @@
 """Why a goal is out of reach: the best there is, and what limits it, in words."""
 
 import math
-from typing import Any
+from typing import Final
 
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.planning._search.choice import Choice
 from transientcam_server.planning._search.goal import BUDGETS, Goal
-from transientcam_server.planning._search.search import Search
+from transientcam_server.planning._search.shortfall import Shortfall
+
+_CLEARLY_LESS: Final = 0.8
+"""Share of the best error that what is dearer has to stay below to be named."""
 
 
-def unreachable(goal: Goal, search: Search, finest: Choice) -> Problem:
-    """Return the problem of the target out of reach, with the best that the budgets allow."""
-    for target in goal.targets:
-        best = finest if target == goal.leading else search.finest(target) or finest
-        if best.error_with_margin(target) > goal.limit(target):
-            value = best.separation_share if target == "separation_m" else best.error(target)
-            return _refusal(goal, target, value, best, _limits(goal, search, best, target))
-    # each by itself is in reach, but nothing reaches all of them
-    value = finest.error(goal.leading)
-    return _refusal(goal, goal.leading, value, finest, ("together", "the targets together"))
-
-
-def too_small(goal: Goal, search: Search) -> Problem:
-    """Return the problem of the budget that is too small, with the least that is possible."""
-    unlimited = search.without_budgets()
-    quickest_of = min(search.families, key=lambda family: family.members[0].capture_s)
-    quickest = unlimited.choice(quickest_of, quickest_of.members[0])
-    given = [name for name in BUDGETS if getattr(goal, name) is not None]
-    for budget in given:
-        if not Goal(**{budget: getattr(goal, budget)}).affords(quickest):
-            value = _spent(quickest, budget)
-            return _refusal(goal, budget, value, quickest, ("budget", f"{budget} alone"))
-    value = _spent(quickest, given[0])
-    return _refusal(goal, given[0], value, quickest, ("together", "the budgets together"))
-
-
-def _spent(choice: Choice, budget: str) -> float:
-    if budget == "computing_share":
-        return math.inf if choice.computing_share is None else choice.computing_share
-    return float(getattr(choice.applied, budget))
-
-
-def _limits(goal: Goal, search: Search, best: Choice, target: str) -> tuple[str, str]:
-    """Return what limits the error, by a word and in words."""
-    if not target.startswith("range"):
-        return "noise", "the longest capture there is does no better"
-    noise_m = best.predicted.range_std.median
-    bias_m = best.predicted.range_bias_m
-    m = best.applied.sequence.harmonics
-    if target == "range_error_m" and bias_m > noise_m:
-        words = f"more time does not help here: bias {bias_m * 1e3:.3g} mm at m = {m}"
-        kind = "bias"
-    else:
-        words = f"noise {noise_m * 1e3:.3g} mm in {best.applied.capture_s * 1e3:.3g} ms at m = {m}"
-        kind = "noise"
-    given = [name for name in BUDGETS if getattr(goal, name) is not None]
-    if given:
-        unlimited = search.without_budgets()
-        other = unlimited.quickest({target: goal.limit(target)}) or unlimited.finest(target)
-        if other is not None and other.error(target) < 0.8 * best.error(target):
-            factor = other.applied.capture_s / best.applied.capture_s
-            words += (
-                f"; m = {other.applied.sequence.harmonics} takes {factor:.2g} x as long and is "
-                f"{other.error(target) * 1e3:.3g} mm off"
-            )
-    return kind, words
-
-
-def _refusal(
-    goal: Goal, field: str, achieved: Any, best: Choice, limits: tuple[str, str]
-) -> Problem:
-    limit = getattr(goal, field)
+def refusal(goal: Goal, shortfall: Shortfall) -> Problem:
+    """Return the problem ``target-unreachable`` of what falls short of a goal."""
+    field, best = shortfall.field, shortfall.best
+    limit, achieved = getattr(goal, field), _achieved(best, field)
+    limited_by, words = _limits(shortfall)
     named = "share of captures that find both" if field == "separation_m" else field
-    kind, words = limits
     margin = ""
-    if field.startswith("range") and achieved is not None and achieved <= limit:
+    if field.startswith("range") and achieved <= limit:
         margin = ", which leaves no margin"
     return Problem(
         kinds.TARGET_UNREACHABLE,
@@ -83,6 +28,49 @@ def _refusal(
         field=field,
         value=limit,
         limit=achieved,
-        limited_by=kind,
+        limited_by=limited_by,
         best=best.to_document(),
+    )
+
+
+def _achieved(best: Choice, field: str) -> float:
+    """Return what a choice achieves of a target, or needs of a budget."""
+    if field == "separation_m":
+        return 0.0 if best.separation_share is None else best.separation_share
+    if field == "computing_share":
+        return math.inf if best.computing_share is None else best.computing_share
+    return float(getattr(best.applied, field)) if field in BUDGETS else best.error(field)
+
+
+def _limits(shortfall: Shortfall) -> tuple[str, str]:
+    """Return what limits a choice, by a word and in words."""
+    field, best = shortfall.field, shortfall.best
+    budget = field in BUDGETS
+    if shortfall.together:
+        return "together", f"the {'budgets' if budget else 'targets'} together"
+    if budget:
+        return "budget", f"{field} alone"
+    if not field.startswith("range"):
+        return "noise", "the longest capture there is does no better"
+    noise_m, bias_m = best.predicted.range_std.median, best.predicted.range_bias_m
+    m = best.applied.sequence.harmonics
+    dearer = _dearer(shortfall)
+    if field == "range_error_m" and bias_m > noise_m:
+        return (
+            "bias",
+            f"more time does not help here: bias {bias_m * 1e3:.3g} mm at m = {m}{dearer}",
+        )
+    capture_ms = best.applied.capture_s * 1e3
+    return "noise", f"noise {noise_m * 1e3:.3g} mm in {capture_ms:.3g} ms at m = {m}{dearer}"
+
+
+def _dearer(shortfall: Shortfall) -> str:
+    """Say what more than the budgets would give, after a semicolon; or nothing."""
+    field, best, dearer = shortfall.field, shortfall.best, shortfall.dearer
+    if dearer is None or dearer.error(field) >= _CLEARLY_LESS * best.error(field):
+        return ""
+    factor = dearer.applied.capture_s / best.applied.capture_s
+    return (
+        f"; m = {dearer.applied.sequence.harmonics} takes {factor:.2g} x as long and is "
+        f"{dearer.error(field) * 1e3:.3g} mm off"
     )

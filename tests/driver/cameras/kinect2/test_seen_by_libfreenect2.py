@@ -1,6 +1,6 @@
 """The emulated camera's frames, held against what libfreenect2 itself read of them over USB.
 
-`python -m benchmarks.kinect2.by_libfreenect2` stored that, with libfreenect2 commit fd64c5d.
+`python -m benchmarks by_libfreenect2` stored that, with libfreenect2 commit fd64c5d.
 """
 
 import numpy as np

@@ -185,9 +185,9 @@ def test_the_predicted_deviation_is_the_noise_of_the_likelihood_where_it_is_the_
     predicted = range_noise(likely, found)
 
     assert predicted is not None
-    assert predicted.median_m == pytest.approx(float(np.nanmedian(found.range_scatter_m())))
-    assert predicted.median_m < float(np.nanmedian(found.range_std_m))
-    assert predicted.p90_m >= predicted.median_m
-    assert predicted.first_order_share == found.likelihood.explained().mean()
+    assert predicted["median"] == pytest.approx(float(np.nanmedian(found.range_scatter_m())))
+    assert predicted["median"] < float(np.nanmedian(found.range_std_m))
+    assert predicted["p90"] >= predicted["median"]
+    assert predicted["first_order_share"] == found.likelihood.explained().mean()
     dark = tm.Reconstruction(np.zeros((4, *SHAPE), np.complex64), settings)
     assert range_noise(likely, dark) is None

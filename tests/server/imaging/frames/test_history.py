@@ -6,6 +6,7 @@ from typing import Any, cast
 import pytest
 from hypothesis import given, strategies as st
 
+from transientcam_server.api._documents.frame import HistoryDocument
 from transientcam_server.errors import Problem
 from transientcam_server.imaging import Frame, History
 from transientcam_server.settings import HistorySettings
@@ -162,7 +163,7 @@ def test_the_newest_seconds_hold_one_sequence() -> None:
 
 
 def test_what_is_kept_and_its_limits_are_stated() -> None:
-    assert filled(30, max_bytes=550).to_document() == {
+    assert HistoryDocument.model_validate(filled(30, max_bytes=550)).model_dump() == {
         "first": 26,
         "last": 30,
         "count": 5,

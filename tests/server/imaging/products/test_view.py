@@ -1,10 +1,11 @@
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from transientcam.documents import FrameDocument
 from transientcam_server.errors import Problem
 from transientcam_server.imaging import WHOLE, Crop
 
@@ -56,8 +57,12 @@ def test_axes_are_cut_by_name_wherever_they_stand() -> None:
 
 
 def test_what_meta_says_names_the_region_also_where_it_is_everything() -> None:
-    assert WHOLE.to_meta(HEIGHT, WIDTH) == {"region": [0, 0, WIDTH, HEIGHT], "decimation": 1}
-    assert of((1, 2, 3, 4), 2).to_meta(HEIGHT, WIDTH) == {"region": [1, 2, 3, 4], "decimation": 2}
+    meta = cast("FrameDocument", {"frame": 7, "width": WIDTH, "height": HEIGHT})
+
+    whole, part = WHOLE.with_meta(meta), of((1, 2, 3, 4), 2).with_meta(meta)
+
+    assert whole == {**meta, "region": [0, 0, WIDTH, HEIGHT], "decimation": 1}
+    assert part == {**meta, "region": [1, 2, 3, 4], "decimation": 2}
 
 
 def test_a_query_reads_the_same_as_four_numbers() -> None:

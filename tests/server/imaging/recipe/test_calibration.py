@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from tests.serving import serving
 from transientcam import Camera as RemoteCamera
+from transientcam.documents import FrameDocument
 from transientcam_driver import (
     CalibrationCapture,
     CalibrationMismatch,
@@ -233,10 +234,10 @@ def test_the_pattern_of_the_simulated_prototype_is_removed(calibrated: Path, wal
     assert range_error_m(wall, calibration) < 0.5 * range_error_m(wall, None)
 
 
-def with_pipeline(camera: Camera, **options: Any) -> dict[str, Any]:
+def with_pipeline(camera: Camera, **options: Any) -> FrameDocument:
     """The metadata of one frame, after its moments were computed."""
 
-    async def main() -> dict[str, Any]:
+    async def main() -> FrameDocument:
         with ThreadPoolExecutor(2, thread_name_prefix="worker") as executor:
             workers = Workers(executor, count=2)
             pipeline = Pipeline(camera, ReconstructionSettings(), workers, **options)
@@ -262,6 +263,7 @@ def test_outlier_images_are_left_out_and_counted(take_order: Any) -> None:
         camera.configure(sequence)
         meta = with_pipeline(camera)
 
+    assert meta["rejected_images"] is not None
     assert 0 < meta["rejected_images"] < 0.25 * sequence.images
 
 

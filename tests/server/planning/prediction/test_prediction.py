@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import transientcam_moments as tm
-from benchmarks.accuracy.promises import measured
+from benchmarks.accuracy.capturing import measured
 from tests.server.planning.looks import SETTINGS, looked
 from transientcam_driver import Sequence
 from transientcam_server.planning import Goal, Planner, SceneStatistics, uniform_scene

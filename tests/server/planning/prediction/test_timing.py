@@ -77,7 +77,7 @@ def test_a_plan_within_a_budget_of_computing_time_says_that_it_compiles(
 def test_a_budget_of_computing_time_affords_nothing_that_is_unknown() -> None:
     goal = Goal(computing_share=0.5)
 
-    assert goal.affords_computing(0.5)
-    assert not goal.affords_computing(0.6)
-    assert not goal.affords_computing(None)
-    assert Goal(capture_s=1.0).affords_computing(None)
+    assert goal.affords(0.1, lambda: 0.05)
+    assert not goal.affords(0.1, lambda: 0.06)
+    assert not goal.affords(0.1, lambda: None)
+    assert Goal(capture_s=1.0).affords(0.1, lambda: None)

@@ -11,7 +11,6 @@ import pytest
 from tests.server.planning import calls
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.planning import PlanningProcess, Progress
-from transientcam_server.planning._process.process import NICE
 
 
 @pytest.fixture(scope="module")
@@ -41,12 +40,6 @@ def test_another_process_computes_and_stays_for_the_next_call(process: PlanningP
     first, second = (process.run(calls.pid, progress=Progress()) for _ in range(2))
 
     assert first == second != os.getpid()
-
-
-def test_it_takes_what_others_leave_of_the_processor(process: PlanningProcess) -> None:
-    niceness = process.run(calls.niceness, progress=Progress())
-
-    assert niceness == min(os.nice(0) + NICE, 19)
 
 
 def test_each_step_and_what_it_shows_arrives_once_and_in_order(process: PlanningProcess) -> None:

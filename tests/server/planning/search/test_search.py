@@ -8,12 +8,11 @@ import pytest
 
 from tests.server.planning.closed_form import MARGIN, ClosedForm, everything, planned, quickest_s
 from transientcam_driver import Capabilities, Sequence
-from transientcam_server.planning import Goal, Progress
+from transientcam_server.planning import Goal
 from transientcam_server.planning._prediction.intervals import Figure
 from transientcam_server.planning._prediction.prediction import Prediction, Predictor
 from transientcam_server.planning._search.families import families
 from transientcam_server.planning._search.plan import plan
-from transientcam_server.planning._search.search import Search
 
 
 @pytest.mark.parametrize("target_m", [0.03, 0.008, 0.002])
@@ -147,35 +146,3 @@ def test_no_exposure_saturates_and_no_range_is_ambiguous(capabilities: Capabilit
     assert max(exposures_s) <= 0.9 * 0.004 + 1e-9
     assert {family.first.base_frequency_hz for family in near} == {11.5e6, 23e6, 46e6, 69e6}
     assert {family.first.base_frequency_hz for family in far} == {11.5e6}
-
-
-def test_lines_fall_onto_the_bias(capabilities: Capabilities) -> None:
-    predictor = cast(Predictor, ClosedForm())
-    goal = Goal()
-    search = Search(goal, families(goal, predictor, capabilities), predictor, lambda *_: 1e-3)
-
-    shares: list[float] = []
-    progress = Progress(lambda share, step: shares.append(share))
-    *so_far, front = search.fronts("range_error_m", progress)
-    ends = front[0].applied.capture_s, front[-1].applied.capture_s
-    for part in so_far[1:]:
-        times_s = [choice.applied.capture_s for choice in part]
-        assert times_s == sorted(times_s)
-        assert (times_s[0], times_s[-1]) == ends, "both ends first, then what is between"
-    assert [len(part) for part in so_far] == sorted(len(part) for part in so_far)
-    lines = search.lines(front)
-
-    assert shares == sorted(set(shares))
-    assert (shares[0], len(shares)) == (0.0, 12)
-
-    times_s = [choice.applied.capture_s for choice in front]
-    assert len(front) > 3
-    assert times_s == sorted(times_s)
-    for line in lines:
-        noise_m = [point.range_std_m for point in line.points]
-        assert noise_m == sorted(noise_m, reverse=True)
-        assert len({point.range_bias_m for point in line.points}) == 1
-        assert all(
-            point.range_error_m == math.hypot(point.range_std_m, point.range_bias_m)
-            for point in line.points
-        )

@@ -1,4 +1,4 @@
-import type { VerdictDocument } from "../../store/documents";
+import type { VerdictDocument } from "../../stream/documents";
 
 /** Which pixels speak against a diffusor, in blocks. */
 export function Blocks({ verdict: { blocks, block_px } }: { verdict: VerdictDocument }) {

@@ -1,8 +1,8 @@
 import { useSignal } from "@preact/signals";
 import { engineering, fixed } from "../../scales/format";
 import { calibrationPath } from "../../store/api";
-import type { CalibrationDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
+import type { CalibrationDocument } from "../../stream/documents";
 import { ActionMenu } from "../../ui/ActionMenu";
 import { download } from "../../ui/files";
 import { Steer } from "../../ui/Steer";
@@ -10,6 +10,7 @@ import type { Task } from "../../ui/useTask";
 import { clock } from "../replay/words";
 import { Blocks } from "./Blocks";
 import { ageOf, doubtOf, driftOf } from "./words";
+import "../recordings/RecordingRow.css";
 
 /** What is used where no calibration is. */
 export function NominalRow({ active, task }: { active: boolean; task: Task }) {

@@ -1,13 +1,15 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { fixed } from "../../scales/format";
-import type { CalibrationDocument, JobDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
+import type { CalibrationDocument, JobDocument } from "../../stream/documents";
 import { Confirm } from "../../ui/Confirm";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
 import { CalibrationRow, NominalRow } from "./CalibrationRow";
+import "../recordings/RecordForm.css";
+import "./CalibrationView.css";
 
 /** As the service has it where nothing is said. */
 const DEFAULT_FRAMES = "40";
@@ -24,7 +26,7 @@ export function CalibrationView() {
   const doomed = deleting.value;
   return (
     <Panel name="calibration" title={<h2>Calibration</h2>} tools={<Import task={task} />}>
-      <div class="panel-body">
+      <div class="panel-body fades">
         {job === null ? <MeasureForm task={task} /> : <Measuring job={job} task={task} />}
         <Obstacle />
         <TaskLine task={task} field="calibration-status" />

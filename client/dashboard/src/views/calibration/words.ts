@@ -1,5 +1,5 @@
 import { fixed } from "../../scales/format";
-import type { CalibrationDocument, VerdictDocument } from "../../store/documents";
+import type { CalibrationDocument, VerdictDocument } from "../../stream/documents";
 
 /** How old something is, as people say it. */
 export function ageOf(age_s: number): string {

@@ -1,6 +1,7 @@
 import { timeOfDay } from "../../scales/format";
 import { useStore } from "../../store/store";
 import { Panel } from "../../ui/Panel";
+import "./EventsView.css";
 
 /** What happened since the page was opened, the newest first. */
 export function EventsView() {
@@ -8,9 +9,9 @@ export function EventsView() {
   const all = [...events.all.value].reverse();
   return (
     <Panel name="events" title={<h2>What happened</h2>}>
-      <div class="panel-body">
+      <div class="panel-body fades">
         {all.length === 0 && <p class="quiet recordings-none">Nothing worth telling since the page was opened.</p>}
-        <ul class="events" tabIndex={0} aria-label="What happened">
+        <ul class="events fades" tabIndex={0} aria-label="What happened">
           {all.map(({ number, at_s, words, tone }) => (
             <li key={number} class={`event event-${tone}`}>
               <time class="quiet">{timeOfDay(at_s)}</time> {words}

@@ -3,6 +3,7 @@ import { useEffect } from "preact/hooks";
 
 import { useStore } from "../../store/store";
 import { openFile } from "./openFile";
+import "./FileDrop.css";
 
 const carriesFiles = (event: DragEvent): boolean => event.dataTransfer?.types.includes("Files") ?? false;
 

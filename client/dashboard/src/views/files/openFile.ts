@@ -1,7 +1,7 @@
 /** Files that a user gives to the page: a scene, a recording, a calibration. */
 import { RequestError } from "../../store/api";
-import type { RecordingDocument } from "../../store/documents";
 import type { Store } from "../../store/store";
+import type { RecordingDocument } from "../../stream/documents";
 
 /** Characters of a scene that the service takes. */
 const LONGEST_SCENE = 65_536;

@@ -12,6 +12,7 @@ import { useDrawing } from "../../ui/hooks";
 import { lensOf } from "../points/lens";
 import { PinsRow } from "./PinsRow";
 import { planeOf } from "./plane";
+import "./Measured.css";
 
 const BINS = 64;
 const HEIGHT_PX = 24;

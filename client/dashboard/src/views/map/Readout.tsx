@@ -6,6 +6,7 @@ import type { Look } from "../../store/looks";
 import { WINDOW } from "../../store/noise";
 import type { Pixel } from "../../store/pixel";
 import { useStore } from "../../store/store";
+import "./Readout.css";
 
 /** Value of a frame at a pixel; NaN without a frame, a pixel or a value. */
 export function valueAtPixel(frame: Frame | null, pixel: Pixel | null): number {

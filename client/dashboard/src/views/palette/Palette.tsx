@@ -4,6 +4,7 @@ import { useEffect, useId, useRef } from "preact/hooks";
 import { useStore } from "../../store/store";
 import { SwitchedDialog } from "../../ui/Dialog";
 import { commandsOf, matching } from "./commands";
+import "./Palette.css";
 
 /** All commands of the page, by the keyboard: type, choose by arrow keys, Enter. After the WAI-ARIA pattern "combobox" with a list. */
 export function Palette() {

@@ -2,7 +2,7 @@ import { signal } from "@preact/signals";
 import { useMemo } from "preact/hooks";
 import type uPlot from "uplot";
 
-import { oneOf, remembered } from "../../store/settings";
+import { oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { Tabs } from "../../ui/controls";
 import { save } from "../../ui/download";
@@ -11,6 +11,7 @@ import { Panel } from "../../ui/Panel";
 import { AlongLine } from "./AlongLine";
 import { KEPT_S } from "./history";
 import { OverTime } from "./OverTime";
+import "./PlotsView.css";
 
 type Side = "time" | "line";
 const SIDES: readonly { readonly value: Side; readonly text: string; readonly hint: string }[] = [
@@ -18,10 +19,12 @@ const SIDES: readonly { readonly value: Side; readonly text: string; readonly hi
   { value: "line", text: "Line A to B", hint: "Along the line from pin A to pin B" },
 ];
 
+const SIDE: Setting<Side> = { key: "plots.side", initial: "time", ...oneOf(SIDES.map(({ value }) => value)) };
+
 /** Values of the map that is shown: over the last seconds, or along a line. */
 export function PlotsView() {
   const store = useStore();
-  const side = useMemo(() => remembered<Side>(store.shelf, "plots.side", "time", oneOf(SIDES.map(({ value }) => value))), [store]);
+  const side = store.settings.of(SIDE);
   const look = store.looks.of(store.mapProduct.value);
   const { product, name, scatterOf } = look.product;
   useProducts([scatterOf ?? product]);

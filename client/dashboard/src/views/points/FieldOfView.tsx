@@ -1,12 +1,13 @@
 import { DEGREE } from "../../physics/constants";
 import { fixed } from "../../scales/format";
-import { isField, useStore } from "../../store/store";
+import { useStore } from "../../store/store";
 import { fieldOfView } from "./cloud";
-import { knownLens } from "./lens";
+import { FIELD_DEG, FIELDS_DEG, knownLens } from "./lens";
 
 /** How wide the camera looks: as the service says, or to be set where it does not know. */
 export function FieldOfView() {
   const store = useStore();
+  const field_deg = store.settings.of(FIELD_DEG);
   const known = knownLens(store);
   if (known !== null) {
     return (
@@ -23,10 +24,10 @@ export function FieldOfView() {
         type="number"
         min={5}
         max={150}
-        value={store.field_deg.value}
+        value={field_deg.value}
         aria-label="Horizontal field of view in degrees"
         onChange={(event) => {
-          if (isField(event.currentTarget.valueAsNumber)) store.field_deg.value = event.currentTarget.valueAsNumber;
+          if (FIELDS_DEG.accepts(event.currentTarget.valueAsNumber)) field_deg.value = event.currentTarget.valueAsNumber;
         }}
       />
       °

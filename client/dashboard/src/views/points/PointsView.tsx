@@ -7,7 +7,7 @@ import { grouped } from "../../scales/format";
 import { LIVE, RequestError } from "../../store/api";
 import type { Frame } from "../../store/frames";
 import type { TransientLook } from "../../store/lightLook";
-import { aBoolean, aNumber, oneOf, remembered } from "../../store/settings";
+import { aBoolean, aNumber, oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { frameUrl } from "../../stream/frameUrl";
 import { ColourBar } from "../../ui/ColourBar";
@@ -26,6 +26,7 @@ import { knownLens, lensOf } from "./lens";
 import { plyOf } from "./ply";
 import type { PointScene } from "./Scene";
 import { SceneStage } from "./SceneStage";
+import "./PointsView.css";
 
 const COLOURINGS = ["range", "light", "validity", "flight"] as const;
 type Colouring = (typeof COLOURINGS)[number];
@@ -33,13 +34,18 @@ const NAMES: Record<Exclude<Colouring, "light">, string> = { range: "range", val
 /** What the colours are made of, besides the range and the light. */
 const NEEDED: Record<Colouring, readonly string[]> = { range: [], light: [], validity: ["flags"], flight: ["coefficients"] };
 
+const COLOURING: Setting<Colouring> = { key: "points.colouring", initial: "range", ...oneOf(COLOURINGS) };
+const SIZE_PX: Setting<number> = { key: "points.size", initial: 2, ...aNumber() };
+const SHADED: Setting<boolean> = { key: "points.shaded", initial: true, ...aBoolean() };
+const SURROUNDED: Setting<boolean> = { key: "points.surrounded", initial: true, ...aBoolean() };
+
 /** The range map as points in space. */
 export function PointsView() {
   const store = useStore();
-  const colouring = useMemo(() => remembered<Colouring>(store.shelf, "points.colouring", "range", oneOf(COLOURINGS)), [store]);
-  const pointSize = useMemo(() => remembered(store.shelf, "points.size", 2, aNumber), [store]);
-  const shaded = useMemo(() => remembered(store.shelf, "points.shaded", true, aBoolean), [store]);
-  const surrounded = useMemo(() => remembered(store.shelf, "points.surrounded", true, aBoolean), [store]);
+  const colouring = store.settings.of(COLOURING);
+  const pointSize = store.settings.of(SIZE_PX);
+  const shaded = store.settings.of(SHADED);
+  const surrounded = store.settings.of(SURROUNDED);
   const { light } = store;
   const ofLight = store.frames.amplitude.value;
   const [rangeLook, lightLook] = [store.looks.of("range"), store.looks.of(ofLight)];

@@ -1,20 +1,26 @@
 /** Where pixels look: as the service says, or by a field of view that is assumed. */
 import { DEGREE } from "../../physics/constants";
 import type { Pixel } from "../../store/pixel";
+import { aNumber, type Setting } from "../../store/settings";
 import type { Store } from "../../store/store";
-import type { Intrinsics } from "../../stream/protocol";
+import type { IntrinsicsDocument } from "../../stream/documents";
 import { fillCloud, makeCloud, type Pinhole, pinholeOf } from "./cloud";
 
 /** What the service knows of the lens; null where it only assumes. */
-export function knownLens({ camera }: Store): Intrinsics | null {
+export function knownLens({ camera }: Store): IntrinsicsDocument | null {
   const lens = camera.value?.intrinsics;
   return lens === undefined || lens.source === "assumed" ? null : lens;
 }
 
+/** Fields of view that a camera may have, across, in degrees. */
+export const FIELDS_DEG = aNumber(5, 150);
+/** Used where the service does not know where its camera looks. */
+export const FIELD_DEG: Setting<number> = { key: "points.field_deg", initial: 45, ...FIELDS_DEG };
+
 /** The lens for pictures of a size. */
 export function lensOf(store: Store, width: number, height: number): Pinhole {
   const lens = knownLens(store);
-  return lens !== null && lens.width === width && lens.height === height ? lens : pinholeOf(width, height, store.field_deg.value * DEGREE);
+  return lens !== null && lens.width === width && lens.height === height ? lens : pinholeOf(width, height, store.settings.of(FIELD_DEG).value * DEGREE);
 }
 
 /** A pixel with its range and the deviation of that, both in m. */

@@ -1,12 +1,12 @@
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
-
-import type { ParameterDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
+import type { ParameterDocument } from "../../stream/documents";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
 import { type Draft, draftOf, isNumber, labelOf, readingOf, spanOf, unitOf } from "./fields";
+import "./ReconstructionView.css";
 
 /** How images become moments and moments become returns; changed while frames come. */
 export function ReconstructionView() {
@@ -42,7 +42,7 @@ export function ReconstructionView() {
       }
     >
       <form
-        class="panel-body"
+        class="panel-body fades"
         onSubmit={(event) => {
           event.preventDefault();
           if ("settings" in reading) void apply(reading.settings, typed.peek()?.tag ?? current?.tag ?? null);

@@ -1,7 +1,7 @@
 /** A form made of what the service says can be set: texts as they are typed, and what they stand for. */
 
 import { withUnit } from "../../scales/format";
-import type { ParameterDocument } from "../../store/documents";
+import type { ParameterDocument } from "../../stream/documents";
 
 export type Draft = Readonly<Record<string, string>>;
 

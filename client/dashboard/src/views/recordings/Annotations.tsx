@@ -1,11 +1,11 @@
 import { useSignal } from "@preact/signals";
-
-import type { RecordingDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
+import type { RecordingDocument } from "../../stream/documents";
 import { Dialog } from "../../ui/Dialog";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
 import { annotationsOf, type Line, linesOf } from "./lines";
+import "./Annotations.css";
 
 /** What is written about a recording: names and what they say, one a line. */
 export function Annotations({ recording, onClose }: { recording: RecordingDocument; onClose: () => void }) {

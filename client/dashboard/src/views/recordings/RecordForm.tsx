@@ -4,6 +4,7 @@ import { PAST_S } from "../../store/recordings";
 import { useStore } from "../../store/store";
 import type { Task } from "../../ui/useTask";
 import { limitsOf } from "./limits";
+import "./RecordForm.css";
 
 /** What to call a recording and when to end it; and a button that saves what just happened. */
 export function RecordForm({ task }: { task: Task }) {
@@ -61,7 +62,7 @@ export function RecordForm({ task }: { task: Task }) {
         />
       </label>
       <fieldset class="record-limits">
-        <legend>Ends after</legend>
+        <legend class="unseen">Ends after</legend>
         {number("Duration", "s", duration_s, "duration_s")}
         {number("Size", "MB", size_mb, "size_mb")}
         {number("Frames", "", frames, "frames")}

@@ -1,15 +1,16 @@
 import { grouped } from "../../scales/format";
 import { recordingPath } from "../../store/api";
-import type { RecordingDocument, RecordingState } from "../../store/documents";
 import { END_REASONS } from "../../store/events";
 import { useStore } from "../../store/store";
+import type { RecordingDocument } from "../../stream/documents";
 import { ActionMenu } from "../../ui/ActionMenu";
 import { download } from "../../ui/files";
 import { PlayIcon } from "../../ui/icons";
 import type { Task } from "../../ui/useTask";
 import { bytes, clock, duration } from "../replay/words";
+import "./RecordingRow.css";
 
-const STATES: Readonly<Record<RecordingState, string | null>> = {
+const STATES: Readonly<Record<RecordingDocument["state"], string | null>> = {
   recording: "running",
   finishing: "finishing",
   complete: null,

@@ -1,8 +1,8 @@
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { grouped } from "../../scales/format";
-import type { RecordingDocument } from "../../store/documents";
 import { useStore } from "../../store/store";
+import type { RecordingDocument } from "../../stream/documents";
 import { Confirm } from "../../ui/Confirm";
 import { Panel } from "../../ui/Panel";
 import { TaskLine } from "../../ui/Steer";
@@ -12,6 +12,7 @@ import { bytes, duration } from "../replay/words";
 import { Annotations } from "./Annotations";
 import { RecordForm } from "./RecordForm";
 import { RecordingRow } from "./RecordingRow";
+import "./RecordingsView.css";
 
 /** Recordings: start and stop one, look through them, play them, take them home. */
 export function RecordingsView() {
@@ -38,7 +39,7 @@ export function RecordingsView() {
         </>
       }
     >
-      <div class="panel-body">
+      <div class="panel-body fades">
         {recordings.active.value === null ? <RecordForm task={task} /> : <Running recording={recordings.active.value} task={task} />}
         <TaskLine task={task} field="recordings-status" />
         {recordings.trouble.value !== null && <p class="refusal">{recordings.trouble.value}</p>}

@@ -1,4 +1,4 @@
-import type { RecordingRequest } from "../../store/documents";
+import type { RecordingRequest } from "../../stream/documents";
 
 /** Limits of a recording as they are typed; empty for none. */
 export interface TypedLimits {

@@ -5,6 +5,7 @@ import { useStore } from "../../store/store";
 import { Choice } from "../../ui/controls";
 import { PauseIcon, PlayIcon, StepIcon } from "../../ui/icons";
 import { clock } from "./words";
+import "./ReplayBar.css";
 
 /** The timeline of the recording that the views show, and the way back to the camera. */
 export function ReplayBar() {

@@ -1,10 +1,11 @@
 import { rangeOfTime_m } from "../../physics/constants";
 import { deviation, engineering, fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
-import type { PixelDocument, Return } from "../../stream/protocol";
+import type { PixelDocument, ReturnDocument } from "../../stream/documents";
 import { FLAGS } from "../../ui/flags";
 import type { FlagHistory } from "./flagShares";
 import { linesOf, type ReturnHistory, type ReturnLine, sifted } from "./returns";
+import "./Listings.css";
 
 /** What the service found at the pixel: returns, the truth where it is known, and flags. `held` is the number of the frame that is held. */
 export function Found({ details, held, flags, returns }: { details: PixelDocument | null; held: number | null; flags: FlagHistory; returns: ReturnHistory }) {
@@ -90,8 +91,8 @@ function differenceOf({ found, truth }: ReturnLine): string {
 }
 
 interface ReturnRowProps {
-  readonly found: Return | null;
-  readonly truth: Return | null;
+  readonly found: ReturnDocument | null;
+  readonly truth: ReturnDocument | null;
   readonly difference: string;
   readonly history: ReturnHistory;
 }

@@ -2,6 +2,7 @@ import type { ReadonlySignal } from "@preact/signals";
 
 import type { Pixel } from "../../physics/reflection";
 import { fixed } from "../../scales/format";
+import "./MomentsPlane.css";
 
 /** A little more than the unit circle, so that labels have room. */
 const REACH = 1.25;

@@ -9,14 +9,15 @@ import { autoLimits, type Span } from "../../scales/scale";
 import type { Frame } from "../../store/frames";
 import { PIN_COLOURS } from "../../store/measures";
 import type { Pixel } from "../../store/pixel";
-import { ASPECTS, type Aspect, SIDES } from "../../store/pixelSides";
-import { aBoolean, remembered } from "../../store/settings";
+import type { Lit } from "../../store/player";
+import { aBoolean, type Setting } from "../../store/settings";
 import { type Store, useStore } from "../../store/store";
 import { Tabs, Toggle } from "../../ui/controls";
 import { save } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
+import { litOf, steady } from "../transient/arrivals";
 import { csvOf, drawnOf, type Subject } from "./curves";
 import { PixelFigures } from "./Figures";
 import { FlagHistory } from "./flagShares";
@@ -25,7 +26,14 @@ import { FlagWords, Found } from "./Listings";
 import { MomentsPlane } from "./MomentsPlane";
 import { type ResponsePlot, responsePlot } from "./plot";
 import { ReturnHistory } from "./returns";
+import { ASPECTS, type Aspect, SIDE, SIDES } from "./sides";
 import { NO_STEMS, stemsOf } from "./stems";
+import "./ResponseView.css";
+
+const LOGARITHMIC: Setting<boolean> = { key: "response.logarithmic", initial: false, ...aBoolean() };
+/** Only the part of the period is plotted in which the picture has light. */
+const LIT: Setting<boolean> = { key: "response.lit", link: "lit", initial: false, ...aBoolean() };
+const PERIOD: Lit = { first: 0, last: 1 };
 
 /** Share of the height that the axis was made for which is left after a frame without such a peak. */
 const SHRINK = 0.96;
@@ -41,7 +49,7 @@ export function ResponseView() {
   const frame = store.frames.of(obstacle === undefined ? "coefficients" : "range");
   useEffect(() => store.details.follow(store.selected, frame), [store, frame]);
   useEffect(() => selectFirst(store, frame), [store, frame]);
-  const { side } = store;
+  const side = store.settings.of(SIDE);
   const shown = useMemo(
     () =>
       computed(() => {
@@ -55,7 +63,7 @@ export function ResponseView() {
     [frame, store],
   );
   const levinson = useComputed(() => (shown.value === null ? null : pixelOf(shown.value.coefficients, shown.value.index)));
-  const logarithmic = useMemo(() => remembered(store.shelf, "response.logarithmic", false, aBoolean), [store]);
+  const logarithmic = store.settings.of(LOGARITHMIC);
   const pointed = useSignal("");
   const pixel = useComputed(() => (absent.value.coefficients === undefined ? (shown.value?.pixel ?? null) : store.selected.value));
   const frameless = useComputed(() => frame.value === null);
@@ -95,7 +103,7 @@ export function ResponseView() {
           <Plot key={side.value} aspect={side.value} logarithmic={logarithmic} shown={shown} returns={returns} pointed={pointed} />
         )}
         {place.value !== null && (
-          <aside class="response-side" aria-label="What was found at the pixel" tabIndex={0}>
+          <aside class="response-side fades" aria-label="What was found at the pixel" tabIndex={0}>
             <Found flags={flags} returns={returns} details={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
             {pixel.value !== null && <PixelFigures key={place.value} pixel={pixel.value} />}
             <FlagWords flags={flags} looked={store.details.document.value !== null} />
@@ -145,13 +153,15 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
   const held = useRef(0);
   const heldFor = useRef<Pixel | null>(null);
   const top = useRef<Span | null>(null);
+  const lit = store.settings.of(LIT);
+  const part = useSignal(PERIOD);
   useEffect(() => {
     if (box.current === null) return undefined;
     const made = responsePlot(box.current, {
       aspect,
       logarithmic,
       top: () => top.current?.high ?? 1,
-      period_ns: () => store.period_s.peek() * 1e9,
+      ends_ns: () => [part.peek().first * store.period_s.peek() * 1e9, part.peek().last * store.period_s.peek() * 1e9],
       seek: (time_ns) => {
         store.player.playing.value = false;
         store.player.seek((time_ns * 1e-9) / store.period_s.peek());
@@ -186,13 +196,16 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
     held.current = now.pixel === heldFor.current ? Math.max(highest, SHRINK * held.current) : highest;
     heldFor.current = now.pixel;
     top.current = autoLimits(top.current, { low: 0, high: held.current });
+    const arrivals = lit.value && store.frames.of("coefficients").value?.light?.arrivals;
+    part.value = (arrivals && steady(part.peek(), litOf(arrivals))) || PERIOD;
     if (details !== null) returns.take(details, store.frames.sceneOf(details.meta));
     plot.value.show(curves, details === null ? NO_STEMS : stemsOf(details, truth, returns), ofPins);
   }, [plot, shown, returns, aspect]);
 
   useDrawing(() => {
-    const turn = store.player.turn.value;
-    if (plot.value !== null) plot.value.head.style.left = `${100 * turn}%`;
+    const { first, last } = part.value;
+    const place = (store.player.turn.value - first) / (last - first);
+    if (plot.value !== null) Object.assign(plot.value.head, { hidden: place < 0 || place > 1 }).style.left = `${100 * place}%`;
   }, [plot]);
 
   const simulated = store.details.document.value?.truth != null;
@@ -223,6 +236,13 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
         {aspect !== "cumulative" && !logarithmic && (
           <em title="Height: linear near zero, logarithmic where it is high, so that what is dim stays in sight beside narrow and high peaks">asinh</em>
         )}
+        <Toggle
+          pressed={lit.value}
+          title="Only the time between the first and the last light of the picture, instead of the whole period"
+          onToggle={() => (lit.value = !lit.peek())}
+        >
+          lit
+        </Toggle>
         {aspect === "density" && (
           <Toggle pressed={logarithmic} title="Logarithmic density" onToggle={() => (wanted.value = !wanted.peek())}>
             log

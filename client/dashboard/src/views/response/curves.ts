@@ -4,8 +4,8 @@ import type { Coefficients } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
 import { boundsAt, pixelOf, poissonKernel } from "../../physics/reflection";
 import type { Pin, PinName } from "../../store/measures";
-import type { Aspect } from "../../store/pixelSides";
-import type { PixelDocument } from "../../stream/protocol";
+import type { PixelDocument } from "../../stream/documents";
+import type { Aspect } from "./sides";
 
 export type Truth = NonNullable<PixelDocument["truth"]>;
 

@@ -1,5 +1,5 @@
 /** Which flags a pixel carried lately, and how often: one look at a time would flicker between two truths. */
-import type { PixelDocument } from "../../stream/protocol";
+import type { PixelDocument } from "../../stream/documents";
 
 /** Looks that count. */
 export const LOOKS = 30;

@@ -3,8 +3,8 @@ import uPlot from "uplot";
 import { rangeOfTime_m } from "../../physics/constants";
 import { grouped, significant, withUnit } from "../../scales/format";
 import { PIN_COLOURS, PIN_NAMES } from "../../store/measures";
-import type { Aspect } from "../../store/pixelSides";
 import { type Curves, ESTIMATES, type PinLines } from "./curves";
+import type { Aspect } from "./sides";
 import { drawStems, NO_STEMS, type Stems } from "./stems";
 
 /** The plot, and the line that marks the player's time in it. */
@@ -20,8 +20,8 @@ export interface PlotOptions {
   readonly logarithmic: boolean;
   /** Upper end of the density's axis. */
   readonly top: () => number;
-  /** The time after which the flight repeats: the right end of the axis, before there is data too. */
-  readonly period_ns: () => number;
+  /** Both ends of the axis of time, before there is data too. */
+  readonly ends_ns: () => [number, number];
   /** Called with the time that was clicked. */
   readonly seek: (time_ns: number) => void;
   /** Called with the sample under the pointer; null when it leaves. */
@@ -29,7 +29,7 @@ export interface PlotOptions {
 }
 
 /** A plot of light over time of flight in ns, with the range it stands for on top. */
-export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, period_ns, seek, point }: PlotOptions): ResponsePlot {
+export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, ends_ns, seek, point }: PlotOptions): ResponsePlot {
   const style = getComputedStyle(box);
   const ink = style.getPropertyValue("--quiet");
   const hairline = style.getPropertyValue("--hairline");
@@ -68,7 +68,7 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, perio
         draw: [(drawn) => drawStems(drawn, stems, { found: line, truth: truthInk })],
       },
       scales: {
-        x: { time: false, range: () => [0, period_ns()] },
+        x: { time: false, range: ends_ns },
         y: logarithmic
           ? { distr: 3, range: () => [10 ** (decade(top()) - LOG_DECADES), top()] }
           : aspect !== "cumulative"

@@ -1,5 +1,5 @@
 /** The returns of one pixel beside what is true, and how they scatter from look to look. */
-import type { PixelDocument, Return } from "../../stream/protocol";
+import type { PixelDocument, ReturnDocument } from "../../stream/documents";
 
 /** Returns with less than this share of the light are listed together. */
 const WEAK_SHARE = 0.02;
@@ -10,7 +10,7 @@ const LOOKS = 30;
 const FEWEST = 5;
 
 /** The returns that are worth a line, by time, and the light of the others together. */
-export function sifted(returns: readonly Return[]): { readonly strong: readonly Return[]; readonly weak: number; readonly weakShare: number } {
+export function sifted(returns: readonly ReturnDocument[]): { readonly strong: readonly ReturnDocument[]; readonly weak: number; readonly weakShare: number } {
   const light = returns.reduce((sum, { weight }) => sum + Math.max(0, weight), 0);
   const strong = returns.filter(({ weight }) => weight >= WEAK_SHARE * light).sort((a, b) => a.time_s - b.time_s);
   const rest = returns.filter((each) => !strong.includes(each));
@@ -19,12 +19,12 @@ export function sifted(returns: readonly Return[]): { readonly strong: readonly 
 
 /** A line of the table: what was found, what is true, or both. */
 export interface ReturnLine {
-  readonly found: Return | null;
-  readonly truth: Return | null;
+  readonly found: ReturnDocument | null;
+  readonly truth: ReturnDocument | null;
 }
 
 /** Returns beside the true ones, by time. The two are the same one where each is the nearest to the other. */
-export function linesOf(found: readonly Return[], truth: readonly Return[]): ReturnLine[] {
+export function linesOf(found: readonly ReturnDocument[], truth: readonly ReturnDocument[]): ReturnLine[] {
   const matched = found.map((each) => {
     const near = nearest(each, truth);
     return { found: each, truth: near !== null && nearest(near, found) === each ? near : null };
@@ -34,9 +34,9 @@ export function linesOf(found: readonly Return[], truth: readonly Return[]): Ret
   return [...matched, ...missed].sort((a, b) => time_s(a) - time_s(b));
 }
 
-function nearest(each: Return, others: readonly Return[]): Return | null {
-  const distance = (other: Return): number => Math.abs(other.time_s - each.time_s);
-  return others.reduce<Return | null>((best, other) => (best === null || distance(other) < distance(best) ? other : best), null);
+function nearest(each: ReturnDocument, others: readonly ReturnDocument[]): ReturnDocument | null {
+  const distance = (other: ReturnDocument): number => Math.abs(other.time_s - each.time_s);
+  return others.reduce<ReturnDocument | null>((best, other) => (best === null || distance(other) < distance(best) ? other : best), null);
 }
 
 /** Standard deviations (1 σ) of a return over the last looks; NaN before there were enough. */
@@ -49,7 +49,7 @@ export interface Scatter {
 export class ReturnHistory {
   #place = "";
   #frame = NaN;
-  #looks: (readonly Return[])[] = [];
+  #looks: (readonly ReturnDocument[])[] = [];
 
   /** Takes a look, once a frame; another pixel, sequence or scene begins anew. */
   take({ x, y, returns, meta }: Pick<PixelDocument, "x" | "y" | "returns" | "meta">, scene = ""): void {
@@ -61,7 +61,7 @@ export class ReturnHistory {
   }
 
   /** How a return scatters. */
-  of(found: Return): Scatter {
+  of(found: ReturnDocument): Scatter {
     const same = this.#looks.flatMap((look) => {
       const near = nearest(found, look);
       return near !== null && Math.abs(near.time_s - found.time_s) <= SAME_S ? [near] : [];

@@ -1,6 +1,6 @@
 import type uPlot from "uplot";
 
-import type { PixelDocument } from "../../stream/protocol";
+import type { PixelDocument } from "../../stream/documents";
 import type { Truth } from "./curves";
 import { type ReturnHistory, sifted } from "./returns";
 
@@ -36,8 +36,11 @@ const CAP_PX = 5;
 
 /** Draws returns as stems from the foot of the plot, found ones over the true ones and with ± 1 σ of their time. */
 export function drawStems(plot: uPlot, { found, truth }: Stems, ink: { readonly found: string; readonly truth: string }): void {
-  const { ctx } = plot;
+  const { ctx, bbox } = plot;
   ctx.save();
+  ctx.beginPath();
+  ctx.rect(bbox.left, 0, bbox.width, ctx.canvas.height);
+  ctx.clip(); // the plot may show a part of the period
   ctx.setLineDash([]);
   ctx.strokeStyle = ink.truth;
   ctx.lineWidth = TRUTH_WIDTH_PX * devicePixelRatio;

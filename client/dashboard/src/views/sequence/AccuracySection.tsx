@@ -1,6 +1,6 @@
 import { engineering, fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
-import type { AppliedSequence, Choice } from "../../stream/protocol";
+import type { AppliedDocument, ChoiceDocument } from "../../stream/documents";
 import { useProducts } from "../../ui/hooks";
 import { Obstacle, Steer } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
@@ -12,9 +12,10 @@ import { GoalForm } from "./GoalForm";
 import { sameSequence, standingOf } from "./place";
 import { Summary } from "./Summary";
 import { errorWords } from "./words";
+import "./AccuracySection.css";
 
 /** What accuracy costs in time on the scene before the camera: the front, and a slider along it that sets the sequence. */
-export function AccuracySection({ applied }: { applied: AppliedSequence }) {
+export function AccuracySection({ applied }: { applied: AppliedDocument }) {
   const store = useStore();
   const { accuracy, sequencing, obstacle } = store;
   const task = useTask();
@@ -27,7 +28,7 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
   const truth_m = judged ? (tradeoff.current.range_error_m?.median ?? null) : null;
   const looked = accuracy.looked.value;
   const busy = accuracy.job.value !== null || task.busy.value !== null;
-  const look = (choice: Choice): void => {
+  const look = (choice: ChoiceDocument): void => {
     accuracy.looked.value = choice;
   };
   const apply = async (): Promise<void> => {
@@ -38,7 +39,7 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
     }
   };
   return (
-    <div class="accuracy" data-predicted={tradeoff !== null}>
+    <div class="accuracy fades" data-predicted={tradeoff !== null}>
       {tradeoff !== null && <FrontPlot tradeoff={tradeoff} now={now} chosen={looked} onChoose={look} />}
       <div class="accuracy-control">
         <p class="accuracy-figures">{looked === null ? <NowFigures applied={applied} truth_m={truth_m} /> : <LookedFigures choice={looked} />}</p>
@@ -56,7 +57,7 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
           </div>
         )}
       </div>
-      <div class="accuracy-facts">
+      <div class="accuracy-facts fades">
         {looked === null ? <Summary applied={applied} /> : <ChoiceFacts choice={looked} />}
         <details class="accuracy-goal">
           <summary>Plan for a target</summary>
@@ -67,7 +68,7 @@ export function AccuracySection({ applied }: { applied: AppliedSequence }) {
   );
 }
 
-function LookedFigures({ choice }: { choice: Choice }) {
+function LookedFigures({ choice }: { choice: ChoiceDocument }) {
   return (
     <>
       <strong data-field="choice_range_error_m">± {engineering(choice.predicted.range_error_m.median, "m")}</strong>{" "}
@@ -78,7 +79,7 @@ function LookedFigures({ choice }: { choice: Choice }) {
 }
 
 /** How well the camera does now, by the figure of the header; and where the truth is known how far it is off. */
-function NowFigures({ applied, truth_m }: { applied: AppliedSequence; truth_m: number | null }) {
+function NowFigures({ applied, truth_m }: { applied: AppliedDocument; truth_m: number | null }) {
   const { status, rangeErrors } = useStore();
   const error = status.newest.value?.sequence_id === applied.sequence_id ? rangeErrors.now.value : null;
   return (

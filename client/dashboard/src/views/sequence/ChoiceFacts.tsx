@@ -1,10 +1,10 @@
 import { engineering, fixed } from "../../scales/format";
-import type { Choice } from "../../stream/protocol";
+import type { ChoiceDocument } from "../../stream/documents";
 import { Fact } from "./Figures";
 import { ZEROTH_NAMES } from "./words";
 
 /** A sequence that is looked at, and what is predicted of it. */
-export function ChoiceFacts({ choice }: { choice: Choice }) {
+export function ChoiceFacts({ choice }: { choice: ChoiceDocument }) {
   const { sequence, predicted } = choice;
   const { low, high } = predicted.range_error_m;
   const bias = engineering(predicted.range_bias_m, "m");

@@ -1,8 +1,9 @@
 import { engineering, fixed, grouped } from "../../scales/format";
-import type { AppliedSequence } from "../../stream/protocol";
+import type { AppliedDocument } from "../../stream/documents";
+import "./Figures.css";
 
 /** The figures that follow from a sequence; shown for the one in use and for one being edited. */
-export function Figures({ applied }: { applied: AppliedSequence }) {
+export function Figures({ applied }: { applied: AppliedDocument }) {
   return (
     <>
       <Fact name="Images" value={grouped(applied.images)} field="images" />

@@ -1,9 +1,10 @@
 import { signal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 import { engineering, significant } from "../../scales/format";
-import type { Choice, Tradeoff } from "../../stream/protocol";
+import type { ChoiceDocument, TradeoffDocument } from "../../stream/documents";
 import { useSize } from "../../ui/hooks";
 import { endsOf, marksOf, nearest, placeOf, type Standing, sameSequence } from "./place";
+import "./FrontPlot.css";
 
 const MARGIN = { left: 52, right: 14, top: 14, bottom: 50 };
 
@@ -13,10 +14,10 @@ const LABEL_PX = { width: 48, height: 16 };
 const STEPS: Readonly<Record<string, number | undefined>> = { ArrowRight: 1, ArrowLeft: -1, Enter: 0, " ": 0 };
 
 interface FrontPlotProps {
-  readonly tradeoff: Tradeoff;
+  readonly tradeoff: TradeoffDocument;
   readonly now: Standing | null;
-  readonly chosen: Choice | null;
-  readonly onChoose: (choice: Choice) => void;
+  readonly chosen: ChoiceDocument | null;
+  readonly onChoose: (choice: ChoiceDocument) => void;
 }
 
 /** The Pareto front with its uncertainty, and where the camera stands now. Points are chosen by click or key. */

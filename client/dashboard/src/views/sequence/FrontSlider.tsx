@@ -1,15 +1,16 @@
 import { useRef } from "preact/hooks";
 import { engineering, fixed } from "../../scales/format";
-import type { Choice } from "../../stream/protocol";
+import type { ChoiceDocument } from "../../stream/documents";
 import { sameSequence, stepOf } from "./place";
+import "./FrontSlider.css";
 
 interface FrontSliderProps {
   /** By rising time and falling error. */
-  readonly front: readonly Choice[];
+  readonly front: readonly ChoiceDocument[];
   /** Time of a capture with the sequence in use. */
   readonly now_s: number;
-  readonly looked: Choice | null;
-  readonly onLook: (choice: Choice) => void;
+  readonly looked: ChoiceDocument | null;
+  readonly onLook: (choice: ChoiceDocument) => void;
   /** The slider was let go at what is looked at. */
   readonly onRelease: () => void;
 }
@@ -67,6 +68,6 @@ export function FrontSlider({ front, now_s, looked, onLook, onRelease }: FrontSl
 }
 
 /** What a choice gives and takes: "± 4.0 mm in 94 ms, 10.6 Hz". */
-function choiceWords(choice: Choice): string {
+function choiceWords(choice: ChoiceDocument): string {
   return `± ${engineering(choice.predicted.range_error_m.median, "m", 2)} in ${engineering(choice.capture_s, "s", 2)}, ${fixed(choice.frame_rate_hz, 1, "Hz")}`;
 }

@@ -1,10 +1,11 @@
 import { useSignal } from "@preact/signals";
 
-import type { Goal } from "../../store/documents";
+import type { PlanRequest } from "../../stream/documents";
+import "./GoalForm.css";
 
 interface GoalFormProps {
   readonly disabled: boolean;
-  readonly onGoal: (goal: Goal) => void;
+  readonly onGoal: (goal: PlanRequest) => void;
 }
 
 /** A target, a budget, or both. */

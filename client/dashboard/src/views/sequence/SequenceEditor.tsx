@@ -3,12 +3,14 @@ import { useEffect, useMemo } from "preact/hooks";
 
 import { RequestError } from "../../store/api";
 import { useStore } from "../../store/store";
-import type { AppliedSequence, Problem, SequenceDocument, Zeroth } from "../../stream/protocol";
+import type { AppliedDocument } from "../../stream/documents";
+import type { Problem, SequenceRequest, TakeOrder, Zeroth } from "../../stream/protocol";
 import { Obstacle, Steer } from "../../ui/Steer";
 import { DRAFT_FIELD, type Draft, documentOf, draftOf } from "./draft";
 import { Figures } from "./Figures";
 import { PRESETS } from "./presets";
 import { fieldOf, sequenceProblem, TAKE_ORDER_NAMES, ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
+import "./SequenceEditor.css";
 
 /** Pause after the last keystroke before the service is asked what the sequence would cost. */
 const TYPING_PAUSE_MS = 250;
@@ -16,11 +18,11 @@ const TYPING_PAUSE_MS = 250;
 /** What came of asking the service about a draft. */
 type Verdict =
   | { readonly kind: "asking" }
-  | { readonly kind: "valid"; readonly applied: AppliedSequence }
+  | { readonly kind: "valid"; readonly applied: AppliedDocument }
   | { readonly kind: "refused"; readonly problem: Problem; readonly words: string };
 
 /** A form that shows, as you type, what a sequence would cost, and says in plain words what is wrong with it. */
-export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; onDone: () => void }) {
+export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; onDone: () => void }) {
   const store = useStore();
   // The sequence that editing began with: one that changes meanwhile must not overwrite what is typed.
   const base = useMemo(() => applied, []);
@@ -42,7 +44,7 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
     };
   }, [JSON.stringify(document)]);
 
-  const ask = async (asked: SequenceDocument, signal: AbortSignal): Promise<void> => {
+  const ask = async (asked: SequenceRequest, signal: AbortSignal): Promise<void> => {
     try {
       verdict.value = { kind: "valid", applied: await store.api.validate(asked, signal) };
     } catch (error) {
@@ -86,7 +88,7 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
 
   return (
     <form
-      class="editor"
+      class="editor fades"
       onSubmit={(event) => {
         event.preventDefault();
         void apply();
@@ -130,24 +132,22 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedSequence; 
             ))}
           </select>
         </label>
-        {draft.value.take_order !== null && (
-          <label class="field field-wide">
-            <span>Order of takes</span>
-            <select
-              name="take_order"
-              value={draft.value.take_order}
-              aria-invalid={wrong === "take_order"}
-              disabled={Number(draft.value.takes) === 1}
-              onChange={(event) => (draft.value = { ...draft.peek(), take_order: event.currentTarget.value })}
-            >
-              {Object.entries(TAKE_ORDER_NAMES).map(([order, name]) => (
-                <option key={order} value={order}>
-                  {name}
-                </option>
-              ))}
-            </select>
-          </label>
-        )}
+        <label class="field field-wide">
+          <span>Order of takes</span>
+          <select
+            name="take_order"
+            value={draft.value.take_order}
+            aria-invalid={wrong === "take_order"}
+            disabled={Number(draft.value.takes) === 1}
+            onChange={(event) => (draft.value = { ...draft.peek(), take_order: event.currentTarget.value as TakeOrder })}
+          >
+            {Object.entries(TAKE_ORDER_NAMES).map(([order, name]) => (
+              <option key={order} value={order}>
+                {name}
+              </option>
+            ))}
+          </select>
+        </label>
       </div>
       <Obstacle />
       <div id="sequence-verdict" class="verdict" role="status">

@@ -1,16 +1,15 @@
 import { engineering, fixed } from "../../scales/format";
-import type { AppliedSequence } from "../../stream/protocol";
+import type { AppliedDocument } from "../../stream/documents";
 import { Fact, Figures } from "./Figures";
 import { TAKE_ORDER_NAMES, ZEROTH_NAMES } from "./words";
 
 /** The sequence in use, and what follows from it. */
-export function Summary({ applied }: { applied: AppliedSequence }) {
-  const order = applied.take_order === undefined ? "" : `, ${TAKE_ORDER_NAMES[applied.take_order] ?? applied.take_order}`;
+export function Summary({ applied }: { applied: AppliedDocument }) {
   return (
     <dl class="facts">
       <Fact name="Harmonics m" value={String(applied.harmonics)} field="harmonics" strong />
       <Fact name="Exposure" value={engineering(applied.exposure_s, "s")} field="exposure_s" strong />
-      <Fact name="Takes" value={applied.takes > 1 ? `${applied.takes}${order}` : String(applied.takes)} field="takes" strong />
+      <Fact name="Takes" value={applied.takes > 1 ? `${applied.takes}, ${TAKE_ORDER_NAMES[applied.take_order]}` : String(applied.takes)} field="takes" strong />
       <Fact name="Base frequency" value={engineering(applied.base_frequency_hz, "Hz", 4)} field="base_frequency_hz" />
       <Fact name="Zeroth moment" value={ZEROTH_NAMES[applied.zeroth]} field="zeroth" />
       <Fact name="Unambiguous range" value={fixed(applied.unambiguous_range_m, 2, "m")} field="unambiguous_range_m" />

@@ -1,4 +1,5 @@
-import type { SequenceDocument, Zeroth } from "../../stream/protocol";
+import type { SequenceDocument } from "../../stream/documents";
+import type { SequenceRequest, TakeOrder, Zeroth } from "../../stream/protocol";
 
 /** A sequence as it is typed: text, in the units people use. */
 export interface Draft {
@@ -7,8 +8,7 @@ export interface Draft {
   readonly zeroth: Zeroth;
   readonly exposure_ms: string;
   readonly takes: string;
-  /** In which order takes follow each other; null where the service does not say. */
-  readonly take_order: string | null;
+  readonly take_order: TakeOrder;
 }
 
 /** Which field of the draft stands for a field of the document. */
@@ -28,12 +28,12 @@ export function draftOf(sequence: SequenceDocument): Draft {
     zeroth: sequence.zeroth,
     exposure_ms: tidy(sequence.exposure_s * 1e3),
     takes: String(sequence.takes),
-    take_order: sequence.take_order ?? null,
+    take_order: sequence.take_order,
   };
 }
 
 /** The document a draft stands for, with what is not edited from `base`; null where a field is no number. */
-export function documentOf(draft: Draft, base: SequenceDocument): SequenceDocument | null {
+export function documentOf(draft: Draft, base: SequenceDocument): SequenceRequest | null {
   const [frequency_mhz, harmonics, exposure_ms, takes] = [draft.base_frequency_mhz, draft.harmonics, draft.exposure_ms, draft.takes].map((text) =>
     text.trim() === "" ? NaN : Number(text),
   );
@@ -45,7 +45,7 @@ export function documentOf(draft: Draft, base: SequenceDocument): SequenceDocume
     exposure_s: exact(exposure_ms / 1e3),
     takes,
     sub_phases: base.sub_phases,
-    ...(draft.take_order === null ? {} : { take_order: draft.take_order }),
+    take_order: draft.take_order,
   };
 }
 

@@ -1,7 +1,7 @@
 /** Where choices of sequences stand in the plot of accuracy against time, both logarithmic. */
 
 import { fraction, type Scale, ticks } from "../../scales/scale";
-import type { AppliedSequence, Choice, FrameMeta, Tradeoff } from "../../stream/protocol";
+import type { AppliedDocument, ChoiceDocument, FrameMeta, TradeoffDocument } from "../../stream/documents";
 
 export interface Ends {
   readonly time: Scale;
@@ -17,7 +17,7 @@ export interface Standing {
 const ROOM = 1.25;
 
 /** Scales, in s and m, that hold the front and the frame beside which it was predicted: what follows trembles, and the axes must not. */
-export function endsOf({ front, current }: Tradeoff): Ends {
+export function endsOf({ front, current }: TradeoffDocument): Ends {
   const times = [current.capture_s, ...front.map(({ capture_s }) => capture_s)];
   const errors = front.flatMap(({ predicted }) => [predicted.range_error_m.low, predicted.range_error_m.high, predicted.range_error_m.median]);
   const then = current.meta.accuracy?.range_error_m ?? null;
@@ -27,7 +27,7 @@ export function endsOf({ front, current }: Tradeoff): Ends {
 }
 
 /** Where the camera stands with a sequence: by the frame on screen, or by that which the front was predicted beside, or as predicted. */
-export function standingOf(meta: FrameMeta | null, sequence: AppliedSequence, { current, front }: Tradeoff): Standing | null {
+export function standingOf(meta: FrameMeta | null, sequence: AppliedDocument, { current, front }: TradeoffDocument): Standing | null {
   const ofIt = [meta, current.meta].find((each) => each?.sequence_id === sequence.sequence_id && each.accuracy?.range_error_m != null);
   const predicted = front.find((choice) => FIELDS.every((field) => choice.sequence[field] === sequence[field]));
   const range_error_m = ofIt?.accuracy?.range_error_m ?? predicted?.predicted.range_error_m.median ?? null;
@@ -53,7 +53,7 @@ export function marksOf(scale: Scale, apart: number): { value: number; place: nu
 }
 
 /** Where a time stands among the points of a front, in steps from the first: between two by its logarithm. */
-export function stepOf(front: readonly Choice[], capture_s: number): number {
+export function stepOf(front: readonly ChoiceDocument[], capture_s: number): number {
   const after = front.findIndex((choice) => choice.capture_s >= capture_s);
   if (after <= 0) return after < 0 ? front.length - 1 : 0;
   const [low, high] = [front[after - 1].capture_s, front[after].capture_s];
@@ -61,7 +61,7 @@ export function stepOf(front: readonly Choice[], capture_s: number): number {
 }
 
 /** Whether two choices are the same sequence. */
-export function sameSequence(a: Choice | null, b: Choice | null): boolean {
+export function sameSequence(a: ChoiceDocument | null, b: ChoiceDocument | null): boolean {
   return a !== null && b !== null && JSON.stringify(a.sequence) === JSON.stringify(b.sequence);
 }
 

@@ -1,5 +1,5 @@
 /** Sequences to begin with. */
-import type { SequenceDocument } from "../../stream/protocol";
+import type { SequenceDocument } from "../../stream/documents";
 
 export interface Preset {
   readonly name: string;
@@ -9,7 +9,7 @@ export interface Preset {
   readonly sequence: Pick<SequenceDocument, "base_frequency_hz" | "harmonics" | "zeroth" | "exposure_s" | "takes">;
 }
 
-/** Measured in docs/default-sequence.md and docs/accuracy.md. */
+/** Measured in docs/measured/default-sequence.md and docs/accuracy.md. */
 export const PRESETS: readonly Preset[] = [
   {
     name: "Default",

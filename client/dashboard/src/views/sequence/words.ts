@@ -1,7 +1,7 @@
 import { engineering } from "../../scales/format";
 import { plainWords } from "../../store/api";
 import type { RangeErrorFigure } from "../../store/rangeErrors";
-import type { Problem, Zeroth } from "../../stream/protocol";
+import type { Problem, TakeOrder, Zeroth } from "../../stream/protocol";
 
 /** Names of the fields as the form has them. */
 const FIELD_NAMES: Readonly<Record<string, string>> = {
@@ -54,7 +54,7 @@ export const ZEROTH_COSTS: Record<Zeroth, string> = {
 };
 
 /** How takes follow each other, in words. */
-export const TAKE_ORDER_NAMES: Readonly<Record<string, string | undefined>> = {
+export const TAKE_ORDER_NAMES: Readonly<Record<TakeOrder, string>> = {
   sequential: "one after another",
   interleaved: "image by image",
 };

@@ -1,12 +1,14 @@
 import { useEffect } from "preact/hooks";
 import { engineering } from "../../scales/format";
-import type { EffectChoice, EffectDocument, Fault } from "../../store/documents";
+import type { EffectChoice, Fault } from "../../store/simulation";
 import { useStore } from "../../store/store";
+import type { EffectDocument } from "../../stream/documents";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
 import { OpenButton } from "../files/OpenButton";
 import { effectWords, FAULTS, ordered, possible, sizeShare, sizeWords } from "./words";
+import "./SimulationView.css";
 
 /** The scene of a simulated camera, which effects it calls for, and what can be made to go wrong. */
 export function SimulationView() {
@@ -29,7 +31,7 @@ export function SimulationView() {
         )
       }
     >
-      <div class="panel-body">
+      <div class="panel-body fades">
         {simulation.trouble.value !== null && <p class="quiet">{simulation.trouble.value}</p>}
         <Obstacle />
         {world !== null && (
@@ -40,7 +42,7 @@ export function SimulationView() {
         {world !== null && (
           <fieldset class="faults">
             <legend>Let something go wrong</legend>
-            {world.faults.map((fault) => (
+            {(world.faults as readonly Fault[]).map((fault) => (
               <FaultButton key={fault} fault={fault} task={task} />
             ))}
           </fieldset>

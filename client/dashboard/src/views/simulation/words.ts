@@ -1,7 +1,8 @@
 /** The simulated world in words. */
 
 import { significant } from "../../scales/format";
-import type { EffectDocument, ExplanationDocument, Fault } from "../../store/documents";
+import type { Fault } from "../../store/simulation";
+import type { EffectDocument, ExplanationDocument } from "../../stream/documents";
 
 /** How faults are called on their buttons, and what they do. */
 export const FAULTS: Readonly<Record<Fault, { readonly word: string; readonly title: string }>> = {

@@ -3,6 +3,7 @@ import { useEffect } from "preact/hooks";
 import { timeOfDay } from "../../scales/format";
 import { lossReason } from "../../store/events";
 import { useStore } from "../../store/store";
+import "./Banner.css";
 
 /** Says at once what is wrong, and what is being done about it; goes away with it. */
 export function Banner({ onRetry }: { onRetry: () => void }) {

@@ -1,11 +1,10 @@
-import { useMemo } from "preact/hooks";
-
-import { remembered } from "../../store/settings";
+import type { Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { SwitchedDialog } from "../../ui/Dialog";
 import { useNow } from "../../ui/hooks";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
+import "./ControlDialog.css";
 
 /** Longest name the service takes. */
 const LONGEST_NAME = 80;
@@ -22,7 +21,7 @@ export function ControlDialog() {
 function Control({ onDone }: { onDone: () => void }) {
   const store = useStore();
   const { lease } = store;
-  const name = useMemo(() => remembered(store.shelf, "lease.holder", "Dashboard", isName), [store]);
+  const name = store.settings.of(HOLDER);
   const task = useTask();
   const now_s = useNow(1);
   const control = lease.control.value;
@@ -95,6 +94,8 @@ function Control({ onDone }: { onDone: () => void }) {
   }
 }
 
-function isName(value: unknown): value is string {
-  return typeof value === "string" && value.length <= LONGEST_NAME;
-}
+const HOLDER: Setting<string> = {
+  key: "lease.holder",
+  initial: "Dashboard",
+  accepts: (value): value is string => typeof value === "string" && value.length <= LONGEST_NAME,
+};

@@ -6,6 +6,7 @@ import { KEPT_S, linesOf, type Trend } from "../../store/trends";
 import { PulseIcon } from "../../ui/icons";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { Sparkline } from "../../ui/Sparkline";
+import "./Figures.css";
 
 /** All figures of the flow of frames, behind a button. */
 export function Figures() {

@@ -3,6 +3,7 @@ import { LAYOUTS } from "../../store/layout";
 import { LONGEST_NAME } from "../../store/layouts";
 import { useStore } from "../../store/store";
 import { SwitchedDialog } from "../../ui/Dialog";
+import "./LayoutDialog.css";
 
 /** Saves the present layout under a name, and removes saved ones. */
 export function LayoutDialog() {

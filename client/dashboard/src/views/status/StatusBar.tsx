@@ -8,6 +8,7 @@ import { Figures } from "./Figures";
 import { Steering } from "./Steering";
 import { Toasts } from "./Toasts";
 import { demandWords } from "./words";
+import "./StatusBar.css";
 
 /** How things stand in three things: health, rate and deviation, and what one looks at; all else is behind a button. */
 export function StatusBar() {
@@ -15,7 +16,7 @@ export function StatusBar() {
     <header class="bar">
       <h1 class="brand">
         <img src="/icon.svg" alt="" width="24" height="24" />
-        <span class="brand-name">transientcam</span>
+        <span class="wide">transientcam</span>
       </h1>
       <StateChip />
       <LessAsked />

@@ -7,6 +7,7 @@ import { ControlIcon, HoldIcon, PauseIcon, PlayIcon, SingleIcon } from "../../ui
 import { Steer } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
 import { PageMenu } from "./PageMenu";
+import "./Steering.css";
 
 /** What can be done to the camera and to the page from anywhere. */
 export function Steering() {

@@ -3,6 +3,7 @@ import { useEffect } from "preact/hooks";
 
 import type { Happening } from "../../store/events";
 import { useStore } from "../../store/store";
+import "./Toasts.css";
 
 /** How long a notice stays, one that something can be done about longer; and how many are seen together. */
 const STAYS_S = 6;

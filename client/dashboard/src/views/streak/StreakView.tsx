@@ -5,7 +5,7 @@ import { COLOUR_MAPS, type ColourMapName } from "../../scales/colourMaps";
 import { fixed, significant } from "../../scales/format";
 import { ticks } from "../../scales/scale";
 import { scaleOf, TONES, type ToneKind } from "../../scales/tone";
-import { oneOf, remembered } from "../../store/settings";
+import { oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
 import { ColourChoice } from "../../ui/ColourChoice";
@@ -15,14 +15,18 @@ import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { ToneChoice } from "../../ui/ToneChoice";
 import { BINS, paintStreak, Streak, whiteOf } from "./streak";
+import "./StreakView.css";
+
+const TONE: Setting<ToneKind> = { key: "streak.tone", initial: "root", ...oneOf(TONES) };
+const COLOURS: Setting<ColourMapName> = { key: "streak.colours", initial: "inferno", ...oneOf(COLOUR_MAPS) };
 
 /** One row of the picture over time of flight: columns across, time downwards. */
 export function StreakView() {
   const store = useStore();
   useProducts(["coefficients"]);
   const frame = store.frames.of("coefficients");
-  const tone = useMemo(() => remembered<ToneKind>(store.shelf, "streak.tone", "root", oneOf(TONES)), [store]);
-  const colours = useMemo(() => remembered<ColourMapName>(store.shelf, "streak.colours", "inferno", oneOf(COLOUR_MAPS)), [store]);
+  const tone = store.settings.of(TONE);
+  const colours = store.settings.of(COLOURS);
   const streak = useMemo(() => new Streak(), []);
   const canvas = useRef<HTMLCanvasElement>(null);
   const bright = useSignal(NaN);

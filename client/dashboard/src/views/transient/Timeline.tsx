@@ -4,6 +4,8 @@ import { fixed } from "../../scales/format";
 import { ticks } from "../../scales/scale";
 import { useStore } from "../../store/store";
 import { useDrawing } from "../../ui/hooks";
+import "../map/Readout.css";
+import "./Timeline.css";
 
 /** Finest step of the slider, in shares of the period. */
 const STEP = 1 / 2048;

@@ -7,7 +7,7 @@ import { Poles } from "../../physics/poles";
 import { fixed, significant, superscript } from "../../scales/format";
 import { gateStart_rad, NAMES, type Play, type TransientLook } from "../../store/lightLook";
 import { AMPLITUDE } from "../../store/mapCatalogue";
-import { type Lit, SPEEDS_NS } from "../../store/player";
+import { SPEEDS_NS } from "../../store/player";
 import { type Store, useStore } from "../../store/store";
 import { Choice, Tabs } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
@@ -16,7 +16,7 @@ import { type FigureParts, saveFigure } from "../../ui/figureFiles";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
-import { litOf, peaksOf, turnsOf } from "./arrivals";
+import { litOf, peaksOf, steady, turnsOf } from "./arrivals";
 import { Filming, FilmProgress } from "./Filming";
 import { LightBar, lightScale } from "./LightBar";
 import { LightSoFar } from "./LightSoFar";
@@ -24,6 +24,7 @@ import { LookMenu } from "./LookMenu";
 import { Picture } from "./Picture";
 import { PICTURES, stripOf } from "./strip";
 import { Timeline, TimeReadout } from "./Timeline";
+import "./TransientView.css";
 
 const PLAY_TABS: readonly { readonly value: Play; readonly text: string; readonly hint: string }[] = [
   { value: "density", text: "In flight", hint: "The light that arrives at one time" },
@@ -119,12 +120,6 @@ export function TransientView() {
       </footer>
     </Panel>
   );
-}
-
-/** Ends that noise alone moves stay where they are. */
-function steady(before: Lit | null, now: Lit | null): Lit | null {
-  const near = before !== null && now !== null && Math.abs(before.first - now.first) + Math.abs(before.last - now.last) < 0.03;
-  return near ? before : now;
 }
 
 /** What is written around a figure or a film of the light. */

@@ -27,6 +27,12 @@ export function litOf(arrivals: ArrayLike<number>): Lit | null {
   return { first: Math.max(0, worth.indexOf(true) / all.length - room), last: Math.min(1, (worth.lastIndexOf(true) + 1) / all.length + room) };
 }
 
+/** Ends that noise alone moves stay where they are. */
+export function steady(before: Lit | null, now: Lit | null): Lit | null {
+  const near = before !== null && now !== null && Math.abs(before.first - now.first) + Math.abs(before.last - now.last) < 0.03;
+  return near ? before : now;
+}
+
 /** Share of the brightest moment's light from which a maximum counts, and how far it must stand out on either side. */
 const LEAST_PEAK = 0.1;
 const REACH = 4;

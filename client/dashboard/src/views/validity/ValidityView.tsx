@@ -10,6 +10,8 @@ import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { Stage } from "../../ui/Stage";
 import { countFlags, paintFlags } from "./reasons";
+import "../response/Listings.css";
+import "./ValidityView.css";
 
 /** Which pixels something is wrong with, and what. */
 export function ValidityView() {

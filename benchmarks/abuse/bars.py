@@ -1,0 +1,113 @@
+"""What healthy clients have under each attack, and whether that reaches the bars."""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from benchmarks.abuse.attacks import ATTACKS
+from benchmarks.abuse.measuring import COMES_BACK_S, GIVE_UP_S, Seen, measure
+from benchmarks.common.machine import commit_of
+from benchmarks.common.tables import Cell, Table, heads
+
+_MIB = 2**20
+FRAMES_BAR: Final = 0.9
+LIVEZ_BAR_S: Final = 1.0
+LIVEZ_CPU_BAR_S: Final = 0.1
+LIGHT_BAR_S: Final = 1.0
+GROWN_BAR_BYTES: Final = 64 * _MIB
+END_BAR_S: Final = 5.0
+
+_COLUMNS: Final = heads(
+    "attack | connections | frames:.0% | /livez | its processor time | lapse | "
+    "safe-off | memory, most / left, MiB | SIGTERM | bars"
+)
+
+
+def missed(seen: Seen) -> list[str]:
+    """Return the bars that are missed."""
+    limits = {
+        "frames": seen.frames >= FRAMES_BAR,
+        "/livez": seen.livez_s is not None and seen.livez_s <= LIVEZ_BAR_S,
+        "processor": seen.livez_cpu_s is not None and seen.livez_cpu_s <= LIVEZ_CPU_BAR_S,
+        "lapse": seen.lapse_s is not None and seen.lapse_s <= LIGHT_BAR_S,
+        "safe-off": seen.safe_off_s is not None and seen.safe_off_s <= LIGHT_BAR_S,
+        "memory": seen.grown_bytes <= GROWN_BAR_BYTES and seen.left_bytes <= GROWN_BAR_BYTES,
+        "SIGTERM": seen.end_s is not None and seen.end_s <= END_BAR_S,
+    }
+    return [name for name, held in limits.items() if not held]
+
+
+def tables(
+    *,
+    attacks: tuple[str, ...] = tuple(ATTACKS),
+    connections: tuple[int, ...] = (1, 16),
+    seconds: float = 5.0,
+) -> Iterator[Table]:
+    """Attack a daemon of its own at full speed from so many connections, half a minute each.
+
+    The simulated camera is at the paper's video setting. Meanwhile a viewer streams range, /livez
+    is asked, a lease lapses, the light is switched off, and SIGTERM ends it.
+    """
+    table = _table(attacks, connections, seconds, None)
+    table.text.append(f"Each attack goes on for {seconds:g} s and longer.")
+    table.notes.extend(
+        [
+            "- frames: of one viewer of range, over those without an attack; bar "
+            f"{FRAMES_BAR:.0%}. With TLS, frames captured.",
+            f"- /livez: the longest answer, each over a new connection; bar {LIVEZ_BAR_S:g} s.",
+            "- its processor time: what the thread of the event loop spent meanwhile, at most; "
+            f"bar {LIVEZ_CPU_BAR_S:g} s.",
+            "- lapse, safe-off: from when the light should have gone off to the last capture; bar "
+            f"{LIGHT_BAR_S:g} s.",
+            f"- memory: growth at most, and {COMES_BACK_S:g} s after the attack; bar "
+            f"{GROWN_BAR_BYTES // _MIB} MiB.",
+            f"- SIGTERM: until the daemon has ended, under attack; bar {END_BAR_S:g} s.",
+            f"- never: not within {GIVE_UP_S:g} s.",
+        ]
+    )
+    yield table
+
+
+def before(
+    *, checkout: Path, attacks: tuple[str, ...] = tuple(ATTACKS), seconds: float = 5.0
+) -> Iterator[Table]:
+    """Attack the daemon of another checkout in the same ways, from one connection."""
+    load, _, _ = os.getloadavg()
+    table = _table(attacks, (1,), seconds, checkout)
+    table.text.append(
+        f"The daemon of commit {commit_of(checkout)}, an older one, under the same attacks. Other "
+        f"programs ran meanwhile: the load average before the first attack was {load:.1f}."
+    )
+    yield table
+
+
+def _table(
+    attacks: tuple[str, ...], connections: tuple[int, ...], seconds: float, checkout: Path | None
+) -> Table:
+    table = Table("Before" if checkout else "", _COLUMNS)
+    for name in attacks:
+        if name not in ATTACKS:
+            raise SystemExit(f"unknown attack {name!r}, choose from {', '.join(ATTACKS)}")
+        for count in connections:
+            seen = measure(name, count, duration_s=seconds, checkout=checkout)
+            table.rows.append(_row(name, count, seen))
+            print(*table.rows[-1], flush=True)
+    return table
+
+
+def _row(name: str, connections: int, seen: Seen) -> tuple[Cell, ...]:
+    below = missed(seen)
+    return (
+        name,
+        connections,
+        seen.frames,
+        *map(_seconds, (seen.livez_s, seen.livez_cpu_s, seen.lapse_s, seen.safe_off_s)),
+        f"{seen.grown_bytes / _MIB:.0f} / {seen.left_bytes / _MIB:.0f}",
+        _seconds(seen.end_s),
+        "missed: " + ", ".join(below) if below else "met",
+    )
+
+
+def _seconds(value: float | None) -> str:
+    return "never" if value is None else f"{value:.2f} s"

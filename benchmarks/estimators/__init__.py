@@ -1,0 +1,1 @@
+"""Estimators, calibrations and repairs on simulated cameras, and how exact the mathematics is."""

@@ -1,0 +1,1 @@
+"""The dashboard in a browser, and pages and pictures that programs write."""

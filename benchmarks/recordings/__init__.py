@@ -1,0 +1,1 @@
+"""Recordings: what they cost, what they survive, and ranges computed from their files."""

@@ -1,0 +1,1 @@
+"""The speed of the reconstruction, all on the same data."""

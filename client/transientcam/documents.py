@@ -1,0 +1,126 @@
+"""What the service says of a frame, in JSON and in messages.
+
+`python tools/documents.py --write` writes this file.
+"""
+
+from typing import TypedDict
+
+
+class PixelCountsDocument(TypedDict):
+    """How many pixels carry each flag; one pixel may carry several."""
+
+    total: int
+    valid: int
+    biased: int
+    """Moved to moments that have a density, as sharp returns or noise make it necessary: normal."""
+    no_signal: int
+    saturated: int
+    non_finite: int
+    degenerate: int
+    replaced: int
+    contradictory: int
+    """Moments that contradict each other by more than noise explains: something is wrong."""
+    unexplained: int
+    """Moments that the returns of the likelihood do not explain: the range may be biased."""
+
+
+class PredictedStdDocument(TypedDict):
+    """Standard deviation of a frame's range in m between frames, by the noise of the sensor.
+
+    To first order, of the returns that the frame shows; `range_std` of `accuracy` draws the noise.
+    """
+
+    median: float
+    p90: float
+    """90 % of the pixels are better."""
+    first_order_share: float
+    """Share of the pixels where the noise model holds; that of the others is a rough figure."""
+
+
+class RangeAccuracyDocument(TypedDict):
+    """Predicted errors of a frame's range: those in m of the median pixel that has one."""
+
+    range_error_m: float | None
+    """Noise and bias together, root sum of squares; null where one frequency knows no bias."""
+    range_std_m: float | None
+    """Standard deviation that the noise of the sensor gives."""
+    range_bias_m: float | None
+    """How far it is off for good, as far as the frame shows it; more takes do not reduce it."""
+    outlier_share: float | None
+    """Share of the ranges that are off by more than five times `range_error_m`; a bias that none
+    of the frame's frequencies shows is not in it."""
+    every_px: int
+    """The errors are those of one pixel in so many rows and columns: more than 1 where not all
+    that predicts them is compiled."""
+
+
+class HopDocument(TypedDict):
+    """One relay that a frame came through."""
+
+    service_id: str
+    """Which service relayed it, as its `GET /info` has it."""
+    latency_s: float
+    """From its arrival at the service before to that at this relay, by the clocks of both."""
+    missed_frames: int
+    """Frames that the service before had and this relay never got, since it began."""
+
+
+class FrameDocument(TypedDict):
+    """What is known of a frame, whatever product of it is fetched."""
+
+    frame: int
+    """Counted from 1; never resets while the service runs."""
+    sequence_id: int
+    calibration_id: str
+    reconstruction_id: int
+    """Counts the settings of the reconstruction; those that it was computed with."""
+    estimator: str
+    """What its range, direct and indirect light are taken from."""
+    device_time_s: float
+    """Start of the first exposure, by the camera's clock."""
+    host_time_s: float
+    """Arrival of the last image, Unix time."""
+    capture_s: float
+    """Measured by the camera's clock."""
+    reconstruct_s: float | None
+    """Computing time spent on this frame so far; null until something was computed."""
+    base_frequency_hz: float
+    harmonics: int
+    zeroth: str
+    exposure_s: float
+    takes: int
+    width: int
+    height: int
+    temperature_c: float
+    lost_images: int
+    """Images lost or corrupt between the frame before and this one."""
+    hops: list[HopDocument]
+    """The relays that it came through, the first one first; none where the camera is here."""
+    rejected_images: int | None
+    """Images left out of the average over takes as outliers; null until it was computed."""
+    repaired_images: int | None
+    """Images that lost their synchronisation, rebuilt from the others; null until computed."""
+    unrepaired_images: int | None
+    """Images of pairs that contradict the others and could not be rebuilt; null until computed."""
+    filled_images: list[int] | None
+    """Which images are those of the frame before, by their index in it; null until computed."""
+    corrected_pixels: int | None
+    """Pixels from whose moments the known harmonics of the modulation were taken out; null where
+    the calibration knows none, and until computed."""
+    pixels: PixelCountsDocument | None
+    """Null until something was computed."""
+    ambient_dn: float | None
+    """Light in DN an image that is not the camera's, in the median pixel; 0 where it hardly adds
+    noise, null until something was computed and where no sensor is known."""
+    predicted_range_std_m: PredictedStdDocument | None
+    """Null until the range was computed."""
+    accuracy: RangeAccuracyDocument | None
+    """Null until one of the products range_std, range_bias and range_error was computed."""
+
+
+class FrameMeta(FrameDocument):
+    """What is known of a frame, and which of its pixels an array holds."""
+
+    region: list[int]
+    """column and row of the first pixel, width, height"""
+    decimation: int

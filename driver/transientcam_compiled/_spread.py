@@ -1,0 +1,151 @@
+"""Parts of an image for several threads: kernels release the interpreter while they run."""
+
+import itertools
+import os
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from functools import partial
+from typing import Protocol
+
+from transientcam_compiled._affinity import ThreadsApart
+
+BLOCK = 1 << 15
+"""Pixels that stay in the caches from one kernel to the next.
+
+After each kernel a thread waits for the interpreter's lock, so that fewer would cost more.
+"""
+LARGE = 1 << 16
+"""Pixels from which an image is cut into parts of `BLOCK`."""
+
+Part = Callable[[int, int], None]
+"""Works on the pixels (or rows) from its first argument up to its second."""
+
+
+class Spread(Protocol):
+    """Has ``total`` pixels worked on, in parts that begin at multiples of ``unit``."""
+
+    def __call__(self, part: Part, total: int, /, unit: int = 1024, each: int = 1) -> None:
+        """Return when all parts are done, of which there are up to ``each`` for each thread."""
+
+
+def at_once(part: Part, total: int, /, unit: int = 1024, each: int = 1) -> None:
+    """Do everything in one part, on the calling thread."""
+    part(0, total)
+
+
+def over(executor: Executor, parts: int) -> Spread:
+    """Return a way to do up to ``parts`` parts of an image at once, on the threads of an executor.
+
+    The calling thread works, too, and waits for the others. Large images are cut into more parts,
+    as are all where several are asked for each thread: it takes the next one when it has done one,
+    so that none waits long for another that is late or has other work. No part is smaller than a
+    unit.
+    """
+
+    def spread(part: Part, total: int, /, unit: int = 1024, each: int = 1) -> None:
+        size = max(unit, -(-total // (parts * each * unit)) * unit)
+        if total >= LARGE:
+            size = min(size, max(unit, BLOCK // unit * unit))
+        cuts = [0, *range(size, total - unit + 1, size), total]
+        # a thread still holds what it was submitted after it is done: of the part, and so of the
+        # results, nothing but this queue may be there
+        waiting = deque(partial(part, *cut) for cut in itertools.pairwise(cuts))
+        del part
+
+        def work() -> None:
+            while waiting:
+                try:
+                    do = waiting.popleft()
+                except IndexError:  # another thread was quicker
+                    return
+                do()
+
+        others = [executor.submit(work) for _ in range(min(parts, len(waiting)) - 1)]
+        work()
+        for other in others:
+            if not other.cancel():  # it has begun
+                other.result()
+
+    return spread
+
+
+class _Here(threading.local):
+    """How many threads calls on this thread use where they do not say."""
+
+    threads: int | None = None
+
+
+class _Shared:
+    """The threads that all calls of a process share: made when they are first needed."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.executor: Executor | None = None
+
+    def get(self) -> Executor:
+        with self.lock:
+            if self.executor is None:
+                others = max(1, _cores() - 1)
+                self.executor = ThreadsApart(others, SHARED_THREADS)
+            return self.executor
+
+    def forget(self) -> None:
+        """Have none: a child process inherits the object, but not its threads."""
+        self.__init__()  # type: ignore[misc]  # the lock may be held by a thread that is gone
+
+
+SHARED_THREADS = "transientcam-kernel"
+"""How the names of the shared threads begin."""
+_HERE, _SHARED = _Here(), _Shared()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_SHARED.forget)
+
+
+def use_one_thread() -> None:
+    """Let calls on this thread use no other, unless they say so: as on the workers of a pool."""
+    _HERE.threads = 1
+
+
+@contextmanager
+def use_all_cores() -> Iterator[None]:
+    """Let calls on this thread use all cores inside the block, also after `use_one_thread`."""
+    before, _HERE.threads = _HERE.threads, None
+    try:
+        yield
+    finally:
+        _HERE.threads = before
+
+
+def on_threads(threads: int | None) -> Spread:
+    """Return a way to do an image on so many threads, or on all cores, of which one is this."""
+    if threads is None:
+        threads = _HERE.threads or _cores()
+    return at_once if threads == 1 else over(_SHARED.get(), threads)
+
+
+def over_all_cores() -> Spread:
+    """Return a way to do an image on all cores, of which this thread has one.
+
+    Also on a thread that `use_one_thread` was called on.
+    """
+    return on_threads(_cores())
+
+
+def start_threads() -> None:
+    """Start the threads that all calls share, so that no call waits until they run."""
+    on_threads(None)(lambda start, stop: None, 1024 * _cores())
+
+
+def _cores() -> int:
+    """Return how many cores this process may use; not every system can say."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return (os.cpu_count() or 1) if affinity is None else len(affinity(0))
+
+
+def blocks(start: int, stop: int) -> Iterator[tuple[int, int]]:
+    """Cut pixels into blocks of `BLOCK`, or half as many more at the end."""
+    cuts = [*range(start, max(start + 1, stop - BLOCK // 2), BLOCK), stop]
+    return itertools.pairwise(cuts)
