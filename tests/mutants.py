@@ -87,7 +87,7 @@ def _test(tests: Path) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     os.dup2(1, 2)
-    os._exit(pytest.main(["-xn0", "-pno:cacheprovider", "--assert=plain", str(tests)]))
+    os._exit(pytest.main(["-x", "-n0", "-pno:cacheprovider", "--assert=plain", str(tests)]))
 
 
 def outcome(tests: Path) -> str:
