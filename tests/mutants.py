@@ -46,7 +46,7 @@ UNPACKING = {"argument", "dictorsetmaker", "param", "parameters", "star_expr"}
 CPU_S, TIMEOUT_S = 60, 600.0
 """Of the tests of one mutant: what a busy machine does not stretch, and for those that wait."""
 LARGE = ("crc32c", "fastapi", "h5py", "httpx", "hypothesis", "numba", "numpy", "scipy.optimize")
-# by pytest's code of exit: a test fails; a module, or a conftest, cannot be imported
+# by pytest's exit code: a test fails; a module or conftest cannot be imported
 ENDED: dict[int | None, str] = {0: "survived", 1: "noticed", 2: "noticed", 4: "noticed"}
 
 
@@ -94,8 +94,7 @@ def _test(tests: Path) -> None:
 
 def outcome(tests: Path) -> str:
     """Return how tests end here; in a fork, which has the large packages that it imports."""
-    process = multiprocessing.get_context("fork").Process(target=_test, args=(tests,))
-    process.start()
+    (process := multiprocessing.get_context("fork").Process(target=_test, args=(tests,))).start()
     process.join(TIMEOUT_S)
     if process.exitcode is None and process.pid is not None:
         os.killpg(process.pid, signal.SIGKILL)
@@ -132,7 +131,8 @@ def main(seed: str, count: str, *places: str) -> None:
         shutil.copytree(Path(__file__).parents[1], copy, ignore=ignored)
         os.chdir(copy)
         sys.path[:1] = [str(copy / each) for each in ("", "client", "driver", "server")]
-        os.environ["PYTHONPATH"] = os.pathsep.join(sys.path[:4])
+        # with CI, hypothesis has no deadlines, and tries the same each time
+        os.environ |= {"PYTHONPATH": os.pathsep.join(sys.path[:4]), "CI": "1"}
         list(map(importlib.import_module, LARGE))
         while ended.total() < int(count):
             module = rng.choice(modules(PLACES[rng.choice(places or list(PLACES))]))
