@@ -2,8 +2,7 @@
 
 ``make mutants`` prints those that no test notices: gaps, or equivalents, which
 docs/measured/notes/mutants.md names. The operators are those of cosmic-ray, whose own sessions run
-every mutant of a module; this draws a place, a module of it, a position and a change of it, each
-uniformly. Only a copy of the tree is changed.
+every mutant of a module; this draws a place, a module of it, a position and a change, in a copy.
 """
 
 import difflib
@@ -47,7 +46,8 @@ UNPACKING = {"argument", "dictorsetmaker", "param", "parameters", "star_expr"}
 CPU_S, TIMEOUT_S = 60, 600.0
 """Of the tests of one mutant: what a busy machine does not stretch, and for those that wait."""
 LARGE = ("crc32c", "fastapi", "h5py", "httpx", "hypothesis", "numba", "numpy", "scipy.optimize")
-NOTICED = {1, 2, 4}  # of pytest: a test fails; a module or a conftest cannot be imported
+# by pytest's exit code: a test fails; a module or conftest cannot be imported
+ENDED: dict[int | None, str] = {0: "survived", 1: "noticed", 2: "noticed", 4: "noticed"}
 
 
 def mirroring(module: Path) -> list[Path]:
@@ -79,7 +79,9 @@ def draw(code: str, rng: random.Random) -> str | None:
         for occurrence, start in enumerate(places):
             if not any(each.start_pos <= start < each.end_pos for each in kept):
                 changes[start].append((operator, occurrence))
-    return mutate_code(code, *rng.choice(changes[rng.choice(sorted(changes))])) if changes else None
+    if not changes:
+        return None
+    return str(mutate_code(code, *rng.choice(changes[rng.choice(sorted(changes))])))
 
 
 def _test(tests: Path) -> None:
@@ -87,20 +89,17 @@ def _test(tests: Path) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     os.dup2(1, 2)
-    os._exit(pytest.main(["-xn0", "-pno:cacheprovider", "--assert=plain", str(tests)]))
+    os._exit(pytest.main(["-x", "-n0", "-pno:cacheprovider", "--assert=plain", str(tests)]))
 
 
 def outcome(tests: Path) -> str:
     """Return how tests end here; in a fork, which has the large packages that it imports."""
-    process = multiprocessing.get_context("fork").Process(target=_test, args=(tests,))
-    process.start()
+    (process := multiprocessing.get_context("fork").Process(target=_test, args=(tests,))).start()
     process.join(TIMEOUT_S)
     if process.exitcode is None and process.pid is not None:
         os.killpg(process.pid, signal.SIGKILL)
         process.join()
-    if process.exitcode == 0:
-        return "survived"
-    return "noticed" if process.exitcode in NOTICED else f"ended by {process.exitcode}"
+    return ENDED.get(process.exitcode, f"ended by {process.exitcode}")
 
 
 as_it_is = cache(outcome)
@@ -132,7 +131,8 @@ def main(seed: str, count: str, *places: str) -> None:
         shutil.copytree(Path(__file__).parents[1], copy, ignore=ignored)
         os.chdir(copy)
         sys.path[:1] = [str(copy / each) for each in ("", "client", "driver", "server")]
-        os.environ["PYTHONPATH"] = os.pathsep.join(sys.path[:4])
+        # with CI, hypothesis has no deadlines, and tries the same each time
+        os.environ |= {"PYTHONPATH": os.pathsep.join(sys.path[:4]), "CI": "1"}
         list(map(importlib.import_module, LARGE))
         while ended.total() < int(count):
             module = rng.choice(modules(PLACES[rng.choice(places or list(PLACES))]))
@@ -141,8 +141,8 @@ def main(seed: str, count: str, *places: str) -> None:
                 continue
             ended[result := held(module, mutant)] += 1
             if result != "noticed":
-                _, _, *lines = difflib.unified_diff(code.splitlines(), mutant.splitlines(), n=0)
-                print(result, module, *lines, sep="\n    ", flush=True)
+                lines = difflib.unified_diff(code.splitlines(), mutant.splitlines(), n=0)
+                print(result, module, *list(lines)[2:], sep="\n    ", flush=True)
     print(*(f"{number} {each}" for each, number in ended.items()), sep=", ")
 
 

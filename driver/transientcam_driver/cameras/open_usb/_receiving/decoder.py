@@ -91,7 +91,6 @@ class PacketDecoder:
                     return found, header
                 # usb-protocol 8.2: noise, unless all images are like that (10.11)
                 self.odd_payload_bytes = header.payload_bytes
-            self._skip(found, found + 1)
             start = found + 1
 
     def _skip(self, start: int, end: int) -> None:

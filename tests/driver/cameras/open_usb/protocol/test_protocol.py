@@ -252,6 +252,29 @@ def test_a_phase_offset_is_appended_to_a_sequence() -> None:
     assert Commitment.unpack(commitment.pack()) == commitment
 
 
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("heartbeat_s", 0.01),
+        ("heartbeat_s", 3600.0),
+        ("bits", 1),
+        ("bits", 16),
+        ("max_harmonics", 1),
+        ("max_harmonics", 255),
+        ("max_sub_phases", 1),
+        ("max_sub_phases", 255),
+        ("max_takes", 1),
+        ("max_takes", 65535),
+        ("max_images", 1),
+        ("max_images", 65535),
+    ],
+)
+def test_capabilities_may_be_at_their_limits(field: str, value: float) -> None:
+    at_limit = replace(CAPABILITIES, **{field: value})
+
+    assert getattr(unpack_capabilities(pack_capabilities(at_limit)), field) == value
+
+
 def test_a_camera_that_can_shift_phases_says_so_in_one_bit() -> None:
     packed = pack_capabilities(replace(CAPABILITIES, phase_offsets=False))
 
