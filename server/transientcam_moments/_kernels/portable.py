@@ -4,6 +4,9 @@ Statements are compiled as they stand: kernels take words and statements alike f
 where they are stated, once this module has been imported.
 """
 
+# llvmlite declares neither a value's type nor all arguments
+# pyright: reportAttributeAccessIssue=false, reportCallIssue=false
+
 import inspect
 from collections.abc import Callable
 from types import ModuleType

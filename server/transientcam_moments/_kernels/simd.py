@@ -9,6 +9,9 @@ Arithmetic is IEEE: the only freedom given to the compiler is ``contract``, to f
 sum into one rounding, so NaN and infinities behave as in NumPy. Comparisons with NaN are False.
 """
 
+# llvmlite declares neither a value's type nor all arguments
+# pyright: reportAttributeAccessIssue=false
+
 import operator
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -164,8 +164,8 @@ class _Pairs:
         share = self.weight / data.weight.sum(axis=0)
         self._given = (self.places, data.re[self.places], data.im[self.places])
         self._weighted = (*self._given, self.weight, share)
-        self.x = [np.cos(each).astype(share.dtype) for each in phases]
-        self.y = [np.sin(each).astype(share.dtype) for each in phases]
+        self.x: list[Any] = [np.cos(each).astype(share.dtype) for each in phases]
+        self.y: list[Any] = [np.sin(each).astype(share.dtype) for each in phases]
         self._begin()
 
     def _begin(self) -> None:
