@@ -21,6 +21,8 @@ from transientcam_moments.moment_problem._levinson import Coefficients
 PEAK_THRESHOLD = 0.1
 """A peak counts when the density in it is at least this share of the highest one's."""
 
+_BLOCK_PIXELS = 32768  # the steps are many and short: calls cost more than misses of the cache
+
 
 class Peaks(NamedTuple):
     """Local maxima of a density.
@@ -94,7 +96,7 @@ def _found(a: Array, reflection: Array, error: Array, threshold: float) -> tuple
     def find(a: Array, reflection: Array, error: Array) -> tuple[Array, ...]:
         return _peaks(a, reflection, error, threshold)
 
-    return by_blocks(find, a, reflection, error)
+    return by_blocks(find, a, reflection, error, pixels=_BLOCK_PIXELS)
 
 
 def _peaks(a: Array, reflection: Array, error: Array, threshold: float) -> tuple[Array, ...]:
