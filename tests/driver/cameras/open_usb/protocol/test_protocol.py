@@ -5,6 +5,7 @@ import re
 import struct
 from dataclasses import replace
 from enum import IntEnum, IntFlag
+from typing import Any
 
 import pytest
 from hypothesis import given, strategies as st
@@ -270,7 +271,8 @@ def test_a_phase_offset_is_appended_to_a_sequence() -> None:
     ],
 )
 def test_capabilities_may_be_at_their_limits(field: str, value: float) -> None:
-    at_limit = replace(CAPABILITIES, **{field: value})
+    change: dict[str, Any] = {field: value}
+    at_limit = replace(CAPABILITIES, **change)
 
     assert getattr(unpack_capabilities(pack_capabilities(at_limit)), field) == value
 
