@@ -31,8 +31,9 @@ test: check .venv/version.stamp debian-packages dashboard  ## Run every check an
 
 # The packages that are arithmetic, without a daemon, a browser, a compiler or a fuzzer.
 test-fast: .venv/test.stamp  ## Run the tests of mathematics, wire format and planning's arithmetic, in a minute
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile -m 'not daemon and not browser and not fuzz and not compiled' \
-		tests/moments tests/stability tests/client/wire tests/server/planning
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile \
+		-m 'not daemon and not browser and not fuzz and not compiled and not sampled' \
+		tests/moments tests/client/wire tests/server/planning/prediction tests/server/planning/search/test_pareto.py
 
 check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lint, types, import laws
 	@$(MAKE) --no-print-directory --jobs 2 check-pyright check-mypy check-style check-documents check-dashboard

@@ -94,6 +94,8 @@ _MARKED = {
     "tests/browser": "browser",
     "tests/server/fuzzing": "fuzz",
     "tests/moments/kernels": "compiled",
+    "tests/moments/arrays/test_namespaces.py": "compiled",  # by JAX
+    "tests/moments/noise": "sampled",
 }
 _DAEMONS = {"breakable", "http", "served", "steady", "streaming", "serving", "url"}
 """Fixtures that begin a daemon, and functions that a module of tests imports for it."""
