@@ -19,6 +19,7 @@ from moto.server import ThreadedMotoServer
 
 import transientcam
 import transientcam_moments as tm
+from tests.moments.compiled_kernels import without_kernels
 from tests.server.recording.made import record
 from transientcam.cli import run
 from transientcam_server.errors import ClusterError, InputError, MixedVersions, StorageError
@@ -40,6 +41,15 @@ NOTHING: Any = lambda *_: None  # noqa: E731 - in place of what compiles
 pytestmark = pytest.mark.usefixtures("zarr_clients")
 
 
+@pytest.fixture(scope="module", autouse=True)
+def numpy_only() -> Iterator[None]:
+    """Leave everything to NumPy, whatever this process compiled or has loaded: kernels round
+    otherwise, and processes are compared bit for bit."""
+    with pytest.MonkeyPatch.context() as patch, without_kernels():
+        patch.setattr(job, "load_kernels", NOTHING)
+        yield
+
+
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return record(tmp_path_factory.mktemp("cluster") / "a.h5", FRAMES)
@@ -59,7 +69,6 @@ def client() -> Iterator[distributed.Client]:
     """Of a cluster of threads, which starts in no time and is reached by its address."""
     quick = {"distributed.worker.profile.enabled": False}
     with (
-        pytest.MonkeyPatch.context() as patch,
         dask.config.set(quick),
         distributed.LocalCluster(
             n_workers=2,
@@ -70,7 +79,6 @@ def client() -> Iterator[distributed.Client]:
         ) as local,
         distributed.Client(local) as client,
     ):
-        patch.setattr(job, "load_kernels", NOTHING)  # these are compared on NumPy
         for worker in client.scheduler_info(n_workers=-1)["workers"]:
             client.submit(int, workers=[worker], pure=False).result()  # starts its thread
         yield client

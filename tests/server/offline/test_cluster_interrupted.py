@@ -8,6 +8,7 @@ import pytest
 import zarr
 
 from tests.interrupting import Hold, interrupt
+from tests.moments.compiled_kernels import without_kernels
 from tests.server.recording.made import record
 from transientcam_server.offline import (
     BatchOptions,
@@ -52,6 +53,7 @@ def test_ctrl_c_ends_the_workers_and_leaves_a_store_to_go_on_with(
     )
 
     with (
+        without_kernels(),
         distributed.LocalCluster(
             n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0"
         ) as local,
@@ -59,7 +61,7 @@ def test_ctrl_c_ends_the_workers_and_leaves_a_store_to_go_on_with(
     ):
         counts = reconstruct_on(client, str(source), str(store), OPTIONS)
     assert counts == (FRAMES, BLOCK_FRAMES)
-    with Recording(source) as recording:
+    with without_kernels(), Recording(source) as recording:
         reconstruct_recording(recording, tmp_path / "serial.zarr", OPTIONS)
     found, serial = (
         np.asarray(zarr.open_array(f"{each}/range", mode="r"))
