@@ -69,7 +69,13 @@ export interface Cut {
 }
 
 /** An array of part of a frame, (..., rows, columns), as one of all of its pixels: left out ones like the next above and left, none outside of the region. */
-export function whole(data: Numbers, shape: readonly number[], { region: [x0, y0, columns, rows], decimation }: Cut, width: number, height: number): Numbers {
+export function whole(
+  data: Numbers,
+  shape: readonly number[],
+  { region: [x0, y0, columns, rows], decimation }: Cut,
+  width: number,
+  height: number,
+): Numbers {
   const [cutRows, cutColumns] = shape.slice(-2);
   const planes = data.length / (cutRows * cutColumns);
   const made = data.constructor as new (length: number) => Numbers;

@@ -31,7 +31,12 @@ class Page {
     shelf: null,
     api: new Api(() => Promise.resolve(new Response(JSON.stringify({ ...CAMERA, absent_products: this.absent })))),
   });
-  readonly client = new StreamClient(this.store, this.worker, new AnimationLoop((callback) => this.#requested.push(callback)), () => this.now_s);
+  readonly client = new StreamClient(
+    this.store,
+    this.worker,
+    new AnimationLoop((callback) => this.#requested.push(callback)),
+    () => this.now_s,
+  );
   now_s = 1000;
 
   receives(...reports: Report[]): void {
@@ -125,7 +130,12 @@ describe("between worker and store", () => {
     test("is counted while it plays, and while it is scrubbed", () => {
       page.store.player.playing.value = true;
       expect(watches()).toEqual([
-        { type: "moved", pictures_hz: expect.closeTo(10, 6) as number, frames_hz: expect.closeTo(5, 6) as number, camera_hz: expect.closeTo(10, 6) as number },
+        {
+          type: "moved",
+          pictures_hz: expect.closeTo(10, 6) as number,
+          frames_hz: expect.closeTo(5, 6) as number,
+          camera_hz: expect.closeTo(10, 6) as number,
+        },
       ]);
       page.store.player.playing.value = false;
       page.store.player.scrubbed.value = true;
@@ -239,13 +249,24 @@ describe("between worker and store", () => {
   test("notices become what happened", () => {
     page.receives({ type: "message", message: { type: "notice", kind: "lease-changed", change: "granted", holder: "bench 2" } });
     page.receives({ type: "message", message: { type: "notice", kind: "lost-images", count: 2, frame: 9 } });
-    expect(page.store.events.all.value.map(({ words }) => words)).toEqual(["bench 2 has taken control.", expect.stringMatching(/^2 images did not arrive intact/)]);
+    expect(page.store.events.all.value.map(({ words }) => words)).toEqual([
+      "bench 2 has taken control.",
+      expect.stringMatching(/^2 images did not arrive intact/),
+    ]);
   });
 
   test("a sequence that was set anew and is what it was is no news", () => {
     const sequence = { sequence_id: 1, harmonics: 4, base_frequency_hz: 23e6, exposure_s: 1e-3, images: 20 };
     const changed = (change: object): void =>
-      page.receives({ type: "message", message: { type: "notice", kind: "sequence-changed", channels: [], sequence: { ...sequence, ...change } as unknown as AppliedDocument } });
+      page.receives({
+        type: "message",
+        message: {
+          type: "notice",
+          kind: "sequence-changed",
+          channels: [],
+          sequence: { ...sequence, ...change } as unknown as AppliedDocument,
+        },
+      });
     changed({});
     changed({ sequence_id: 2 });
     expect(page.store.events.all.value).toHaveLength(1);

@@ -47,7 +47,14 @@ function MapPanel({ name, choice }: MapPanelProps) {
   const figure = (kind: "png" | "svg"): void => {
     const meta = look.frame.peek()?.meta;
     if (meta === undefined) return;
-    const parts = { title: shown.name, caption: captionOf(meta), scale: look.scale.peek(), colours: look.colours.peek(), unit: shown.unit, ground: "white" } as const;
+    const parts = {
+      title: shown.name,
+      caption: captionOf(meta),
+      scale: look.scale.peek(),
+      colours: look.colours.peek(),
+      unit: shown.unit,
+      ground: "white",
+    } as const;
     void saveFigure(`${shown.product}-${meta.frame}`, canvas.current, parts, kind);
   };
   return (
@@ -80,7 +87,10 @@ function MapLookMenu({ look, name }: { look: Look; name: ViewName }) {
   return (
     <PopoverButton face="Look" label={`Look of the ${name}`} title="Limits, scale and colours" kind="look">
       <LimitFields look={look} looks={looks} />
-      <Check checked={look.kind.value === "logarithmic"} onChange={(logarithmic) => (look.kind.value = logarithmic ? "logarithmic" : "linear")}>
+      <Check
+        checked={look.kind.value === "logarithmic"}
+        onChange={(logarithmic) => (look.kind.value = logarithmic ? "logarithmic" : "linear")}
+      >
         Logarithmic
       </Check>
       <ColourChoice colours={look.colours} />
@@ -141,7 +151,14 @@ function MapPicture({ look, canvas }: MapProps) {
         {waiting.value ? (
           <div class="colour-bar" />
         ) : (
-          <ColourBar scale={look.scale.value} colours={look.colours.value} unit={shown.unit} values={frame} marked={marked} onLimit={(limits) => store.looks.limit(look, limits)} />
+          <ColourBar
+            scale={look.scale.value}
+            colours={look.colours.value}
+            unit={shown.unit}
+            values={frame}
+            marked={marked}
+            onLimit={(limits) => store.looks.limit(look, limits)}
+          />
         )}
       </div>
       <footer class="panel-foot">

@@ -104,7 +104,12 @@ export function ResponseView() {
         )}
         {place.value !== null && (
           <aside class="response-side fades" aria-label="What was found at the pixel" tabIndex={0}>
-            <Found flags={flags} returns={returns} details={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
+            <Found
+              flags={flags}
+              returns={returns}
+              details={store.details.document.value}
+              held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null}
+            />
             {pixel.value !== null && <PixelFigures key={place.value} pixel={pixel.value} />}
             <FlagWords flags={flags} looked={store.details.document.value !== null} />
           </aside>
@@ -232,9 +237,13 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
             truth
           </span>
         )}
-        {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">smoothed</em>}
+        {aspect === "bounds" && (
+          <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">smoothed</em>
+        )}
         {aspect !== "cumulative" && !logarithmic && (
-          <em title="Height: linear near zero, logarithmic where it is high, so that what is dim stays in sight beside narrow and high peaks">asinh</em>
+          <em title="Height: linear near zero, logarithmic where it is high, so that what is dim stays in sight beside narrow and high peaks">
+            asinh
+          </em>
         )}
         <Toggle
           pressed={lit.value}

@@ -57,7 +57,8 @@ export function Picture({ look }: { look: TransientLook }) {
     if (renderer.value === null || coefficients === null) return;
     const fits = brightness?.values.length === coefficients.width * coefficients.height;
     const white = brightness?.map?.high ?? NaN;
-    const backdrop = wanted && fits && white > 0 && brightness?.values instanceof Float32Array ? { values: brightness.values, white } : null;
+    const backdrop =
+      wanted && fits && white > 0 && brightness?.values instanceof Float32Array ? { values: brightness.values, white } : null;
     renderer.value.draw(coefficients, { phase_rad, tone, colours, backdrop });
     if (canvas.current !== null) canvas.current.dataset.frame = String(frame.peek()?.meta.frame);
     look.snapshot = () => {
