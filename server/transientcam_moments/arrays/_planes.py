@@ -32,7 +32,7 @@ def as_array(values: Array) -> Array:
     What NumPy masks is NaN, and whole numbers become real ones for it.
     """
     if isinstance(values, np.ma.MaskedArray):
-        values = values.astype(np.result_type(values.dtype, np.float32)).filled(np.nan)
+        values = np.ma.filled(values.astype(np.result_type(values.dtype, np.float32)), np.nan)
     array = values if hasattr(values, "__array_namespace__") else np.asarray(values)
     if isinstance(array, np.ndarray) and not array.dtype.isnative:  # as FITS and HDF5 keep them
         return array.astype(array.dtype.newbyteorder("="))

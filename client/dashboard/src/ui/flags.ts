@@ -12,9 +12,9 @@ export interface Flag {
 
 /** The gravest first: a pixel with several is shown by the first. */
 export const FLAGS: readonly Flag[] = [
-  { bit: 8, name: "non_finite", title: "Not finite", words: "a moment is not a number, or too large", colour: "#cc79a7" },
-  { bit: 2, name: "no_signal", title: "No signal", words: "no light came back", colour: "#1b2a6b" },
   { bit: 4, name: "saturated", title: "Saturated", words: "an image was at the end of its scale", colour: "#e69f00" },
+  { bit: 8, name: "non_finite", title: "Not finite", words: "a moment is not a number, or too large", colour: "#cc79a7" },
+  { bit: 2, name: "no_signal", title: "No signal", words: "no light above the noise came back", colour: "#1b2a6b" },
   {
     bit: 64,
     name: "contradictory",
