@@ -162,6 +162,13 @@ export class StreamConnection {
     if (this.#adapts && this.#open && this.#pace.judge(report)) this.#askAnew();
   }
 
+  /** Light stands still, or something is measured: however slow pictures were, they are not what is waited for. */
+  rested(): void {
+    if (this.#pace.maxRate_hz === null) return;
+    this.#pace = new PaceControl();
+    this.#askAnew();
+  }
+
   /** Tries at once instead of waiting out the pause between attempts. */
   retryNow(): void {
     if (this.#socket !== null) return;

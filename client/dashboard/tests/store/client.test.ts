@@ -112,6 +112,32 @@ describe("between worker and store", () => {
     expect(page.acknowledged).toEqual([4]);
   });
 
+  test("a frame of which a part was sent is fetched whole when it is held", () => {
+    const report = frame("range", 4) as FrameReport;
+    const part = { width: 2, height: 1, region: [0, 0, 2, 1], decimation: 2 };
+    const thinned = { ...report.message, meta: { ...report.message.meta, ...part } } as unknown as FrameMessage;
+    page.receives(summarised(thinned));
+    page.refreshes();
+    page.store.held.value = true;
+    const asked = page.sent.filter((command) => command.type === "bring");
+    expect(asked).toEqual([{ type: "bring", ticket: 1, path: "/api/v1/frames/4", products: ["range"] }]);
+  });
+
+  test.each(["a pause", "a pin"])("%s ends the limits of a slow browser, and is told once", (what) => {
+    page.store.frames.claim(["coefficients"]);
+    page.store.player.playing.value = true;
+    page.receives({ ...frame("coefficients", 1), light: null } as Report);
+    page.refreshes();
+    page.sent.length = 0;
+    if (what === "a pause") page.store.player.playing.value = false;
+    else page.store.measures.pins.value = [{ name: "A", pixel: { x: 0, y: 0 } }] as never;
+    for (let n = 2; n < 5; n++) {
+      page.receives({ ...frame("coefficients", n), light: null } as Report);
+      page.refreshes();
+    }
+    expect(page.sent.filter(({ type }) => type === "rested")).toEqual([{ type: "rested" }]);
+  });
+
   describe("how fluently light moves", () => {
     const light = (number: number): Report => ({ ...frame("coefficients", number), light: null }) as Report;
     /** 3 s of 10 refreshes a second, a new frame at each second one. */

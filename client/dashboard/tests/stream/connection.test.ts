@@ -190,6 +190,15 @@ describe("with a slow browser", () => {
     expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
   });
 
+  test("asks for everything as soon as nothing moves", () => {
+    world.socket.opens();
+    for (let window = 0; window < 5; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: 1, camera_hz: 16 });
+    expect(asked()).toEqual([expect.objectContaining({ decimation: 2 })]);
+    world.connection.rested();
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+    expect(world.events.at(-1)).toMatchObject({ type: "demand", demand: { maxRate_hz: null, part: false } });
+  });
+
   test("asks for more again where there is room, and for all of another sequence", () => {
     world.socket.opens();
     stutters();

@@ -91,7 +91,7 @@ describe("messages of the service", () => {
       encode({ type: "frame", meta, array: { dtype: "<f4", shape: [2, 2], data } }).slice().buffer,
     ) as FrameMessage;
     expect(message.array.shape).toEqual([3, 5]);
-    expect([...message.array.data]).toEqual([NaN, 1, 1, 2, NaN, NaN, 1, 1, 2, NaN, NaN, 3, 3, 4, NaN]);
+    expect([...message.array.data]).toEqual([NaN, 1, NaN, 2, NaN, NaN, NaN, NaN, NaN, NaN, NaN, 3, NaN, 4, NaN]);
   });
 
   test("a kind of message from a later service is passed over", () =>

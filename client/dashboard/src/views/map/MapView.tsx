@@ -1,7 +1,7 @@
 import { computed, type ReadonlySignal, type Signal } from "@preact/signals";
 import type { RefObject } from "preact";
 import { useMemo, useRef } from "preact/hooks";
-
+import { drawnOf } from "../../store/frames";
 import type { Look } from "../../store/looks";
 import { MAP_PRODUCTS, type MapProduct } from "../../store/mapCatalogue";
 import { useStore } from "../../store/store";
@@ -64,7 +64,7 @@ function MapPanel({ name, choice }: MapPanelProps) {
         { text: "Picture (PNG)", run: () => savePicture(`${shown.product}-${look.frame.peek()?.meta.frame ?? 0}`, canvas.current) },
         { text: "Figure (PNG)", run: () => figure("png") },
         { text: "Figure (SVG)", run: () => figure("svg") },
-        { text: `${shown.name} in ${shown.unit} (NPY)`, run: () => saveNumbers(look.frame.peek()) },
+        { text: `${shown.name} in ${shown.unit} (NPY)`, run: () => saveNumbers(store.api, look.frame.peek()) },
       ]}
       title={
         <Tabs
@@ -135,7 +135,7 @@ function MapPicture({ look, canvas }: MapProps) {
     const [rows, columns] = newest.shape;
     if (target.width !== columns || target.height !== rows) [target.width, target.height] = [columns, rows];
     const image = context.createImageData(columns, rows);
-    paint(newest.values, scale, colours, image.data);
+    paint(drawnOf(newest), scale, colours, image.data);
     context.putImageData(image, 0, 0);
     // What the picture shows, for tests and for scripts that read the page.
     Object.assign(target.dataset, { product: shown.product, frame: newest.meta.frame, low: scale.low, high: scale.high, colours });

@@ -5,7 +5,7 @@ import { LightPainter } from "../../gl/paintLight";
 import type { Backdrop } from "../../gl/renderer";
 import { grouped } from "../../scales/format";
 import { LIVE, RequestError } from "../../store/api";
-import type { Frame } from "../../store/frames";
+import { drawnOf, type Frame } from "../../store/frames";
 import type { TransientLook } from "../../store/lightLook";
 import { aBoolean, aNumber, oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
@@ -266,5 +266,7 @@ export function PointsView() {
 /** The still scene behind the light, where it is wanted. */
 function backdropOf(amplitude: Frame | null, light: TransientLook): Backdrop | null {
   const white = amplitude?.map?.high ?? NaN;
-  return light.backdrop.value && white > 0 && amplitude?.values instanceof Float32Array ? { values: amplitude.values, white } : null;
+  return light.backdrop.value && white > 0 && amplitude?.values instanceof Float32Array
+    ? { values: drawnOf(amplitude) as Float32Array, white }
+    : null;
 }

@@ -6,7 +6,7 @@ import { rangeOfTime_m } from "../../physics/constants";
 import { pixelOf } from "../../physics/reflection";
 import { fixed, significant } from "../../scales/format";
 import { autoLimits, type Span } from "../../scales/scale";
-import type { Frame } from "../../store/frames";
+import { type Frame, wasSent } from "../../store/frames";
 import { PIN_COLOURS } from "../../store/measures";
 import type { Pixel } from "../../store/pixel";
 import type { Lit } from "../../store/player";
@@ -57,6 +57,7 @@ export function ResponseView() {
         const pixel = store.selected.value;
         if (!coefficients || pixel === null) return null;
         if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return null;
+        if (frame.value !== null && !wasSent(frame.value, pixel)) return null;
         const index = pixel.y * coefficients.width + pixel.x;
         return { pixel, coefficients, index };
       }),
@@ -126,7 +127,8 @@ function selectFirst(store: Store, frame: ReadonlySignal<Frame | null>): () => v
     if (store.selected.value !== null || newest === null) return;
     const [height, width] = newest.shape;
     const pixel = newest.coefficients ? richestPixel(newest.coefficients) : { x: width >> 1, y: height >> 1 };
-    untracked(() => (store.selected.value = pixel));
+    // a slow browser has every second pixel while light plays: one of these keeps its curve
+    untracked(() => (store.selected.value = pixel && { x: pixel.x & ~1, y: pixel.y & ~1 }));
   });
   return end;
 }
