@@ -208,20 +208,68 @@ def test_whatever_is_not_capabilities_is_a_protocol_error(data: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    ("lie", "name"),
+    ("field", "within", "beyond", "name"),
     [
-        ({"width": 0}, "width"),
-        ({"height": 60000}, "height"),
-        ({"bits": 24}, "bits"),
-        ({"max_harmonics": 0}, "harmonics"),
-        ({"fifo_bytes": 64}, "FIFO"),
-        ({"heartbeat_s": 0.0}, "heartbeat"),
-        ({"min_exposure_s": 0.06}, "shortest exposure"),
+        ("width", [1, 4096], [0, 4097], "width"),
+        ("height", [1, 4096], [0, 4097], "height"),
+        ("bits", [1, 16], [0, 17], "bits"),
+        ("max_harmonics", [1, 255], [0], "harmonics"),
+        ("max_sub_phases", [1, 255], [0], "sub-phases"),
+        ("max_takes", [1, 65535], [0], "takes"),
+        ("max_images", [1, 65535], [0], "images"),
+        ("min_frequency_hz", [1.0, 150e6], [0.0, 0.75, 150e6 + 0.25], "lowest frequency"),
+        ("min_exposure_s", [1e-9, 0.05], [0.0, 0.050000001], "shortest exposure"),
+        ("heartbeat_s", [0.01, 3600.0], [0.009, 3600.001], "heartbeat"),
+        ("fifo_bytes", [64 + 39120, 2**32 - 1], [64 + 39119], "FIFO"),
+        ("schemes", [("arccos",)], [()], "schemes"),
+        ("zeroths", [("on-off",), ("estimated",)], [()], "zeroth moment"),
     ],
 )
-def test_a_device_that_lies_about_itself_is_refused(lie: dict[str, float], name: str) -> None:
-    with pytest.raises(ProtocolError, match=name):
-        unpack_capabilities(pack_capabilities(replace(CAPABILITIES, **lie)))  # type: ignore[arg-type]  # fields by name
+def test_capabilities_are_taken_up_to_their_limits(
+    field: str, within: list[Any], beyond: list[Any], name: str
+) -> None:
+    wide = replace(CAPABILITIES, fifo_bytes=2**28) if field in {"width", "height"} else CAPABILITIES
+    for value in within:
+        at_limit = replace(wide, **{field: value})
+        assert getattr(unpack_capabilities(pack_capabilities(at_limit)), field) == value
+    for value in beyond:
+        liar = replace(wide, **{field: value})
+        with pytest.raises(ProtocolError, match=name):
+            unpack_capabilities(pack_capabilities(liar))
+
+
+def test_a_synthesiser_has_steps_of_a_millionth_of_a_hertz_or_more() -> None:
+    finest = replace(
+        CAPABILITIES,
+        tuning_step_hz=1e-6,
+        min_frequency_hz=1.0,
+        max_frequency_hz=4000.0,
+        low_frequency_hz=0.0,
+    )
+
+    packed = pack_capabilities(finest)
+    without = packed[:104] + bytes(4) + packed[108:-4]
+
+    assert unpack_capabilities(packed).tuning_step_hz == 1e-6
+    with pytest.raises(ProtocolError, match="tuning step"):
+        unpack_capabilities(without + struct.pack("<I", naive_crc(without)))
+
+
+@pytest.mark.parametrize("kept", range(CAPS_BYTES))
+def test_capabilities_cut_short_are_refused(kept: int) -> None:
+    whole = pack_capabilities(CAPABILITIES)
+    named = "mark" if kept < 8 else f"of {kept} bytes, {CAPS_BYTES} needed"
+
+    with pytest.raises(ProtocolError, match=named):
+        unpack_capabilities(whole[:kept])
+
+
+def test_capabilities_that_state_to_be_shorter_than_their_fields_are_refused() -> None:
+    short = bytearray(pack_capabilities(CAPABILITIES))
+    struct.pack_into("<H", short, 6, CAPS_BYTES - 1)
+
+    with pytest.raises(ProtocolError, match=f"{CAPS_BYTES} needed"):
+        unpack_capabilities(bytes(short))
 
 
 def test_a_sequence_has_the_bytes_of_the_specification() -> None:
@@ -251,30 +299,6 @@ def test_a_phase_offset_is_appended_to_a_sequence() -> None:
     assert SequenceWords.unpack(words.pack()).sequence(CAPABILITIES) == sequence
     assert len(commitment.pack()) == 44
     assert Commitment.unpack(commitment.pack()) == commitment
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("heartbeat_s", 0.01),
-        ("heartbeat_s", 3600.0),
-        ("bits", 1),
-        ("bits", 16),
-        ("max_harmonics", 1),
-        ("max_harmonics", 255),
-        ("max_sub_phases", 1),
-        ("max_sub_phases", 255),
-        ("max_takes", 1),
-        ("max_takes", 65535),
-        ("max_images", 1),
-        ("max_images", 65535),
-    ],
-)
-def test_capabilities_may_be_at_their_limits(field: str, value: float) -> None:
-    change: dict[str, Any] = {field: value}
-    at_limit = replace(CAPABILITIES, **change)
-
-    assert getattr(unpack_capabilities(pack_capabilities(at_limit)), field) == value
 
 
 def test_a_camera_that_can_shift_phases_says_so_in_one_bit() -> None:

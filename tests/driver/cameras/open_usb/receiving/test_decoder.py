@@ -172,6 +172,17 @@ def test_reset_forgets_the_bytes_of_a_stream_that_was_cut_off(kept: int) -> None
     assert decoder.resyncs == 0
 
 
+@pytest.mark.parametrize("noise", ["x" * count for count in range(9)])
+def test_bytes_that_cannot_begin_a_packet_are_passed_over_at_once(noise: str) -> None:
+    decoder = PacketDecoder(payload_bytes=PAYLOAD_BYTES)
+
+    assert decoder.feed(noise.encode()) == []
+
+    assert decoder.resyncs == (len(noise) >= len(b"TCIM"))
+    assert numbers(decoder.feed(packet(0))) == [0]
+    assert decoder.resyncs == (len(noise) > 0)
+
+
 def test_memory_stays_bounded_under_endless_garbage() -> None:
     decoder = PacketDecoder(payload_bytes=PAYLOAD_BYTES)
 
