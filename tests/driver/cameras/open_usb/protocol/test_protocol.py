@@ -288,6 +288,17 @@ def test_interleaved_takes_are_one_byte_of_a_sequence() -> None:
     assert packed == bytes.fromhex("01 04 01 01 08 01 1400 00cf7b05 80ee3600 004c1d00")
 
 
+@pytest.mark.parametrize(
+    ("zeroth", "low_word"), [("low-frequency", 3_600_000), ("on-off", 0), ("estimated", 0)]
+)
+def test_only_a_zeroth_moment_at_a_low_frequency_has_one(zeroth: Any, low_word: int) -> None:
+    words = SequenceWords.of(Sequence(23e6, 4, zeroth), CAPABILITIES)
+
+    assert (words.low_word, words.word(0)) == (low_word, low_word)
+    assert number(words.pack(), 12, 4) == low_word
+    assert words.word(3) == 3 * 92_000_000
+
+
 def test_a_phase_offset_is_appended_to_a_sequence() -> None:
     sequence = Sequence(23e6, 4, exposure_s=1.92e-3, takes=20, phase_offset_rad=math.pi / 16)
 
