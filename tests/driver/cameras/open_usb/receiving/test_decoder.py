@@ -183,6 +183,34 @@ def test_bytes_that_cannot_begin_a_packet_are_passed_over_at_once(noise: str) ->
     assert decoder.resyncs == (len(noise) > 0)
 
 
+@pytest.mark.parametrize("before", [b"", packet(0), b"noise", b"noise" + packet(0)])
+def test_noise_is_counted_again_after_a_reset(before: bytes) -> None:
+    decoder = PacketDecoder(payload_bytes=PAYLOAD_BYTES)
+    decoder.feed(before)
+    counted = decoder.resyncs
+    assert counted == before.startswith(b"noise")
+
+    decoder.reset()
+    decoder.feed(b"noise" + packet(1))
+
+    assert decoder.resyncs == counted + 1
+
+
+def test_the_length_that_an_intact_header_announced_is_kept_until_a_reset() -> None:
+    decoder = PacketDecoder(payload_bytes=PAYLOAD_BYTES)
+    assert decoder.odd_payload_bytes is None
+
+    decoder.feed(packet(0))
+    assert decoder.odd_payload_bytes is None
+    decoder.feed(packet(1, bytes(90)) + packet(2, bytes(91)))
+    assert decoder.odd_payload_bytes == 91
+    decoder.feed(packet(3))
+    assert decoder.odd_payload_bytes == 91
+
+    decoder.reset()
+    assert decoder.odd_payload_bytes is None
+
+
 def test_memory_stays_bounded_under_endless_garbage() -> None:
     decoder = PacketDecoder(payload_bytes=PAYLOAD_BYTES)
 
