@@ -185,3 +185,35 @@ def test_the_first_image_of_a_run_is_missed_too() -> None:
     (frame,) = assembly.push(*map(image, range(1, 2 * COUNT)))
 
     assert (frame.number, frame.lost_images) == (1, 1)
+
+
+def test_a_run_begins_with_image_0_where_nothing_is_said() -> None:
+    counters = Counters()
+    assembler = FrameAssembler(APPLIED, CAPABILITIES, counters)
+
+    assembler.push(image(1), host_time_s=99.0)
+
+    assert counters.lost == 1
+
+
+def test_every_image_is_counted_once_by_what_became_of_it() -> None:
+    assembly = Assembly()
+    good = [image(k) for k in range(2 * COUNT)]
+    other = [image(k, epoch=4) for k in range(3)]
+    damaged = replace(image(2 * COUNT), intact=False)
+    late = image(2 * COUNT + 3)
+
+    frames = assembly.push(*good, good[0], *other, damaged, late, late)
+
+    assert len(frames) == 2
+    assert assembly.counters == Counters(
+        images=2 * COUNT + 1, frames=2, lost=2, corrupt=1, duplicates=2
+    )
+
+
+def test_images_of_a_frame_after_a_missing_one_are_counted_too() -> None:
+    assembly = Assembly()
+
+    assembly.push(*(image(k) for k in range(COUNT) if k != 1))
+
+    assert assembly.counters == Counters(images=COUNT - 1, lost=1, incomplete_frames=1)
