@@ -32,6 +32,12 @@ from transientcam_driver.cameras.open_usb.protocol import (
     unpack_time,
 )
 from transientcam_driver.cameras.open_usb.protocol._capabilities import CAPS_BYTES
+from transientcam_driver.cameras.open_usb.protocol._requests import (
+    IMAGE_ENDPOINT,
+    PRODUCT_ID,
+    VENDOR_CLASS,
+    VENDOR_ID,
+)
 from transientcam_simulation.emulated._open_usb.prototype import prototype
 
 SPECIFICATION = ROOT / "docs" / "usb-protocol.md"
@@ -95,6 +101,14 @@ def test_codes_are_those_of_the_specification(codes: type[IntEnum] | type[IntFla
         found = re.findall(r"(\d) ([A-Z_]{3,})", found[0])
 
     assert {int(code, 0): name for code, name in found} == {int(each): each.name for each in codes}
+
+
+def test_the_device_is_found_by_what_the_specification_states() -> None:
+    text = SPECIFICATION.read_text("utf-8")
+
+    assert f"| vendor : product | {VENDOR_ID:04x} : {PRODUCT_ID:04x}, a test number" in text
+    assert f"| class | vendor specific (0x{VENDOR_CLASS:02X}), one configuration" in text
+    assert f"| endpoint | 0x{IMAGE_ENDPOINT:02x}, bulk IN: images |" in text
 
 
 def test_the_checksum_is_the_castagnoli_one() -> None:
@@ -449,6 +463,13 @@ def test_a_last_error_names_request_code_and_reason() -> None:
 
 def test_a_last_error_of_a_later_firmware_is_still_read() -> None:
     assert unpack_last_error(b"\x63\x00\x7fwhat") == ("request 0x7f", "error 99", "what")
+
+
+@pytest.mark.parametrize("data", [b"", b"\x03", b"\x03\x00"])
+def test_a_last_error_without_its_codes_is_a_protocol_error(data: bytes) -> None:
+    with pytest.raises(ProtocolError, match=f"last error of {len(data)} bytes"):
+        unpack_last_error(data)
+    assert unpack_last_error(b"\x00\x00\x01") == ("GET_CAPS", "NONE", "")
 
 
 def test_a_last_error_fits_into_one_packet() -> None:
