@@ -313,6 +313,23 @@ def test_the_next_frame_is_no_gap() -> None:
     run(test)
 
 
+@pytest.mark.parametrize(("first", "last"), [(None, None), (None, 4), (3, None)])
+def test_of_a_past_that_was_emptied_nothing_is_waited_for(
+    first: int | None, last: int | None
+) -> None:
+    def test() -> None:
+        outbox, past = subscribed(), FakePast(1, 4)
+        outbox.resume(past, start=2)
+        past.first, past.last = first, last
+
+        assert waiting(outbox) == []
+        outbox.put_frame(fake_frame(5))
+
+        assert numbers(waiting(outbox)) == [5]
+
+    run(test)
+
+
 def test_credits_hold_back_frames_of_the_past_too() -> None:
     def test() -> None:
         outbox = subscribed(credit=2)

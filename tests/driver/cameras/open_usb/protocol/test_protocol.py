@@ -31,7 +31,10 @@ from transientcam_driver.cameras.open_usb.protocol import (
     unpack_status,
     unpack_time,
 )
-from transientcam_driver.cameras.open_usb.protocol._capabilities import CAPS_BYTES
+from transientcam_driver.cameras.open_usb.protocol._capabilities import (
+    CAPS_BYTES,
+    CAPS_ROOM_BYTES,
+)
 from transientcam_driver.cameras.open_usb.protocol._requests import (
     IMAGE_ENDPOINT,
     PRODUCT_ID,
@@ -109,6 +112,7 @@ def test_the_device_is_found_by_what_the_specification_states() -> None:
     assert f"| vendor : product | {VENDOR_ID:04x} : {PRODUCT_ID:04x}, a test number" in text
     assert f"| class | vendor specific (0x{VENDOR_CLASS:02X}), one configuration" in text
     assert f"| endpoint | 0x{IMAGE_ENDPOINT:02x}, bulk IN: images |" in text
+    assert f"capabilities (section 4); ask for {CAPS_ROOM_BYTES} bytes" in text
 
 
 def test_the_checksum_is_the_castagnoli_one() -> None:
@@ -161,6 +165,19 @@ def test_a_header_with_any_bit_flipped_is_none(header: ImageHeader, bit: int) ->
     assert ImageHeader.unpack(bytes(damaged)) is None
 
 
+@pytest.mark.parametrize(
+    ("offset", "values"), [(0, b"SU"), (3, b"LN"), (4, b"\x00\x02\xff"), (5, b"\x3f\x41\x00\xff")]
+)
+def test_another_mark_version_or_length_is_no_header_though_its_checksum_holds(
+    offset: int, values: bytes
+) -> None:
+    for value in values:
+        body = bytearray(HEADER.pack()[:60])
+        body[offset] = value
+
+        assert ImageHeader.unpack(body + struct.pack("<I", naive_crc(bytes(body)))) is None
+
+
 def test_capabilities_have_the_fields_at_the_offsets_of_the_specification() -> None:
     packed = pack_capabilities(CAPABILITIES)
 
@@ -199,11 +216,18 @@ def test_capabilities_with_fields_appended_by_a_later_firmware_are_read() -> Non
     assert unpack_capabilities(bytes(longer)) == CAPABILITIES
 
 
-def test_another_protocol_version_requires_new_firmware() -> None:
-    old = pack_capabilities(replace(CAPABILITIES, protocol_version=0))
+@pytest.mark.parametrize("version", [0, 2, 65535])
+def test_another_protocol_version_requires_new_firmware(version: int) -> None:
+    other = pack_capabilities(replace(CAPABILITIES, protocol_version=version))
 
-    with pytest.raises(FirmwareTooOld, match="version 0 found, version 1 needed"):
-        unpack_capabilities(old)
+    with pytest.raises(FirmwareTooOld, match=f"version {version} found, version 1 needed"):
+        unpack_capabilities(other)
+
+
+@pytest.mark.parametrize("mark", [b"TCCO", b"TCCQ", b"SCCP", b"UCCP"])
+def test_what_has_another_mark_is_no_capabilities(mark: bytes) -> None:
+    with pytest.raises(ProtocolError, match="152 bytes without the mark"):
+        unpack_capabilities(mark + pack_capabilities(CAPABILITIES)[4:])
 
 
 @given(bit=st.integers(8 * 8, CAPS_BYTES * 8 - 1))
@@ -385,6 +409,9 @@ def test_a_sequence_on_the_grid_survives_the_wire(
     ("code", "name"),
     [
         ({"zeroth": 3}, "code 3 for the zeroth moment"),
+        ({"zeroth": 255}, "code 255 for the zeroth moment"),
+        ({"scheme": 4}, "code 4 for the scheme"),
+        ({"take_order": 3}, "code 3 for the order of takes"),
         ({"scheme": 3}, "code 3 for the scheme"),
         ({"take_order": 2}, "code 2 for the order of takes"),
     ],
@@ -444,9 +471,81 @@ def test_answers_of_the_wrong_length_are_protocol_errors(data: bytes) -> None:
                 unpack(data)
 
 
-def test_an_unknown_state_is_a_protocol_error() -> None:
-    with pytest.raises(ProtocolError, match="state 9"):
-        unpack_status(b"\x01\x09" + bytes(38))
+@pytest.mark.parametrize("version", [0, 2, 255])
+@pytest.mark.parametrize("size", [20, 24])
+def test_a_sequence_or_status_of_another_version_is_a_protocol_error(
+    version: int, size: int
+) -> None:
+    words = SequenceWords.of(Sequence(), CAPABILITIES).pack().ljust(size, b"\0")
+    assert SequenceWords.unpack(words).phase_offset == 0
+
+    with pytest.raises(ProtocolError, match=f"{size} bytes for a sequence"):
+        SequenceWords.unpack(bytes([version]) + words[1:])
+    with pytest.raises(ProtocolError, match="status of 40 bytes"):
+        unpack_status(bytes([version]) + bytes(39))
+
+
+@pytest.mark.parametrize("state", [len(DeviceState), 9, 255])
+def test_an_unknown_state_is_a_protocol_error(state: int) -> None:
+    with pytest.raises(ProtocolError, match=f"state {state}"):
+        unpack_status(bytes([1, state]) + bytes(38))
+
+
+def test_every_state_and_flag_is_read() -> None:
+    for state in DeviceState:
+        assert unpack_status(bytes([1, state]) + bytes(38)).state is state
+    for flag in StatusFlag:
+        status = unpack_status(bytes([1, 0]) + struct.pack("<H", flag) + bytes(36))
+        assert status.flags == flag
+
+
+@pytest.mark.parametrize(
+    ("temperature_c", "centidegrees"),
+    [
+        (0.0, 0),
+        (-0.01, -1),
+        (25.004, 2500),
+        (25.006, 2501),
+        (327.67, 32767),
+        (327.66, 32766),
+        (327.68, 32767),
+        (1e9, 32767),
+        (-327.68, -32768),
+        (-327.67, -32767),
+        (-327.69, -32768),
+        (-1e9, -32768),
+    ],
+)
+def test_a_temperature_is_in_hundredths_within_16_bits(
+    temperature_c: float, centidegrees: int
+) -> None:
+    packed = replace(HEADER, temperature_c=temperature_c).pack()
+
+    assert int.from_bytes(packed[48:50], "little", signed=True) == centidegrees
+    found = ImageHeader.unpack(packed)
+    assert found is not None
+    assert found.temperature_c == centidegrees / 100
+
+
+@pytest.mark.parametrize(
+    ("turns", "word"),
+    [
+        (0.0, 0),
+        (1 / 65536, 1),
+        (0.49 / 65536, 0),
+        (0.51 / 65536, 1),
+        (-1 / 65536, 65535),
+        (1.25, 16384),
+        (-0.25, 49152),
+        (65535.4 / 65536, 65535),
+        (65535.6 / 65536, 0),
+    ],
+)
+def test_a_phase_is_in_parts_of_a_turn_and_wraps(turns: float, word: int) -> None:
+    assert phase_word(turns * 2 * math.pi) == word
+    words = replace(SequenceWords.of(Sequence(), CAPABILITIES), phase_offset=word)
+    offset_rad = words.sequence(CAPABILITIES).phase_offset_rad
+    assert offset_rad == pytest.approx(2 * math.pi * word / 65536, rel=1e-15)
 
 
 def test_time_is_in_nanoseconds() -> None:
