@@ -1,5 +1,6 @@
 """Arrays as plain maps."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -104,6 +105,13 @@ def test_a_map_that_is_no_array_is_refused_by_name(document: dict[str, object], 
 def test_more_axes_than_can_travel_are_refused() -> None:
     with pytest.raises(ParameterError, match="dimensions is 7"):
         array_document(np.zeros((1,) * 7, dtype="<f4"))
+
+
+def test_as_many_bytes_as_msgpack_can_hold_are_taken(tmp_path: Path) -> None:
+    most = 2**32 - 1
+    array = np.memmap(tmp_path / "sparse", np.uint8, "w+", shape=most)  # takes no memory
+
+    assert array_document(array)["data"].nbytes == most
 
 
 @pytest.mark.parametrize("too_many", [2**32, 2**32 + 1, 2**33])

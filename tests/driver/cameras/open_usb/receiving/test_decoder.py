@@ -198,17 +198,15 @@ def test_noise_is_counted_again_after_a_reset(before: bytes) -> None:
 
 def test_the_length_that_an_intact_header_announced_is_kept_until_a_reset() -> None:
     decoder = PacketDecoder(payload_bytes=PAYLOAD_BYTES)
-    assert decoder.odd_payload_bytes is None
+    announced = [decoder.odd_payload_bytes]
 
-    decoder.feed(packet(0))
-    assert decoder.odd_payload_bytes is None
-    decoder.feed(packet(1, bytes(90)) + packet(2, bytes(91)))
-    assert decoder.odd_payload_bytes == 91
-    decoder.feed(packet(3))
-    assert decoder.odd_payload_bytes == 91
-
+    for data in (packet(0), packet(1, bytes(90)) + packet(2, bytes(91)), packet(3)):
+        decoder.feed(data)
+        announced.append(decoder.odd_payload_bytes)
     decoder.reset()
-    assert decoder.odd_payload_bytes is None
+    announced.append(decoder.odd_payload_bytes)
+
+    assert announced == [None, None, 91, 91, None]
 
 
 def test_memory_stays_bounded_under_endless_garbage() -> None:
