@@ -200,7 +200,7 @@ def test_a_token_is_not_shown() -> None:
 _SUBSCRIBE = _MESSAGES["subscribe"].to_document()
 _HELLO = _MESSAGES["hello"].to_document()
 _CHANNEL = _HELLO["channels"][0]
-_FRAME = {
+_FRAME: dict[str, Any] = {
     "v": 1,
     "type": "frame",
     "product": "range",
@@ -530,7 +530,7 @@ def test_limits_are_those_of_the_specification() -> None:
     ],
 )
 def test_codes_of_rfc_6455_are_those_of_another_library(ours: wire.CloseCode, name: str) -> None:
-    assert ours == CloseCode[name]
+    assert int(ours) == int(CloseCode[name])
 
 
 def test_every_close_code_is_in_the_specification() -> None:
