@@ -1,5 +1,6 @@
 """What a reconstruction takes over from a pass, and what it computes itself."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ MARK = np.arange(3.0)
 
 
 def passed(brightness: float = 100.0, flags: int = 0, **changes: Any) -> PassedReconstruction:
-    settings = {"base_frequency_hz": F_HZ, "smoothing_sigma_px": 0.0, "estimator": "pisarenko"}
+    plain = tm.Settings(base_frequency_hz=F_HZ, smoothing_sigma_px=0.0, estimator="pisarenko")
     planes = Planes(
         smoothed=SMOOTHED,
         brightness=np.full(3, brightness, np.float32),
@@ -31,7 +32,7 @@ def passed(brightness: float = 100.0, flags: int = 0, **changes: Any) -> PassedR
         indirect=MARK + 4,
         range_m=MARK + 5,
     )
-    return PassedReconstruction(planes, tm.Settings(**(settings | changes)), lambda: SMOOTHED * 2)
+    return PassedReconstruction(planes, replace(plain, **changes), lambda: SMOOTHED * 2)
 
 
 def test_returns_and_range_are_those_of_the_pass() -> None:
