@@ -19,8 +19,7 @@ def errors(found_m: list[float], true_m: list[float]) -> dict[str, float] | None
 def test_pixels_with_a_range_and_a_truth_count() -> None:
     none = np.nan
 
-    assert errors([1.3, 2.6, none, 3.0, 9.0], [1.0, 3.0, 5.0, none, 9.0]) == {
-        "median": pytest.approx(0.3),
-        "rms": pytest.approx(np.sqrt((0.3**2 + 0.4**2) / 3)),
-    }
+    assert errors([1.3, 2.6, none, 3.0, 9.0], [1.0, 3.0, 5.0, none, 9.0]) == pytest.approx(
+        {"median": 0.3, "rms": np.sqrt((0.3**2 + 0.4**2) / 3)}
+    )
     assert errors([none, 1.0], [1.0, none]) is None

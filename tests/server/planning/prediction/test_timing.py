@@ -74,8 +74,9 @@ def test_averaging_takes_its_time_for_each_image(
     now_s = [0.0]
 
     def reconstruct(images: Any, settings: tm.Settings, **_: object) -> MagicMock:
-        harmonics = len(images) // (4 * settings.takes)
-        averaged_s = 0.0 if settings.takes == 1 else image_s * settings.takes * len(images)
+        each = settings.takes or 0
+        harmonics = len(images) // (4 * each)
+        averaged_s = 0.0 if each == 1 else image_s * each * len(images)
         now_s[0] += once_s * harmonics + averaged_s
         return MagicMock()
 
