@@ -1,5 +1,6 @@
 """Arrays as plain maps."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -104,3 +105,18 @@ def test_a_map_that_is_no_array_is_refused_by_name(document: dict[str, object], 
 def test_more_axes_than_can_travel_are_refused() -> None:
     with pytest.raises(ParameterError, match="dimensions is 7"):
         array_document(np.zeros((1,) * 7, dtype="<f4"))
+
+
+def test_as_many_bytes_as_msgpack_can_hold_are_taken(tmp_path: Path) -> None:
+    most = 2**32 - 1
+    array = np.memmap(tmp_path / "sparse", np.uint8, "w+", shape=most)  # takes no memory
+
+    assert array_document(array)["data"].nbytes == most
+
+
+@pytest.mark.parametrize("too_many", [2**32, 2**32 + 1, 2**33])
+def test_more_bytes_than_msgpack_can_hold_are_refused(too_many: int) -> None:
+    array = np.broadcast_to(np.uint8(0), too_many)  # of one byte
+
+    with pytest.raises(ParameterError, match=f"size is '?{too_many} bytes"):
+        array_document(array)

@@ -99,3 +99,11 @@ def test_what_is_no_map_is_refused_by_name(data: bytes | str, field: str, value:
     assert caught.value.field == field
     assert value in str(caught.value)
     assert len(str(caught.value)) < 200
+
+
+def test_a_message_may_be_as_long_as_allowed() -> None:
+    data = pack({"k": "x" * 50})
+
+    assert unpack(data, max_bytes=len(data)) == {"k": "x" * 50}
+    with pytest.raises(ProtocolError, match=f"{len(data)} bytes"):
+        unpack(data, max_bytes=len(data) - 1)

@@ -10,9 +10,9 @@ from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
 from transientcam import density, wire
-from transientcam.density import step_up
+from transientcam.density import step_down, step_up
 from transientcam.errors import ProtocolError
-from transientcam.wire._encodings import decoded
+from transientcam.wire._encodings import ENCODINGS, decoded, measured_error
 
 _PHASES_RAD = np.linspace(0.0, 2.0 * np.pi, 256, endpoint=False)
 
@@ -119,6 +119,81 @@ def test_reflection16_keeps_pixels_without_a_value_and_without_light() -> None:
     np.testing.assert_allclose(again[:, 2], planes[:, 2], rtol=0.01, atol=0.01)
 
 
+@pytest.mark.parametrize("reflection", [1.0 + 1e-6, 1.2, 1e6])
+def test_a_reflection_beyond_the_border_is_sent_as_just_within(reflection: float) -> None:
+    planes = np.array([[1.0], [reflection], [0.0]], np.float32)
+    found = step_down(planes)[1]
+    assert abs(complex(found[0, 0])) > 1.0
+
+    codes, _ = wire.encode_reflection16(planes)
+
+    # |g| = 1 is u = 1 - 2 / 32767, which is 32765 steps from the middle
+    direction = found[0, 0] / abs(found[0, 0])
+    parts = [32768 + 32765 * direction.real, 32768 + 32765 * direction.imag]
+    assert codes[:, 0].tolist() == pytest.approx(parts, abs=0.5)
+
+
+def test_the_stated_error_is_the_largest_over_pixels_at_128_phases() -> None:
+    planes = _pixels(3, smallest=0.05)[:, :200]
+    coded = wire.encode_reflection16(planes)
+    coded = coded._replace(array=coded.array // 512 * 512)  # errors far above those of float32
+
+    median, most = measured_error(planes, coded)
+
+    phase_rad = np.arange(128) * 2.0 * np.pi / 128
+    worst = []
+    brightness = np.frombuffer(coded.fields["brightness"]["data"], "<f4")
+    again = wire.decode_reflection16(coded.array, brightness)
+    for pixel in range(200):
+        exact = density(planes[:, pixel].astype(np.float64), phase_rad)
+        found = density(again[:, pixel].astype(np.float64), phase_rad)
+        worst.append(np.abs(found - exact).max() / exact.max())
+    assert most == pytest.approx(max(worst), rel=1e-5)
+    assert median == pytest.approx(np.median(worst), rel=1e-5)
+
+
+@pytest.mark.parametrize(("pixels", "step"), [(1024, 1), (1025, 2), (2048, 2), (2049, 3)])
+def test_at_most_1024_pixels_are_judged_evenly_spread(pixels: int, step: int) -> None:
+    planes = np.repeat(_pixels(2, smallest=0.1)[:, :1], pixels, axis=1)
+    coded = wire.encode_reflection16(planes)
+
+    for spoilt in (0, 1, 2, 3, pixels - 1):
+        codes = coded.array.copy()
+        codes[:, spoilt] = 32768  # an even density
+        _, most = measured_error(planes, coded._replace(array=codes))
+        assert (most > 0.1) == (spoilt % step == 0)
+
+
+def test_an_image_without_light_has_no_error() -> None:
+    planes = np.zeros((7, 5), np.float32)
+    planes[:, 2:] = np.nan
+
+    assert measured_error(planes, wire.encode_reflection16(planes)) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("name", ["u16", "reflection16"])
+@pytest.mark.parametrize("axes", [("y", "x"), ("coefficient", "y", "x"), ("x", "y"), ("y",)])
+@pytest.mark.parametrize("dtype", ["<f4", "<u2"])
+def test_images_of_float_go_as_u16_and_coefficients_as_reflection16(
+    name: str, axes: tuple[str, ...], dtype: str
+) -> None:
+    fits = ENCODINGS[name].fits(axes, dtype)
+
+    assert fits == (
+        (name, axes, dtype) == ("u16", ("y", "x"), "<f4")
+        or (name, axes) == ("reflection16", ("coefficient", "y", "x"))
+    )
+
+
+def test_codes_have_the_shape_that_is_announced() -> None:
+    image, planes = np.ones((4, 6), np.float32), _pixels(3, smallest=0.1)[:, :6].reshape(7, 2, 3)
+
+    for name, array in (("u16", image), ("reflection16", planes)):
+        encoding = ENCODINGS[name]
+        codes = encoding.encode(array).array
+        assert (codes.shape, codes.dtype.str) == (encoding.shape(array.shape), encoding.dtype)
+
+
 def _message(array: NDArray[Any], product: str = "range", **said: Any) -> bytes:
     axes = ("coefficient", "y", "x")[-array.ndim :]
     return wire.encode_frame(
@@ -170,6 +245,12 @@ _BRIGHTNESS = wire.array_document(np.ones((2, 3), "<f4"))
             {"encoding": "reflection16", "brightness": wire.array_document(np.ones((3, 2), "<f4"))},
             "brightness.shape",
         ),
+        (
+            _PLANES,
+            {"encoding": "reflection16", "brightness": wire.array_document(np.ones((2, 3), "<f8"))},
+            "brightness.shape",
+        ),
+        (_PLANES[:0], {"encoding": "reflection16", "brightness": _BRIGHTNESS}, "array.shape"),
     ],
 )
 def test_codes_that_cannot_be_read_are_refused_by_name(

@@ -9,6 +9,7 @@ import msgpack  # type: ignore[import-untyped]  # it ships no types
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from websockets.frames import CloseCode
 
 from tests.client.conftest import SPECIFICATION, Recording
 from transientcam import wire
@@ -199,7 +200,7 @@ def test_a_token_is_not_shown() -> None:
 _SUBSCRIBE = _MESSAGES["subscribe"].to_document()
 _HELLO = _MESSAGES["hello"].to_document()
 _CHANNEL = _HELLO["channels"][0]
-_FRAME = {
+_FRAME: dict[str, Any] = {
     "v": 1,
     "type": "frame",
     "product": "range",
@@ -216,13 +217,58 @@ def test_a_frame_may_have_any_number_that_a_browser_counts_exactly(frame: int) -
     assert wire.parse_client_message(wire.encode(wire.Ack(frame))) == wire.Ack(frame)
 
 
-@pytest.mark.parametrize("decimation", [1, 64])
-def test_the_limits_of_a_decimation_are_part_of_it(decimation: int) -> None:
-    item = {"product": "range", "decimation": decimation}
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"subscriptions": [{"product": "range"}] * 16},
+        {"subscriptions": [{"product": "x" * 64}]},
+        {"subscriptions": [{"product": "range", "max_rate_hz": 5e-324}]},
+        {"subscriptions": [{"product": "range", "decimation": 1}]},
+        {"subscriptions": [{"product": "range", "decimation": 64}]},
+        {"subscriptions": [{"product": "range", "region": [0, 0, 1, 2**31 - 1]}]},
+        {"token": "x" * 4096},
+        {"credits": 1},
+        {"credits": 64},
+        {"start": 1},
+        {"start": 2**53 - 1},
+    ],
+)
+def test_the_limits_of_a_subscription_are_part_of_it(change: dict[str, Any]) -> None:
+    document = _SUBSCRIBE | change
 
-    parsed = wire.parse_client_message(wire.pack(_SUBSCRIBE | {"subscriptions": [item]}))
+    parsed = wire.parse_client_message(wire.pack(document))
 
-    assert parsed == wire.Subscribe((wire.Subscription("range", decimation=decimation),), credits=2)
+    assert isinstance(parsed, wire.Subscribe)
+    assert parsed.credits == document["credits"]
+    assert parsed.start == document["start"]
+    assert parsed.token == document["token"]
+    assert [
+        (each.product, each.max_rate_hz, each.region and list(each.region), each.decimation)
+        for each in parsed.subscriptions
+    ] == [
+        (each["product"], each.get("max_rate_hz"), each.get("region"), each.get("decimation", 1))
+        for each in document["subscriptions"]
+    ]
+
+
+def test_messages_up_to_the_longest_are_read() -> None:
+    message = {"type": "ack", "frame": 1, "more": ""}
+    longest = wire.pack(message | {"more": "x" * (65536 - len(wire.pack(message)) - 2)})
+    assert len(longest) == 65536
+
+    assert wire.parse_client_message(longest) == wire.Ack(1)
+    with pytest.raises(ProtocolError, match="65537 bytes', but must be at most 65536 bytes"):
+        wire.parse_client_message(longest + b"x")
+    with pytest.raises(ProtocolError, match="65536 bytes', but must be at most 65535 bytes"):
+        wire.parse_server_message(longest, max_bytes=65535)
+
+
+def test_a_client_reads_a_frame_of_640_x_480_at_32_harmonics_and_not_what_fills_its_memory() -> (
+    None
+):
+    largest_bytes = 65 * 640 * 480 * 4
+
+    assert largest_bytes < wire.MAX_SERVER_MESSAGE_BYTES < 2**30
 
 
 def test_a_frame_that_states_no_time_of_encoding_took_none() -> None:
@@ -270,6 +316,14 @@ def test_a_frame_that_states_no_time_of_encoding_took_none() -> None:
             "subscriptions[0].decimation",
         ),
         (
+            {"subscriptions": [{"product": "range", "region": [0, 0, 8, 2**31]}]},
+            "subscriptions[0].region[3]",
+        ),
+        (
+            {"subscriptions": [{"product": "range", "region": [-1, 0, 8, 8]}]},
+            "subscriptions[0].region[0]",
+        ),
+        (
             {"subscriptions": [{"product": "range", "region": [0, 0, 8]}]},
             "subscriptions[0].region",
         ),
@@ -278,7 +332,8 @@ def test_a_frame_that_states_no_time_of_encoding_took_none() -> None:
             "subscriptions[0].region",
         ),
         ({"token": 5}, "token"),
-        ({"token": "x" * 5000}, "token"),
+        ({"token": "x" * 4097}, "token"),
+        ({"type": "x" * 257}, "type"),
         ({"credits": 0}, "credits"),
         ({"credits": 65}, "credits"),
         ({"credits": 2.0}, "credits"),
@@ -321,6 +376,18 @@ def test_a_bad_acknowledgement_is_refused(number: object) -> None:
         (_FRAME | {"array": b"\0"}, "array"),
         (_FRAME | {"encode_s": "fast"}, "encode_s"),
         (_FRAME | {"channel": -1}, "channel"),
+        (_FRAME | {"channel": 2**53}, "channel"),
+        (_FRAME | {"meta": {"frame": -1}}, "meta.frame"),
+        (_FRAME | {"meta": {"frame": 2**53}}, "meta.frame"),
+        (_FRAME | {"axes": ["x"] * 7}, "axes"),
+        (_FRAME | {"product": "x" * 257}, "product"),
+        (_HELLO | {"channels": [_CHANNEL | {"channel": -1}]}, "channels[0].channel"),
+        (_HELLO | {"channels": [_CHANNEL | {"channel": 2**53}]}, "channels[0].channel"),
+        (_HELLO | {"channels": [_CHANNEL | {"shape": [1] * 7}]}, "channels[0].shape"),
+        (_HELLO | {"channels": [_CHANNEL | {"shape": [2**31]}]}, "channels[0].shape[0]"),
+        (_HELLO | {"channels": [_CHANNEL | {"axes": ["x"] * 7}]}, "channels[0].axes"),
+        (_HELLO | {"channels": [_CHANNEL | {"decimation": 0}]}, "channels[0].decimation"),
+        (_HELLO | {"channels": [_CHANNEL | {"decimation": 65}]}, "channels[0].decimation"),
         ({"type": "notice"}, "kind"),
         ({"type": "error"}, "problem"),
     ],
@@ -330,6 +397,56 @@ def test_a_bad_message_of_a_server_is_refused_by_name(document: dict[str, Any], 
         wire.parse_server_message(wire.pack(document))
 
     assert caught.value.field == field
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"channel": 0},
+        {"channel": 2**53 - 1},
+        {"product": "x" * 256},
+        {"axes": ["x"] * 6, "shape": [2**31 - 1] * 6},
+        {"shape": [0]},
+        {"decimation": 1},
+        {"decimation": 64},
+        {"region": [0, 0, 2**31 - 1, 1]},
+    ],
+)
+def test_the_limits_of_a_channel_are_part_of_it(change: dict[str, Any]) -> None:
+    channel = _CHANNEL | {"encoding": "f32"} | change
+
+    parsed = wire.parse_server_message(wire.pack(_HELLO | {"channels": [channel] * 64}))
+
+    assert isinstance(parsed, wire.Hello)
+    assert len(parsed.channels) == 64
+    assert parsed.channels[63].to_document() == {
+        key: value for key, value in channel.items() if (key, value) != ("decimation", 1)
+    }
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"channel": 0},
+        {"channel": 2**53 - 1},
+        {"channel": None},
+        {"meta": {"frame": 0}},
+        {"meta": {"frame": 2**53 - 1}},
+        {
+            "axes": ["x"] * 6,
+            "array": {"dtype": "|u1", "shape": [1] * 6, "data": b"\0"},
+        },
+    ],
+)
+def test_the_limits_of_a_frame_are_part_of_it(change: dict[str, Any]) -> None:
+    document = _FRAME | change
+
+    parsed = wire.parse_server_message(wire.pack(document))
+
+    assert isinstance(parsed, wire.Frame)
+    assert parsed.channel == document.get("channel")
+    assert parsed.frame == document["meta"]["frame"]
+    assert list(parsed.axes) == document["axes"]
 
 
 def test_a_message_that_is_no_frame_is_no_frame() -> None:
@@ -394,6 +511,26 @@ def test_limits_are_those_of_the_specification() -> None:
     text = " ".join(SPECIFICATION.read_text("utf-8").split())
 
     assert f"The first message, within {wire.FIRST_MESSAGE_WITHIN_S:g} s" in text
+    assert f"reads no message longer than {wire.MAX_CLIENT_MESSAGE_BYTES / 1024:g} KiB" in text
+    assert f"1 to {wire.MAX_SUBSCRIPTIONS} maps" in text
+    assert f"integer from 1 to {wire.MAX_CREDITS}: how many frames" in text
+    assert f"integer from 1 to {wire.MAX_DECIMATION}: only every so many pixels" in text
+
+
+@pytest.mark.parametrize(
+    ("ours", "name"),
+    [
+        (wire.CloseCode.NORMAL, "NORMAL_CLOSURE"),
+        (wire.CloseCode.GOING_AWAY, "GOING_AWAY"),
+        (wire.CloseCode.ABNORMAL, "ABNORMAL_CLOSURE"),
+        (wire.CloseCode.POLICY, "POLICY_VIOLATION"),
+        (wire.CloseCode.TOO_BIG, "MESSAGE_TOO_BIG"),
+        (wire.CloseCode.INTERNAL_ERROR, "INTERNAL_ERROR"),
+        (wire.CloseCode.TRY_AGAIN_LATER, "TRY_AGAIN_LATER"),
+    ],
+)
+def test_codes_of_rfc_6455_are_those_of_another_library(ours: wire.CloseCode, name: str) -> None:
+    assert int(ours) == int(CloseCode[name])
 
 
 def test_every_close_code_is_in_the_specification() -> None:

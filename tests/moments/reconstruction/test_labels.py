@@ -80,6 +80,20 @@ def test_labelled_images_in_any_order_have_their_range(sequence: Sequence, shuff
     assert found.settings.zeroth == sequence.zeroth
 
 
+@pytest.mark.parametrize("turns", [0, 1, -3])
+@pytest.mark.parametrize("off_rad", [-1e-7, -1e-12, 1e-12, 1e-7])
+def test_phases_are_the_same_whole_turns_and_roundings_apart(turns: int, off_rad: float) -> None:
+    labels = labels_of(SEQUENCES[1])
+    exact = tm.Labels(**labels)
+    again = labels["take"] == 1  # the second take is as far off
+
+    labels["phase_rad"] = labels["phase_rad"] + again * (2 * np.pi * turns + off_rad)
+
+    found = tm.Labels(**labels)
+    np.testing.assert_allclose(found.phases_rad, exact.phases_rad, atol=1e-6)
+    np.testing.assert_allclose(found.weight, exact.weight, atol=1e-6)
+
+
 def test_what_is_missing_is_named_with_the_call() -> None:
     images = np.zeros((16, *SHAPE), np.uint16)
     with pytest.raises(tm.UnlabelledImages, match=r"reconstruct\(images, harmonic=") as caught:

@@ -9,7 +9,6 @@ from tests.server.broadcast.outboxes import lost, numbers, run, subscribed, wait
 from tests.server.fakes import NOTICE, channel, fake_frame
 from transientcam import wire
 from transientcam_server.broadcast import Close, Delivery, Item, Outbox
-from transientcam_server.broadcast._outbox import MAX_WAITING_MESSAGES
 from transientcam_server.imaging import Crop, Frame
 
 
@@ -23,6 +22,19 @@ def test_the_newest_frames_wait_and_the_dropped_ones_are_counted() -> None:
         assert numbers(found) == [4, 5]
         assert lost(found[:1]) == (3, 0)  # before the first that is sent
         assert lost(found[1:]) == (0, 0)
+
+    run(test)
+
+
+@pytest.mark.parametrize("depth", [1, 2, 3, 5])
+@pytest.mark.parametrize("frames", range(9))
+def test_so_many_frames_wait_as_there_is_room_for(depth: int, frames: int) -> None:
+    def test() -> None:
+        outbox = subscribed(depth=depth)
+        dropped = [outbox.put_frame(fake_frame(number)) for number in range(frames)]
+
+        assert dropped == [0] * min(frames, depth) + [1] * max(0, frames - depth)
+        assert numbers(waiting(outbox)) == list(range(frames))[-depth:]
 
     run(test)
 
@@ -115,8 +127,10 @@ def test_messages_and_frames_keep_their_order_otherwise() -> None:
 def test_a_client_that_reads_no_messages_is_closed_instead_of_filling_the_memory() -> None:
     def test() -> None:
         outbox = subscribed()
-        for _ in range(MAX_WAITING_MESSAGES + 1):
+        for _ in range(64):
             outbox.put(NOTICE)
+        assert len(outbox._waiting) == 64
+        outbox.put(NOTICE)
 
         (last,) = waiting(outbox)
 
@@ -292,6 +306,23 @@ def test_the_next_frame_is_no_gap() -> None:
     def test() -> None:
         outbox = subscribed()
         outbox.resume(FakePast(1, 4), start=5)
+        outbox.put_frame(fake_frame(5))
+
+        assert numbers(waiting(outbox)) == [5]
+
+    run(test)
+
+
+@pytest.mark.parametrize(("first", "last"), [(None, None), (None, 4), (3, None)])
+def test_of_a_past_that_was_emptied_nothing_is_waited_for(
+    first: int | None, last: int | None
+) -> None:
+    def test() -> None:
+        outbox, past = subscribed(), FakePast(1, 4)
+        outbox.resume(past, start=2)
+        past.first, past.last = first, last
+
+        assert waiting(outbox) == []
         outbox.put_frame(fake_frame(5))
 
         assert numbers(waiting(outbox)) == [5]

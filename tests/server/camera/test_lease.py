@@ -5,7 +5,12 @@ from collections.abc import Callable
 import pytest
 
 from transientcam_server.camera import Change, Lease, LeaseManager
-from transientcam_server.camera._lease import OnLapse
+from transientcam_server.camera._lease import (
+    DEFAULT_DURATION_S,
+    MAX_DURATION_S,
+    MIN_DURATION_S,
+    OnLapse,
+)
 from transientcam_server.errors import Problem
 
 
@@ -89,6 +94,10 @@ def refusal(call: Callable[[], object]) -> Problem:
     with pytest.raises(Problem) as caught:
         call()
     return caught.value
+
+
+def test_a_lease_lasts_a_second_to_an_hour_and_half_a_minute_where_nothing_is_said() -> None:
+    assert (MIN_DURATION_S, DEFAULT_DURATION_S, MAX_DURATION_S) == (1.0, 30.0, 3600.0)
 
 
 def test_without_a_lease_every_change_passes(manager: LeaseManager) -> None:
@@ -223,4 +232,4 @@ def test_the_id_shows_up_in_no_representation(manager: LeaseManager) -> None:
     lease = grant(manager)
 
     assert lease.id not in repr(lease)
-    assert len(lease.id) >= 20
+    assert len(lease.id) >= 22  # 128 bits in base 64

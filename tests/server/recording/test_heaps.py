@@ -81,6 +81,46 @@ def test_a_heap_larger_than_any_text_or_the_file_is_damage(
 
 
 @by_all_readers
+@pytest.mark.parametrize(("size", "damaged"), [(2**40 - 1, True), (2**40, False)])
+def test_a_size_that_no_memory_has_is_that_of_no_heap(
+    size: int, read: Callable[[IO[bytes]], object], *, damaged: bool
+) -> None:
+    stream = io.BytesIO(b"GCOL\1\0\0\0" + size.to_bytes(8, "little") + bytes(100))
+
+    if damaged:
+        with pytest.raises(ValueError, match="heap of texts at 0"):
+            read(stream)
+    else:
+        read(stream)
+
+
+@pytest.mark.parametrize("read", [require_sound_heaps, READERS["as it is read"]])
+def test_the_largest_heap_is_sound(read: Callable[[IO[bytes]], object]) -> None:
+    assert MAX_HEAP_BYTES == 16 * 1024**2
+
+    read(heap((1, MAX_HEAP_BYTES - 32, MAX_HEAP_BYTES - 32), size=MAX_HEAP_BYTES))
+
+
+@pytest.mark.parametrize("before", range(7))
+def test_heaps_are_found_where_a_file_is_read_in_two_pieces(before: int) -> None:
+    at = 4 * 1024**2 - before
+    torn = heap((1, 10, 16), (0, 0, 0)).getvalue()[6:]
+
+    with pytest.raises(ValueError, match=f"heap of texts at {at} is damaged"):
+        require_sound_heaps(io.BytesIO(bytes(at) + torn))
+
+
+@by_all_readers
+def test_each_of_several_heaps_is_looked_at(read: Callable[[IO[bytes]], object]) -> None:
+    sound = heap(*SOUND["full"]).getvalue()
+    torn = heap(*DAMAGED["no size"]).getvalue()
+
+    read(io.BytesIO(sound + sound))
+    with pytest.raises(ValueError, match=f"heap of texts at {len(sound) + 6} is damaged"):
+        read(io.BytesIO(sound + torn))
+
+
+@by_all_readers
 def test_data_that_begin_like_a_heap_of_no_possible_size_are_none(
     read: Callable[[IO[bytes]], object],
 ) -> None:

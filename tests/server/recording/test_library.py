@@ -1,19 +1,22 @@
 """What the service keeps of recordings, beside their files."""
 
+import re
 import shutil
 import threading
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.server.recording.made import APPLIED, frame, header, record
+from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, frame, header, record
 from tests.server.recording.test_recovery import abandoned
 from transientcam_server.errors import Problem
 from transientcam_server.recording import (
     Header,
     Library,
+    Limits,
     RecordingOptions,
     _descriptions as descriptions,
     _layout as layout,
@@ -207,3 +210,75 @@ def test_a_clock_beyond_the_year_9999_can_be_recorded_by(tmp_path: Path) -> None
 
     assert running["started_s"] == 3e11
     assert library.describe(running["id"])["state"] == "complete"
+
+
+@pytest.mark.parametrize(
+    ("requested", "ends_at"),
+    [
+        (Limits(), Limits(60.0, 10_000_000, None, 1000)),
+        (Limits(59.0, 9_000_000, 7, 2000), Limits(59.0, 9_000_000, 7, 2000)),
+        (Limits(61.0, 11_000_000, 7, 999), Limits(60.0, 10_000_000, 7, 1000)),
+    ],
+)
+def test_a_recording_ends_at_the_narrower_of_two_limits(
+    tmp_path: Path, requested: Limits, ends_at: Limits
+) -> None:
+    settings = RecordingSettings(
+        directory=tmp_path, max_duration_s=60.0, max_bytes=10_000_000, min_free_bytes=1000
+    )
+    library = Library(settings, header=new_header)
+
+    document = library.start(RecordingOptions(limits=requested))
+
+    assert document["limits"] == asdict(ends_at)
+    library.close()
+
+
+@pytest.mark.parametrize(("free_bytes", "there_is_room"), [(1000, True), (999, False)])
+def test_a_recording_begins_where_as_much_is_free_as_has_to_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, free_bytes: int, *, there_is_room: bool
+) -> None:
+    monkeypatch.setattr(Directory, "free_bytes", lambda self: free_bytes)
+    library = Library(RecordingSettings(directory=tmp_path, min_free_bytes=1000), header=new_header)
+
+    if there_is_room:
+        library.start(RecordingOptions())
+    else:
+        with pytest.raises(Problem, match="999 bytes are free, 1000 have to stay so"):
+            library.start(RecordingOptions())
+    library.close()
+
+
+@pytest.mark.parametrize(
+    ("frames_bytes", "depth"), [(0, 2), (2.99, 2), (3.0, 3), (3.99, 3), (10.0, 10)]
+)
+def test_frames_wait_for_the_disk_within_their_memory_and_two_at_least(
+    tmp_path: Path, frames_bytes: float, depth: int
+) -> None:
+    frame_bytes = 8 * HEIGHT * WIDTH * 2
+    settings = RecordingSettings(directory=tmp_path, min_free_bytes=0)
+    settings = settings.model_copy(update={"queue_bytes": int(frames_bytes * frame_bytes)})
+
+    assert Library(settings, header=new_header)._queue_frames(header()) == depth
+
+
+def test_a_recording_without_a_name_is_called_by_its_begin_in_utc(tmp_path: Path) -> None:
+    settings = RecordingSettings(directory=tmp_path, min_free_bytes=0)
+    library = Library(settings, header=new_header, unix_s=lambda: 951782400.9)
+
+    document = library.start(RecordingOptions())
+    library.close()
+
+    assert document["name"] == "Recording of 2000-02-29 00:00:00 UTC"
+    assert re.fullmatch(r"20000229T000000Z-[0-9a-f]{6}", document["id"])
+    assert library.active_id is None
+
+
+def test_recordings_are_listed_newest_first(tmp_path: Path) -> None:
+    for name, started_s in (("b", 20.0), ("a", 10.0), ("d", 20.0), ("c", 30.0)):
+        record(tmp_path / f"{name}.h5", 0, recording_id=name, started_s=started_s)
+    (tmp_path / "e.h5").write_bytes(b"no recording")
+
+    library = Library(RecordingSettings(directory=tmp_path), header=new_header)
+
+    assert [each["id"] for each in library.describe_all()] == ["c", "d", "b", "a", "e"]

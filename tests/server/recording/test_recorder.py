@@ -11,7 +11,7 @@ from tests.server.recording.made import APPLIED, CAPABILITIES, assert_same, fram
 from tests.server.recording.test_recovery import limited_files
 from transientcam_driver import Sequence
 from transientcam_server.recording import Limits, Recording, RecordingWriter, recover
-from transientcam_server.recording._recorder import Recorder
+from transientcam_server.recording._recorder import Progress, Recorder, Totals
 
 PATIENCE_S = 30.0
 PLENTY = 10**15
@@ -288,3 +288,76 @@ def test_a_disk_that_is_really_full_loses_no_frame_that_was_acknowledged(
     with Recording(recover(tmp_path / "a.h5.part")) as recording:
         assert recording.frames == acknowledged
         assert_same(recording.frame(acknowledged - 1), frame(acknowledged - 1))
+
+
+def test_totals_are_sums_over_recordings_and_count_why_they_ended() -> None:
+    running = Progress(5, 2, 700, 1.5, None, None, finished=False)
+    stopped = replace(running, reason="stopped", finished=True)
+
+    totals = Totals().with_running(running)
+
+    assert (totals.frames, totals.dropped_frames, totals.size_bytes) == (5, 2, 700)
+    assert set(totals.ended.values()) == {0}
+    after = Totals(1, 10, 100).after(stopped).after(replace(stopped, reason=None))
+    assert (after.frames, after.dropped_frames, after.size_bytes) == (11, 14, 1500)
+    assert {reason: count for reason, count in after.ended.items() if count} == {
+        "stopped": 1,
+        "failed": 1,
+    }
+
+
+def test_what_was_dropped_is_told_once_a_second_and_in_all_at_the_end(tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    now_s = [100.0]
+    recorder = Recorder(
+        RecordingWriter(tmp_path / "a.h5", header()),
+        header(),
+        limits=Limits(),
+        queue_frames=1,
+        free_bytes=lambda: PLENTY,
+        on_dropped=lambda count, total: told.append((count, total)),
+        clock=lambda: now_s[0],
+    )
+
+    def write(offered: int) -> None:
+        for number in range(offered):
+            recorder.offer(frame(number), APPLIED)
+        recorder._step()
+
+    write(3)  # of which one has room
+    assert told == [(2, 2)]
+    now_s[0] += 0.999
+    write(4)
+    assert told == [(2, 2)]
+    now_s[0] += 0.001
+    write(1)
+    assert told == [(2, 2), (3, 5)]
+    write(2)
+    recorder.stop()
+    recorder.start()
+    recorder.join()
+    assert told == [(2, 2), (3, 5), (1, 6)]
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.series("dropped_frames").tolist() == [0, 2, 3, 0]
+        assert recording.end["dropped_frames"] == 6
+
+
+@pytest.mark.parametrize(("free_bytes", "reason"), [(1000, None), (999, "disk-space")])
+def test_it_ends_when_less_is_free_than_is_to_stay_so(
+    tmp_path: Path, free_bytes: int, reason: str | None
+) -> None:
+    recorder = Recorder(
+        RecordingWriter(tmp_path / "a.h5", header()),
+        header(),
+        limits=Limits(free_bytes=1000),
+        queue_frames=8,
+        free_bytes=lambda: free_bytes,
+    )
+
+    recorder.offer(frame(0), APPLIED)
+    recorder._step()
+
+    assert recorder.progress.reason == reason
+    recorder.stop()
+    recorder.start()
+    recorder.join()

@@ -2,6 +2,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
 
 from tests.server.recording.made import APPLIED, CAPABILITIES, SEQUENCE, assert_same, frame, record
@@ -61,6 +62,90 @@ def test_frames_come_at_the_times_of_the_device(path: Path, speed: float, betwee
             times_s.append(clock.now_s())
 
     assert times_s == pytest.approx([between_s * k for k in range(6)])
+
+
+def test_who_reads_late_gets_the_next_frame_at_once_and_the_others_by_a_new_schedule(
+    path: Path,
+) -> None:
+    clock = VirtualClock()
+    came_s = []
+    with ReplayCamera(path, clock=clock) as camera:
+        camera.start()
+        for busy_s in (0.0, 0.05, 0.07, 0.25, 0.0, 0.0):  # one frame each 0.1 s
+            clock.sleep(busy_s)
+            camera.read_frame()
+            came_s.append(clock.now_s())
+
+    # late by less than a frame, a reader keeps the schedule; by more, it begins anew
+    assert came_s == pytest.approx([0.0, 0.1, 0.2, 0.45, 0.55, 0.65])
+
+
+@pytest.mark.parametrize(("late_s", "next_s"), [(0.0, 0.1), (0.09, 0.1), (0.11, 0.21)])
+def test_a_schedule_is_kept_by_who_is_late_by_less_than_a_frame(
+    path: Path, late_s: float, next_s: float
+) -> None:
+    clock = VirtualClock()
+    with ReplayCamera(path, clock=clock) as camera:
+        camera.start()
+        clock.sleep(late_s)
+        camera.read_frame()
+        camera.read_frame()
+
+    assert clock.now_s() == pytest.approx(next_s)
+
+
+def test_a_device_that_counts_its_time_anew_stops_no_replay(tmp_path: Path) -> None:
+    path = record(tmp_path / "a.h5", 4)
+    with h5py.File(path, "r+") as file:
+        file["device_time_s"][()] = [5.0, 5.1, 0.0, 0.1]
+    clock = VirtualClock()
+    with ReplayCamera(path, clock=clock) as camera:
+        camera.start()
+        came_s = []
+        for _ in range(4):
+            camera.read_frame()
+            came_s.append(clock.now_s())
+
+    assert came_s == pytest.approx([0.0, 0.1, 0.1, 0.2])
+
+
+def test_images_and_losses_are_counted_and_the_status_goes_on(path: Path) -> None:
+    with ReplayCamera(path, loop=True, clock=VirtualClock()) as camera:
+        images = APPLIED.images
+        assert camera.status().next_image == 0
+        assert camera.status().temperature_c == 0.0
+        camera.start()
+        frames = [camera.read_frame() for _ in range(4)]
+        status = camera.status()
+
+        assert (camera.counters.frames, camera.counters.images) == (4, 4 * images)
+        assert camera.counters.lost == sum(frame(number).lost_images for number in range(4)) > 0
+        assert (status.epoch, status.next_image) == (APPLIED.epoch, 4 * images)
+        assert status.temperature_c == frames[-1].temperature_c
+        assert status.device_time_s == pytest.approx(0.4)
+        assert camera.device_time_s() == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(("name", "known"), [("factory", True), ("nominal", False), ("c1", False)])
+def test_gains_of_the_factory_are_those_of_the_camera(
+    tmp_path: Path, name: str, *, known: bool
+) -> None:
+    gains = np.array([1, 2j, 3], np.complex64)
+    path = record(tmp_path / "a.h5", 1, calibration={"id": name}, calibration_planes=gains)
+
+    with ReplayCamera(path) as camera:
+        assert (camera.factory is not None) == known
+        if camera.factory is not None:
+            np.testing.assert_array_equal(camera.factory.gains, gains)
+
+
+def test_where_the_pixels_look_is_what_was_recorded(tmp_path: Path, path: Path) -> None:
+    lens = {"fx_px": 200.0}
+    with ReplayCamera(record(tmp_path / "a.h5", 1, camera={"intrinsics": lens})) as camera:
+        assert camera.intrinsics == lens
+        assert camera.factory is None
+    with ReplayCamera(path) as camera:
+        assert camera.intrinsics is None
 
 
 def test_a_frame_that_is_not_due_yet_is_a_timeout_and_comes_later(path: Path) -> None:

@@ -6,8 +6,10 @@ import sys
 from pathlib import Path
 
 import h5py
+import pytest
 
 from tests.server.fuzzing.damage import checked_blocks, lookup3
+from transientcam_server.recording._storage import Storage, read_rows
 
 LISTED = """
 import resource, sys
@@ -49,3 +51,51 @@ def test_a_text_that_states_a_length_of_4_gib_takes_no_memory_where_that_is_limi
     )
 
     assert result.stdout.split() == ["damaged", "True"]
+
+
+@pytest.mark.parametrize(("rows", "readable"), [(4096, True), (4097, False)])
+def test_so_many_chunks_are_read_at_once(tmp_path: Path, rows: int, *, readable: bool) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("many", (rows,), "|u1", chunks=(1,))
+        storage = Storage(file, 10**9)
+
+        if readable:
+            assert storage.values("many").tolist() == [0] * rows
+        else:
+            with pytest.raises(ValueError, match="stored in 4097 chunks, more than 4096"):
+                storage.values("many")
+        dataset = storage.dataset("many")
+        assert len(read_rows(dataset, 1, 4097)) == rows - 1
+
+
+@pytest.mark.parametrize(
+    ("file_bytes", "allowed"), [(0, 16 * 1024**2), (10**6, 16 * 1024**2), (2 * 10**7, 2 * 10**7)]
+)
+def test_no_more_is_read_than_the_file_holds_or_16_mebibytes(
+    tmp_path: Path, file_bytes: int, allowed: int
+) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("half", (allowed - 100,), "|u1", chunks=(2**20,))  # never written
+        file.create_dataset("rest", (100,), "|u1")
+        file.create_dataset("more", (1,), "|u1")
+        storage = Storage(file, file_bytes)
+
+        assert storage.values("half").size == allowed - 100
+        assert storage.values("rest").size == 100
+        with pytest.raises(ValueError, match="more states a size of 1 bytes"):
+            storage.values("more")
+
+
+@pytest.mark.parametrize(("mebibytes", "readable"), [(256, True), (257, False)])
+def test_a_chunk_has_256_mebibytes_at_most(
+    tmp_path: Path, mebibytes: int, *, readable: bool
+) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("one", (1024, 2**20), "|u1", chunks=(mebibytes, 2**20))
+        storage = Storage(file, 10**9)
+
+        if readable:
+            assert storage.dataset("one").chunks == (256, 2**20)
+        else:
+            with pytest.raises(ValueError, match="chunks of more than 268435456 bytes"):
+                storage.dataset("one")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tests.server.recording.made import frame, header, record
 from transientcam_server.errors import DamagedFrame
+from transientcam_server.imaging import Column
 from transientcam_server.recording import Recording, RecordingWriter, ZarrKeys
 from transientcam_server.recording._storage import place_of_chunk
 from transientcam_server.recording._zarr_keys import GROUP_KEYS
@@ -52,6 +53,50 @@ def test_consolidated_metadata_has_every_other_document(source: Path) -> None:
     with h5py.File(source) as file:
         # two are attributes of the group, and one is an axis without values
         assert arrays == file.keys() - {"annotations", "end", "sub_phase"}
+
+
+def test_documents_state_the_versions_of_the_specification(source: Path) -> None:
+    with Recording(source) as recording:
+        keys = ZarrKeys(recording)
+        consolidated = json.loads(keys.value(".zmetadata"))
+        images = json.loads(keys.value("raw/.zarray"))
+        others = [json.loads(keys.value(f"{name}/.zarray")) for name in ("frame", "kind")]
+
+    assert consolidated["zarr_consolidated_format"] == 1
+    assert consolidated["metadata"][".zgroup"] == {"zarr_format": 2}
+    assert images == {
+        "zarr_format": 2,
+        "shape": [FRAMES, *frame(0).images.shape],
+        "chunks": [1, *frame(0).images.shape],
+        "dtype": "<u2",
+        "filters": [{"id": "shuffle", "elementsize": 2}],
+        "compressor": {"id": "zlib", "level": 1},
+        "fill_value": None,
+        "order": "C",
+    }
+    for each in others:
+        assert (each["zarr_format"], each["fill_value"], each["order"]) == (2, None, "C")
+        assert (each["filters"], each["compressor"]) == (None, None)
+
+
+@pytest.mark.parametrize(("rows", "count"), [(0, 0), (1, 1), (1024, 1), (1025, 2), (2048, 2)])
+def test_a_long_series_is_in_chunks_of_1024_of_which_the_last_is_filled(
+    source: Path, rows: int, count: int
+) -> None:
+    values = np.arange(1, rows + 1, dtype="<i4")
+    with Recording(source) as recording:
+        keys = ZarrKeys(recording)
+        keys.__dict__["_columns"] = {"long": Column(("frame",), values)}
+        names = list(keys.small())
+        read = [np.frombuffer(keys.value(name), "<i4") for name in names]
+        with pytest.raises(KeyError):
+            keys.value(f"long/{count}")
+
+    assert names == [f"long/{number}" for number in range(count)]
+    assert all(len(each) == 1024 for each in read)
+    padded = np.zeros(1024 * count, "<i4")
+    padded[:rows] = values
+    np.testing.assert_array_equal(np.concatenate([np.empty(0, "<i4"), *read]), padded)
 
 
 def unpacked(recording: Recording, into: Path) -> zarr.Group:

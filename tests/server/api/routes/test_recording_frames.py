@@ -17,8 +17,7 @@ from tests.server.recording.made import record
 from tests.serving import Served, serving
 from tests.waiting import wait_until
 from transientcam import wire
-from transientcam_server.recording import Recording, timeline
-from transientcam_server.recording._frames import MAX_TIMES
+from transientcam_server.recording import Recording
 
 RECORDINGS = "/api/v1/recordings"
 
@@ -250,27 +249,3 @@ def test_few_recordings_stay_opened_and_no_file_does(
     assert all(len(each._frames) <= 2 for each in opened.values())
     for name in ("a", "b", "c"):
         h5py.File(directory / f"{name}.h5", "r+").close()  # refused while any reader has it open
-
-
-def test_a_timeline_of_a_long_recording_is_thinned_out() -> None:
-    host_time_s = 1e9 + np.arange(3 * MAX_TIMES + 1) / 10.0
-
-    found = timeline(host_time_s)
-
-    assert found["count"] == len(host_time_s)
-    assert found["times_step"] == 4
-    np.testing.assert_allclose(found["times_s"], np.arange(0, len(host_time_s), 4) / 10.0)
-    assert found["frame_rate_hz"] == pytest.approx(10.0)
-
-
-def test_a_recording_without_frames_has_an_empty_timeline() -> None:
-    assert timeline(np.empty(0)) == {
-        "first": None,
-        "last": None,
-        "count": 0,
-        "duration_s": 0.0,
-        "frame_rate_hz": None,
-        "host_time_s": None,
-        "times_s": [],
-        "times_step": 1,
-    }

@@ -5,9 +5,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from transientcam import Frame, density, wire
+from transientcam import Frame, wire
 from transientcam.density import step_up
-from transientcam.wire._encodings import SAMPLED_PHASES, measured_error
 from transientcam_driver import Sequence, open_camera
 from transientcam_server.imaging import PRODUCTS, encoding_name, stream_encoding, travelling
 
@@ -60,28 +59,3 @@ def test_the_channel_table_says_what_the_messages_of_each_encoding_hold(name: st
         assert (travelled["array"]["dtype"], travelled["array"]["shape"]) == (dtype, list(lengths))
         frame = wire.parse_frame(data)
         assert (frame.array.shape, frame.channel) == (shape, 3)
-
-
-def test_the_stated_error_is_the_largest_over_pixels_at_the_phases_judged() -> None:
-    planes = _planes(200)
-    coded = wire.encode_reflection16(planes)
-
-    median, most = measured_error(planes, coded)
-
-    phase_rad = np.arange(SAMPLED_PHASES) * 2.0 * np.pi / SAMPLED_PHASES
-    worst = []
-    brightness = np.frombuffer(coded.fields["brightness"]["data"], "<f4")
-    again = wire.decode_reflection16(coded.array, brightness)
-    for pixel in range(200):
-        exact = density(planes[:, pixel].astype(np.float64), phase_rad)
-        found = density(again[:, pixel].astype(np.float64), phase_rad)
-        worst.append(np.abs(found - exact).max() / exact.max())
-    assert most == pytest.approx(max(worst), rel=1e-3)
-    assert median == pytest.approx(np.median(worst), rel=1e-2)
-
-
-def test_a_frame_without_light_has_no_error() -> None:
-    planes = np.zeros((7, 5), np.float32)
-    planes[:, 2:] = np.nan
-
-    assert measured_error(planes, wire.encode_reflection16(planes)) == (0.0, 0.0)

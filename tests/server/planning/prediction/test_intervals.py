@@ -1,6 +1,7 @@
 """Intervals of predicted errors."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from transientcam_server.planning._prediction.intervals import (
     RESAMPLED,
     Figure,
+    _widened,
     between,
     figure,
 )
@@ -46,3 +48,53 @@ def test_fewer_pixels_widen_a_figure() -> None:
         return found.high / found.low
 
     assert width(10) > width(1000)
+
+
+def first(errors_m: Any) -> Any:
+    """Stands for the median: what it is of a sample is then up to the test."""
+    return errors_m[..., 0]
+
+
+def test_the_ends_of_an_interval_add_sampling_and_model_as_independent() -> None:
+    """Of samples whose medians are 1, 2, ... 101 times the least."""
+    errors_m = 1e-3 * np.arange(1, 102)
+    picks = np.repeat(np.arange(101)[:, None], 101, axis=1)
+    errors_m = np.roll(errors_m, -20)  # the median of the pixels is 21 mm
+
+    found = figure(errors_m, first, np.roll(picks, 20, axis=0), spread=0.1)
+
+    def end(sampled: float, deviations: float) -> float:
+        apart = math.hypot(math.log(sampled / 21), deviations * 0.1)
+        return 21e-3 * math.exp(math.copysign(apart, deviations))
+
+    # quantiles of 1 ... 101 are 6, 96 and 91; those of a normal variable are 1.6449 and 1.2816
+    assert found.median == pytest.approx(21e-3)
+    assert found.low == pytest.approx(end(6, -1.6449), rel=1e-4)
+    assert found.high == pytest.approx(end(96, 1.6449), rel=1e-4)
+    assert found.with_margin == pytest.approx(end(91, 1.2816), rel=1e-4)
+    assert found.p90 == pytest.approx(91e-3)
+
+
+def test_samples_on_one_side_alone_widen_an_interval_to_that_side() -> None:
+    errors_m = np.array([1e-3, 2e-3])
+    found = figure(errors_m, first, np.ones((RESAMPLED, 2), int), spread=0.1)
+
+    assert found.high / 1e-3 == pytest.approx(math.exp(math.hypot(math.log(2), 0.16449)), rel=1e-4)
+    assert 1e-3 / found.low == pytest.approx(math.exp(0.16449), rel=1e-4)
+
+
+def test_no_error_is_less_than_a_nanometre() -> None:
+    found = figure(np.zeros(3), first, np.zeros((RESAMPLED, 3), int), spread=0.0)
+
+    assert (found.median, found.low, found.high) == pytest.approx((1e-9, 1e-9, 1e-9))
+
+
+@pytest.mark.parametrize(
+    ("value", "sampled"), [(math.inf, 3.0), (1.0, math.inf), (1.0, 0.0), (math.inf, math.inf)]
+)
+def test_an_end_without_a_logarithm_stays_as_it_is(value: float, sampled: float) -> None:
+    assert _widened(value, sampled, 1.6449, 0.08) == sampled
+
+
+def test_a_figure_is_stated_without_its_margin() -> None:
+    assert ERROR.to_document() == {"median": 5e-3, "low": 4e-3, "high": 6e-3, "p90": 9e-3}

@@ -2,6 +2,8 @@
 
 import dataclasses
 from itertools import product
+from typing import Any
+from unittest.mock import MagicMock
 
 import pytest
 
@@ -28,6 +30,66 @@ def test_computing_time_is_measured_once_and_grows_with_takes(capabilities: Capa
     several = seconds(Sequence(harmonics=3, takes=4), "pisarenko")
     assert several is not None
     assert several >= first
+
+
+@pytest.mark.parametrize(
+    ("durations_s", "expected_s", "used"),
+    [
+        ([0.049, 0.03, 0.04], 0.03, 3),
+        ([0.01, 0.2, 0.3], 0.01, 3),
+        ([0.05], 0.05, 1),
+        ([2.0], 2.0, 1),
+    ],
+)
+def test_what_is_quick_is_measured_three_times_and_the_quickest_counts(
+    durations_s: list[float],
+    expected_s: float,
+    used: int,
+    capabilities: Capabilities,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    times_s = [each for duration_s in durations_s for each in (0.0, duration_s)]
+    ticks = iter([*times_s, *[99.0] * 8])
+    done: list[object] = []
+
+    def reconstruct(images: object, *_: object, **__: object) -> MagicMock:
+        done.append(images)
+        return MagicMock()
+
+    monkeypatch.setattr(tm.kernels, "settled", lambda names, m: True)
+    monkeypatch.setattr(tm, "reconstruct", reconstruct)
+    small = dataclasses.replace(capabilities, width=8, height=6)
+    seconds = ReconstructionTimer(small, SETTINGS, clock=lambda: next(ticks))
+
+    assert seconds(Sequence(harmonics=3), "pisarenko") == pytest.approx(expected_s)
+    assert len(done) == used
+
+
+@pytest.mark.parametrize(("takes", "few"), [(1, 1), (2, 2), (3, 3), (20, 3)])
+def test_averaging_takes_its_time_for_each_image(
+    takes: int, few: int, capabilities: Capabilities, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By what it takes of few takes at one frequency: 2 averaged plainly, 3 searched."""
+    image_s, once_s = 1e-3, 0.25
+    now_s = [0.0]
+
+    def reconstruct(images: Any, settings: tm.Settings, **_: object) -> MagicMock:
+        each = settings.takes or 0
+        harmonics = len(images) // (4 * each)
+        averaged_s = 0.0 if each == 1 else image_s * each * len(images)
+        now_s[0] += once_s * harmonics + averaged_s
+        return MagicMock()
+
+    monkeypatch.setattr(tm.kernels, "settled", lambda names, m: True)
+    monkeypatch.setattr(tm, "reconstruct", reconstruct)
+    small = dataclasses.replace(capabilities, width=8, height=6)
+    seconds = ReconstructionTimer(small, SETTINGS, clock=lambda: now_s[0])
+
+    found_s = seconds(Sequence(harmonics=5, takes=takes), "maximum-entropy")
+
+    # in this model an image of `few` takes is averaged in `few` ms
+    averaging_s = 0.0 if takes == 1 else few * image_s * 4 * 5 * takes
+    assert found_s == pytest.approx(5 * once_s + averaging_s)
 
 
 def test_no_computing_time_is_stated_before_the_kernels_of_a_frame_are_there(

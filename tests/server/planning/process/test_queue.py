@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
+from tests.conftest import ROOT
 from transientcam_server.api import problem_response
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.planning import PlanningQueue, Progress
-from transientcam_server.planning._process.queue import MOST, MOST_OF_ONE, RETRY_AFTER_S
+from transientcam_server.planning._process.queue import MOST, MOST_OF_ONE, RETRY_AFTER_S, WAIT_S
 
 
 class Held:
@@ -115,6 +116,14 @@ def test_no_process_is_made_ready_once_the_service_ends() -> None:
         assert held.prepared == 0
 
     asyncio.run(end())
+
+
+def test_there_are_as_many_places_as_the_page_states() -> None:
+    text = " ".join((ROOT / "docs" / "service.md").read_text("utf-8").split())
+
+    assert (MOST, MOST_OF_ONE) == (8, 4)
+    assert "Eight such requests, four of one address, are queued" in text
+    assert f"others wait for {WAIT_S:g} s and then fail with 503" in text
 
 
 def test_an_address_has_few_places_and_leaves_some_to_others() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.server.planning.looks import SCENE, SETTINGS, looked
-from transientcam_driver import Camera, RawFrame, Sequence, open_camera
+from transientcam_driver import AppliedSequence, Camera, RawFrame, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.camera import sensor_of
 from transientcam_server.errors import Problem
@@ -76,10 +76,17 @@ class Carried:
 
     def __init__(self, camera: Camera, pixels: int) -> None:
         self.capabilities = camera.capabilities
-        self.configure, self.start, self.stop = camera.configure, camera.start, camera.stop
+        self.start, self.stop = camera.start, camera.stop
+        self.asked: list[Sequence] = []
+        self.waited_s: list[float] = []
         self._camera, self._pixels, self._read = camera, pixels, 0
 
+    def configure(self, sequence: Sequence) -> AppliedSequence:
+        self.asked.append(sequence)
+        return self._camera.configure(sequence)
+
     def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
+        self.waited_s.append(timeout_s)
         raw = self._camera.read_frame(timeout_s=timeout_s)
         self._read += 1
         images = np.roll(np.asarray(raw.images), self._pixels * self._read, axis=2)
@@ -96,11 +103,26 @@ def test_only_what_stands_still_is_looked_at_for_long(
 
     with open_camera(f"sim:{path}?seed=7", clock=VirtualClock()) as camera:
         planner = Planner(camera.capabilities, sensor_of(camera, SensorSettings()), SETTINGS)
+        carried = Carried(camera, pixels)
         scene = planner.look(
-            Carried(camera, pixels),
+            carried,
             Sequence(),
             progress=Progress(lambda share, step: steps.append(step)),
         )
+        highest_hz = camera.capabilities.max_frequency_hz
+        rates_hz = [camera.capabilities.apply(each).frame_rate_hz for each in carried.asked]
 
+    first, coarse, fine = carried.asked
+    assert (first.base_frequency_hz, first.harmonics, first.exposure_s) == (2e6, 1, 5e-4)
+    assert (coarse.base_frequency_hz, coarse.harmonics) == (2e6, 1)
+    assert fine.base_frequency_hz == Sequence().base_frequency_hz / 2
+    assert fine.harmonics == highest_hz // fine.base_frequency_hz
+    assert fine.exposure_s == coarse.exposure_s
+    assert {(each.takes, each.zeroth) for each in carried.asked} == {(1, "estimated")}
+    # four frames more than the ten seconds that a camera may need anyhow
+    patience_s = [10 + 4 / rate_hz for rate_hz in rates_hz]
+    expected_s = np.repeat(patience_s, [1, 4, frames])
+    assert carried.waited_s == pytest.approx(expected_s)
+    assert (steps.count("exposure"), steps.count("coarse range")) == (1, 4)
     assert steps.count("all frequencies") == frames
     assert (scene.moving_share > STILL_SHARE) == (frames == FRAMES)

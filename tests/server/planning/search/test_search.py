@@ -8,6 +8,7 @@ import pytest
 
 from tests.server.planning.closed_form import MARGIN, ClosedForm, everything, planned, quickest_s
 from transientcam_driver import Capabilities, Sequence
+from transientcam_server.errors import Problem
 from transientcam_server.planning import Goal
 from transientcam_server.planning._prediction.intervals import Figure
 from transientcam_server.planning._prediction.prediction import Prediction, Predictor
@@ -41,6 +42,23 @@ def test_half_the_time_will_do_where_the_rest_only_wears_noise_off_a_bias(
     assert error.median <= target_m
     assert found.half_time is not None
     assert found.half_time.error("range_error_m") > target_m
+
+
+def test_what_the_longest_capture_alone_reaches_is_found(capabilities: Capabilities) -> None:
+    base = Sequence(harmonics=4)
+    fixed = frozenset({"harmonics", "base_frequency_hz"})
+    goal = Goal(base=base, fixed=fixed, estimator="likelihood", capture_s=1e9)
+    (family,) = families(goal, cast(Predictor, ClosedForm()), capabilities)
+    times_s = [member.capture_s for member in family.members]
+    least_m = ClosedForm().least_noise_m("likelihood", family.first, family.members[-1].scale)
+
+    best = planned(
+        dataclasses.replace(goal, range_std_m=MARGIN * least_m * (1 + 1e-9)), capabilities
+    ).recommended
+
+    assert best.applied.capture_s == pytest.approx(times_s[-1])
+    with pytest.raises(Problem):
+        planned(dataclasses.replace(goal, range_std_m=MARGIN * least_m * 0.999), capabilities)
 
 
 @pytest.mark.parametrize("budget_s", [0.03, 0.2])

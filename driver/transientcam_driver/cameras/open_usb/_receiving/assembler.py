@@ -113,7 +113,6 @@ class FrameAssembler:
             lost_images=self._lost_since_delivery,
         )
         self._images = None
-        self._received = 0
         self._lost_since_delivery = 0
         self._counters.frames += 1
         return frame

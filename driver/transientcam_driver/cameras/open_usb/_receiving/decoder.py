@@ -52,8 +52,8 @@ class PacketDecoder:
         self._buffer += data
         packets: list[ImagePacket] = []
         start = 0
-        while (header := self._header_at(start)) is not None:
-            start, found = header
+        while True:
+            start, found = self._header_at(start)
             if found is None:
                 break
             end = start + IMAGE_HEADER_BYTES + self._payload_bytes
@@ -69,7 +69,7 @@ class PacketDecoder:
             self._buffer = self._buffer[start:]
         return packets
 
-    def _header_at(self, start: int) -> tuple[int, ImageHeader | None] | None:
+    def _header_at(self, start: int) -> tuple[int, ImageHeader | None]:
         """Find the next header at or after ``start``; without one, where to go on searching.
 
         Read boundaries mean nothing here (usb-protocol 8.2).
@@ -87,7 +87,6 @@ class PacketDecoder:
             header = ImageHeader.unpack(bytes(self._buffer[found : found + IMAGE_HEADER_BYTES]))
             if header is not None:
                 if header.payload_bytes == self._payload_bytes:
-                    self._lost_track = False
                     return found, header
                 # usb-protocol 8.2: noise, unless all images are like that (10.11)
                 self.odd_payload_bytes = header.payload_bytes

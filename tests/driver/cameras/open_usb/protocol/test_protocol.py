@@ -31,7 +31,16 @@ from transientcam_driver.cameras.open_usb.protocol import (
     unpack_status,
     unpack_time,
 )
-from transientcam_driver.cameras.open_usb.protocol._capabilities import CAPS_BYTES
+from transientcam_driver.cameras.open_usb.protocol._capabilities import (
+    CAPS_BYTES,
+    CAPS_ROOM_BYTES,
+)
+from transientcam_driver.cameras.open_usb.protocol._requests import (
+    IMAGE_ENDPOINT,
+    PRODUCT_ID,
+    VENDOR_CLASS,
+    VENDOR_ID,
+)
 from transientcam_simulation.emulated._open_usb.prototype import prototype
 
 SPECIFICATION = ROOT / "docs" / "usb-protocol.md"
@@ -97,6 +106,15 @@ def test_codes_are_those_of_the_specification(codes: type[IntEnum] | type[IntFla
     assert {int(code, 0): name for code, name in found} == {int(each): each.name for each in codes}
 
 
+def test_the_device_is_found_by_what_the_specification_states() -> None:
+    text = SPECIFICATION.read_text("utf-8")
+
+    assert f"| vendor : product | {VENDOR_ID:04x} : {PRODUCT_ID:04x}, a test number" in text
+    assert f"| class | vendor specific (0x{VENDOR_CLASS:02X}), one configuration" in text
+    assert f"| endpoint | 0x{IMAGE_ENDPOINT:02x}, bulk IN: images |" in text
+    assert f"capabilities (section 4); ask for {CAPS_ROOM_BYTES} bytes" in text
+
+
 def test_the_checksum_is_the_castagnoli_one() -> None:
     assert payload_checksum(b"123456789") == naive_crc(b"123456789") == 0xE3069283
 
@@ -147,6 +165,19 @@ def test_a_header_with_any_bit_flipped_is_none(header: ImageHeader, bit: int) ->
     assert ImageHeader.unpack(bytes(damaged)) is None
 
 
+@pytest.mark.parametrize(
+    ("offset", "values"), [(0, b"SU"), (3, b"LN"), (4, b"\x00\x02\xff"), (5, b"\x3f\x41\x00\xff")]
+)
+def test_another_mark_version_or_length_is_no_header_though_its_checksum_holds(
+    offset: int, values: bytes
+) -> None:
+    for value in values:
+        body = bytearray(HEADER.pack()[:60])
+        body[offset] = value
+
+        assert ImageHeader.unpack(body + struct.pack("<I", naive_crc(bytes(body)))) is None
+
+
 def test_capabilities_have_the_fields_at_the_offsets_of_the_specification() -> None:
     packed = pack_capabilities(CAPABILITIES)
 
@@ -185,11 +216,18 @@ def test_capabilities_with_fields_appended_by_a_later_firmware_are_read() -> Non
     assert unpack_capabilities(bytes(longer)) == CAPABILITIES
 
 
-def test_another_protocol_version_requires_new_firmware() -> None:
-    old = pack_capabilities(replace(CAPABILITIES, protocol_version=0))
+@pytest.mark.parametrize("version", [0, 2, 65535])
+def test_another_protocol_version_requires_new_firmware(version: int) -> None:
+    other = pack_capabilities(replace(CAPABILITIES, protocol_version=version))
 
-    with pytest.raises(FirmwareTooOld, match="version 0 found, version 1 needed"):
-        unpack_capabilities(old)
+    with pytest.raises(FirmwareTooOld, match=f"version {version} found, version 1 needed"):
+        unpack_capabilities(other)
+
+
+@pytest.mark.parametrize("mark", [b"TCCO", b"TCCQ", b"SCCP", b"UCCP"])
+def test_what_has_another_mark_is_no_capabilities(mark: bytes) -> None:
+    with pytest.raises(ProtocolError, match="152 bytes without the mark"):
+        unpack_capabilities(mark + pack_capabilities(CAPABILITIES)[4:])
 
 
 @given(bit=st.integers(8 * 8, CAPS_BYTES * 8 - 1))
@@ -208,20 +246,68 @@ def test_whatever_is_not_capabilities_is_a_protocol_error(data: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    ("lie", "name"),
+    ("field", "within", "beyond", "name"),
     [
-        ({"width": 0}, "width"),
-        ({"height": 60000}, "height"),
-        ({"bits": 24}, "bits"),
-        ({"max_harmonics": 0}, "harmonics"),
-        ({"fifo_bytes": 64}, "FIFO"),
-        ({"heartbeat_s": 0.0}, "heartbeat"),
-        ({"min_exposure_s": 0.06}, "shortest exposure"),
+        ("width", [1, 4096], [0, 4097], "width"),
+        ("height", [1, 4096], [0, 4097], "height"),
+        ("bits", [1, 16], [0, 17], "bits"),
+        ("max_harmonics", [1, 255], [0], "harmonics"),
+        ("max_sub_phases", [1, 255], [0], "sub-phases"),
+        ("max_takes", [1, 65535], [0], "takes"),
+        ("max_images", [1, 65535], [0], "images"),
+        ("min_frequency_hz", [1.0, 150e6], [0.0, 0.75, 150e6 + 0.25], "lowest frequency"),
+        ("min_exposure_s", [1e-9, 0.05], [0.0, 0.050000001], "shortest exposure"),
+        ("heartbeat_s", [0.01, 3600.0], [0.009, 3600.001], "heartbeat"),
+        ("fifo_bytes", [64 + 39120, 2**32 - 1], [64 + 39119], "FIFO"),
+        ("schemes", [("arccos",)], [()], "schemes"),
+        ("zeroths", [("on-off",), ("estimated",)], [()], "zeroth moment"),
     ],
 )
-def test_a_device_that_lies_about_itself_is_refused(lie: dict[str, float], name: str) -> None:
-    with pytest.raises(ProtocolError, match=name):
-        unpack_capabilities(pack_capabilities(replace(CAPABILITIES, **lie)))  # type: ignore[arg-type]  # fields by name
+def test_capabilities_are_taken_up_to_their_limits(
+    field: str, within: list[Any], beyond: list[Any], name: str
+) -> None:
+    wide = replace(CAPABILITIES, fifo_bytes=2**28) if field in {"width", "height"} else CAPABILITIES
+    for value in within:
+        at_limit = replace(wide, **{field: value})
+        assert getattr(unpack_capabilities(pack_capabilities(at_limit)), field) == value
+    for value in beyond:
+        liar = replace(wide, **{field: value})
+        with pytest.raises(ProtocolError, match=name):
+            unpack_capabilities(pack_capabilities(liar))
+
+
+def test_a_synthesiser_has_steps_of_a_millionth_of_a_hertz_or_more() -> None:
+    finest = replace(
+        CAPABILITIES,
+        tuning_step_hz=1e-6,
+        min_frequency_hz=1.0,
+        max_frequency_hz=4000.0,
+        low_frequency_hz=0.0,
+    )
+
+    packed = pack_capabilities(finest)
+    without = packed[:104] + bytes(4) + packed[108:-4]
+
+    assert unpack_capabilities(packed).tuning_step_hz == 1e-6
+    with pytest.raises(ProtocolError, match="tuning step"):
+        unpack_capabilities(without + struct.pack("<I", naive_crc(without)))
+
+
+@pytest.mark.parametrize("kept", range(CAPS_BYTES))
+def test_capabilities_cut_short_are_refused(kept: int) -> None:
+    whole = pack_capabilities(CAPABILITIES)
+    named = "mark" if kept < 8 else f"of {kept} bytes, {CAPS_BYTES} needed"
+
+    with pytest.raises(ProtocolError, match=named):
+        unpack_capabilities(whole[:kept])
+
+
+def test_capabilities_that_state_to_be_shorter_than_their_fields_are_refused() -> None:
+    short = bytearray(pack_capabilities(CAPABILITIES))
+    struct.pack_into("<H", short, 6, CAPS_BYTES - 1)
+
+    with pytest.raises(ProtocolError, match=f"{CAPS_BYTES} needed"):
+        unpack_capabilities(bytes(short))
 
 
 def test_a_sequence_has_the_bytes_of_the_specification() -> None:
@@ -240,6 +326,17 @@ def test_interleaved_takes_are_one_byte_of_a_sequence() -> None:
     assert packed == bytes.fromhex("01 04 01 01 08 01 1400 00cf7b05 80ee3600 004c1d00")
 
 
+@pytest.mark.parametrize(
+    ("zeroth", "low_word"), [("low-frequency", 3_600_000), ("on-off", 0), ("estimated", 0)]
+)
+def test_only_a_zeroth_moment_at_a_low_frequency_has_one(zeroth: Any, low_word: int) -> None:
+    words = SequenceWords.of(Sequence(23e6, 4, zeroth), CAPABILITIES)
+
+    assert (words.low_word, words.word(0)) == (low_word, low_word)
+    assert number(words.pack(), 12, 4) == low_word
+    assert words.word(3) == 3 * 92_000_000
+
+
 def test_a_phase_offset_is_appended_to_a_sequence() -> None:
     sequence = Sequence(23e6, 4, exposure_s=1.92e-3, takes=20, phase_offset_rad=math.pi / 16)
 
@@ -251,30 +348,6 @@ def test_a_phase_offset_is_appended_to_a_sequence() -> None:
     assert SequenceWords.unpack(words.pack()).sequence(CAPABILITIES) == sequence
     assert len(commitment.pack()) == 44
     assert Commitment.unpack(commitment.pack()) == commitment
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("heartbeat_s", 0.01),
-        ("heartbeat_s", 3600.0),
-        ("bits", 1),
-        ("bits", 16),
-        ("max_harmonics", 1),
-        ("max_harmonics", 255),
-        ("max_sub_phases", 1),
-        ("max_sub_phases", 255),
-        ("max_takes", 1),
-        ("max_takes", 65535),
-        ("max_images", 1),
-        ("max_images", 65535),
-    ],
-)
-def test_capabilities_may_be_at_their_limits(field: str, value: float) -> None:
-    change: dict[str, Any] = {field: value}
-    at_limit = replace(CAPABILITIES, **change)
-
-    assert getattr(unpack_capabilities(pack_capabilities(at_limit)), field) == value
 
 
 def test_a_camera_that_can_shift_phases_says_so_in_one_bit() -> None:
@@ -336,6 +409,9 @@ def test_a_sequence_on_the_grid_survives_the_wire(
     ("code", "name"),
     [
         ({"zeroth": 3}, "code 3 for the zeroth moment"),
+        ({"zeroth": 255}, "code 255 for the zeroth moment"),
+        ({"scheme": 4}, "code 4 for the scheme"),
+        ({"take_order": 3}, "code 3 for the order of takes"),
         ({"scheme": 3}, "code 3 for the scheme"),
         ({"take_order": 2}, "code 2 for the order of takes"),
     ],
@@ -395,9 +471,81 @@ def test_answers_of_the_wrong_length_are_protocol_errors(data: bytes) -> None:
                 unpack(data)
 
 
-def test_an_unknown_state_is_a_protocol_error() -> None:
-    with pytest.raises(ProtocolError, match="state 9"):
-        unpack_status(b"\x01\x09" + bytes(38))
+@pytest.mark.parametrize("version", [0, 2, 255])
+@pytest.mark.parametrize("size", [20, 24])
+def test_a_sequence_or_status_of_another_version_is_a_protocol_error(
+    version: int, size: int
+) -> None:
+    words = SequenceWords.of(Sequence(), CAPABILITIES).pack().ljust(size, b"\0")
+    assert SequenceWords.unpack(words).phase_offset == 0
+
+    with pytest.raises(ProtocolError, match=f"{size} bytes for a sequence"):
+        SequenceWords.unpack(bytes([version]) + words[1:])
+    with pytest.raises(ProtocolError, match="status of 40 bytes"):
+        unpack_status(bytes([version]) + bytes(39))
+
+
+@pytest.mark.parametrize("state", [len(DeviceState), 9, 255])
+def test_an_unknown_state_is_a_protocol_error(state: int) -> None:
+    with pytest.raises(ProtocolError, match=f"state {state}"):
+        unpack_status(bytes([1, state]) + bytes(38))
+
+
+def test_every_state_and_flag_is_read() -> None:
+    for state in DeviceState:
+        assert unpack_status(bytes([1, state]) + bytes(38)).state is state
+    for flag in StatusFlag:
+        status = unpack_status(bytes([1, 0]) + struct.pack("<H", flag) + bytes(36))
+        assert status.flags == flag
+
+
+@pytest.mark.parametrize(
+    ("temperature_c", "centidegrees"),
+    [
+        (0.0, 0),
+        (-0.01, -1),
+        (25.004, 2500),
+        (25.006, 2501),
+        (327.67, 32767),
+        (327.66, 32766),
+        (327.68, 32767),
+        (1e9, 32767),
+        (-327.68, -32768),
+        (-327.67, -32767),
+        (-327.69, -32768),
+        (-1e9, -32768),
+    ],
+)
+def test_a_temperature_is_in_hundredths_within_16_bits(
+    temperature_c: float, centidegrees: int
+) -> None:
+    packed = replace(HEADER, temperature_c=temperature_c).pack()
+
+    assert int.from_bytes(packed[48:50], "little", signed=True) == centidegrees
+    found = ImageHeader.unpack(packed)
+    assert found is not None
+    assert found.temperature_c == centidegrees / 100
+
+
+@pytest.mark.parametrize(
+    ("turns", "word"),
+    [
+        (0.0, 0),
+        (1 / 65536, 1),
+        (0.49 / 65536, 0),
+        (0.51 / 65536, 1),
+        (-1 / 65536, 65535),
+        (1.25, 16384),
+        (-0.25, 49152),
+        (65535.4 / 65536, 65535),
+        (65535.6 / 65536, 0),
+    ],
+)
+def test_a_phase_is_in_parts_of_a_turn_and_wraps(turns: float, word: int) -> None:
+    assert phase_word(turns * 2 * math.pi) == word
+    words = replace(SequenceWords.of(Sequence(), CAPABILITIES), phase_offset=word)
+    offset_rad = words.sequence(CAPABILITIES).phase_offset_rad
+    assert offset_rad == pytest.approx(2 * math.pi * word / 65536, rel=1e-15)
 
 
 def test_time_is_in_nanoseconds() -> None:
@@ -414,6 +562,13 @@ def test_a_last_error_names_request_code_and_reason() -> None:
 
 def test_a_last_error_of_a_later_firmware_is_still_read() -> None:
     assert unpack_last_error(b"\x63\x00\x7fwhat") == ("request 0x7f", "error 99", "what")
+
+
+@pytest.mark.parametrize("data", [b"", b"\x03", b"\x03\x00"])
+def test_a_last_error_without_its_codes_is_a_protocol_error(data: bytes) -> None:
+    with pytest.raises(ProtocolError, match=f"last error of {len(data)} bytes"):
+        unpack_last_error(data)
+    assert unpack_last_error(b"\x00\x00\x01") == ("GET_CAPS", "NONE", "")
 
 
 def test_a_last_error_fits_into_one_packet() -> None:

@@ -87,6 +87,19 @@ def test_times_are_the_devices_own() -> None:
     assert frame.temperature_c == pytest.approx(30 + (2 * COUNT - 1) / 100)
 
 
+def test_times_are_as_fine_after_ten_days_as_at_once() -> None:
+    days_ns = 864_000 * 10**9
+    images = [
+        replace(each, header=replace(each.header, device_time_ns=days_ns + k * PERIOD_NS))
+        for k, each in enumerate(map(image, range(COUNT)))
+    ]
+
+    (frame,) = Assembly().push(*images)
+
+    assert frame.device_time_s == pytest.approx(864_000, rel=1e-15)
+    assert frame.capture_s == pytest.approx(COUNT * 5.9e-3, abs=1e-9)
+
+
 @pytest.mark.parametrize("missing", range(COUNT))
 def test_a_missing_image_drops_its_frame_and_the_next_frame_counts_it(missing: int) -> None:
     assembly = Assembly()
@@ -147,15 +160,27 @@ def test_images_of_another_epoch_are_left_out() -> None:
     assert assembly.counters.lost == 0
 
 
-def test_images_that_were_not_asked_for_count_as_corrupt() -> None:
-    assembly = Assembly()
-    for lie in ({"tuning_word": 1}, {"phase": 1}, {"harmonic": 9}, {"count": 7}, {"index": 600}):
-        number = assembly.counters.corrupt
-        packet = image(number)
-        header = replace(packet.header, **lie)  # type: ignore[arg-type]  # fields by name
+@pytest.mark.parametrize("number", range(COUNT))
+@pytest.mark.parametrize("field", ["tuning_word", "phase", "harmonic", "count"])
+@pytest.mark.parametrize("off", [-1, 1])
+def test_images_that_were_not_asked_for_count_as_corrupt(number: int, field: str, off: int) -> None:
+    assembly = Assembly(first_image=number)
+    packet = image(number)
+    lie: dict[str, Any] = {field: getattr(packet.header, field) + off}
 
-        assert assembly.push(replace(packet, header=header)) == []
-        assert assembly.counters.corrupt == number + 1
+    assert assembly.push(replace(packet, header=replace(packet.header, **lie))) == []
+
+    assert assembly.counters == Counters(corrupt=1)
+
+
+@pytest.mark.parametrize("index", [COUNT, COUNT + 1, 600])
+def test_an_image_beyond_the_last_one_is_corrupt(index: int) -> None:
+    assembly = Assembly()
+    packet = image(0)
+
+    assert assembly.push(replace(packet, header=replace(packet.header, index=index))) == []
+
+    assert assembly.counters == Counters(corrupt=1)
 
 
 def test_the_images_of_two_frames_are_never_mixed() -> None:
@@ -185,3 +210,35 @@ def test_the_first_image_of_a_run_is_missed_too() -> None:
     (frame,) = assembly.push(*map(image, range(1, 2 * COUNT)))
 
     assert (frame.number, frame.lost_images) == (1, 1)
+
+
+def test_a_run_begins_with_image_0_where_nothing_is_said() -> None:
+    counters = Counters()
+    assembler = FrameAssembler(APPLIED, CAPABILITIES, counters)
+
+    assembler.push(image(1), host_time_s=99.0)
+
+    assert counters.lost == 1
+
+
+def test_every_image_is_counted_once_by_what_became_of_it() -> None:
+    assembly = Assembly()
+    good = [image(k) for k in range(2 * COUNT)]
+    other = [image(k, epoch=4) for k in range(3)]
+    damaged = replace(image(2 * COUNT), intact=False)
+    late = image(2 * COUNT + 3)
+
+    frames = assembly.push(*good, good[0], *other, damaged, late, late)
+
+    assert len(frames) == 2
+    assert assembly.counters == Counters(
+        images=2 * COUNT + 1, frames=2, lost=2, corrupt=1, duplicates=2
+    )
+
+
+def test_images_of_a_frame_after_a_missing_one_are_counted_too() -> None:
+    assembly = Assembly()
+
+    assembly.push(*(image(k) for k in range(COUNT) if k != 1))
+
+    assert assembly.counters == Counters(images=COUNT - 1, lost=1, incomplete_frames=1)

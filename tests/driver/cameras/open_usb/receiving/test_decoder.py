@@ -172,6 +172,43 @@ def test_reset_forgets_the_bytes_of_a_stream_that_was_cut_off(kept: int) -> None
     assert decoder.resyncs == 0
 
 
+@pytest.mark.parametrize("noise", ["x" * count for count in range(9)])
+def test_bytes_that_cannot_begin_a_packet_are_passed_over_at_once(noise: str) -> None:
+    decoder = PacketDecoder(payload_bytes=PAYLOAD_BYTES)
+
+    assert decoder.feed(noise.encode()) == []
+
+    assert decoder.resyncs == (len(noise) >= len(b"TCIM"))
+    assert numbers(decoder.feed(packet(0))) == [0]
+    assert decoder.resyncs == (len(noise) > 0)
+
+
+@pytest.mark.parametrize("before", [b"", packet(0), b"noise", b"noise" + packet(0)])
+def test_noise_is_counted_again_after_a_reset(before: bytes) -> None:
+    decoder = PacketDecoder(payload_bytes=PAYLOAD_BYTES)
+    decoder.feed(before)
+    counted = decoder.resyncs
+    assert counted == before.startswith(b"noise")
+
+    decoder.reset()
+    decoder.feed(b"noise" + packet(1))
+
+    assert decoder.resyncs == counted + 1
+
+
+def test_the_length_that_an_intact_header_announced_is_kept_until_a_reset() -> None:
+    decoder = PacketDecoder(payload_bytes=PAYLOAD_BYTES)
+    announced = [decoder.odd_payload_bytes]
+
+    for data in (packet(0), packet(1, bytes(90)) + packet(2, bytes(91)), packet(3)):
+        decoder.feed(data)
+        announced.append(decoder.odd_payload_bytes)
+    decoder.reset()
+    announced.append(decoder.odd_payload_bytes)
+
+    assert announced == [None, None, 91, 91, None]
+
+
 def test_memory_stays_bounded_under_endless_garbage() -> None:
     decoder = PacketDecoder(payload_bytes=PAYLOAD_BYTES)
 
