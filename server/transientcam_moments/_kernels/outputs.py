@@ -7,6 +7,7 @@ from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import simd
 from transientcam_moments._kernels.arrays import Complexes, Counts, Flags, Places, Reals
 from transientcam_moments._kernels.portable import (
+    bank,
     eps,
     larger,
     largest,
@@ -16,6 +17,7 @@ from transientcam_moments._kernels.portable import (
     some,
 )
 from transientcam_moments.arrays import Length
+from transientcam_moments.moment_problem import sparse
 
 _INTERLEAVE = 2
 # transientcam_moments.Flags
@@ -91,24 +93,18 @@ def separate(
     """Separate direct from indirect light: the first return above a threshold (Sec. 5.1)."""
     one = simd.ones(direct, _INTERLEAVE)
     step = simd.width(one)
+    phases, weights = bank(one, order, 0), bank(one, order, 0)
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        strongest, total = one * 0.0, one * 0.0
         for i in range(len(order)):
-            w = simd.load(one, weight[i], p)
-            strongest, total = larger(w, strongest), total + w
-        first, angle = one * 0.0, not_a_number(one)
-        for i in range(len(order) - 1, -1, -1):
-            w = simd.load(one, weight[i], p)
-            enough = (w >= threshold * strongest) & (w > 0.0)
-            first = select(enough, w, first)
-            angle = select(enough, simd.load(one, phase[i], p), angle)
+            weights[i], phases[i] = simd.load(one, weight[i], p), simd.load(one, phase[i], p)
+        first, rest, angle = sparse.separate(order, threshold, one, phases, weights)
         flag = simd.load(one, flags, p)
         invalid = flag >= _NON_FINITE
         flag = select(flag >= _SATURATED, flag - _SATURATED, flag)
         invalid = invalid | (flag >= _NO_SIGNAL)
         simd.store(direct, p, first)
-        simd.store(indirect, p, larger(total - first, 0.0))
+        simd.store(indirect, p, rest)
         simd.store(range_m, p, select(invalid, not_a_number(one), angle * metres))
 
 

@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 
 from transientcam_compiled import Spread, at_once, blocks, empty
-from transientcam_moments._kernels.arrays import Complexes, Reals
+from transientcam_moments._kernels.arrays import Complexes, FlatReturns, Reals
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
-from transientcam_moments._kernels.refine import Found, redo
 from transientcam_moments._kernels.returns import returns_entry, usual_steps
 from transientcam_moments._kernels.wide import WideReturns
-from transientcam_moments.moment_problem import half_turns
+from transientcam_moments.moment_problem import half_turns, redo, sparse
 
 _ROOM = 256  # pixels that are redone in double precision at a time
 
@@ -37,7 +36,7 @@ def pisarenko_kernel(m: int, precision: str) -> Callable[..., Any]:
             uniform[:] = eigenvalue.reshape(-1)
         phase, weight = empty((m, pixels), precision), empty((m, pixels), precision)
         count, residual = empty(pixels, np.int32), empty(pixels, precision)
-        found = Found(uniform, phase, weight, count, residual)
+        found = FlatReturns(uniform, phase, weight, count, residual)
         brightness = np.ascontiguousarray(planes[0].real)
         eps = noise or float(np.finfo(precision).eps)
         ill: list[int] = []
@@ -58,7 +57,7 @@ def pisarenko_kernel(m: int, precision: str) -> Callable[..., Any]:
 
         spread(part, pixels)
         if any(ill):
-            where = np.flatnonzero(residual > 16 * (m + 1) * eps)
+            where = np.flatnonzero(residual > sparse.largest_residual(m, eps))
             redo(planes, (phase, weight, uniform, count), where, eps)
         return (
             phase.reshape((m, *shape)),

@@ -6,7 +6,7 @@ import numpy as np
 
 from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import outputs
-from transientcam_moments._kernels.arrays import Complexes, Reals
+from transientcam_moments._kernels.arrays import Complexes, FlatReturns, Reals
 from transientcam_moments._kernels.compiled_entry import (
     COUNTS,
     PIXELS,
@@ -19,9 +19,8 @@ from transientcam_moments._kernels.compiled_entry import (
 )
 from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
 from transientcam_moments._kernels.padding import RAMP
-from transientcam_moments._kernels.refine import Found, redo
 from transientcam_moments._kernels.returns import MOST_STEPS, returns_entry
-from transientcam_moments.moment_problem import half_turns
+from transientcam_moments.moment_problem import half_turns, redo, sparse
 
 _EPS = float(np.finfo(np.float32).eps)
 
@@ -67,7 +66,7 @@ class WideReturns:
         self,
         b: Complexes,
         brightness: Reals,
-        found: Found,
+        found: FlatReturns,
         room: tuple[Any, ...],
         start: int,
         stop: int,
@@ -76,7 +75,7 @@ class WideReturns:
 
         ``b`` (m + 1, P) are the moments, but for ``brightness`` (P) in place of b_0.
         """
-        tolerance = 16 * (len(self._order) + 1) * _EPS
+        tolerance = sparse.largest_residual(len(self._order), _EPS)
         places, moments, uniform, phase, weight, count, residual, packed = room
         redone = 0
         while True:
