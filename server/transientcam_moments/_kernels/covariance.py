@@ -8,8 +8,8 @@ from numba import njit
 
 from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Reals
-from transientcam_moments._kernels.compiled_entry import PIXELS, entry, order_type, real_arrays
+from transientcam_moments._kernels.arrays import RealPlanes, Reals
+from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.portable import bank, square_bank
 from transientcam_moments.arrays import Length
 from transientcam_moments.noise import interpolation
@@ -19,10 +19,10 @@ from transientcam_moments.noise import interpolation
 def covariance(
     order: Length,
     both: Length,
-    basis: Reals,
-    turned: Reals,
-    variance: Reals,
-    out: Reals,
+    basis: RealPlanes,
+    turned: RealPlanes,
+    variance: RealPlanes,
+    out: RealPlanes,
     start: int,
     stop: int,
 ) -> None:
@@ -48,19 +48,10 @@ def covariance(
                 simd.store(out[2 * m * column + row], p, total)
 
 
-def covariance_entry(m: int) -> Callable[..., Any]:
-    """Compile the kernel of order m, in double precision."""
-    planes = real_arrays("d")[2]
-    return entry(
-        covariance,
-        order_type(m), order_type(2 * m), planes, planes, planes, planes, PIXELS, PIXELS,
-    )  # fmt: skip
-
-
 def covariance_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the covariance of order m; see the table in ``_kernels``."""
     order, both = (0,) * m, (0,) * (2 * m)
-    run, basis = covariance_entry(m), interpolation.basis(m)
+    run, basis = entry(covariance, m, "d", both=2 * m), interpolation.basis(m)
 
     def kernel(phase: Reals, variance: Reals, *, spread: Spread = at_once) -> Any:
         turned, planes = interpolation.half_turned(phase), np.ascontiguousarray(variance)

@@ -10,16 +10,15 @@ from numba import njit
 from transientcam_compiled import Spread, at_once, empty
 from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Complexes, Places, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    FLAG,
-    PIXELS,
-    TABLE,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
+from transientcam_moments._kernels.arrays import (
+    Complexes,
+    ComplexPlanes,
+    RealPlane,
+    RealPlanes,
+    Reals,
+    Table,
 )
+from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.phase_groups import ANY, MIRRORED, TURN, grouping
 from transientcam_moments._kernels.portable import bank, eps
 from transientcam_moments.arrays import Bank, Length, Plane
@@ -104,13 +103,13 @@ def _fill(
 @njit(nogil=True, error_model="numpy")
 def _density(
     order: Length,
-    polynomial: Complexes,
-    reflection: Complexes,
-    error: Reals,
-    rows: Places,
-    waves: Reals,
-    centre: Reals,
-    out: Reals,
+    polynomial: ComplexPlanes,
+    reflection: ComplexPlanes,
+    error: RealPlane,
+    rows: Table,
+    waves: RealPlanes,
+    centre: RealPlane,
+    out: RealPlane,
     start: int,
     stop: int,
     together: int,
@@ -197,12 +196,7 @@ def _density(
 def density_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the density of order m; see the table in ``_kernels`` for what it takes."""
     order = (0,) * m
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    run = entry(
-        _density,
-        order_type(m), cplx[2], cplx[2], real[1], TABLE, real[2], real[1], real[1],
-        PIXELS, PIXELS, PIXELS, FLAG,
-    )  # fmt: skip
+    run = entry(_density, m, precision)
     grouped = grouping(m, precision)
 
     def kernel(

@@ -8,15 +8,9 @@ from numba import njit
 
 from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Reals
-from transientcam_moments._kernels.compiled_entry import (
-    PIXELS,
-    REAL,
-    entry,
-    order_type,
-    real_arrays,
-)
-from transientcam_moments._kernels.covariance import covariance, covariance_entry
+from transientcam_moments._kernels.arrays import RealPlanes, Reals
+from transientcam_moments._kernels.compiled_entry import entry
+from transientcam_moments._kernels.covariance import covariance
 from transientcam_moments._kernels.portable import bank, root, select
 from transientcam_moments.arrays import Length
 from transientcam_moments.noise import first_order, interpolation
@@ -24,9 +18,9 @@ from transientcam_moments.noise import first_order, interpolation
 
 @njit(nogil=True, error_model="numpy")
 def _direct_noise(
-    order: Length, both: Length, basis: Reals, turned: Reals, phase: Reals, weight: Reals,
-    variance: Reals, threshold: float, clear: float, coincide_rad: float, out: Reals, found: Reals,
-    pixels: int,
+    order: Length, both: Length, basis: RealPlanes, turned: RealPlanes, phase: RealPlanes, weight:
+    RealPlanes, variance: RealPlanes, threshold: float, clear: float, coincide_rad: float, out:
+    RealPlanes, found: RealPlanes, pixels: int,
 ) -> None:  # fmt: skip
     """Fill ``found`` (3, P): deviation, whether first order holds, whether there are m returns.
 
@@ -57,13 +51,8 @@ def _direct_noise(
 def direct_noise_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the deviation of order m; see the table in ``_kernels``."""
     order, both = (0,) * m, (0,) * (2 * m)
-    covariance_entry(m)  # which is linked
-    planes = real_arrays(precision)[2]
-    run = entry(
-        _direct_noise,
-        order_type(m), order_type(2 * m), planes, planes, planes, planes, planes, REAL, REAL, REAL,
-        planes, planes, PIXELS,
-    )  # fmt: skip
+    entry(covariance, m, precision, both=2 * m)  # which is linked
+    run = entry(_direct_noise, m, precision, both=2 * m)
     basis = interpolation.basis(m)
 
     def kernel(

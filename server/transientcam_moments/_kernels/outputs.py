@@ -5,7 +5,19 @@ from numba import njit
 
 from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Complexes, Counts, Flags, Places, Reals
+from transientcam_moments._kernels.arrays import (
+    Complexes,
+    ComplexPlanes,
+    Counts,
+    Flags,
+    Places,
+    RealPlane,
+    RealPlanes,
+    Reals,
+    WideComplexPlanes,
+    WideRealPlane,
+    WideRealPlanes,
+)
 from transientcam_moments._kernels.portable import (
     bank,
     eps,
@@ -79,12 +91,12 @@ def flag_and_bias(
 @njit(nogil=True, error_model="numpy")
 def separate(
     order: Length,
-    phase: Reals,
-    weight: Reals,
+    phase: RealPlanes,
+    weight: RealPlanes,
     flags: Flags,
-    direct: Reals,
-    indirect: Reals,
-    range_m: Reals,
+    direct: RealPlane,
+    indirect: RealPlane,
+    range_m: RealPlane,
     threshold: float,
     metres: float,
     start: int,
@@ -110,8 +122,8 @@ def separate(
 
 @njit(nogil=True, error_model="numpy")
 def gather(
-    order: Length, b: Complexes, brightness: Reals, residual: Reals, tolerance: float, ramp: Reals,
-    packed: Reals, wide: Complexes, where: Places, begin: int,
+    order: Length, b: ComplexPlanes, brightness: RealPlane, residual: RealPlane, tolerance: float,
+    ramp: RealPlane, packed: RealPlane, wide: WideComplexPlanes, where: Places, begin: int,
 ) -> int:  # fmt: skip
     """Collect pixels from ``begin`` on whose residual is above the tolerance, until room ends.
 
@@ -147,9 +159,9 @@ def gather(
 
 @njit(nogil=True, error_model="numpy")
 def scatter(
-    order: Length, where: Places, found: int, wide_phase: Reals, wide_weight: Reals,
-    wide_count: Counts, wide_residual: Reals, phase: Reals, weight: Reals, count: Counts,
-    residual: Reals,
+    order: Length, where: Places, found: int, wide_phase: WideRealPlanes, wide_weight:
+    WideRealPlanes, wide_count: Counts, wide_residual: WideRealPlane, phase: RealPlanes, weight:
+    RealPlanes, count: Counts, residual: RealPlane,
 ) -> None:  # fmt: skip
     """Put redone returns back where they came from."""
     for i in range(found):

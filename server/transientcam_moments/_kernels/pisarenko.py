@@ -7,8 +7,9 @@ import numpy as np
 
 from transientcam_compiled import Spread, at_once, blocks, empty
 from transientcam_moments._kernels.arrays import Complexes, FlatReturns, Reals
-from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
-from transientcam_moments._kernels.returns import returns_entry, usual_steps
+from transientcam_moments._kernels.compiled_entry import entry
+from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue
+from transientcam_moments._kernels.returns import find_returns, usual_steps
 from transientcam_moments._kernels.wide import WideReturns
 from transientcam_moments.moment_problem import half_turns, redo, sparse
 
@@ -19,7 +20,8 @@ def pisarenko_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile Pisarenko's returns of order m; see the table in ``_kernels``."""
     order = (0,) * m
     turns = half_turns(m, precision)
-    run_eigenvalue, run_returns = eigenvalue_entry(m, precision), returns_entry(m, precision)
+    run_eigenvalue = entry(smallest_eigenvalue, m, precision)
+    run_returns = entry(find_returns, m, precision)
     wide = WideReturns(m) if precision == "f" else None
 
     def kernel(

@@ -3,23 +3,19 @@
 ``order`` is a tuple of length m; banks of registers are taken and filled.
 """
 
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numba import njit
 
 from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Complexes, Counts, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    COUNTS,
-    PIXELS,
-    REAL,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
+from transientcam_moments._kernels.arrays import (
+    Complexes,
+    ComplexPlanes,
+    Counts,
+    RealPlane,
+    RealPlanes,
+    Reals,
 )
 from transientcam_moments._kernels.moments import load_harmonics, load_zeroth
 from transientcam_moments._kernels.portable import bank
@@ -76,15 +72,15 @@ def _returns(
 @njit(nogil=True, error_model="numpy")
 def find_returns(
     order: Length,
-    turns: Reals,
-    b: Complexes,
-    zeroth: Reals,
+    turns: RealPlane,
+    b: ComplexPlanes,
+    zeroth: RealPlane,
     apart: int,
-    uniform: Reals,
-    phase: Reals,
-    weight: Reals,
+    uniform: RealPlane,
+    phase: RealPlanes,
+    weight: RealPlanes,
     count: Counts,
-    residual: Reals,
+    residual: RealPlane,
     noise: float,
     steps: int,
     start: int,
@@ -150,25 +146,3 @@ def usual_steps(m: int, precision: str) -> int:
     Fewest of processor time with m = 3, 4 and 8 in single precision (decision 11).
     """
     return (3 if m < 6 else 5) + (precision == "d")
-
-
-def returns_entry(m: int, precision: str) -> Callable[..., Any]:
-    """Compile the kernel of order m."""
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    return entry(
-        find_returns,
-        order_type(m),
-        real[1],
-        cplx[2],
-        real[1],
-        PIXELS,
-        real[1],
-        real[2],
-        real[2],
-        COUNTS,
-        real[1],
-        REAL,
-        PIXELS,
-        PIXELS,
-        PIXELS,
-    )
