@@ -39,7 +39,7 @@ _BIASED, _NO_SIGNAL, _SATURATED, _NON_FINITE = 1.0, 2.0, 4.0, 8.0
 @njit(nogil=True, error_model="numpy")
 def flag_and_bias(
     order: Length,
-    estimated: bool,
+    estimated: int,
     b: Complexes,
     saturated: Flags,
     eigenvalue: Reals,

@@ -3,7 +3,6 @@
 ``order`` is a tuple of length m; banks of registers are taken and filled.
 """
 
-
 import numpy as np
 from numba import njit
 

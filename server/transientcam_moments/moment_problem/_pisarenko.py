@@ -192,6 +192,7 @@ def _quick_returns(b: Array, uniform: Array | None = None) -> tuple[Array, ...]:
         one, turns = np.ones_like(re[0]), circle.half_turns(len(order), re[0].dtype)
         phase, weight = bank(one, order, 0), bank(one, order, 0)
         noise = float(np.finfo(one.dtype).eps)
+        count: Array
         count, residual = sparse.returns(
             order, turns, _STEPS, noise, one, uniform.astype(one.dtype), re, im, phase, weight
         )

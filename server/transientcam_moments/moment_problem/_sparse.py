@@ -21,7 +21,7 @@ from transientcam_moments.arrays import (
 )
 from transientcam_moments.moment_problem._circle import circle_roots, doubled, phase_of, weigh
 from transientcam_moments.moment_problem._sorting import sort
-from transientcam_moments.moment_problem._toeplitz import singular
+from transientcam_moments.moment_problem._toeplitz import definite
 
 _FAINT = 1024.0  # times what rounding makes of nothing
 
@@ -69,8 +69,7 @@ def returns(
     re[0], im[0] = one, 0.0 * one
     for k in range(1, m + 1):
         re[k], im[k] = re[k] * factor, im[k] * factor
-    degree = singular(order, re, im, floor, ar, ai, gr, gi, inverse)
-    fewer = lit & (degree < float(m))
+    fewer = lit & definite(order, re, im, floor, ar, ai, gr, gi, inverse)
     least, doubtful = floor, fewer & ~fewer
     if some(fewer):
         # a little more in the diagonal makes all smaller blocks definite: the surplus returns
@@ -79,7 +78,7 @@ def returns(
         factor = select(fewer, 1.0 - 2.0 * floor, 1.0)
         for k in range(1, m + 1):
             re[k], im[k] = re[k] * factor, im[k] * factor
-        singular(order, re, im, floor, ar, ai, gr, gi, inverse)
+        definite(order, re, im, floor, ar, ai, gr, gi, inverse)
         for k in range(1, m + 1):
             re[k], im[k] = re[k] / factor, im[k] / factor
     circle_roots(order, turns, steps, ar, ai, wr, wi)
