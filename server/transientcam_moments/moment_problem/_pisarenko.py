@@ -184,9 +184,10 @@ def _quick_returns(b: Array, uniform: Array | None = None) -> tuple[Array, ...]:
     """Return phase, weight, uniform, count and residual of planes (m + 1, P), as kernels do."""
     order = (0,) * (len(b) - 1)
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
+        eigenvalue: Array = uniform
         if uniform is None:
             *relative, scale = normalised(b)
-            uniform = scale * smallest_eigenvalue(order, *relative)
+            eigenvalue = scale * smallest_eigenvalue(order, *relative)
         re, im = parts(b)
         re[0] = re[0] + 0 * im[0]
         one, turns = np.ones_like(re[0]), circle.half_turns(len(order), re[0].dtype)
@@ -194,9 +195,9 @@ def _quick_returns(b: Array, uniform: Array | None = None) -> tuple[Array, ...]:
         noise = float(np.finfo(one.dtype).eps)
         count: Array
         count, residual = sparse.returns(
-            order, turns, _STEPS, noise, one, uniform.astype(one.dtype), re, im, phase, weight
+            order, turns, _STEPS, noise, one, eigenvalue.astype(one.dtype), re, im, phase, weight
         )
-    return np.stack(phase), np.stack(weight), uniform, count.astype(np.int32), residual
+    return np.stack(phase), np.stack(weight), eigenvalue, count.astype(np.int32), residual
 
 
 def first_returns(
