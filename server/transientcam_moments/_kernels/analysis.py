@@ -10,20 +10,17 @@ from typing import Any, Final
 
 from numba import njit
 
-from transientcam_moments._kernels.arrays import Complexes, Counts, Flags, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    BYTES,
-    COUNTS,
-    PIXELS,
-    REAL,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
+from transientcam_moments._kernels.arrays import (
+    ComplexPlanes,
+    Counts,
+    Flags,
+    RealPlane,
+    RealPlanes,
 )
-from transientcam_moments._kernels.eigenvalue import eigenvalue_entry, smallest_eigenvalue
+from transientcam_moments._kernels.compiled_entry import entry
+from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue
 from transientcam_moments._kernels.outputs import flag_and_bias
-from transientcam_moments._kernels.returns import find_returns, returns_entry
+from transientcam_moments._kernels.returns import find_returns
 from transientcam_moments.arrays import Length
 
 _BLOCK: Final = 4096
@@ -32,10 +29,10 @@ _BLOCK: Final = 4096
 
 @njit(nogil=True, error_model="numpy")
 def _analyse(
-    order: Length, turns: Reals, estimated: bool, b: Complexes, saturated: Flags, eigenvalue: Reals,
-    brightness: Reals, uniform: Reals, validity: Reals, flags: Flags, epsilon: float, least: float,
-    phase: Reals, weight: Reals, count: Counts, residual: Reals, noise: float, steps: int,
-    start: int, stop: int,
+    order: Length, turns: RealPlane, estimated: int, b: ComplexPlanes, saturated: Flags, eigenvalue:
+    RealPlane, brightness: RealPlane, uniform: RealPlane, validity: RealPlane, flags: Flags,
+    epsilon: float, least: float, phase: RealPlanes, weight: RealPlanes, count: Counts, residual:
+    RealPlane, noise: float, steps: int, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Do as `smallest_eigenvalue`, `flag_and_bias` and `find_returns` do one after the other."""
     left = start
@@ -55,11 +52,6 @@ def _analyse(
 
 def analysis_entry(m: int) -> Callable[..., Any]:
     """Compile the kernel of order m in single precision."""
-    eigenvalue_entry(m, "f")  # which are linked, as they are kept for other kernels anyway
-    returns_entry(m, "f")
-    plane, planes, moments = real_arrays("f")[1], real_arrays("f")[2], complex_arrays("f")[2]
-    return entry(
-        _analyse,
-        order_type(m), plane, PIXELS, moments, BYTES, plane, plane, plane, plane, BYTES, REAL, REAL,
-        planes, planes, COUNTS, plane, REAL, PIXELS, PIXELS, PIXELS,
-    )  # fmt: skip
+    entry(smallest_eigenvalue, m, "f")  # which are linked, and kept for other kernels anyway
+    entry(find_returns, m, "f")
+    return entry(_analyse, m, "f")

@@ -1,49 +1,43 @@
 """From a jitted function to a compiled entry that never compiles again."""
 
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, get_type_hints
 
 from numba import types as numba_types
 
 from transientcam_moments._dispatch import CACHE
+from transientcam_moments._kernels.arrays import Form
+from transientcam_moments.arrays import Length
 
-# numba is only partly annotated
-_types: Any = numba_types
-
-_REAL = {"f": _types.float32, "d": _types.float64}
-_COMPLEX = {"f": _types.complex64, "d": _types.complex128}
-
-
-def real_arrays(precision: str) -> dict[int, Any]:
-    """Return the types of contiguous real arrays by their number of axes."""
-    return {axes: _types.Array(_REAL[precision], axes, "C") for axes in (1, 2)}
+_types: Any = numba_types  # numba is only partly annotated
+_ELEMENTS = {
+    "f": {"real": "float32", "complex": "complex64"},
+    "d": {"real": "float64", "complex": "complex128"},
+}
+_NUMBERS = {int: _types.int64, float: _types.float64, bool: _types.boolean}
 
 
-def complex_arrays(precision: str) -> dict[int, Any]:
-    """Return the types of contiguous complex arrays by their number of axes."""
-    return {axes: _types.Array(_COMPLEX[precision], axes, "C") for axes in (1, 2)}
+def entry(
+    function: Any, m: int, precision: str, **lengths: int | Sequence[int]
+) -> Callable[..., Any]:
+    """Compile ``function`` for what it is annotated with, or load it from the cache.
+
+    Tuples are of length m, which is how a kernel learns m while it is compiled, but for those that
+    are named in ``lengths``; of a tuple of tuples, the length of each.
+    """
+    hints = get_type_hints(function.py_func, include_extras=True)
+    hints.pop("return")
+    signature = [_type_of(hint, precision, lengths.get(name, m)) for name, hint in hints.items()]
+    return CACHE.compile(function, tuple(signature))
 
 
-PIXELS = _types.int64
-REAL = _types.float64
-FLAG = _types.boolean
-COUNTS = _types.Array(_types.int32, 1, "C")
-PLACES = _types.Array(_types.int64, 1, "C")
-TABLE = _types.Array(_types.int64, 2, "C")
-BYTES = _types.Array(_types.uint8, 1, "C")
-IMAGES = _types.Array(_types.uint16, 2, "C")
-
-
-def order_type(m: int) -> Any:
-    """Return the type of a tuple of length m: how a kernel learns m while it's compiled."""
-    return _types.UniTuple(_types.int64, m)
-
-
-def sizes_type(sizes: Iterable[int]) -> Any:
-    """Return the type of a tuple of tuples of such lengths."""
-    return _types.Tuple([order_type(size) for size in sizes])
-
-
-def entry(function: Any, *signature: Any) -> Callable[..., Any]:
-    """Compile ``function`` for one signature, or load it from the cache, and return its entry."""
-    return CACHE.compile(function, signature)
+def _type_of(hint: Any, precision: str, length: int | Sequence[int]) -> Any:
+    if hint in _NUMBERS:
+        return _NUMBERS[hint]
+    if not isinstance(length, int):
+        return _types.Tuple([_type_of(Length, precision, each) for each in length])
+    if hint == Length:
+        return _types.UniTuple(_types.int64, length)
+    (form,) = (each for each in hint.__metadata__ if isinstance(each, Form))
+    element = _ELEMENTS[precision].get(form.element, form.element)
+    return _types.Array(getattr(_types, element), form.axes, "C")

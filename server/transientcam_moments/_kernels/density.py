@@ -10,20 +10,19 @@ from numba import njit
 from transientcam_compiled import Spread, at_once, empty
 from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Complexes, Places, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    FLAG,
-    PIXELS,
-    TABLE,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
+from transientcam_moments._kernels.arrays import (
+    Complexes,
+    ComplexPlanes,
+    RealPlane,
+    RealPlanes,
+    Reals,
+    Table,
 )
+from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.phase_groups import ANY, MIRRORED, TURN, grouping
-from transientcam_moments._kernels.portable import bank, eps, larger
+from transientcam_moments._kernels.portable import bank, eps
 from transientcam_moments.arrays import Bank, Length, Plane
-from transientcam_moments.moment_problem import toeplitz
+from transientcam_moments.moment_problem import evaluation, toeplitz
 
 _BANK = 240  # pairs of registers of coefficients, which stay in the first cache for all phases
 _PAST_CACHES_BYTES = 1 << 24
@@ -37,85 +36,12 @@ _PARTS_EACH = 4  # of a film for each thread: the other may be late
 
 
 @njit(forceinline=True, error_model="numpy")
-def _any_two(
-    order: Length, q: Bank, pitch: int, p: int, c0: Bank, s0: Bank, c1: Bank, s1: Bank
-) -> Any:
-    """Evaluate Eq. (2) for the pixels from ``p`` on at two phases, which share the loads."""
-    # sum_j conj(a_j) exp(i j phi), a_0 = 1
-    re, im = simd.load_within(q, 2 * pitch + p), simd.load_within(q, 3 * pitch + p)
-    x0, y0 = 1.0 + re * c0[0] + im * s0[0], re * s0[0] - im * c0[0]
-    x1, y1 = 1.0 + re * c1[0] + im * s1[0], re * s1[0] - im * c1[0]
-    for j in range(1, len(order)):
-        re = simd.load_within(q, (2 * j + 2) * pitch + p)
-        im = simd.load_within(q, (2 * j + 3) * pitch + p)
-        x0, y0 = x0 + re * c0[j] + im * s0[j], y0 + re * s0[j] - im * c0[j]
-        x1, y1 = x1 + re * c1[j] + im * s1[j], y1 + re * s1[j] - im * c1[j]
-    scale, least = simd.load_within(q, p), simd.load_within(q, pitch + p)
-    return (
-        scale / larger(x0 * x0 + y0 * y0, least),
-        scale / larger(x1 * x1 + y1 * y1, least),
-    )
-
-
-@njit(forceinline=True, error_model="numpy")
-def _sums(
-    order: Length,
-    uc: Plane,
-    zero: Plane,
-    q: Bank,
-    pitch: int,
-    p: int,
-    c: Bank,
-    s: Bank,
-    j0: int,
-    every: int,
-) -> Any:
-    """Sum u c, v s, u s and v c of every so many j from ``j0`` on; ``uc`` is what to add to."""
-    vs = us = vc = zero
-    for j in range(j0, len(order), every):
-        u = simd.load_within(q, (2 * j + 2) * pitch + p)
-        v = simd.load_within(q, (2 * j + 3) * pitch + p)
-        uc, vs, us, vc = uc + u * c[j], vs + v * s[j], us + u * s[j], vc + v * c[j]
-    return uc, vs, us, vc
-
-
-@njit(forceinline=True, error_model="numpy")
-def _mirrored_two(order: Length, q: Bank, pitch: int, p: int, c: Bank, s: Bank) -> Any:
-    """Evaluate Eq. (2) at two phases as far before as behind the one to which q is turned.
-
-    With conj(a_j) turned to u + i v it is sum_j (u c - v s) + i (u s + v c), and s changes sign:
-    the same four sums serve both.
-    """
-    scale, least = simd.load_within(q, p), simd.load_within(q, pitch + p)
-    one, zero = simd.spread(scale, 1.0), simd.spread(scale, 0.0)
-    uc, vs, us, vc = _sums(order, one, zero, q, pitch, p, c, s, 0, 1)
-    x0, y0, x1, y1 = uc - vs, vc + us, uc + vs, vc - us
-    return (
-        scale / larger(x0 * x0 + y0 * y0, least),
-        scale / larger(x1 * x1 + y1 * y1, least),
-    )
-
-
-@njit(forceinline=True, error_model="numpy")
-def _four_of_a_turn(order: Length, q: Bank, pitch: int, p: int, c: Bank, s: Bank) -> Any:
-    """Evaluate Eq. (2) at the two phases of `_mirrored_two` and half a turn from each of them.
-
-    There the terms of odd j change sign: the same eight sums serve all four.
-    """
-    scale, least = simd.load_within(q, p), simd.load_within(q, pitch + p)
-    one, zero = simd.spread(scale, 1.0), simd.spread(scale, 0.0)
-    uc, vs, us, vc = _sums(order, one, zero, q, pitch, p, c, s, 1, 2)  # j = 2, 4, ...
-    x0, y0, x1, y1 = uc - vs, vc + us, uc + vs, vc - us
-    uc, vs, us, vc = _sums(order, zero, zero, q, pitch, p, c, s, 0, 2)  # j = 1, 3, ...
-    dx0, dy0, dx1, dy1 = uc - vs, vc + us, uc + vs, vc - us
-    x2, y2, x3, y3 = x0 - dx0, y0 - dy0, x1 - dx1, y1 - dy1
-    x0, y0, x1, y1 = x0 + dx0, y0 + dy0, x1 + dx1, y1 + dy1
-    return (
-        scale / larger(x0 * x0 + y0 * y0, least),
-        scale / larger(x1 * x1 + y1 * y1, least),
-        scale / larger(x2 * x2 + y2 * y2, least),
-        scale / larger(x3 * x3 + y3 * y3, least),
-    )
+def _load(order: Length, q: Bank, pitch: int, at: int, u: Bank, v: Bank) -> Any:
+    """Load what `_fill` put into a bank for some pixels."""
+    for j in range(len(order)):
+        u[j] = simd.load_within(q, (2 * j + 2) * pitch + at)
+        v[j] = simd.load_within(q, (2 * j + 3) * pitch + at)
+    return simd.load_within(q, at), simd.load_within(q, pitch + at)
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -166,7 +92,7 @@ def _fill(
             re, im = simd.load_complex(one, polynomial[j + 1], left + p)
             if turned:  # conj(a_j) exp(i j centre)
                 c, s = simd.spread(one, centre[j]), simd.spread(one, centre[m + j])
-                re, im = re * c + im * s, re * s - im * c
+                re, im = evaluation.turned(re, im, c, s)
             simd.store_within(q, (2 * j + 2) * pitch + at, re)
             simd.store_within(q, (2 * j + 3) * pitch + at, im)
             re, im = simd.load_complex(one, reflection[j], left + p)
@@ -177,13 +103,13 @@ def _fill(
 @njit(nogil=True, error_model="numpy")
 def _density(
     order: Length,
-    polynomial: Complexes,
-    reflection: Complexes,
-    error: Reals,
-    rows: Places,
-    waves: Reals,
-    centre: Reals,
-    out: Reals,
+    polynomial: ComplexPlanes,
+    reflection: ComplexPlanes,
+    error: RealPlane,
+    rows: Table,
+    waves: RealPlanes,
+    centre: RealPlane,
+    out: RealPlane,
     start: int,
     stop: int,
     together: int,
@@ -212,6 +138,7 @@ def _density(
     staged = past_caches and _IN_PARTS
     c0, s0 = bank(one, order, 0), bank(one, order, 0)
     c1, s1 = bank(one, order, 0), bank(one, order, 0)
+    u, v = bank(one, order, 0), bank(one, order, 0)
     left = start
     while left < stop:
         left = min(left, stop - step)
@@ -243,14 +170,17 @@ def _density(
                 how = staged, past_caches and p == i
                 for part in range(0, step, simd.width(one)):
                     at, to, x = p + shift + part, p + part, i - first + part
+                    scale, least = _load(order, q, pitch, at, u, v)
                     if together == TURN:
-                        h0, h1, h2, h3 = _four_of_a_turn(order, q, pitch, at, c0, s0)
+                        h0, h1, h2, h3 = evaluation.four_of_a_turn(
+                            order, one, scale, least, u, v, c0, s0
+                        )
                         _put(out, r3 + to, stage, x + 3 * pitch, h3, how)
                         _put(out, r2 + to, stage, x + 2 * pitch, h2, how)
                     elif together == MIRRORED:
-                        h0, h1 = _mirrored_two(order, q, pitch, at, c0, s0)
+                        h0, h1 = evaluation.mirrored_two(order, one, scale, least, u, v, c0, s0)
                     else:
-                        h0, h1 = _any_two(order, q, pitch, at, c0, s0, c1, s1)
+                        h0, h1 = evaluation.any_two(order, scale, least, u, v, c0, s0, c1, s1)
                     _put(out, r1 + to, stage, x + pitch, h1, how)
                     _put(out, r0 + to, stage, x, h0, how)
             if staged:
@@ -266,12 +196,7 @@ def _density(
 def density_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the density of order m; see the table in ``_kernels`` for what it takes."""
     order = (0,) * m
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    run = entry(
-        _density,
-        order_type(m), cplx[2], cplx[2], real[1], TABLE, real[2], real[1], real[1],
-        PIXELS, PIXELS, PIXELS, FLAG,
-    )  # fmt: skip
+    run = entry(_density, m, precision)
     grouped = grouping(m, precision)
 
     def kernel(

@@ -8,14 +8,8 @@ from numba import njit
 
 from transientcam_compiled import Spread, at_once, empty
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Complexes, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    PIXELS,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
-)
+from transientcam_moments._kernels.arrays import Complexes, ComplexPlanes, RealPlane
+from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.moments import load_harmonics, load_zeroth
 from transientcam_moments._kernels.portable import bank
 from transientcam_moments.arrays import Length
@@ -26,7 +20,7 @@ _INTERLEAVE = 4
 
 @njit(nogil=True, error_model="numpy")
 def smallest_eigenvalue(
-    order: Length, b: Complexes, without: bool, out: Reals, start: int, stop: int
+    order: Length, b: ComplexPlanes, without: int, out: RealPlane, start: int, stop: int
 ) -> None:
     """Write the smallest eigenvalues of the pixels start..stop, with or ``without`` b_0."""
     one = simd.ones(out, _INTERLEAVE)
@@ -42,16 +36,10 @@ def smallest_eigenvalue(
         simd.store(out, p, scale * eigenvalue.smallest_eigenvalue(order, re, im))
 
 
-def eigenvalue_entry(m: int, precision: str) -> Callable[..., Any]:
-    """Compile the kernel of order m."""
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    return entry(smallest_eigenvalue, order_type(m), cplx[2], PIXELS, real[1], PIXELS, PIXELS)
-
-
 def smallest_eigenvalue_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the smallest eigenvalue of order m; see the table in ``_kernels``."""
     order = (0,) * m
-    run = eigenvalue_entry(m, precision)
+    run = entry(smallest_eigenvalue, m, precision)
 
     def kernel(b: Complexes, *, spread: Spread = at_once) -> Any:
         pixels = b[0].size

@@ -9,61 +9,22 @@ from transientcam_compiled import Spread, at_once, empty
 from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import inputs, outputs
 from transientcam_moments._kernels.arrays import Complexes, Images, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    BYTES,
-    IMAGES,
-    PIXELS,
-    REAL,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
-)
+from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.padding import LEAST_WIDTH, normalisation, row_length
 
 ZEROTH = {"low-frequency": 0, "on-off": 1, "estimated": 2}
-_REAL, _COMPLEX = real_arrays("f"), complex_arrays("f")
-
-
-def measure_entry(m: int) -> Callable[..., Any]:
-    """Compile the kernel of order m."""
-    return entry(
-        inputs.measure,
-        order_type(m), IMAGES, PIXELS, _COMPLEX[2], PIXELS, REAL, _COMPLEX[2], BYTES, PIXELS,
-        PIXELS,
-    )  # fmt: skip
-
-
-def smooth_entry() -> Callable[..., Any]:
-    """Compile the kernel of all orders."""
-    plane, planes = _REAL[1], _REAL[2]
-    return entry(inputs.smooth, planes, plane, plane, plane, planes, PIXELS, PIXELS, PIXELS)
 
 
 def measure_and_smooth_entry(m: int) -> Callable[..., Any]:
     """Compile the kernel of order m."""
-    measure_entry(m)  # which are linked
-    smooth_entry()
-    plane, planes = _REAL[1], _REAL[2]
-    return entry(
-        inputs.measure_and_smooth,
-        order_type(m), IMAGES, PIXELS, _COMPLEX[2], PIXELS, REAL, _COMPLEX[2], BYTES,
-        plane, plane, plane, planes, planes, PIXELS, PIXELS, PIXELS,
-    )  # fmt: skip
-
-
-def separate_entry(m: int) -> Callable[..., Any]:
-    """Compile the kernel of order m."""
-    plane, planes = _REAL[1], _REAL[2]
-    return entry(
-        outputs.separate,
-        order_type(m), planes, planes, BYTES, plane, plane, plane, REAL, REAL, PIXELS, PIXELS,
-    )  # fmt: skip
+    entry(inputs.measure, m, "f")  # which are linked
+    entry(inputs.smooth, m, "f")
+    return entry(inputs.measure_and_smooth, m, "f")
 
 
 def measure_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the way from raw images to uncalibrated moments."""
-    order, run = (0,) * m, measure_entry(m)
+    order, run = (0,) * m, entry(inputs.measure, m, "f")
     ones = np.ones((m + 1, LEAST_PIXELS), np.complex64)
 
     def kernel(images: Images, zeroth: str, *, spread: Spread = at_once) -> Any:
@@ -84,7 +45,7 @@ def smooth_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile smoothing; the kernel gives None for
     moments that aren't finite, narrow images and other axes.
     """
-    run = smooth_entry()
+    run = entry(inputs.smooth, m, "f")
 
     def kernel(moments: Complexes, taps: Reals, *, spread: Spread = at_once) -> Any:
         height, width = moments.shape[-2:]
@@ -108,7 +69,7 @@ def smooth_kernel(m: int, precision: str) -> Callable[..., Any]:
 
 def separate_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the separation of direct and indirect light."""
-    order, run = (0,) * m, separate_entry(m)
+    order, run = (0,) * m, entry(outputs.separate, m, "f")
 
     def kernel(weight: Reals, phase: Reals, threshold: float, *, spread: Spread = at_once) -> Any:
         shape, pixels = weight.shape[1:], weight[0].size

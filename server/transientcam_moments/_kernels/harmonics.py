@@ -8,15 +8,8 @@ from numba import njit
 
 from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Complexes, Places, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    PIXELS,
-    PLACES,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
-)
+from transientcam_moments._kernels.arrays import Complexes, ComplexPlanes, Places, RealPlane
+from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.portable import bank, square_bank
 from transientcam_moments.arrays import Length
 from transientcam_moments.moment_problem import extension
@@ -29,13 +22,13 @@ MOST_ODD = 31
 def _without_harmonics(
     order: Length,
     odd: Places,
-    given: Complexes,
-    current: Complexes,
-    polynomial: Complexes,
-    mixed: Complexes,
-    inverse: Complexes,
-    following: Complexes,
-    misfit: Reals,
+    given: ComplexPlanes,
+    current: ComplexPlanes,
+    polynomial: ComplexPlanes,
+    mixed: ComplexPlanes,
+    inverse: ComplexPlanes,
+    following: ComplexPlanes,
+    misfit: RealPlane,
     start: int,
     stop: int,
 ) -> None:
@@ -70,9 +63,7 @@ def _without_harmonics(
 def harmonics_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the round of order m; see the table in ``_kernels``."""
     order = (0,) * m
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    planes = (cplx[2],) * 6
-    run = entry(_without_harmonics, order_type(m), PLACES, *planes, real[1], PIXELS, PIXELS)
+    run = entry(_without_harmonics, m, precision)
 
     def kernel(
         given: Complexes,

@@ -5,7 +5,13 @@ from typing import Any
 from numba import njit
 
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Complexes, Flags, Images, Reals
+from transientcam_moments._kernels.arrays import (
+    ComplexPlanes,
+    Flags,
+    Images,
+    RealPlane,
+    RealPlanes,
+)
 from transientcam_moments._kernels.portable import larger, root, select, some
 from transientcam_moments.arrays import Length, Plane
 
@@ -27,10 +33,10 @@ def measure(
     order: Length,
     images: Images,
     zeroth: int,
-    inverse: Complexes,
+    inverse: ComplexPlanes,
     stride: int,
     full_scale: float,
-    moments: Complexes,
+    moments: ComplexPlanes,
     flags: Flags,
     start: int,
     stop: int,
@@ -67,11 +73,11 @@ def measure(
 
 @njit(nogil=True, error_model="numpy")
 def smooth(
-    moments: Reals,
-    taps: Reals,
-    weight: Reals,
-    rows: Reals,
-    out: Reals,
+    moments: RealPlanes,
+    taps: RealPlane,
+    weight: RealPlane,
+    rows: RealPlane,
+    out: RealPlanes,
     width: int,
     start: int,
     stop: int,
@@ -112,9 +118,9 @@ def smooth(
 
 @njit(nogil=True, error_model="numpy")
 def measure_and_smooth(
-    order: Length, images: Images, zeroth: int, inverse: Complexes, stride: int, full_scale: float,
-    moments: Complexes, flags: Flags, taps: Reals, weight: Reals, rows: Reals, planes: Reals,
-    out: Reals, width: int, start: int, stop: int,
+    order: Length, images: Images, zeroth: int, inverse: ComplexPlanes, stride: int, full_scale:
+    float, moments: ComplexPlanes, flags: Flags, taps: RealPlane, weight: RealPlane, rows:
+    RealPlane, planes: RealPlanes, out: RealPlanes, width: int, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the smoothed moments of rows, each few of them as soon as they are measured.
 

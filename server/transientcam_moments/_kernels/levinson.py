@@ -8,14 +8,8 @@ from numba import njit
 
 from transientcam_compiled import Spread, at_once, empty
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Complexes, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    PIXELS,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
-)
+from transientcam_moments._kernels.arrays import Complexes, ComplexPlanes, RealPlane, Reals
+from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.moments import load_harmonics, load_zeroth
 from transientcam_moments._kernels.portable import bank
 from transientcam_moments.arrays import Length
@@ -27,12 +21,12 @@ _INTERLEAVE = 2
 @njit(nogil=True, error_model="numpy")
 def _levinson(
     order: Length,
-    b: Complexes,
-    zeroth: Reals,
-    apart: bool,
-    error: Reals,
-    polynomial: Complexes,
-    reflection: Complexes,
+    b: ComplexPlanes,
+    zeroth: RealPlane,
+    apart: int,
+    error: RealPlane,
+    polynomial: ComplexPlanes,
+    reflection: ComplexPlanes,
     start: int,
     stop: int,
 ) -> None:
@@ -57,27 +51,10 @@ def _levinson(
             simd.store_complex(reflection[j], p, gr[j], gi[j])
 
 
-def levinson_entry(m: int, precision: str) -> Callable[..., Any]:
-    """Compile the kernel of order m."""
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    return entry(
-        _levinson,
-        order_type(m),
-        cplx[2],
-        real[1],
-        PIXELS,
-        real[1],
-        cplx[2],
-        cplx[2],
-        PIXELS,
-        PIXELS,
-    )
-
-
 def levinson_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile Levinson's recursion of order m; see the table in ``_kernels``."""
     order = (0,) * m
-    run = levinson_entry(m, precision)
+    run = entry(_levinson, m, precision)
 
     def kernel(
         b: Complexes, brightness: Reals | None = None, *, spread: Spread = at_once

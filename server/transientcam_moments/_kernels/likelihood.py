@@ -12,16 +12,14 @@ import numpy as np
 from numba import njit
 
 from transientcam_compiled import Spread, at_once, empty
-from transientcam_moments._kernels.arrays import Complexes, Counts, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    COUNTS,
-    PIXELS,
-    REAL,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
+from transientcam_moments._kernels.arrays import (
+    Complexes,
+    ComplexPlanes,
+    Counts,
+    RealPlanes,
+    Reals,
 )
+from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.packing import PIXELS_AT_ONCE, ROW
 from transientcam_moments._kernels.stages import (
     TAIL_ROUNDS,
@@ -41,8 +39,8 @@ from transientcam_moments.likelihood import MOST_RETURNS, TAIL_SHAPE, choice
 
 @njit(nogil=True, error_model="numpy")
 def fit_returns(
-    order: Length, slots: Length, turns: Reals, b: Complexes, variance: Reals, error: float,
-    planes: Reals, free: Counts, count: Counts, start: int, stop: int,
+    order: Length, slots: Length, turns: RealPlanes, b: ComplexPlanes, variance: RealPlanes, error:
+    float, planes: RealPlanes, free: Counts, count: Counts, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; each model where simpler ones leave enough."""
     size = rows_of(order) * ROW
@@ -70,12 +68,7 @@ def fit_returns(
 def likelihood_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the estimate of order m; see the table in ``_kernels``."""
     order, slots = (0,) * m, (0,) * min(MOST_RETURNS, m)
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    run = entry(
-        fit_returns,
-        order_type(m), order_type(len(slots)), real[2], cplx[2], real[2], REAL, real[2],
-        COUNTS, COUNTS, PIXELS, PIXELS,
-    )  # fmt: skip
+    run = entry(fit_returns, m, precision, slots=len(slots))
     turns = choice.turns_of(m).astype(precision)
 
     def kernel(

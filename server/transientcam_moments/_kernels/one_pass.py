@@ -11,9 +11,14 @@ import numpy as np
 
 from transientcam_compiled import BLOCK, Spread, empty
 from transientcam_moments._dispatch import LEAST_PIXELS
-from transientcam_moments._kernels.arrays import Booleans, Complexes, Images, Reals
+from transientcam_moments._kernels.arrays import (
+    Booleans,
+    Complexes,
+    FlatReturns,
+    Images,
+    Reals,
+)
 from transientcam_moments._kernels.padding import normalisation, row_length
-from transientcam_moments._kernels.refine import Found
 
 if TYPE_CHECKING:  # it brings along the compiler
     from transientcam_moments._kernels.wide import WideReturns
@@ -201,7 +206,7 @@ class OnePass:
         if self._estimated:
             smoothed[0] = 0
         planes = self._new_planes(smoothed)
-        found = Found(None, planes.phase_rad, planes.weight, planes.count, scratch.residual)
+        found = FlatReturns(None, planes.phase_rad, planes.weight, planes.count, scratch.residual)
         redone: list[int] = []
 
         def analyse(start: int, stop: int) -> None:

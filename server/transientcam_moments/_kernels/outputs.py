@@ -5,8 +5,21 @@ from numba import njit
 
 from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Complexes, Counts, Flags, Places, Reals
+from transientcam_moments._kernels.arrays import (
+    Complexes,
+    ComplexPlanes,
+    Counts,
+    Flags,
+    Places,
+    RealPlane,
+    RealPlanes,
+    Reals,
+    WideComplexPlanes,
+    WideRealPlane,
+    WideRealPlanes,
+)
 from transientcam_moments._kernels.portable import (
+    bank,
     eps,
     larger,
     largest,
@@ -16,6 +29,7 @@ from transientcam_moments._kernels.portable import (
     some,
 )
 from transientcam_moments.arrays import Length
+from transientcam_moments.moment_problem import sparse
 
 _INTERLEAVE = 2
 # transientcam_moments.Flags
@@ -25,7 +39,7 @@ _BIASED, _NO_SIGNAL, _SATURATED, _NON_FINITE = 1.0, 2.0, 4.0, 8.0
 @njit(nogil=True, error_model="numpy")
 def flag_and_bias(
     order: Length,
-    estimated: bool,
+    estimated: int,
     b: Complexes,
     saturated: Flags,
     eigenvalue: Reals,
@@ -77,12 +91,12 @@ def flag_and_bias(
 @njit(nogil=True, error_model="numpy")
 def separate(
     order: Length,
-    phase: Reals,
-    weight: Reals,
+    phase: RealPlanes,
+    weight: RealPlanes,
     flags: Flags,
-    direct: Reals,
-    indirect: Reals,
-    range_m: Reals,
+    direct: RealPlane,
+    indirect: RealPlane,
+    range_m: RealPlane,
     threshold: float,
     metres: float,
     start: int,
@@ -91,31 +105,25 @@ def separate(
     """Separate direct from indirect light: the first return above a threshold (Sec. 5.1)."""
     one = simd.ones(direct, _INTERLEAVE)
     step = simd.width(one)
+    phases, weights = bank(one, order, 0), bank(one, order, 0)
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        strongest, total = one * 0.0, one * 0.0
         for i in range(len(order)):
-            w = simd.load(one, weight[i], p)
-            strongest, total = larger(w, strongest), total + w
-        first, angle = one * 0.0, not_a_number(one)
-        for i in range(len(order) - 1, -1, -1):
-            w = simd.load(one, weight[i], p)
-            enough = (w >= threshold * strongest) & (w > 0.0)
-            first = select(enough, w, first)
-            angle = select(enough, simd.load(one, phase[i], p), angle)
+            weights[i], phases[i] = simd.load(one, weight[i], p), simd.load(one, phase[i], p)
+        first, rest, angle = sparse.separate(order, threshold, one, phases, weights)
         flag = simd.load(one, flags, p)
         invalid = flag >= _NON_FINITE
         flag = select(flag >= _SATURATED, flag - _SATURATED, flag)
         invalid = invalid | (flag >= _NO_SIGNAL)
         simd.store(direct, p, first)
-        simd.store(indirect, p, larger(total - first, 0.0))
+        simd.store(indirect, p, rest)
         simd.store(range_m, p, select(invalid, not_a_number(one), angle * metres))
 
 
 @njit(nogil=True, error_model="numpy")
 def gather(
-    order: Length, b: Complexes, brightness: Reals, residual: Reals, tolerance: float, ramp: Reals,
-    packed: Reals, wide: Complexes, where: Places, begin: int,
+    order: Length, b: ComplexPlanes, brightness: RealPlane, residual: RealPlane, tolerance: float,
+    ramp: RealPlane, packed: RealPlane, wide: WideComplexPlanes, where: Places, begin: int,
 ) -> int:  # fmt: skip
     """Collect pixels from ``begin`` on whose residual is above the tolerance, until room ends.
 
@@ -151,9 +159,9 @@ def gather(
 
 @njit(nogil=True, error_model="numpy")
 def scatter(
-    order: Length, where: Places, found: int, wide_phase: Reals, wide_weight: Reals,
-    wide_count: Counts, wide_residual: Reals, phase: Reals, weight: Reals, count: Counts,
-    residual: Reals,
+    order: Length, where: Places, found: int, wide_phase: WideRealPlanes, wide_weight:
+    WideRealPlanes, wide_count: Counts, wide_residual: WideRealPlane, phase: RealPlanes, weight:
+    RealPlanes, count: Counts, residual: RealPlane,
 ) -> None:  # fmt: skip
     """Put redone returns back where they came from."""
     for i in range(found):

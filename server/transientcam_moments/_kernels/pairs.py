@@ -8,18 +8,15 @@ from numba import njit
 
 from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Complexes, Counts, Places, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    COUNTS,
-    PIXELS,
-    PLACES,
-    REAL,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
-    sizes_type,
+from transientcam_moments._kernels.arrays import (
+    Complexes,
+    ComplexPlanes,
+    Counts,
+    Places,
+    RealPlanes,
+    Reals,
 )
+from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.fits import fit_one, portable, vary, write
 from transientcam_moments._kernels.portable import bank, infinity, larger, select, some, square_bank
 from transientcam_moments.arrays import Bank, Length, Mask, Plane
@@ -230,9 +227,9 @@ def _choose(
 
 @njit(nogil=True, error_model="numpy")
 def fit_pairs(
-    order: Length, lists: tuple[Length, ...], places: Places, first_turns: Reals, same: float,
-    turns: Reals, b: Complexes, variance: Reals, error: float, planes: Reals, free: Counts,
-    count: Counts, start: int, stop: int,
+    order: Length, lists: tuple[Length, ...], places: Places, first_turns: RealPlanes, same: float,
+    turns: RealPlanes, b: ComplexPlanes, variance: RealPlanes, error: float, planes: RealPlanes,
+    free: Counts, count: Counts, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; two returns where one leaves enough.
 
@@ -304,12 +301,7 @@ def pairs_kernel(m: int, precision: str) -> Callable[..., Any]:
     order = (0,) * m
     sizes = (2 * (m + 1), STARTS, PEAKS, FINALISTS, 4 * FINALISTS)
     lists = tuple((0,) * size for size in sizes)
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    run = entry(
-        fit_pairs,
-        order_type(m), sizes_type(sizes), PLACES, real[2], REAL, real[2], cplx[2], real[2], REAL,
-        real[2], COUNTS, COUNTS, PIXELS, PIXELS,
-    )  # fmt: skip
+    run = entry(fit_pairs, m, precision, lists=sizes)
     first_turns = choice.turns_of(m).astype(precision)
     phase, same = grid(m), least_alike(m)
     turns = np.stack([np.cos(phase), np.sin(phase)]).astype(precision)

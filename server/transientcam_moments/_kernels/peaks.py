@@ -8,15 +8,14 @@ from numba import njit
 
 from transientcam_compiled import Spread, at_once, empty
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Complexes, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    PIXELS,
-    REAL,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
+from transientcam_moments._kernels.arrays import (
+    Complexes,
+    ComplexPlanes,
+    RealPlane,
+    RealPlanes,
+    Reals,
 )
+from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.portable import (
     bank,
     not_a_number,
@@ -31,15 +30,15 @@ _INTERLEAVE = 2
 @njit(nogil=True, error_model="numpy")
 def _peaks(
     order: Length,
-    polynomial: Complexes,
-    reflection: Complexes,
-    error: Reals,
-    starts: Reals,
+    polynomial: ComplexPlanes,
+    reflection: ComplexPlanes,
+    error: RealPlane,
+    starts: RealPlane,
     threshold: float,
-    first: Reals,
-    strongest: Reals,
-    phase: Reals,
-    height: Reals,
+    first: RealPlane,
+    strongest: RealPlane,
+    phase: RealPlanes,
+    height: RealPlanes,
     start: int,
     stop: int,
 ) -> None:
@@ -70,12 +69,7 @@ def _peaks(
 def peaks_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the peaks of order m; see the table in ``_kernels``."""
     order = (0,) * m
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    run = entry(
-        _peaks,
-        order_type(m), cplx[2], cplx[2], real[1], real[1], REAL,
-        real[1], real[1], real[2], real[2], PIXELS, PIXELS,
-    )  # fmt: skip
+    run = entry(_peaks, m, precision)
     starts = maxima.start_angles(m, precision)
 
     def kernel(

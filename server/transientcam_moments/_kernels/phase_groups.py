@@ -8,14 +8,14 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numba import njit
 
-from transientcam_moments._kernels.arrays import Places, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    PIXELS,
-    TABLE,
-    entry,
-    order_type,
-    real_arrays,
+from transientcam_moments._kernels.arrays import (
+    RealPlane,
+    RealPlanes,
+    Reals,
+    Table,
+    WideRealPlane,
 )
+from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments.arrays import Length
 
 ANY: Final = 0
@@ -67,7 +67,12 @@ def _kind(phase_rad: Reals) -> int:
 
 @njit(nogil=True, error_model="numpy")
 def _group(
-    order: Length, phase_rad: Reals, alike: int, rows: Places, waves: Reals, turn: Reals
+    order: Length,
+    phase_rad: WideRealPlane,
+    alike: int,
+    rows: Table,
+    waves: RealPlanes,
+    turn: RealPlane,
 ) -> tuple[int, int]:
     """Fill the arrays of `Groups`; return how many groups there are, and of which kind."""
     m, phases = len(order), phase_rad.shape[0]
@@ -110,8 +115,7 @@ def grouping(m: int, precision: str) -> Callable[[Any, int], Groups]:
     evaluated in a millisecond, of which NumPy would take a third when it is first asked.
     """
     order = (0,) * m
-    real = real_arrays(precision)
-    run = entry(_group, order_type(m), real_arrays("d")[1], PIXELS, TABLE, real[2], real[1])
+    run = entry(_group, m, precision)
 
     def grouped(phase_rad: Reals, alike: int) -> Groups:
         rows = np.zeros((phase_rad.size, 4), np.int64)

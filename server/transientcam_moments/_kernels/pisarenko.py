@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from transientcam_compiled import Spread, at_once, blocks, empty
-from transientcam_moments._kernels.arrays import Complexes, Reals
-from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
-from transientcam_moments._kernels.refine import Found, redo
-from transientcam_moments._kernels.returns import returns_entry, usual_steps
+from transientcam_moments._kernels.arrays import Complexes, FlatReturns, Reals
+from transientcam_moments._kernels.compiled_entry import entry
+from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue
+from transientcam_moments._kernels.returns import find_returns, usual_steps
 from transientcam_moments._kernels.wide import WideReturns
-from transientcam_moments.moment_problem import half_turns
+from transientcam_moments.moment_problem import half_turns, redo, sparse
 
 _ROOM = 256  # pixels that are redone in double precision at a time
 
@@ -20,7 +20,8 @@ def pisarenko_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile Pisarenko's returns of order m; see the table in ``_kernels``."""
     order = (0,) * m
     turns = half_turns(m, precision)
-    run_eigenvalue, run_returns = eigenvalue_entry(m, precision), returns_entry(m, precision)
+    run_eigenvalue = entry(smallest_eigenvalue, m, precision)
+    run_returns = entry(find_returns, m, precision)
     wide = WideReturns(m) if precision == "f" else None
 
     def kernel(
@@ -37,7 +38,7 @@ def pisarenko_kernel(m: int, precision: str) -> Callable[..., Any]:
             uniform[:] = eigenvalue.reshape(-1)
         phase, weight = empty((m, pixels), precision), empty((m, pixels), precision)
         count, residual = empty(pixels, np.int32), empty(pixels, precision)
-        found = Found(uniform, phase, weight, count, residual)
+        found = FlatReturns(uniform, phase, weight, count, residual)
         brightness = np.ascontiguousarray(planes[0].real)
         eps = noise or float(np.finfo(precision).eps)
         ill: list[int] = []
@@ -58,7 +59,7 @@ def pisarenko_kernel(m: int, precision: str) -> Callable[..., Any]:
 
         spread(part, pixels)
         if any(ill):
-            where = np.flatnonzero(residual > 16 * (m + 1) * eps)
+            where = np.flatnonzero(residual > sparse.largest_residual(m, eps))
             redo(planes, (phase, weight, uniform, count), where, eps)
         return (
             phase.reshape((m, *shape)),

@@ -40,6 +40,7 @@ from transientcam_moments.arrays import (
     logarithm,
     lost_by_squaring,
     magnitude,
+    multiply_rows,
     not_a_number,
     product_bank,
     repeat,
@@ -57,11 +58,14 @@ from transientcam_moments.likelihood import choice, linear, pair_fit, sharp, tai
 from transientcam_moments.moment_problem import (
     circle,
     eigenvalue,
+    evaluation,
     extension,
     maxima,
     sorting,
+    sparse,
     toeplitz,
 )
+from transientcam_moments.noise import first_order, interpolation
 
 __all__ = [
     "arctangent_ratio",
@@ -229,6 +233,20 @@ def _repeat(body: Any, steps: Any, fixed: Any, given: Any, state: Any) -> Callab
     return run
 
 
+@extending.overload(multiply_rows, jit_options={"error_model": "numpy", "forceinline": True})
+def _multiply_rows(values: Any, length: Any, table: Any, out: Any) -> Callable[..., Any]:
+    def run(values: Any, length: Any, table: Any, out: Any) -> Any:
+        n = len(length) + 1
+        for row in range(n):
+            for j in range(n):
+                total = simd.spread(values[0], 0.0)
+                for i in range(n):
+                    total = total + values[row * n + i] * table[i, j]
+                out[row * n + j] = total
+
+    return run
+
+
 def _compile_statements(module: ModuleType, *, inline: bool) -> None:
     """Let kernels call what a module states."""
     for function in vars(module).values():
@@ -239,5 +257,16 @@ def _compile_statements(module: ModuleType, *, inline: bool) -> None:
 extending.register_jitable(error_model="numpy")(logarithm)
 for _module in (choice, linear, pair_fit, sharp, tail):
     _compile_statements(_module, inline=False)
-for _module in (toeplitz, eigenvalue, circle, extension, maxima, sorting):
+for _module in (
+    toeplitz,
+    eigenvalue,
+    circle,
+    evaluation,
+    extension,
+    maxima,
+    sorting,
+    sparse,
+    interpolation,
+    first_order,
+):
     _compile_statements(_module, inline=True)

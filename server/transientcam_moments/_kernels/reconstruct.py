@@ -3,13 +3,10 @@
 from collections.abc import Callable
 from typing import Any
 
+from transientcam_moments._kernels import inputs, outputs
 from transientcam_moments._kernels.analysis import analysis_entry
-from transientcam_moments._kernels.frames import (
-    measure_and_smooth_entry,
-    measure_entry,
-    separate_entry,
-    smooth_entry,
-)
+from transientcam_moments._kernels.compiled_entry import entry
+from transientcam_moments._kernels.frames import measure_and_smooth_entry
 from transientcam_moments._kernels.one_pass import Constants, OnePass, Stages
 from transientcam_moments._kernels.returns import usual_steps
 from transientcam_moments._kernels.wide import WideReturns
@@ -31,11 +28,11 @@ def reconstruct_stages(m: int) -> Stages:
     return Stages(
         order=(0,) * m,
         turns=half_turns(m, "f"),
-        measure=measure_entry(m),
-        smooth=smooth_entry(),
+        measure=entry(inputs.measure, m, "f"),
+        smooth=entry(inputs.smooth, m, "f"),
         measure_and_smooth=measure_and_smooth_entry(m),
         analyse=analysis_entry(m),
         steps=usual_steps(m, "f"),
-        separate=separate_entry(m),
+        separate=entry(outputs.separate, m, "f"),
         wide=WideReturns(m),
     )

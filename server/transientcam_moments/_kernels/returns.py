@@ -3,40 +3,25 @@
 ``order`` is a tuple of length m; banks of registers are taken and filled.
 """
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from numba import njit
 
 from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import simd
-from transientcam_moments._kernels.arrays import Complexes, Counts, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    COUNTS,
-    PIXELS,
-    REAL,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
+from transientcam_moments._kernels.arrays import (
+    Complexes,
+    ComplexPlanes,
+    Counts,
+    RealPlane,
+    RealPlanes,
+    Reals,
 )
 from transientcam_moments._kernels.moments import load_harmonics, load_zeroth
-from transientcam_moments._kernels.portable import (
-    bank,
-    eps,
-    infinity,
-    magnitude,
-    not_a_number,
-    root,
-    select,
-    some,
-)
+from transientcam_moments._kernels.portable import bank
 from transientcam_moments.arrays import Length
-from transientcam_moments.moment_problem import circle, sort, toeplitz
+from transientcam_moments.moment_problem import sparse
 
 _INTERLEAVE = 2
-_FAINT = 1024.0  # times what rounding makes of nothing
 _LATE = 1024  # pixels that are redone with more steps at a time
 MOST_STEPS = 24
 """Of the iteration for roots, for pixels that need more than the others."""
@@ -64,81 +49,37 @@ def _returns(
     one = simd.ones(uniform, _INTERLEAVE)
     step = simd.width(one)
     re, im = bank(one, order, 1), bank(one, order, 1)
-    ar, ai = bank(one, order, 1), bank(one, order, 1)
-    gr, gi = bank(one, order, 0), bank(one, order, 0)
-    wr, wi = bank(one, order, 0), bank(one, order, 0)
-    inverse, weights, phases = bank(one, order, 0), bank(one, order, 0), bank(one, order, 0)
-    floor = simd.spread(one, 4.0 * m * noise)
-    tolerance = simd.spread(one, 16.0 * (m + 1) * noise)
+    phases, weights = bank(one, order, 0), bank(one, order, 0)
+    explained = simd.spread(one, sparse.largest_residual(m, noise))
     ill = 0
     for left in range(start, stop, step):
         p = min(left, stop - step)
-        b0 = simd.load(one, zeroth, p) if apart else load_zeroth(one, b, p)
-        total = b0 - simd.load(one, uniform, p)
-        lit = total > 4.0 * eps(one) * magnitude(b0)  # less is rounding
-        factor = 1.0 / total
-        re[0] = one
+        re[0] = simd.load(one, zeroth, p) if apart else load_zeroth(one, b, p)
         load_harmonics(order, one, b, p, re, im)
-        for k in range(1, m + 1):
-            re[k], im[k] = re[k] * factor, im[k] * factor
-        degree = toeplitz.singular(order, re, im, floor, ar, ai, gr, gi, inverse)
-        fewer = lit & (degree < float(m))
-        least, doubtful = floor, fewer & ~fewer
-        if some(fewer):
-            # a little more in the diagonal makes all smaller blocks definite: the surplus returns
-            # become as faint as that, wherever they are
-            least = select(fewer, 4.0 * floor, floor)
-            factor = select(fewer, 1.0 - 2.0 * floor, 1.0)
-            for k in range(1, m + 1):
-                re[k], im[k] = re[k] * factor, im[k] * factor
-            toeplitz.singular(order, re, im, floor, ar, ai, gr, gi, inverse)
-            for k in range(1, m + 1):
-                re[k], im[k] = re[k] / factor, im[k] / factor
-        circle.circle_roots(order, turns, steps, ar, ai, wr, wi)
-        found = one * 0.0
-        for i in range(m):
-            w, x, y = circle.weigh(order, gr, gi, inverse, wr[i], wi[i])
-            zr, zi = circle.doubled(x, y)
-            used = lit & (w > least) & (w * total > 0.0)
-            # a surplus return next to one of the others takes a share of that one's weight
-            doubtful = doubtful | (fewer & used & (w < _FAINT * floor))
-            found = found + select(used, one, 0.0)
-            weights[i] = select(used, w, 0.0)
-            phases[i] = select(used, circle.phase_of(zr, zi), infinity(one))
-            # what the returns leave of the moments
-            ur, ui = weights[i], im[0]
-            re[0] = re[0] - ur
-            for k in range(1, m + 1):
-                ur, ui = ur * zr - ui * zi, ur * zi + ui * zr
-                re[k], im[k] = re[k] - ur, im[k] - ui
-        worst = re[0] * re[0]
-        for k in range(1, m + 1):
-            worst = worst + re[k] * re[k] + im[k] * im[k]  # NaN stays, as in no maximum
-        worst = select((worst < 1.0) & ~doubtful, root(worst), infinity(one))
-        worst = select(lit, worst, 0.0)
-        simd.store(residual, p, worst)
-        ill += simd.count(worst > tolerance)
-        sort(order, phases, weights)
+        found, worst = sparse.returns(
+            order, turns, steps, noise, one, simd.load(one, uniform, p), re, im, phases, weights
+        )
         simd.store(count, p, found)
+        simd.store(residual, p, worst)
+        ill += simd.count(worst > explained)
         for i in range(m):
-            unused = phases[i] > 7.0
-            simd.store(phase[i], p, select(unused, not_a_number(one), phases[i]))
-            simd.store(weight[i], p, select(unused, 0.0, weights[i] * total))
+            simd.store(phase[i], p, phases[i])
+            simd.store(weight[i], p, weights[i])
     return ill
 
 
 @njit(nogil=True, error_model="numpy")
 def find_returns(
     order: Length,
-    turns: Reals,
-    b: Complexes,
-    zeroth: Reals,
+    turns: RealPlane,
+    b: ComplexPlanes,
+    zeroth: RealPlane,
     apart: int,
-    uniform: Reals,
-    phase: Reals,
-    weight: Reals,
+    uniform: RealPlane,
+    phase: RealPlanes,
+    weight: RealPlanes,
     count: Counts,
-    residual: Reals,
+    residual: RealPlane,
     noise: float,
     steps: int,
     start: int,
@@ -162,7 +103,7 @@ def find_returns(
     if ill == 0 or steps >= MOST_STEPS:
         return ill
     m = len(order)
-    tolerance = 16.0 * (m + 1) * noise
+    tolerance = sparse.largest_residual(m, noise)
     where = np.empty(_LATE, np.int64)
     moments = np.empty((m + 1, _LATE), b.dtype)
     late_zeroth, late_uniform = np.empty(_LATE, uniform.dtype), np.empty(_LATE, uniform.dtype)
@@ -204,25 +145,3 @@ def usual_steps(m: int, precision: str) -> int:
     Fewest of processor time with m = 3, 4 and 8 in single precision (decision 11).
     """
     return (3 if m < 6 else 5) + (precision == "d")
-
-
-def returns_entry(m: int, precision: str) -> Callable[..., Any]:
-    """Compile the kernel of order m."""
-    real, cplx = real_arrays(precision), complex_arrays(precision)
-    return entry(
-        find_returns,
-        order_type(m),
-        real[1],
-        cplx[2],
-        real[1],
-        PIXELS,
-        real[1],
-        real[2],
-        real[2],
-        COUNTS,
-        real[1],
-        REAL,
-        PIXELS,
-        PIXELS,
-        PIXELS,
-    )

@@ -6,22 +6,12 @@ import numpy as np
 
 from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import outputs
-from transientcam_moments._kernels.arrays import Complexes, Reals
-from transientcam_moments._kernels.compiled_entry import (
-    COUNTS,
-    PIXELS,
-    PLACES,
-    REAL,
-    complex_arrays,
-    entry,
-    order_type,
-    real_arrays,
-)
-from transientcam_moments._kernels.eigenvalue import eigenvalue_entry
+from transientcam_moments._kernels.arrays import Complexes, FlatReturns, Reals
+from transientcam_moments._kernels.compiled_entry import entry
+from transientcam_moments._kernels.eigenvalue import smallest_eigenvalue
 from transientcam_moments._kernels.padding import RAMP
-from transientcam_moments._kernels.refine import Found, redo
-from transientcam_moments._kernels.returns import MOST_STEPS, returns_entry
-from transientcam_moments.moment_problem import half_turns
+from transientcam_moments._kernels.returns import MOST_STEPS, find_returns
+from transientcam_moments.moment_problem import half_turns, redo, sparse
 
 _EPS = float(np.finfo(np.float32).eps)
 
@@ -33,21 +23,12 @@ class WideReturns:
     """
 
     def __init__(self, m: int) -> None:
-        order, plane, planes = order_type(m), real_arrays("f")[1], real_arrays("f")[2]
-        wide = real_arrays("d")
         self._order = (0,) * m
         self._turns = half_turns(m, "d")
-        self._gather = entry(
-            outputs.gather,
-            order, complex_arrays("f")[2], plane, plane, REAL, plane, plane,
-            complex_arrays("d")[2], PLACES, PIXELS,
-        )  # fmt: skip
-        self._scatter = entry(
-            outputs.scatter,
-            order, PLACES, PIXELS, wide[2], wide[2], COUNTS, wide[1],
-            planes, planes, COUNTS, plane,
-        )  # fmt: skip
-        self._eigenvalue, self._returns = eigenvalue_entry(m, "d"), returns_entry(m, "d")
+        self._gather = entry(outputs.gather, m, "f")
+        self._scatter = entry(outputs.scatter, m, "f")
+        self._eigenvalue = entry(smallest_eigenvalue, m, "d")
+        self._returns = entry(find_returns, m, "d")
 
     def room(self, pixels: int) -> tuple[Any, ...]:
         """Return scratch space for so many pixels at a time, a multiple of LEAST_PIXELS."""
@@ -67,7 +48,7 @@ class WideReturns:
         self,
         b: Complexes,
         brightness: Reals,
-        found: Found,
+        found: FlatReturns,
         room: tuple[Any, ...],
         start: int,
         stop: int,
@@ -76,7 +57,7 @@ class WideReturns:
 
         ``b`` (m + 1, P) are the moments, but for ``brightness`` (P) in place of b_0.
         """
-        tolerance = 16 * (len(self._order) + 1) * _EPS
+        tolerance = sparse.largest_residual(len(self._order), _EPS)
         places, moments, uniform, phase, weight, count, residual, packed = room
         redone = 0
         while True:

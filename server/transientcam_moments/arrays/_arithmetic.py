@@ -96,6 +96,19 @@ def product_bank(like: Plane, length: Length, other: Length) -> Any:
     return [like] * (len(length) * len(other))
 
 
+def multiply_rows(values: Bank, length: Length, table: Array, out: Bank) -> None:
+    """Fill ``out`` with the product of a square matrix of planes and a matrix of numbers.
+
+    A row has as many planes as the tuple is long, and one more; of the table it takes as many rows
+    and columns.
+    """
+    n = len(length) + 1
+    rows = namespace(values[0]).stack([values[k] for k in range(n * n)])
+    product = table[:n, :n].T @ rows.reshape((n, n, -1))
+    for k, plane in enumerate(product.reshape(rows.shape)):
+        out[k] = plane
+
+
 def select(mask: Mask, yes: Plane | float, no: Plane | float) -> Plane:
     """Return ``yes`` where the mask is true, else ``no``; at least one of them is a plane."""
     return _space(mask).where(mask, yes, no)

@@ -7,9 +7,11 @@ paper), with the bounds on what moments leave open.
 from transientcam_moments.moment_problem import (
     _circle as circle,
     _eigenvalue as eigenvalue,
+    _evaluation as evaluation,
     _extension as extension,
     _maxima as maxima,
     _sorting as sorting,
+    _sparse as sparse,
     _toeplitz as toeplitz,
 )
 from transientcam_moments.moment_problem._biasing import (
@@ -36,12 +38,10 @@ from transientcam_moments.moment_problem._pisarenko import (
     Returns,
     Separation,
     first_returns,
-    improved_returns,
     pisarenko,
+    redo,
     separate,
 )
-from transientcam_moments.moment_problem._polishing import polish
-from transientcam_moments.moment_problem._sorting import sort
 
 __all__ = [
     "DIRECT_THRESHOLD",
@@ -58,23 +58,23 @@ __all__ = [
     "density",
     "eigenvalue",
     "estimate_zeroth",
+    "evaluation",
     "extend",
     "extension",
     "first_returns",
     "from_reflection",
     "half_turns",
-    "improved_returns",
     "levinson",
     "maxima",
     "moments_of",
     "peaks",
     "phase_of",
     "pisarenko",
-    "polish",
+    "redo",
     "separate",
     "smallest_eigenvalue",
     "smoothed_density",
-    "sort",
     "sorting",
+    "sparse",
     "toeplitz",
 ]

@@ -14,6 +14,7 @@ from transientcam_moments.arrays import (
     phases,
     real_type,
 )
+from transientcam_moments.moment_problem._evaluation import height
 from transientcam_moments.moment_problem._levinson import Coefficients
 from transientcam_moments.moment_problem._toeplitz import least_modulus
 
@@ -108,7 +109,7 @@ def _density(a: Array, error: Array, floor: Array, phase: Array) -> Array:
     imag = xp.concatenate([sin, -cos], axis=1) @ parts
     with np.errstate(all="ignore"):
         # Eq. (2): e_0* B^-1 e_0 = 1 / E and e_0* B^-1 s(phi) = sum_j conj(a_j) exp(i j phi) / E
-        return error / (2 * np.pi) / xp.maximum(real * real + imag * imag, floor)
+        return height(error / (2 * np.pi), floor, real, imag)
 
 
 def _density_fourier(a: Array, error: Array, floor: Array, phase: Array) -> Array:

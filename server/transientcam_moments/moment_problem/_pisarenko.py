@@ -1,6 +1,6 @@
 """Pisarenko's estimate: a uniform part and at most m sharp returns (Sec. 5.1, Theorem 2)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,10 +14,15 @@ from transientcam_moments.arrays import (
     in_turn,
     moment_planes,
     namespace,
+    parts,
     some,
     summary,
 )
-from transientcam_moments.moment_problem import _circle as circle, _toeplitz as toeplitz
+from transientcam_moments.moment_problem import (
+    _circle as circle,
+    _sparse as sparse,
+    _toeplitz as toeplitz,
+)
 from transientcam_moments.moment_problem._eigenvalue import smallest_eigenvalue
 from transientcam_moments.moment_problem._levinson import normalised
 from transientcam_moments.moment_problem._polishing import polish, residual, size
@@ -156,30 +161,51 @@ def separate(returns: Returns, threshold: float = DIRECT_THRESHOLD) -> Separatio
 
 @accelerated("separate", order=lambda weights, *_: len(weights), of="f")
 def _separate(weights: Array, phases_rad: Array, threshold: float) -> tuple[Array, ...]:
-    """Planar statement of `separate`: direct, indirect and phase of the direct return."""
-    xp = namespace(weights)
-    enough = threshold * weights.max(axis=0)
-    direct = xp.zeros_like(weights[0])
-    phase = xp.full(weights[0].shape, np.nan, dtype=weights.dtype)
-    for weight, angle in zip(weights[::-1], phases_rad[::-1], strict=True):
-        first = (weight >= enough) & (weight > 0)
-        direct = xp.where(first, weight, direct)
-        phase = xp.where(first, angle, phase)
-    return direct, xp.maximum(weights.sum(axis=0) - direct, 0), phase
+    order, one = (0,) * len(weights), namespace(weights).ones_like(weights[0])
+    found: tuple[Array, ...] = sparse.separate(
+        order, threshold, one, list(phases_rad), list(weights)
+    )
+    return found
 
 
 @accelerated("pisarenko")
 def _explained(b: Array, eigenvalue: Array | None) -> tuple[Array, ...]:
-    """Return phase, weight, uniform and count of flat planes, improved where they are ill."""
+    """Return phase, weight, uniform and count of flat planes, redone where they are ill."""
     known = () if eigenvalue is None else (eigenvalue.reshape(-1),)
-    found = by_blocks(first_returns, b, *known)
-    return improved_returns(b, found) if namespace(b) is np else found
+    if namespace(b) is not np:
+        return by_blocks(first_returns, b, *known)
+    *found, residual = by_blocks(_quick_returns, b, *known)
+    noise = float(np.finfo(residual.dtype).eps)
+    redo(b, found, np.flatnonzero(residual > sparse.largest_residual(len(b) - 1, noise)), noise)
+    return tuple(found)
+
+
+def _quick_returns(b: Array, uniform: Array | None = None) -> tuple[Array, ...]:
+    """Return phase, weight, uniform, count and residual of planes (m + 1, P), as kernels do."""
+    order = (0,) * (len(b) - 1)
+    with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
+        eigenvalue: Array = uniform
+        if uniform is None:
+            *relative, scale = normalised(b)
+            eigenvalue = scale * smallest_eigenvalue(order, *relative)
+        re, im = parts(b)
+        re[0] = re[0] + 0 * im[0]
+        one, turns = np.ones_like(re[0]), circle.half_turns(len(order), re[0].dtype)
+        phase, weight = bank(one, order, 0), bank(one, order, 0)
+        noise = float(np.finfo(one.dtype).eps)
+        count: Array
+        count, residual = sparse.returns(
+            order, turns, _STEPS, noise, one, eigenvalue.astype(one.dtype), re, im, phase, weight
+        )
+    return np.stack(phase), np.stack(weight), eigenvalue, count.astype(np.int32), residual
 
 
 def first_returns(
     b: Array, uniform: Array | None = None, *, noise: float | None = None
 ) -> tuple[Array, Array, Array, Array]:
-    """Planar statement of `pisarenko`: b (m + 1, P) to phase, weight, uniform, count.
+    """Find returns with care: b (m + 1, P) to phase, weight, uniform, count.
+
+    Each number of returns has a polynomial of its own.
 
     `uniform` is the smallest eigenvalue where it is known, `noise` the precision of the data where
     it isn't that of their type.
@@ -187,47 +213,46 @@ def first_returns(
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
         re, im, scale = normalised(b)
         if uniform is None:
-            uniform = smallest_eigenvalue((0,) * (len(re) - 1), re, im)
+            eigenvalue = smallest_eigenvalue((0,) * (len(re) - 1), re, im)
         else:
-            uniform = namespace(b).where(scale > 0, uniform / scale, 0 * scale)
-        uniform = _raised(re, im, uniform)
-        floor = 4 * (len(re) - 1) * (noise or float(np.finfo(scale.dtype).eps))
-        phase, weight, count = _returns(re, im, uniform, scale, floor)
-        return phase, weight, uniform * scale, count
+            eigenvalue = namespace(b).where(scale > 0, uniform / scale, 0 * scale)
+        eigenvalue = _raised(re, im, eigenvalue)
+        floor = sparse.least_share(len(re) - 1, noise or float(np.finfo(scale.dtype).eps))
+        phase, weight, count = _returns(re, im, eigenvalue, scale, floor)
+        return phase, weight, eigenvalue * scale, count
 
 
-def improved_returns(b: Array, found: tuple[Array, ...]) -> tuple[Array, ...]:
-    """Redo in double precision, or polish, the pixels that don't reproduce their moments.
+def redo(b: Array, found: Sequence[Array], ill: Array, noise: float) -> None:
+    """Redo pixels whose returns don't reproduce their moments, with more digits and more care.
 
-    That is where single precision, or the closed form in double precision, isn't enough; by more
-    than rounding the result to `b`'s type explains.
+    Parameters
+    ----------
+    b : array, shape (m + 1, P)
+        Moments.
+    found : sequence of array
+        Phase, weight, uniform, count of all pixels; written to.
+    ill : integer array
+        The pixels.
+    noise : float
+        Precision of the data.
     """
-    eps = float(np.finfo(found[1].dtype).eps)
-    tolerance = 16 * b.shape[0] * eps
-    with np.errstate(all="ignore"):
-        (error,) = by_blocks(lambda b, *found: (size(residual(b, *found), b),), b, *found[:3])
-    ill = np.flatnonzero(error > tolerance)  # NaN stays
     if not ill.size:
-        return found
+        return
+    enough = sparse.largest_residual(len(b) - 1, noise)
     with np.errstate(all="ignore"):
         wide = b[:, ill].astype(np.complex128)
-        better = tuple(part[..., ill].astype(np.float64) for part in found[:3])
-        if b.dtype == np.complex64:
-            _take_if_better(wide, better, eps, tolerance)
-        better = polish(wide, *better, tolerance=tolerance)
+        better: tuple[Array, ...] = first_returns(wide, noise=noise)[:3]
+        better = polish(wide, *better, tolerance=enough / 4)
         for coarser in (1e2, 1e4, 1e6):
-            _take_if_better(wide, better, coarser * eps, tolerance)
-        better = polish(wide, *better, tolerance=tolerance)
-        order = np.argsort(better[0], axis=0)
-        phase = np.take_along_axis(better[0], order, axis=0).astype(found[0].dtype)
-        phase = in_turn(phase)
-        weight = np.take_along_axis(better[1], order, axis=0).astype(found[1].dtype)
-        phase = np.where(weight > 0, phase, np.nan)  # rounding may take the faintest away
-    count = np.count_nonzero(weight, axis=0)
-    result = tuple(np.array(part) for part in found)
-    for part, new in zip(result, (phase, weight, better[2], count), strict=True):
-        part[..., ill] = new
-    return result
+            _take_if_better(wide, better, coarser * noise, enough)
+        phase, weight, uniform = polish(wide, *better, tolerance=enough / 4)
+        weight = weight.astype(found[1].dtype)
+        # what is less than the least number of that precision isn't a return
+        phase = in_turn(np.where(weight > 0, phase, np.nan).astype(found[0].dtype))
+    ascending = np.argsort(phase, axis=0)
+    phase, weight = (np.take_along_axis(part, ascending, axis=0) for part in (phase, weight))
+    for plane, new in zip(found, (phase, weight, uniform, (weight > 0).sum(axis=0)), strict=True):
+        plane[..., ill] = new
 
 
 def _take_if_better(b: Array, found: tuple[Array, ...], noise: float, tolerance: float) -> None:

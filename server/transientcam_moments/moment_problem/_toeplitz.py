@@ -141,6 +141,35 @@ def levinson(order: Length, re: Bank, im: Bank, ar: Bank, ai: Bank, gr: Bank, gi
     return select(dark, 0.0 * light, error)
 
 
+def definite(
+    order: Length,
+    re: Bank,
+    im: Bank,
+    floor: Plane,
+    ar: Bank,
+    ai: Bank,
+    gr: Bank,
+    gi: Bank,
+    inverse: Bank,
+) -> Mask:
+    """Do as `singular` does, but for definite smaller blocks; return where one is singular."""
+    m = len(order)
+    error = re[0]
+    fewer = error < error
+    for k in range(1, m + 1):
+        inverse[k - 1] = 1.0 / error
+        x, y = reflect(k, re, im, ar, ai, inverse[k - 1])
+        if k < m:
+            error = error * below_one(x, y)
+            fewer = fewer | ~(error > floor)
+        else:  # E_m = 0: a is the eigenvector of the smallest eigenvalue (Sec. 5.1)
+            unit = 1.0 / root(x * x + y * y)
+            x, y = x * unit, y * unit
+        step_up(k, ar, ai, x, y)
+        gr[k - 1], gi[k - 1] = x, y
+    return fewer
+
+
 def singular(
     order: Length,
     re: Bank,

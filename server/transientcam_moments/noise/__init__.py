@@ -12,6 +12,10 @@ through the estimator itself. ::
     range_std_m = tm.range_m(deviation.direct_phase_std_rad, 23e6)
 """
 
+from transientcam_moments.noise import (
+    _first_order as first_order,
+    _interpolation as interpolation,
+)
 from transientcam_moments.noise._ambient import ambient_light
 from transientcam_moments.noise._cramer_rao import CramerRao, cramer_rao
 from transientcam_moments.noise._density import DensityNoise, density_noise, density_std
@@ -41,6 +45,8 @@ __all__ = [
     "density_std",
     "direct_phase_noise",
     "draw",
+    "first_order",
+    "interpolation",
     "moment_noise",
     "own_share",
     "return_noise",

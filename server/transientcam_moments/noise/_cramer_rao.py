@@ -4,13 +4,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from transientcam_moments.arrays import Array, as_array, namespace, summary
+from transientcam_moments._dispatch import accelerated
+from transientcam_moments.arrays import Array, as_array, by_blocks, namespace, square_bank, summary
 from transientcam_moments.errors import ShapeError
-from transientcam_moments.noise._interpolation import determined_covariance
+from transientcam_moments.noise import _interpolation as interpolation
 from transientcam_moments.noise._moments import MomentNoise
 
 COINCIDE_RAD = 1e-5
 """Returns closer than that cannot be resolved in double precision: the bound is infinite."""
+
+_BLOCK_PIXELS = 4096
 
 
 class CramerRao(NamedTuple):
@@ -94,14 +97,31 @@ def _covariance(phase: Array, used: Array, variance: Array) -> Array:
         return xp.moveaxis(xp.linalg.inv(_information(phase, used, variance)), 0, -1)
     determined = used.all(axis=0)
     if determined.all():
-        return determined_covariance(phase, variance)
+        return _determined_covariance(phase, variance)
     covariance = np.empty((2 * len(phase), 2 * len(phase), phase.shape[1]))
-    covariance[..., determined] = determined_covariance(
+    covariance[..., determined] = _determined_covariance(
         phase[:, determined], variance[:, determined]
     )
     others = phase[:, ~determined], used[:, ~determined], variance[:, ~determined]
     covariance[..., ~determined] = np.moveaxis(np.linalg.inv(_information(*others)), 0, -1)
     return covariance
+
+
+@accelerated("covariance", order=lambda phase, _: len(phase))
+def _determined_covariance(phase: Array, variance: Array) -> Array:
+    """Return the covariance (2m, 2m, P) of m returns that m harmonics determine, in closed form."""
+    return by_blocks(_interpolated, phase, variance, pixels=_BLOCK_PIXELS)[0]
+
+
+def _interpolated(phase: Array, variance: Array) -> tuple[Array]:
+    order, both = (0,) * len(phase), (0,) * (2 * len(phase))
+    turned, out = interpolation.half_turned(phase), square_bank(phase[0], both, 0)
+    x, y = list(turned[: len(phase)]), list(turned[len(phase) :])
+    table, one = interpolation.basis(len(order)), np.ones_like(phase[0])
+    interpolation.covariance(order, both, table, one, x, y, list(variance), out)
+    rows = range(len(both))
+    whole = [out[len(both) * max(i, j) + min(i, j)] for i in rows for j in rows]
+    return (np.stack(whole).reshape((len(both), len(both), -1)),)
 
 
 def _information(phase: Array, used: Array, variance: Array) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 from transientcam_moments._dispatch import lookup
 from transientcam_moments.arrays import Array, in_range, namespace, summary
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, Returns
+from transientcam_moments.noise import _first_order as first_order
 from transientcam_moments.noise._cramer_rao import COINCIDE_RAD, CramerRao, cramer_rao
 from transientcam_moments.noise._moments import MomentNoise
 
@@ -87,16 +88,19 @@ def return_noise(
     first = _first(returns, used, threshold)
     any_there = used.any(axis=0)
     with np.errstate(all="ignore"):
+        direct_phase_std, holds = _direct(returns, bound, threshold)
         total = _of_sum(bound, used)
         indirect = _of_sum(bound, used & ~first)
         return ReturnNoise(
             phase_std_rad=bound.phase_std_rad,
             weight_std=bound.weight_std,
             uniform_std=xp.sqrt(noise.variance[0] + total),
-            direct_phase_std_rad=_of_first(bound.phase_std_rad, first, any_there),
-            direct_std=_of_first(bound.weight_std, first, any_there),
+            direct_phase_std_rad=direct_phase_std,
+            direct_std=xp.where(
+                any_there, xp.where(first, bound.weight_std, 0).sum(axis=0), np.nan
+            ),
             indirect_std=xp.where(any_there, xp.sqrt(indirect), np.nan),
-            holds=_holds(returns, bound, used, first, threshold),
+            holds=holds,
         )
 
 
@@ -133,13 +137,25 @@ def _planar_direct_phase_noise(
     returns: Returns, noise: MomentNoise, threshold: float
 ) -> tuple[Array, Array]:
     bound = cramer_rao(returns.phase_rad, returns.weight, noise)
-    used = returns.weight > 0
-    first = _first(returns, used, threshold)
     with np.errstate(all="ignore"):
-        return (
-            _of_first(bound.phase_std_rad, first, used.any(axis=0)),
-            _holds(returns, bound, used, first, threshold),
-        )
+        return _direct(returns, bound, threshold)
+
+
+def _direct(returns: Returns, bound: CramerRao, threshold: float) -> tuple[Array, Array]:
+    """Return the deviation of the direct return's phase, and where first order holds."""
+    count = len(returns.weight)
+    mixed = [bound.covariance[count + k, count + max(k - 1, 0)] for k in range(count)]
+    found: tuple[Array, Array] = first_order.direct_noise(
+        (0,) * count,
+        threshold,
+        CLEAR,
+        list(returns.phase_rad),
+        list(returns.weight),
+        list(bound.phase_std_rad),
+        list(bound.weight_std),
+        mixed,
+    )
+    return found
 
 
 def _first(returns: Returns, used: Array, threshold: float) -> Array:
@@ -148,59 +164,9 @@ def _first(returns: Returns, used: Array, threshold: float) -> Array:
     return direct & (namespace(used).cumsum(direct, axis=0) == 1)
 
 
-def _of_first(values: Array, first: Array, any_there: Array) -> Array:
-    xp = namespace(values)
-    return xp.where(any_there, xp.where(first, values, 0).sum(axis=0), np.nan)
-
-
-def _holds(
-    returns: Returns, bound: CramerRao, used: Array, first: Array, threshold: float
-) -> Array:
-    """Whether first order holds, see `return_noise`."""
-    return (
-        used.all(axis=0)
-        & _strong(returns, bound)
-        & _apart(returns, bound)
-        & _decided(returns, bound, first, threshold)
-    )
-
-
 def _of_sum(bound: CramerRao, chosen: Array) -> Array:
     """Variance of the sum of the chosen weights."""
     xp = namespace(bound.covariance)
     count = chosen.shape[0]
     both = chosen[:, None] & chosen[None]
     return xp.where(both, bound.covariance[:count, :count], 0).sum(axis=(0, 1))
-
-
-def _strong(returns: Returns, bound: CramerRao) -> Array:
-    """Whether every return is clearly there."""
-    return (returns.weight > CLEAR * bound.weight_std).all(axis=0)
-
-
-def _apart(returns: Returns, bound: CramerRao) -> Array:
-    """Whether neighbours on the turn keep their order, and none crosses its ends."""
-    xp = namespace(bound.covariance)
-    phase, weight = returns.phase_rad, returns.weight
-    count = weight.shape[0]
-    clear = (phase > CLEAR * bound.phase_std_rad) & (
-        2 * np.pi - phase > CLEAR * bound.phase_std_rad
-    )
-    clear = clear.all(axis=0)
-    for k in range(count - 1):
-        mixed = bound.covariance[count + k, count + k + 1] / (weight[k] * weight[k + 1])
-        variance = bound.phase_std_rad[k] ** 2 + bound.phase_std_rad[k + 1] ** 2 - 2 * mixed
-        clear = clear & (phase[k + 1] - phase[k] > CLEAR * xp.sqrt(xp.maximum(variance, 0)))
-    return clear
-
-
-def _decided(returns: Returns, bound: CramerRao, first: Array, threshold: float) -> Array:
-    """Whether noise cannot lift an earlier return over the threshold or the direct one under it."""
-    xp = namespace(bound.covariance)
-    strongest = returns.weight.max(axis=0)
-    is_strongest = returns.weight == strongest
-    of_strongest = xp.where(is_strongest, bound.weight_std, 0).max(axis=0)
-    spread = bound.weight_std + threshold * of_strongest
-    margin = abs(returns.weight - threshold * strongest) > CLEAR * spread
-    until = xp.cumsum(first[::-1], axis=0)[::-1] > 0  # the direct one and all before it
-    return (margin | is_strongest | ~until).all(axis=0)

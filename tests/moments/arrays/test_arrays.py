@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.moments import oracles
-from transientcam_moments.arrays import by_blocks, in_turn, repeat
+from transientcam_moments.arrays import by_blocks, in_turn, multiply_rows, repeat
 from transientcam_moments.moment_problem._toeplitz import below_one
 
 
@@ -19,6 +19,19 @@ def test_blocks_put_together_are_the_whole(pixels: int) -> None:
 
     assert np.array_equal(total, a.sum(axis=0) + b)
     assert np.array_equal(shifted, a + b)
+
+
+def test_rows_of_planes_are_multiplied_with_a_matrix_of_numbers() -> None:
+    rng = np.random.default_rng(1)
+    rows, table = rng.normal(size=(3, 3, 5)), rng.normal(size=(3, 4))
+    out: list[Any] = [None] * 9
+
+    multiply_rows(list(rows.reshape(9, 5)), (0, 0), table, out)
+
+    for pixel in range(5):
+        expected = rows[..., pixel] @ table[:, :3]
+        found = [plane[pixel] for plane in out]
+        assert np.allclose(np.reshape(found, (3, 3)), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("dtype", [np.complex64, np.complex128])

@@ -3,8 +3,7 @@
 import numpy as np
 
 from tests.moments import oracles
-from transientcam_moments.moment_problem import polish
-from transientcam_moments.moment_problem._polishing import residual, size
+from transientcam_moments.moment_problem._polishing import polish, residual, size
 
 
 def test_residual_is_what_returns_leave_of_the_moments() -> None:
