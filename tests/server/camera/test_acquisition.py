@@ -50,6 +50,8 @@ class ScriptedCamera:
 
     def __init__(self) -> None:
         self.applied = APPLIED
+        self.capabilities = SimpleNamespace(heartbeat_s=2.0)
+        self.interlock_closed = True
         self.script: queue.SimpleQueue[RawFrame | Exception] = queue.SimpleQueue()
         self.absent: list[Exception] = []
         self.calls: list[str] = []
@@ -83,10 +85,10 @@ class ScriptedCamera:
     def safe_off(self) -> None:
         self.calls.append("safe_off")
 
-    def status(self) -> str:
+    def status(self) -> SimpleNamespace:
         if self.gone:
             raise CameraLost("it is disconnected")
-        return "fine"
+        return SimpleNamespace(interlock_closed=self.interlock_closed)
 
     def reconnect(self) -> None:
         self.calls.append("reconnect")
@@ -270,13 +272,13 @@ def test_meanwhile_nothing_is_read_and_what_would_disturb_it_is_refused() -> Non
             begun.set()
             until(end, go_on)
 
-        occupied = one.acquisition.occupy("job-1", work)
+        occupied = one.acquisition.occupy("job-1", work, offs=0)
         assert begun.wait(PATIENCE_S)
         one.camera.deliver(1)
         for disturb in (
             lambda: one.acquisition.configure(Sequence()),
             lambda: one.acquisition.set_running(True),
-            lambda: one.acquisition.occupy("job-2", lambda camera, go_on: None),
+            lambda: one.acquisition.occupy("job-2", lambda camera, go_on: None, offs=0),
         ):
             with pytest.raises(Problem) as caught:
                 disturb()
@@ -284,7 +286,7 @@ def test_meanwhile_nothing_is_read_and_what_would_disturb_it_is_refused() -> Non
             assert caught.value.extensions["job"] == "job-1"
         assert one.acquisition.status().state == "calibrating"
         status: Any = one.acquisition.device_status().result(PATIENCE_S)
-        assert status == "fine"
+        assert status.interlock_closed
         assert one.events.empty()
         end.set()
         occupied.result(PATIENCE_S)
@@ -297,7 +299,7 @@ def test_meanwhile_nothing_is_read_and_what_would_disturb_it_is_refused() -> Non
 def test_switching_the_light_off_breaks_it_off(command: str) -> None:
     with running() as one:
         occupied = one.acquisition.occupy(
-            "job-1", lambda camera, go_on: until(threading.Event(), go_on)
+            "job-1", lambda camera, go_on: until(threading.Event(), go_on), offs=0
         )
         if command == "safe_off":
             one.acquisition.safe_off().result(PATIENCE_S)
@@ -312,7 +314,7 @@ def test_switching_the_light_off_breaks_it_off(command: str) -> None:
 def test_what_it_counted_anew_is_reported_and_frames_of_it_are_known() -> None:
     with running() as one:
         one.acquisition.occupy(
-            "job-1", lambda camera, go_on: camera.configure(APPLIED.sequence)
+            "job-1", lambda camera, go_on: camera.configure(APPLIED.sequence), offs=0
         ).result(PATIENCE_S)
         changed = one.event()
         one.camera.deliver(1, epoch=2)
@@ -330,7 +332,7 @@ def test_a_sequence_that_it_left_behind_is_put_back() -> None:
 
     with running() as one:
         with pytest.raises(CameraLost):
-            one.acquisition.occupy("job-1", leave).result(PATIENCE_S)
+            one.acquisition.occupy("job-1", leave, offs=0).result(PATIENCE_S)
         changed = one.event()
 
     assert isinstance(changed, SequenceChanged)
@@ -339,7 +341,7 @@ def test_a_sequence_that_it_left_behind_is_put_back() -> None:
 
 def test_one_that_was_taken_back_has_the_camera_no_more() -> None:
     one = Running()
-    occupied = one.acquisition.occupy("job-1", lambda camera, go_on: None)
+    occupied = one.acquisition.occupy("job-1", lambda camera, go_on: None, offs=0)
     assert occupied.cancel()
 
     one.acquisition.require_free()

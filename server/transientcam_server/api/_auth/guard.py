@@ -21,14 +21,23 @@ _FORWARDED: Final = ("forwarded", "x-forwarded-for")
 
 @dataclass(frozen=True, slots=True)
 class Principal:
-    """An authenticated client; ``token_id`` is None where no token was required."""
+    """An authenticated client.
+
+    Attributes
+    ----------
+    may_light
+        Whether it may do what switches the light on.
+    token_id
+        None where no token was required.
+    """
 
     name: str
     role: Role
+    may_light: bool
     token_id: str | None = None
 
 
-UNAUTHENTICATED: Final = Principal("anybody", Role.ADMIN)
+UNAUTHENTICATED: Final = Principal("anybody", Role.ADMIN, may_light=True)
 """Every client of a service that requires no token."""
 
 
@@ -78,7 +87,7 @@ class Guard:
             token = None
         if token is None:
             raise Problem(kinds.TOKEN_REFUSED, "This token is unknown, revoked or expired.")
-        return Principal(token.name, token.rank, token.id)
+        return Principal(token.name, token.rank, token.lights, token.id)
 
 
 class Authentication:
