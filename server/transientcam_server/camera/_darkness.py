@@ -24,7 +24,7 @@ _WORDS: Final[dict[Cause, str]] = {
     "stop": "the capture was stopped",
     "safe-off": "the light was switched off",
     "lapse": "a lease lapsed",
-    "device": "the camera switched its light off",
+    "device": "the device keeps its light off",
     "unused": "nobody used the capture",
     "unreadable": "what is kept of the light cannot be read",
     "unwritable": "that the light is off could not be kept",
