@@ -47,8 +47,6 @@ _T = TypeVar("_T")
 
 READ_TIMEOUT_S: Final = 0.1
 """How long a read, and so a command behind it, may wait for a frame."""
-UNREAD_S: Final = 2.0
-"""A camera without a heartbeat may be dark after it was not read for so long."""
 IDLE_S: Final = 0.5
 """Interval at which a camera that captures nothing is checked for an unplug."""
 BACKOFF_S: Final = (0.1, 0.2, 0.5, 1.0)
@@ -340,20 +338,29 @@ class Acquisition:
             self._camera.stop()
 
     def _read(self) -> None:
-        if self._clock() - self._read_s >= (self._camera.capabilities.heartbeat_s or UNREAD_S):
-            self._end_light()  # the camera is dark, or will be: reading would switch it on
+        if self._is_missed():
+            self._end_light()
             return
         try:
             raw = self._camera.read_frame(timeout_s=READ_TIMEOUT_S)
         except FrameTimeout:
             return
-        finally:
-            self._read_s = self._clock()
         self._camera_works()
         self._frames += 1
         self._moved_s = self._clock()
         self._arrivals_s.append(self._moved_s)
         self._report_frame(raw)
+
+    def _is_missed(self) -> bool:
+        """Return whether the camera was not read for so long that reading would light it anew.
+
+        Reading also counts where it took so long, as when the process was stopped; but a camera
+        without a heartbeat of its own may take as long as it likes for a frame.
+        """
+        now_s, read_s = self._clock(), self._read_s
+        heartbeat_s = self._camera.capabilities.heartbeat_s
+        self._read_s = now_s
+        return now_s - read_s >= heartbeat_s > 0.0
 
     def _report_frame(self, raw: RawFrame) -> None:
         self._report(Captured(raw, self._applied[raw.epoch]))

@@ -74,6 +74,9 @@ class SharedAcquisition(Acquisition):
             self._known = self._origin.origin
             self._report(OriginChanged())
 
+    def _is_missed(self) -> bool:
+        return False  # not by this service
+
     def _end_light(self) -> None:
         """Leave the light to the origin: only what clients ask for goes there."""
         self._started = False

@@ -1,8 +1,6 @@
 """What is kept of a light that was switched off, on a disk that fails in several ways."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -76,22 +74,6 @@ def test_what_is_told_last_is_kept(tmp_path: Path) -> None:
 
     assert kept(tmp_path) == Dark("stop")
     assert [each.suffix for each in tmp_path.iterdir()] == [".json"]
-
-
-def test_it_survives_the_end_of_the_process_at_any_time(tmp_path: Path) -> None:
-    program = f"""
-import os, pathlib
-from transientcam_server.camera import Dark, Darkness
-darkness = Darkness(pathlib.Path({str(tmp_path)!r}), {CAMERA!r})
-darkness.open()
-darkness.keep(Dark("safe-off"))
-darkness.written.result()
-os.kill(os.getpid(), 9)
-"""
-    ended = subprocess.run([sys.executable, "-c", program], check=False)
-
-    assert ended.returncode == -9
-    assert kept(tmp_path) == Dark("safe-off")
 
 
 def damages(whole: bytes) -> list[bytes]:
