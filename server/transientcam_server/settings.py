@@ -176,8 +176,8 @@ def default_recordings_directory() -> Path:
 class LightSettings(_Group):
     """When the light of the camera begins, and when it ends by itself.
 
-    Cameras that are simulated (``sim:``) or replayed shine at nobody; the emulation of a real
-    device counts as the device.
+    A simulated scene (sim:) or a recording shines at nobody; the emulation of a real device counts
+    as the device.
     """
 
     delay_s: _Finite | None = Field(default=None, ge=0.0, le=60.0)
