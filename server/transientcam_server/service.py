@@ -212,7 +212,11 @@ class Service:
         """Capture from entry to exit."""
         self._loop = asyncio.get_running_loop()
         await asyncio.to_thread(self.recordings.open)
-        dark = await self._dark_at_start()
+        dark = None if self._darkness is None else await asyncio.to_thread(self._darkness.open)
+        if dark is None and self.relay is None and not self._rules.capture_at_start:
+            dark = Dark("start")
+        if dark is not None:
+            _log.warning("%s", dark)
         self._light.turned()
         self._light.used()
         self.acquisition.start(dark=dark)
@@ -235,15 +239,6 @@ class Service:
             if not ended:
                 _log.warning("a worker does not end; what it computes is dropped")
             self._executor.shutdown(wait=ended, cancel_futures=True)
-
-    async def _dark_at_start(self) -> Dark | None:
-        """Return why nothing is captured from the start, None where it is."""
-        if self.relay is not None:  # it does what its origin does
-            return None
-        kept = None if self._darkness is None else await asyncio.to_thread(self._darkness.open)
-        if kept is None and not self._rules.capture_at_start:
-            return Dark("start")
-        return kept
 
     async def close_streams(self) -> None:
         """Close every stream, and give clients that still read the time to receive the reason."""

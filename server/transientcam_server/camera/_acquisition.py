@@ -59,16 +59,7 @@ _RATE_FRAMES = 32
 class Acquisition:
     """Owns ``camera`` from `start` to `stop`, on a thread of its own.
 
-    Parameters
-    ----------
-    report
-        Called with each event, on that thread.
-    light
-        What the light needs to stay on.
-    delay_s
-        From the announcement of the light to the light.
-    darkness
-        Keeps that the light is off; None where another service does.
+    Light begins ``delay_s`` after it was announced; ``darkness`` keeps that it is off.
     """
 
     def __init__(
@@ -235,7 +226,7 @@ class Acquisition:
             stalled=state in ("starting", "streaming") and age_s > self._stall_after_s(),
             light_on_in_s=self._announcement.light_on_in_s,
             off_because=None if dark is None else dark.cause,
-            off_kept=None if dark is None or darkness is None else darkness.kept,
+            off_kept=None if dark is None or darkness is None else darkness.written.done(),
         )
 
     def _state(self) -> State:
@@ -295,10 +286,7 @@ class Acquisition:
             self._read()
 
     def _may_light(self) -> bool:
-        """Return whether the light may begin: the one gate of whatever switches it on.
-
-        The first call announces it.
-        """
+        """Announce the light; return whether it may begin: the one gate of all that lights."""
         if self._announcement.begin() and self._announcement.delay_s:
             _log.warning("the light goes on in %g s", self._announcement.delay_s)
             self._report(LightArmingEvent(self._announcement.delay_s))
@@ -352,10 +340,9 @@ class Acquisition:
         self._report_frame(raw)
 
     def _is_missed(self) -> bool:
-        """Return whether the camera was not read for so long that reading would light it anew.
+        """Return whether the device went dark as it was not read, so that reading would light it.
 
-        Reading also counts where it took so long, as when the process was stopped; but a camera
-        without a heartbeat of its own may take as long as it likes for a frame.
+        That includes a read that took so long, as where the process was stopped.
         """
         now_s, read_s = self._clock(), self._read_s
         heartbeat_s = self._camera.capabilities.heartbeat_s
@@ -417,9 +404,10 @@ class Acquisition:
     def _shut_off_by_device(self, error: CameraError) -> bool:
         """Go dark where a failure is the device's own protection, and return whether it is."""
         opened = isinstance(error, CameraFault)
-        if not opened and not isinstance(error, CameraLost):
-            with suppress(CameraError):
-                opened = not self._camera.status().interlock_closed
+        try:
+            self._require_interlock()
+        except CameraError as now:
+            opened = opened or isinstance(now, CameraFault)
         if opened and self._running:
             self._started = False  # by the device
             self._go_dark(Dark("device", str(error)))

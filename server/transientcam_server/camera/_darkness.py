@@ -16,7 +16,7 @@ _log = logging.getLogger("transientcam_server.camera.darkness")
 KeptCause = Literal["stop", "safe-off", "lapse", "device", "unused"]
 Cause = KeptCause | Literal["start", "unreadable", "unwritable"]
 RETRY_S: Final = 1.0
-CLOSE_S: Final = 1.0
+CLOSE_S: Final = 2.0
 _MOST_BYTES: Final = 64 * 1024
 _UNTIL: Final = "off until the capture is started"
 _WORDS: Final[dict[Cause, str]] = {
@@ -33,15 +33,7 @@ _WORDS: Final[dict[Cause, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Dark:
-    """That the light is off, and why.
-
-    Attributes
-    ----------
-    cause
-        ``start`` where nothing was captured yet; ``unreadable`` and ``unwritable`` of the file.
-    detail
-        What there is to say beyond the cause.
-    """
+    """That the light is off, and why; ``detail`` says more than the cause."""
 
     cause: Cause
     detail: str = ""
@@ -55,7 +47,6 @@ class Dark:
 class _Document(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
-    v: Literal[1] = 1
     camera: str
     dark: KeptCause | None
     detail: str = ""
@@ -75,10 +66,8 @@ class Darkness:
 
     Attributes
     ----------
-    kept
-        Whether the disk holds what was told last.
     written
-        Done once it does.
+        Done once the disk holds what was told last.
     """
 
     def __init__(self, directory: Path, camera: str, *, retry_s: float = RETRY_S) -> None:
@@ -90,7 +79,6 @@ class Darkness:
         self._told: Dark | None = None
         self._closing = False
         self._thread = threading.Thread(target=self._run, name="darkness", daemon=True)
-        self.kept = True
         self.written: Future[None] = Future()
         self.written.set_result(None)
 
@@ -105,17 +93,14 @@ class Darkness:
             try:
                 self._write(found)
             except OSError as error:
-                self.kept = False
+                self.written = Future()
                 found = found or Dark("unwritable", f"{self._path}: {error.strerror or error}")
-        if found is not None:
-            _log.warning("%s", found)
         self._thread.start()
         return found
 
     def keep(self, dark: Dark | None) -> None:
         """Keep this, None for a capture that was started; a failure is logged, and tried again."""
         with self._changed:
-            self.kept = False
             self._told, self.written = dark, Future()
             self._changed.notify()
 
@@ -158,8 +143,6 @@ class Darkness:
                     self._changed.wait(self._retry_s)
                 continue
             written = told
-            with self._changed:
-                self.kept = self.written is told
             told.set_result(None)
 
     def _write(self, dark: Dark | None) -> None:
@@ -168,17 +151,15 @@ class Darkness:
         It is replaced before it is synchronised: a process that is killed leaves it at once, and
         what a loss of power leaves of it is whole, or damaged, which counts as dark.
         """
-        document = _Document(
-            camera=self._camera,
-            dark=None if dark is None else dark.cause,  # type: ignore[arg-type]  # validated
-            detail="" if dark is None else _plain(dark.detail),
-        )
+        cause, detail = (None, "") if dark is None else (dark.cause, _plain(dark.detail))
+        content = {"camera": self._camera, "dark": cause, "detail": detail}
+        data = _Document.model_validate(content).model_dump_json().encode()
         directory = self._path.parent
         directory.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=directory, prefix=self._path.stem, suffix=".part")
         with os.fdopen(handle, "wb") as file:
             try:
-                file.write(document.model_dump_json().encode())
+                file.write(data)
                 file.flush()
                 Path(name).replace(self._path)
             except BaseException:

@@ -81,15 +81,7 @@ class LightGuard:
 
 
 class Announcement:
-    """The one gate of every path to the light: it begins a while after it was announced.
-
-    Opened and closed by the thread of the camera, read by any.
-
-    Parameters
-    ----------
-    delay_s
-        From the announcement to the light.
-    """
+    """Light begins ``delay_s`` after it was announced; the camera's thread does, any may look."""
 
     def __init__(self, delay_s: float, *, clock: Callable[[], float] = time.monotonic) -> None:
         self.delay_s = delay_s
@@ -105,10 +97,10 @@ class Announcement:
 
     def begin(self) -> bool:
         """Announce the light; return whether it was not announced before."""
-        begins = self._on_s is None
-        if self._on_s is None:
-            self._on_s = self._clock() + self.delay_s
-        return begins
+        if self._on_s is not None:
+            return False
+        self._on_s = self._clock() + self.delay_s
+        return True
 
     def withdraw(self) -> None:
         """Take the announcement back: the next light is announced anew."""

@@ -41,20 +41,9 @@ def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
 class LightRules:
     """When a camera's light may begin, and when its capture ends by itself.
 
-    A camera shines at somebody unless it is simulated from the device on (``sim:``) or replayed.
-    The emulation of a real device counts as the device: it is there to try what happens with that.
-
-    Attributes
-    ----------
-    unit
-        By which it is kept that the light is off: the device, or what is simulated; None of a
-        recording, which is no camera.
-    capture_at_start
-        Whether the service captures without being asked.
-    delay_s
-        From the announcement of light to light.
-    unused_s
-        After which a capture ends that nobody uses.
+    A camera shines at somebody unless it is simulated (``sim:``) or replayed. The emulation of a
+    real device counts as the device: it is there to try what happens with that. ``unit`` is what
+    it is kept by that the light is off: the device, what is simulated, None of a recording.
     """
 
     unit: str | None
@@ -64,7 +53,7 @@ class LightRules:
 
     @classmethod
     def of(cls, camera: Camera, settings: Settings) -> Self:
-        """Return the settings', and where these leave it open those that suit the camera."""
+        """Return those of the settings, else those that suit the camera."""
         name, about, light = CameraName.parse(settings.camera), camera.capabilities, settings.light
         shines = name.kind not in ("sim", "recording")
         capture, delay_s, unused_s = settings.capture_at_start, light.delay_s, light.unused_s

@@ -32,11 +32,9 @@ class AcquisitionStatus:
         Whether frames are to be captured and the camera is there, but none came for too long.
     light_on_in_s
         Time until the light goes on; None where none is announced.
-    off_because
-        What ended the capture, or kept it from beginning; None while it is running.
-    off_kept
-        Whether that holds over a restart of the service; None while it is running, or where
-        another service keeps it.
+    off_because, off_kept
+        What ended the capture, or kept it from beginning, and whether that holds over a restart of
+        the service; None while it is running, and of a relay.
     """
 
     state: State

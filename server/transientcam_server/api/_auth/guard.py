@@ -21,15 +21,7 @@ _FORWARDED: Final = ("forwarded", "x-forwarded-for")
 
 @dataclass(frozen=True, slots=True)
 class Principal:
-    """An authenticated client.
-
-    Attributes
-    ----------
-    may_light
-        Whether it may do what switches the light on.
-    token_id
-        None where no token was required.
-    """
+    """An authenticated client; ``token_id`` is None where no token was required."""
 
     name: str
     role: Role
