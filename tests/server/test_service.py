@@ -174,7 +174,7 @@ def test_a_capture_that_nobody_uses_ends_and_stays_ended(tmp_path: Path) -> None
 
 
 def test_viewers_readers_recordings_jobs_and_leases_use_the_capture(tmp_path: Path) -> None:
-    settings = {"recordings": {"directory": tmp_path, "min_free_bytes": 0}}
+    settings: dict[str, Any] = {"recordings": {"directory": tmp_path, "min_free_bytes": 0}}
     with serving("sim:wall?noise=off", **settings) as served:
         service, url = served.service, f"{served.url}/api/v1"
         used = [service._is_used()]

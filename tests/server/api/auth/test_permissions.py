@@ -108,7 +108,7 @@ def test_each_client_is_refused_what_it_may_not(
         url = PREFIX + path.replace("{frame}", "1").replace("{product}", "range")
         # nothing is done for those that are let in: what they send is refused behind the door
         nonsense: dict[str, Any] = {"unheard_of": 1}
-        sent = {"params": nonsense} if method == "GET" else {"json": nonsense}
+        sent: dict[str, Any] = {"params": nonsense} if method == "GET" else {"json": nonsense}
         answer = http.request(method, url, headers=headers[who], **sent)
         slug = answer.json().get("type", "").removeprefix("/problems/")
         refused = slug if answer.status_code in (401, 403) else None
