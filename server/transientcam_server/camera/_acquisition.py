@@ -281,6 +281,7 @@ class Acquisition:
                 self._moved_s = self._read_s = self._clock()
             else:
                 self._require_interlock()
+                self._camera_works()
                 self._run_commands(wait_s=READ_TIMEOUT_S)
         else:
             self._read()
@@ -381,6 +382,8 @@ class Acquisition:
             self._running, self._dark = True, None
             if self._darkness is not None:
                 self._darkness.keep(None)
+            if self._connected:
+                self._may_light()  # announced by the time it is answered
 
     def _go_dark(self, dark: Dark) -> None:
         """End the capture, and keep that it ended, also where the camera fails."""
