@@ -90,12 +90,15 @@ def serving(
 ) -> Iterator[Served]:
     """Serve a camera on an ephemeral port until the end of the block; leave nothing behind.
 
-    Calibrations are kept where no other service has them, unless ``settings`` say where.
+    Calibrations, and that the light is off, are kept where no other service has them, unless
+    ``settings`` say where. Every camera captures at once, as a simulated one does.
 
     ``prepare`` is given the application before it starts; ``clock`` is that of a simulated camera.
     """
     with open_camera(camera, clock=clock) as opened, TemporaryDirectory() as state:
-        usual = {"port": 0, "log_level": "warning", "calibrations": {"directory": state}}
+        usual: dict[str, Any] = {"port": 0, "log_level": "warning", "capture_at_start": True}
+        usual |= {"calibrations": {"directory": state}}
+        usual |= {"light": {"directory": f"{state}/light", "delay_s": 0.0, "unused_s": 0.0}}
         # "automatic" depends on the kernels that other tests of this process have compiled
         usual |= {"reconstruction": {"estimator": "pisarenko"}}
         chosen = _patient(Settings(camera=camera, **{**usual, **settings}))

@@ -17,6 +17,7 @@ BEGIN = "<!-- python -m benchmarks reference --write writes what follows -->"
 _DEFAULT_IN_HELP = re.compile(r"\s*\[default: (.*?)\]")
 _OF_THIS_MACHINE = {
     "calibrations.directory": "calibrations in the state directory",
+    "light.directory": "light in the state directory",
     "recordings.directory": "recordings in the state directory",
     "tokens_file": "tokens.json in the user's configuration",
     "workers": "one a processor",

@@ -24,14 +24,19 @@ from transientcam_server.camera import (
     CameraRecoveredEvent,
     Captured,
     Change,
+    Dark,
+    Darkness,
     Event,
     Job,
     Jobs,
     Lease,
     LeaseManager,
+    LightArmingEvent,
     LightGuard,
     LightHeldEvent,
+    LightOffEvent,
     LightReleasedEvent,
+    LightRules,
     OriginChanged,
     OriginLease,
     SequenceChanged,
@@ -73,6 +78,8 @@ VERSION: Final = version("transientcam")
 _CLOSING_S = 1.0
 _TURN_S = 0.2
 _WORKERS_END_S = 1.0
+_KEPT_S = 0.1
+"""An answer to what switched the light off waits for the disk no longer."""
 WORKER_THREADS: Final = "worker"
 """What the names of their threads begin with."""
 
@@ -141,9 +148,21 @@ class Service:
             self.planner, self.workers, self.planning, self.looks, simulated=simulated
         )
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._light = LightGuard(unserved_s=settings.limits.unserved_s)
+        self._rules = rules = LightRules.of(camera, settings)
+        self._light = LightGuard(unserved_s=settings.limits.unserved_s, unused_s=rules.unused_s)
+        self._darkness = (
+            Darkness(settings.light.directory, rules.unit)
+            if self.relay is None and rules.unit is not None
+            else None
+        )
         self.acquisition = (
-            Acquisition(camera, report=self._from_acquisition, light=self._light)
+            Acquisition(
+                camera,
+                report=self._from_acquisition,
+                light=self._light,
+                delay_s=rules.delay_s,
+                darkness=self._darkness,
+            )
             if self.relay is None
             else SharedAcquisition(self.relay, report=self._from_acquisition, light=self._light)
         )
@@ -193,8 +212,14 @@ class Service:
         """Capture from entry to exit."""
         self._loop = asyncio.get_running_loop()
         await asyncio.to_thread(self.recordings.open)
+        dark = None if self._darkness is None else await asyncio.to_thread(self._darkness.open)
+        if dark is None and self.relay is None and not self._rules.capture_at_start:
+            dark = Dark("start")
+        if dark is not None:
+            _log.warning("%s", dark)
         self._light.turned()
-        self.acquisition.start()
+        self._light.used()
+        self.acquisition.start(dark=dark)
         turning = asyncio.create_task(self._keep_light())
         try:
             yield
@@ -206,6 +231,8 @@ class Service:
             self.jobs.cancel_all()
             # not behind frames that are computed: the light goes off now
             await asyncio.to_thread(self.acquisition.stop)
+            if self._darkness is not None:
+                await asyncio.to_thread(self._darkness.close)
             await self.jobs.close()
             await asyncio.to_thread(self.recordings.close)
             ended = await self.workers.close(within_s=_WORKERS_END_S)
@@ -237,6 +264,17 @@ class Service:
         recorded = self.recordings.active_id is not None
         return recorded or bool(self.hub.clients or self.mjpeg_clients)
 
+    async def off(self, switching: "Future[None]") -> None:
+        """Wait until the light is off, and a moment until that is kept."""
+        try:
+            await asyncio.wrap_future(switching)
+        finally:
+            if self._darkness is not None:
+                written = asyncio.wrap_future(self._darkness.written)
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(_KEPT_S):
+                        await asyncio.shield(written)
+
     @property
     def intrinsics(self) -> Intrinsics:
         """Where the pixels look; another simulated scene may have another lens."""
@@ -259,6 +297,8 @@ class Service:
             reasons.append(f"the camera is lost: {status.reason}")
         if status.state == "held":
             reasons.append(f"the light is held off: {status.reason}")
+        if status.state == "arming":
+            reasons.append("the light is announced and not on yet")
         if status.state in ("starting", "streaming") and not status.frames:
             reasons.append("the camera is starting")
         if status.stalled:
@@ -382,6 +422,10 @@ class Service:
                 self.hub.notify("camera-lost", {"reason": reason})
             case CameraRecoveredEvent():
                 self.hub.notify("camera-back", {})
+            case LightArmingEvent(in_s):
+                self.hub.notify("light-arming", {"in_s": in_s})
+            case LightOffEvent(dark):
+                self.hub.notify("light-off", {"because": dark.cause, "reason": str(dark)})
             case LightHeldEvent(reason):
                 self.hub.notify("light-held", {"reason": reason})
             case LightReleasedEvent():
@@ -419,10 +463,20 @@ class Service:
         self._superseded = computing
 
     async def _keep_light(self) -> None:
-        """Prove to the thread of the camera, again and again, that clients are served."""
+        """Prove to the camera's thread, again and again, that clients are served and use it."""
+        reads = self.hub.reads
         while True:
             self._light.turned()
+            if self._is_used() or self.hub.reads != reads:
+                self._light.used()
+            reads = self.hub.reads
             await asyncio.sleep(_TURN_S)
+
+    def _is_used(self) -> bool:
+        """Return whether somebody needs the capture, other than for single frames."""
+        shown = self.hub.subscribers or self.mjpeg_clients or self.recordings.active_id is not None
+        controlled = self.lease.current is not None
+        return bool(shown) or controlled or any(not job.finished for job in self.jobs.all)
 
     def _lease_due(self, lease: Lease | None) -> None:
         stops = lease is not None and lease.on_lapse == "stop"
@@ -447,7 +501,8 @@ class Service:
         details = {"change": change, "holder": lease.holder}
         self.hub.notify("lease-changed", details | ({"from": former.holder} if former else {}))
         if change == "lapsed" and lease.on_lapse == "stop":
-            self.acquisition.set_running(False).add_done_callback(_log_failure)
+            stopping = self.acquisition.set_running(False, cause="lapse")
+            stopping.add_done_callback(_log_failure)
         if self.origin_lease is not None and change != "granted":
             self.origin_lease.release()  # behind the change above; a new holder takes it anew
 

@@ -186,6 +186,23 @@ def default_recordings_directory() -> Path:
     return default_state_directory() / "recordings"
 
 
+class LightSettings(_Group):
+    """When the light of the camera begins, and when it ends by itself.
+
+    A simulated scene (sim:) or a recording shines at nobody; the emulation of a real device counts
+    as the device.
+    """
+
+    delay_s: _Finite | None = Field(default=None, ge=0.0, le=60.0)
+    """From the announcement that the light goes on until it does; without it 3 s, and 0 s of a
+    camera that shines at nobody."""
+    unused_s: _Finite | None = Field(default=None, ge=0.0, le=31_536_000.0)
+    """A capture ends that has had no viewer, reader, recording, job or lease for so long; 0 for
+    never. Without it 300 s, and never of a camera that shines at nobody."""
+    directory: Path = Field(default_factory=lambda: default_state_directory() / "light")
+    """Where it is kept that the light was switched off, for the next start."""
+
+
 class CalibrationSettings(_Group):
     """Where calibrations are kept, and how many."""
 
@@ -248,6 +265,9 @@ class Settings(_Group):
     camera: str = Field(default="sim:mirrors", min_length=1)
     """Which camera, as NAME:ADDRESS: ``usb:SERIAL``, ``sim:SCENE``, ``tofcam660:ADDRESS``,
     ``recording:FILE``, or one of another package; `transientcam devices` lists them."""
+    capture_at_start: bool | None = None
+    """Capture from the start, unless the light was switched off before; without it only a camera
+    does so that is simulated (``sim:``) or replayed. A relay does what its origin does."""
     host: str = Field(default="127.0.0.1", min_length=1)
     """Address to listen on."""
     port: int = Field(default=8000, ge=0, le=65535)
@@ -284,6 +304,7 @@ class Settings(_Group):
     stream: StreamSettings = StreamSettings()
     history: HistorySettings = HistorySettings()
     limits: LimitSettings = LimitSettings()
+    light: LightSettings = Field(default_factory=LightSettings)
     recordings: RecordingSettings = Field(default_factory=RecordingSettings)
     calibrations: CalibrationSettings = Field(default_factory=CalibrationSettings)
 

@@ -53,6 +53,12 @@ NOTICES: Final[dict[str, NoticeKind]] = {
         ),
         NoticeKind("camera-lost", "the camera does not answer", {"reason": "string"}),
         NoticeKind("camera-back", "the camera answers again"),
+        NoticeKind("light-arming", "the light goes on after this time", {"in_s": "number"}),
+        NoticeKind(
+            "light-off",
+            "the capture ended, and stays so until somebody starts it",
+            {"because": "string", "reason": "string"},
+        ),
         NoticeKind(
             "light-held",
             "the light was switched off because clients were not served",

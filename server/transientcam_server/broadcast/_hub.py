@@ -22,6 +22,8 @@ class Hub:
     ----------
     latest
         The newest frame, None before the first.
+    reads
+        How often a single frame was asked for.
     dropped
         Frames that clients were too slow for, of all clients together.
     deserted
@@ -30,6 +32,7 @@ class Hub:
 
     def __init__(self) -> None:
         self.latest: Frame | None = None
+        self.reads = 0
         self.dropped = 0
         self._outboxes: set[Outbox] = set()
         self._arrived = asyncio.Event()
@@ -94,6 +97,7 @@ class Hub:
 
         What was computed of it is not computed anew then.
         """
+        self.reads += 1
         found = (outbox.partly_sent(number) for outbox in self._outboxes)
         return next((frame for frame in found if frame is not None), None)
 
@@ -105,6 +109,7 @@ class Hub:
         Problem
             ``no-frame-yet`` if none came within ``wait_s``, ``shutting-down``.
         """
+        self.reads += 1
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(wait_s):
                 while not self._closed:

@@ -12,12 +12,15 @@ from transientcam_server.camera._calibration_store import (
     load_given,
 )
 from transientcam_server.camera._calibrator import CalibrationOptions, Calibrator, Drift
+from transientcam_server.camera._darkness import Cause, Dark, Darkness
 from transientcam_server.camera._events import (
     CameraLostEvent,
     CameraRecoveredEvent,
     Captured,
     Event,
+    LightArmingEvent,
     LightHeldEvent,
+    LightOffEvent,
     LightReleasedEvent,
     OriginChanged,
     SequenceChanged,
@@ -35,8 +38,8 @@ from transientcam_server.camera._lease import (
 from transientcam_server.camera._light import LightGuard
 from transientcam_server.camera._origin_lease import OriginLease
 from transientcam_server.camera._shared import SharedAcquisition
-from transientcam_server.camera._source import sensor_of, snapshot_of, start_with
-from transientcam_server.camera._status import AcquisitionStatus
+from transientcam_server.camera._source import LightRules, sensor_of, snapshot_of, start_with
+from transientcam_server.camera._status import AcquisitionStatus, State
 
 __all__ = [
     "DEFAULT_DURATION_S",
@@ -50,20 +53,27 @@ __all__ = [
     "CameraLostEvent",
     "CameraRecoveredEvent",
     "Captured",
+    "Cause",
     "Change",
+    "Dark",
+    "Darkness",
     "Drift",
     "Event",
     "Job",
     "Jobs",
     "Lease",
     "LeaseManager",
+    "LightArmingEvent",
     "LightGuard",
     "LightHeldEvent",
+    "LightOffEvent",
     "LightReleasedEvent",
+    "LightRules",
     "OriginChanged",
     "OriginLease",
     "SequenceChanged",
     "SharedAcquisition",
+    "State",
     "StoredCalibration",
     "Timer",
     "lease",

@@ -12,27 +12,33 @@ import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import suppress
 from typing import Any, Final, TypeVar
 
 from transientcam_driver import (
     AppliedSequence,
     Camera,
     CameraError,
+    CameraFault,
+    CameraLost,
     FrameTimeout,
     RawFrame,
     Sequence,
     Status,
 )
+from transientcam_server.camera._darkness import Dark, Darkness, KeptCause
 from transientcam_server.camera._events import (
     CameraLostEvent,
     CameraRecoveredEvent,
     Captured,
     Event,
+    LightArmingEvent,
     LightHeldEvent,
+    LightOffEvent,
     LightReleasedEvent,
     SequenceChanged,
 )
-from transientcam_server.camera._light import LightGuard
+from transientcam_server.camera._light import Announcement, LightGuard
 from transientcam_server.camera._status import AcquisitionStatus, State
 from transientcam_server.errors import JobCancelled, Problem, SequenceConflict, kinds
 
@@ -51,7 +57,10 @@ _RATE_FRAMES = 32
 
 
 class Acquisition:
-    """Owns ``camera`` from `start` to `stop`, on a thread of its own."""
+    """Owns ``camera`` from `start` to `stop`, on a thread of its own.
+
+    Light begins ``delay_s`` after it was announced; ``darkness`` keeps that it is off.
+    """
 
     def __init__(
         self,
@@ -59,16 +68,21 @@ class Acquisition:
         *,
         report: Callable[[Event], None],
         light: LightGuard | None = None,
+        delay_s: float = 0.0,
+        darkness: Darkness | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._light = LightGuard(unserved_s=math.inf, clock=clock) if light is None else light
+        self._announcement = Announcement(delay_s, clock=clock)
+        self._darkness = darkness
+        self._dark: Dark | None = None
+        self._offs = 0
         self._camera = camera
         self._report = report
         self._clock = clock
         self._commands: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._occupied = threading.Lock()
         self._occupant: str | None = None
-        self._interrupted = threading.Event()
         self._restored: Sequence | None = None
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="acquisition", daemon=True)
@@ -79,21 +93,23 @@ class Acquisition:
         self._started = False
         self._attempts = 0
         self._frames = 0
-        self._moved_s = clock()
+        self._moved_s = self._read_s = clock()
         self._arrivals_s: deque[float] = deque(maxlen=_RATE_FRAMES)
         self._applied: dict[int, AppliedSequence] = {}
         self._remember(camera.applied)
 
     # -- from any thread -----------------------------------------------------------------------
 
-    def start(self) -> None:
-        """Start the thread."""
+    def start(self, *, dark: Dark | None = None) -> None:
+        """Start the thread; it captures unless there is a reason to stay ``dark``."""
+        if dark is not None:
+            self._dark, self._running = dark, False
         self._thread.start()
 
     def stop(self) -> None:
         """Stop the camera, its light and the thread; waits for it."""
         self._stopping.set()
-        self._interrupted.set()
+        self._offs += 1
         self._commands.put(lambda: None)
         self._thread.join()
 
@@ -113,8 +129,8 @@ class Acquisition:
             self.require_free()
             return self.submit(lambda: self._configure(sequence, expected))
 
-    def set_running(self, running: bool) -> "Future[None]":
-        """Start or stop capturing; stopping also interrupts a job that has the camera.
+    def set_running(self, running: bool, *, cause: KeptCause = "stop") -> "Future[None]":
+        """Start or stop capturing; stopping also ends jobs that have the camera or wait for it.
 
         Raises
         ------
@@ -124,24 +140,32 @@ class Acquisition:
         with self._occupied:
             if running:
                 self.require_free()
-            self._interrupted.set()
-            return self.submit(lambda: self._set_running(running))
+            else:
+                self._offs += 1
+            return self.submit(lambda: self._set_running(running, cause))
 
     def safe_off(self) -> "Future[None]":
         """Stop capturing and switch the light off, by the request that no state refuses."""
-        self._interrupted.set()
+        self._offs += 1
         return self.submit(self._safe_off)
+
+    @property
+    def offs(self) -> int:
+        """How often the light was to go off; a job of before the last does not light any more."""
+        return self._offs
 
     def device_status(self) -> "Future[Status]":
         """Read the status of the device."""
         return self.submit(self._camera.status)
 
-    def occupy(self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T]) -> "Future[_T]":
-        """Run ``work`` with exclusive use of the camera until it returns.
+    def occupy(
+        self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T], *, offs: int
+    ) -> "Future[_T]":
+        """Run ``work`` with exclusive use of the camera until it returns, once light is announced.
 
         No frames are reported meanwhile, and the sequence is restored afterwards. ``work`` must
         call its second argument several times a second; it raises `JobCancelled` once the light
-        has to go off.
+        has to go off. ``offs`` is what `offs` was when the job was asked for.
 
         Raises
         ------
@@ -151,8 +175,7 @@ class Acquisition:
         with self._occupied:
             self.require_free()
             self._occupant = job_id
-            self._interrupted.clear()
-            occupied = self.submit(lambda: self._occupy(job_id, work))
+            occupied = self.submit(lambda: self._occupy(job_id, work, offs))
         occupied.add_done_callback(self._occupied_done)  # also where it was taken back
         return occupied
 
@@ -192,20 +215,25 @@ class Acquisition:
         if len(arrivals_s) > 1 and arrivals_s[-1] > arrivals_s[0]:
             rate_hz = (len(arrivals_s) - 1) / (arrivals_s[-1] - arrivals_s[0])
         age_s = self._clock() - self._moved_s
-        state = self._state()
+        state, dark, darkness = self._state(), self._dark, self._darkness
         return AcquisitionStatus(
             state=state,
             running=self._running,
             rate_hz=rate_hz,
             frames=self._frames,
             frame_age_s=age_s,
-            reason=self._lost or self._held,
+            reason=self._lost or self._held or (None if dark is None else str(dark)),
             stalled=state in ("starting", "streaming") and age_s > self._stall_after_s(),
+            light_on_in_s=self._announcement.light_on_in_s,
+            off_because=None if dark is None else dark.cause,
+            off_kept=None if dark is None or darkness is None else darkness.written.done(),
         )
 
     def _state(self) -> State:
         if self._lost is not None:
             return "lost"
+        if self._announcement.light_on_in_s is not None:
+            return "arming"
         if self._occupant is not None:
             return "calibrating"
         if not self._running:
@@ -226,7 +254,8 @@ class Acquisition:
                 self._run_commands(wait_s=0.0)
                 self._step()
             except CameraError as error:
-                self._camera_lost(str(error))
+                if not self._shut_off_by_device(error):
+                    self._camera_lost(str(error))
             except Exception:
                 # no failure with one frame may end the acquisition
                 _log.exception("the acquisition failed and is continued")
@@ -246,15 +275,29 @@ class Acquisition:
             self._camera.status()  # detects an unplug while nothing is read
             self._camera_works()
         elif not self._started:
-            self._camera.start()
-            self._started = True
-            self._moved_s = self._clock()
+            if self._may_light():
+                self._camera.start()
+                self._started = True
+                self._moved_s = self._read_s = self._clock()
+            else:
+                self._require_interlock()
+                self._camera_works()
+                self._run_commands(wait_s=READ_TIMEOUT_S)
         else:
             self._read()
+
+    def _may_light(self) -> bool:
+        """Announce the light; return whether it may begin: the one gate of all that lights."""
+        if self._announcement.begin() and self._announcement.delay_s:
+            _log.warning("the light goes on in %g s", self._announcement.delay_s)
+            self._report(LightArmingEvent(self._announcement.delay_s))
+        return self._announcement.light_on_in_s is None
 
     def _light_is_held(self) -> bool:
         """Switch the light off where it may not stay on; return whether it has to stay off."""
         self._act_on_lapse()
+        if self._running and (unused := self._light.unused()) is not None:
+            self._go_dark(Dark("unused", unused))
         reason = self._light.unserved()
         if reason is None or not self._running:
             if self._held is not None:
@@ -267,18 +310,26 @@ class Acquisition:
             _log.error("the light is switched off: %s", reason)
             self._arrivals_s.clear()
             self._report(LightHeldEvent(reason))
-            if self._started:
-                self._started = False
-                self._camera.stop()
+            self._end_light()
         return True
 
     def _act_on_lapse(self) -> None:
         if self._light.lapsed():
             _log.warning("a lease lapsed, and the loop that serves clients is late to act on it")
-            self._interrupted.set()
-            self._set_running(False)
+            self._offs += 1
+            self._set_running(False, "lapse")
+
+    def _end_light(self) -> None:
+        """Switch the light off; the next one is announced anew."""
+        self._announcement.withdraw()
+        if self._started:
+            self._started = False
+            self._camera.stop()
 
     def _read(self) -> None:
+        if self._is_missed():
+            self._end_light()
+            return
         try:
             raw = self._camera.read_frame(timeout_s=READ_TIMEOUT_S)
         except FrameTimeout:
@@ -288,6 +339,16 @@ class Acquisition:
         self._moved_s = self._clock()
         self._arrivals_s.append(self._moved_s)
         self._report_frame(raw)
+
+    def _is_missed(self) -> bool:
+        """Return whether the device went dark as it was not read, so that reading would light it.
+
+        That includes a read that took so long, as where the process was stopped.
+        """
+        now_s, read_s = self._clock(), self._read_s
+        heartbeat_s = self._camera.capabilities.heartbeat_s
+        self._read_s = now_s
+        return now_s - read_s >= heartbeat_s > 0.0
 
     def _report_frame(self, raw: RawFrame) -> None:
         self._report(Captured(raw, self._applied[raw.epoch]))
@@ -308,29 +369,73 @@ class Acquisition:
         self._report(SequenceChanged(applied))
         return applied
 
-    def _set_running(self, running: bool) -> None:
-        if running != self._running:
-            self._running = running
+    def _set_running(self, running: bool, cause: KeptCause = "stop") -> None:
+        if not running:
+            if self._running or cause == "stop":  # a lapse ends nothing that has ended already
+                self._go_dark(Dark(cause))
+        elif not self._running:
+            with suppress(CameraLost):  # it starts once it is found
+                self._require_interlock()
+            self._light.used()
             self._arrivals_s.clear()
             self._moved_s = self._clock()
-            if not running and self._started:
-                self._started = False
-                self._camera.stop()
+            self._running, self._dark = True, None
+            if self._darkness is not None:
+                self._darkness.keep(None)
+            if self._connected:
+                self._may_light()  # announced by the time it is answered
+
+    def _go_dark(self, dark: Dark) -> None:
+        """End the capture, and keep that it ended, also where the camera fails."""
+        self._running, self._dark = False, dark
+        self._arrivals_s.clear()
+        self._moved_s = self._clock()
+        try:
+            self._end_light()
+            if dark.cause == "safe-off":
+                self._camera.safe_off()
+        finally:
+            _log.warning("%s", dark)
+            if self._darkness is not None:
+                self._darkness.keep(dark)
+            self._report(LightOffEvent(dark))
+
+    def _require_interlock(self) -> None:
+        if not self._camera.status().interlock_closed:
+            raise CameraFault("the interlock is open")
+
+    def _shut_off_by_device(self, error: CameraError) -> bool:
+        """Go dark where a failure is the device's own protection, and return whether it is."""
+        opened = isinstance(error, CameraFault)
+        try:
+            self._require_interlock()
+        except CameraError as now:
+            opened = opened or isinstance(now, CameraFault)
+        if opened and self._running:
+            self._started = False  # by the device
+            self._go_dark(Dark("device", str(error)))
+        return opened
 
     def _occupied_done(self, occupied: "Future[Any]") -> None:
         if occupied.cancelled():
             self._occupant = None
 
-    def _occupy(self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T]) -> _T:
+    def _occupy(
+        self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T], offs: int
+    ) -> _T:
         def go_on() -> None:
             self._act_on_lapse()
-            if self._interrupted.is_set() or self._light.unserved() is not None:
-                raise JobCancelled(job_id)
             self._run_commands(wait_s=0.0)  # those that do not need the camera, or cancel this job
+            # behind the commands: one of them may have switched the light off
+            if self._offs != offs or self._light.unserved() is not None:
+                raise JobCancelled(job_id)
 
         before = self._camera.applied
         try:
             go_on()
+            while not self._may_light():
+                self._run_commands(wait_s=READ_TIMEOUT_S)
+                go_on()
             self._arrivals_s.clear()
             if self._started:
                 self._started = False
@@ -338,6 +443,8 @@ class Acquisition:
             return work(self._camera, go_on)
         finally:
             self._occupant = None
+            if not self._running:
+                self._announcement.withdraw()
             self._arrivals_s.clear()
             self._moved_s = self._clock()
             applied = self._camera.applied
@@ -348,16 +455,14 @@ class Acquisition:
                 self._report(SequenceChanged(applied))
 
     def _safe_off(self) -> None:
-        # first, so that it is not started again even if the request fails
-        self._running = False
-        self._started = False
-        self._arrivals_s.clear()
-        self._moved_s = self._clock()
-        self._camera.safe_off()
+        self._started = False  # no request comes before the one that no state refuses
+        self._go_dark(Dark("safe-off"))
 
     def _camera_lost(self, reason: str) -> None:
         self._connected = False
-        self._started = False
+        self._started = True
+        with suppress(CameraError):
+            self._end_light()  # or it would light by itself once it is found again
         if self._lost is None:
             _log.warning("%s", reason)
             self._attempts = 0

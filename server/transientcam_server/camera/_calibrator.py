@@ -243,12 +243,16 @@ class Calibrator:
                 limit=f"at most {most}",
             )
 
+        offs = self._acquisition.offs  # a light that is switched off while the job waits stays off
+
         async def work(job: Job) -> dict[str, Any]:
             await asyncio.to_thread(self.store.require_room)  # checked before anything is captured
             takes = _Takes()
             sweep = SweepEvaluation(self._camera.capabilities, takes=options.frames)
             measuring = self._acquisition.occupy(
-                job.id, lambda camera, go_on: _capture(camera, job, options, takes, sweep, go_on)
+                job.id,
+                lambda camera, go_on: _capture(camera, job, options, takes, sweep, go_on),
+                offs=offs,
             )
             capture = await asyncio.wrap_future(measuring)
             # the sequence may have been changed since the request, and may be while this goes on

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from transientcam_driver import AppliedSequence, RawFrame
+from transientcam_server.camera._darkness import Dark
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +24,20 @@ class CameraLostEvent:
 @dataclass(frozen=True, slots=True)
 class CameraRecoveredEvent:
     """A lost camera works again."""
+
+
+@dataclass(frozen=True, slots=True)
+class LightArmingEvent:
+    """The light goes on after this time, unless it is switched off before."""
+
+    in_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class LightOffEvent:
+    """The capture ended, and with it the light, until somebody starts it."""
+
+    dark: Dark
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +68,8 @@ Event = (
     Captured
     | CameraLostEvent
     | CameraRecoveredEvent
+    | LightArmingEvent
+    | LightOffEvent
     | LightHeldEvent
     | LightReleasedEvent
     | SequenceChanged

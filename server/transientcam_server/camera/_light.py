@@ -1,9 +1,11 @@
-"""When the light may not stay on: no client could switch it off, or the lease has lapsed.
+"""When the light may begin, and when it may not stay on.
 
-The event loop that serves clients writes here, the thread that owns the camera reads: the light
-does not depend on the loop.
+It may not where no client could switch it off, a lease has lapsed, or nobody uses the capture. The
+event loop that serves clients writes here, the thread that owns the camera reads: the light does
+not depend on the loop.
 """
 
+import math
 import time
 from collections.abc import Callable
 from typing import Final
@@ -21,14 +23,23 @@ class LightGuard:
     ----------
     unserved_s
         For so long the clients' loop may not turn.
+    unused_s
+        For so long a capture may go on that nobody uses.
     clock
         Time in s; that of the leases.
     """
 
-    def __init__(self, *, unserved_s: float, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        *,
+        unserved_s: float,
+        unused_s: float = math.inf,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._unserved_s = unserved_s
+        self._unused_s = unused_s
         self._clock = clock
-        self._turned_s = clock()
+        self._turned_s = self._used_s = clock()
         self._lapses_s: float | None = None
 
     # -- from the loop -------------------------------------------------------------------------
@@ -40,6 +51,10 @@ class LightGuard:
     def lapses_at(self, time_s: float | None) -> None:
         """Stop the capture at this time by the clock; None for never."""
         self._lapses_s = time_s
+
+    def used(self) -> None:
+        """Note that somebody uses the capture, or has just started it; from any thread."""
+        self._used_s = self._clock()
 
     # -- from the thread of the camera ---------------------------------------------------------
 
@@ -57,3 +72,36 @@ class LightGuard:
         if age_s <= self._unserved_s:
             return None
         return f"no client was served for {self._unserved_s:g} s, so none could switch it off"
+
+    def unused(self) -> str | None:
+        """Return why a capture has to end that nobody uses, or None."""
+        if self._clock() - self._used_s <= self._unused_s:
+            return None
+        return f"no viewer, reader, recording, job or lease for {self._unused_s:g} s"
+
+
+class Announcement:
+    """Light begins ``delay_s`` after it was announced; the camera's thread does, any may look."""
+
+    def __init__(self, delay_s: float, *, clock: Callable[[], float] = time.monotonic) -> None:
+        self.delay_s = delay_s
+        self._clock = clock
+        self._on_s: float | None = None
+
+    @property
+    def light_on_in_s(self) -> float | None:
+        """Time until the light begins; None where none is announced, or it may be on already."""
+        on_s = self._on_s
+        left_s = 0.0 if on_s is None else on_s - self._clock()
+        return left_s if left_s > 0.0 else None
+
+    def begin(self) -> bool:
+        """Announce the light; return whether it was not announced before."""
+        if self._on_s is not None:
+            return False
+        self._on_s = self._clock() + self.delay_s
+        return True
+
+    def withdraw(self) -> None:
+        """Take the announcement back: the next light is announced anew."""
+        self._on_s = None

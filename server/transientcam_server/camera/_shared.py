@@ -6,6 +6,7 @@ from typing import TypeVar
 
 from transientcam_driver import Camera, CameraState, NotStreaming, RawFrame
 from transientcam_server.camera._acquisition import Acquisition
+from transientcam_server.camera._darkness import KeptCause
 from transientcam_server.camera._events import Event, OriginChanged
 from transientcam_server.camera._light import LightGuard
 from transientcam_server.errors import Problem, kinds
@@ -29,7 +30,9 @@ class SharedAcquisition(Acquisition):
         self._known = camera.origin
         self._running = self._started = camera.state is CameraState.STREAMING
 
-    def occupy(self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T]) -> "Future[_T]":
+    def occupy(
+        self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T], *, offs: int
+    ) -> "Future[_T]":
         """Refuse exclusive use of the camera, which is not this service's to give.
 
         Raises
@@ -71,7 +74,14 @@ class SharedAcquisition(Acquisition):
             self._known = self._origin.origin
             self._report(OriginChanged())
 
-    def _set_running(self, running: bool) -> None:
+    def _is_missed(self) -> bool:
+        return False  # not by this service
+
+    def _end_light(self) -> None:
+        """Leave the light to the origin: only what clients ask for goes there."""
+        self._started = False
+
+    def _set_running(self, running: bool, cause: KeptCause = "stop") -> None:
         if running:
             self._camera.start()
         else:

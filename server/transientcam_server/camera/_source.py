@@ -2,16 +2,21 @@
 
 import contextlib
 import logging
+import math
 from dataclasses import dataclass
+from typing import Final, Self
 
 import transientcam_moments as tm
-from transientcam_driver import Camera, CameraError, Sequence, open_camera
+from transientcam_driver import Camera, CameraError, CameraName, Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.recording import ReplayCamera
 from transientcam_server.relay import RelayCamera
-from transientcam_server.settings import SensorSettings, SequenceSettings
+from transientcam_server.settings import SensorSettings, SequenceSettings, Settings
 
 _log = logging.getLogger("transientcam_server.camera.source")
+DELAY_S: Final = 3.0
+UNUSED_S: Final = 300.0
+"""Of a camera that shines at somebody."""
 
 
 def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
@@ -30,6 +35,36 @@ def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
         dark_dn=model.dark_dn if dark_dn is None else dark_dn,
         bits=camera.capabilities.bits,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class LightRules:
+    """When a camera's light may begin, and when its capture ends by itself.
+
+    A camera shines at somebody unless it is simulated (``sim:``) or replayed. The emulation of a
+    real device counts as the device: it is there to try what happens with that. ``unit`` is what
+    it is kept by that the light is off: the device, what is simulated, None of a recording.
+    """
+
+    unit: str | None
+    capture_at_start: bool
+    delay_s: float
+    unused_s: float
+
+    @classmethod
+    def of(cls, camera: Camera, settings: Settings) -> Self:
+        """Return those of the settings, else those that suit the camera."""
+        name, about, light = CameraName.parse(settings.camera), camera.capabilities, settings.light
+        shines = name.kind not in ("sim", "recording")
+        capture, delay_s, unused_s = settings.capture_at_start, light.delay_s, light.unused_s
+        unused_s = unused_s if unused_s is not None else UNUSED_S if shines else 0.0
+        simulated = None if name.kind == "recording" else settings.camera
+        return cls(
+            unit=f"{about.model} {about.serial}" if shines else simulated,
+            capture_at_start=not shines if capture is None else capture,
+            delay_s=delay_s if delay_s is not None else DELAY_S if shines else 0.0,
+            unused_s=unused_s or math.inf,
+        )
 
 
 def start_with(camera: Camera, settings: SequenceSettings) -> None:

@@ -3,7 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal
 
-State = Literal["starting", "streaming", "stopped", "calibrating", "lost", "held"]
+from transientcam_server.camera._darkness import Cause
+
+State = Literal["arming", "starting", "streaming", "stopped", "calibrating", "lost", "held"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,9 +15,9 @@ class AcquisitionStatus:
     Attributes
     ----------
     state
-        ``streaming`` also before the first frame; ``stopped`` on request;
-        ``calibrating`` while a calibration has exclusive use of the camera; ``held`` while the
-        light is off because clients are not served.
+        ``arming`` while the light is announced; ``streaming`` also before the first frame;
+        ``stopped`` until somebody starts; ``calibrating`` while a calibration has exclusive use of
+        the camera; ``held`` while the light is off because clients are not served.
     running
         Whether frames are to be captured.
     rate_hz
@@ -25,9 +27,14 @@ class AcquisitionStatus:
     frame_age_s
         Since the last frame, or since the start where there was none.
     reason
-        Why the camera is lost or held.
+        Why the camera is lost, held or stopped.
     stalled
         Whether frames are to be captured and the camera is there, but none came for too long.
+    light_on_in_s
+        Time until the light goes on; None where none is announced.
+    off_because, off_kept
+        What ended the capture, or kept it from beginning, and whether that holds over a restart of
+        the service; None while it is running, and of a relay.
     """
 
     state: State
@@ -37,3 +44,6 @@ class AcquisitionStatus:
     frame_age_s: float
     reason: str | None
     stalled: bool
+    light_on_in_s: float | None = None
+    off_because: Cause | None = None
+    off_kept: bool | None = None

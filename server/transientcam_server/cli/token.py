@@ -39,6 +39,13 @@ def create(
     days: Annotated[
         float | None, typer.Option(min=0.0, help="How long it is valid.  [default: for ever]")
     ] = None,
+    may_light: Annotated[
+        bool | None,
+        typer.Option(
+            help="Whether it may switch the light on; a viewer never may.  "
+            "[default: operators and admins may]"
+        ),
+    ] = None,
     config: _Config = None,
     tokens_file: _File = None,
     as_json: JsonOption = False,
@@ -48,10 +55,14 @@ def create(
 
     if not 1 <= len(name) <= 80 or not name.isprintable():
         raise typer.BadParameter("it must have 1 to 80 printable characters", param_hint="NAME")
+    if role == "viewer" and may_light:
+        raise typer.BadParameter("a viewer never has it", param_hint="--may-light")
     file = TokenFile(_path(config, tokens_file))
     now = utc_now()
     expires = None if days is None else now + timedelta(days=days)
-    token, text = file.create(name, Role.named(role), now=now, expires=expires)
+    token, text = file.create(
+        name, Role.named(role), now=now, expires=expires, may_light=may_light is not False
+    )
     if as_json:
         typer.echo(json.dumps({**_document(token.model_dump(mode="json")), "token": text}))
         return
@@ -80,13 +91,14 @@ def list_tokens(
     if not tokens:
         typer.echo(f"There are no tokens in {file.path}.")
         return
-    table = Table("id", "name", "role", "made", "expires", box=None)
+    table = Table("id", "name", "role", "light", "made", "expires", box=None)
     for token in tokens:
         expires = "never" if token.expires is None else f"{token.expires:%Y-%m-%d %H:%M}"
         if token.expired(utc_now()):
             expires += " (over)"
         made = f"{token.created:%Y-%m-%d}"
-        table.add_row(token.id, escape(token.name), token.role, made, expires)
+        light = "yes" if token.lights else "no"
+        table.add_row(token.id, escape(token.name), token.role, light, made, expires)
     Console().print(table)
 
 

@@ -91,6 +91,7 @@ def _kernels() -> Reported:
 def _directories(settings: Settings) -> Iterator[Reported]:
     yield _directory("recordings", settings.recordings.directory, "recordings.directory")
     yield _directory("calibrations", settings.calibrations.directory, "calibrations.directory")
+    yield _directory("light", settings.light.directory, "light.directory")
     tokens = settings.tokens_file
     if tokens.exists() and not os.access(tokens, os.W_OK):
         message = f"{tokens} can be read, but not changed"

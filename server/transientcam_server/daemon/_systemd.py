@@ -125,6 +125,8 @@ def status_line(status: AcquisitionStatus) -> str:
             return f"the camera is lost: {status.reason}"
         case "held":
             return f"the light is held off: {status.reason}"
+        case "arming":
+            return "the light is announced and not on yet"
         case "stopped":
             return "the capture is stopped"
         case "calibrating":

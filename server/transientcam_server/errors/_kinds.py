@@ -62,6 +62,14 @@ ROLE_TOO_LOW: Final = ProblemKind(
     "The token's role (`value`) does not permit this request; `limit` is the role that it "
     "requires.",
 )
+MAY_NOT_LIGHT: Final = ProblemKind(
+    "may-not-light",
+    403,
+    "Not allowed to switch the light on",
+    "The token has not the right `may_light`, which is required by whatever starts the light: "
+    "capturing and measuring a calibration. Switching it off needs no more than a token. "
+    "`transientcam token create` makes tokens with it and without it.",
+)
 NOT_FOUND: Final = ProblemKind(
     "not-found",
     404,

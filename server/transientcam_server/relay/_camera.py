@@ -31,7 +31,7 @@ _SLICE_S: Final = 0.05
 SILENT_S: Final = 1.0
 SILENT_PERIODS: Final = 5.0
 """Without a frame for so long, the larger of both, the origin is asked whether it captures."""
-_CAPTURING: Final = frozenset(("starting", "streaming", "held"))
+_CAPTURING: Final = frozenset(("arming", "starting", "streaming", "held"))
 
 
 class RelayCamera(HostCamera):

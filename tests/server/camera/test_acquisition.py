@@ -1,5 +1,6 @@
 """The acquisition's thread against a scripted camera."""
 
+import math
 import queue
 import threading
 from collections.abc import Callable, Iterator
@@ -16,7 +17,9 @@ from transientcam_driver import (
     CameraFault,
     CameraLost,
     CameraNotFound,
+    DeviceRefused,
     FrameTimeout,
+    ProtocolError,
     RawFrame,
     Sequence,
     SequenceError,
@@ -26,7 +29,11 @@ from transientcam_server.camera import (
     CameraLostEvent,
     CameraRecoveredEvent,
     Captured,
+    Dark,
     Event,
+    LightArmingEvent,
+    LightGuard,
+    LightOffEvent,
     SequenceChanged,
 )
 from transientcam_server.camera._acquisition import STALLED_MIN_S
@@ -50,6 +57,8 @@ class ScriptedCamera:
 
     def __init__(self) -> None:
         self.applied = APPLIED
+        self.capabilities = SimpleNamespace(heartbeat_s=2.0)
+        self.interlock_closed = True
         self.script: queue.SimpleQueue[RawFrame | Exception] = queue.SimpleQueue()
         self.absent: list[Exception] = []
         self.calls: list[str] = []
@@ -75,6 +84,8 @@ class ScriptedCamera:
         return self.applied
 
     def start(self) -> None:
+        if not self.interlock_closed:
+            raise DeviceRefused("START", "INTERLOCK_OPEN", "the interlock is open")
         self.calls.append("start")
 
     def stop(self) -> None:
@@ -83,10 +94,10 @@ class ScriptedCamera:
     def safe_off(self) -> None:
         self.calls.append("safe_off")
 
-    def status(self) -> str:
+    def status(self) -> SimpleNamespace:
         if self.gone:
             raise CameraLost("it is disconnected")
-        return "fine"
+        return SimpleNamespace(interlock_closed=self.interlock_closed)
 
     def reconnect(self) -> None:
         self.calls.append("reconnect")
@@ -98,21 +109,36 @@ class ScriptedCamera:
 class Running:
     """An acquisition on a scripted camera, and what it reported."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, delay_s: float = 0.0, unused_s: float = math.inf) -> None:
         self.camera = ScriptedCamera()
         self.events: queue.SimpleQueue[Event] = queue.SimpleQueue()
         self.now_s = 0.0
+        self.light = LightGuard(unserved_s=1e9, unused_s=unused_s, clock=lambda: self.now_s)
         self.acquisition = Acquisition(
-            cast("Camera", self.camera), report=self.events.put, clock=lambda: self.now_s
+            cast("Camera", self.camera),
+            report=self.events.put,
+            light=self.light,
+            delay_s=delay_s,
+            clock=lambda: self.now_s,
         )
 
     def event(self) -> Event:
         return self.events.get(timeout=PATIENCE_S)
 
+    def settle(self) -> None:
+        """Wait until the thread has come round twice: it has seen what was changed before."""
+        for _ in range(2):
+            self.acquisition.submit(lambda: None).result(PATIENCE_S)
+
+    @property
+    def lit(self) -> bool:
+        """Whether the light was switched on last, and not off."""
+        return [each for each in self.camera.calls if each != "reconnect"][-1:] == ["start"]
+
 
 @contextmanager
-def running() -> Iterator[Running]:
-    one = Running()
+def running(**options: float) -> Iterator[Running]:
+    one = Running(**options)
     one.acquisition.start()
     try:
         yield one
@@ -180,7 +206,7 @@ def test_a_lost_camera_is_reported_once_looked_for_and_reported_back_with_its_fi
 def test_a_camera_that_fails_at_once_each_time_is_lost_all_along() -> None:
     with running() as one:
         for _ in range(3):
-            one.camera.script.put(CameraFault("the interlock was opened"))
+            one.camera.script.put(ProtocolError("an image of another size"))
         lost = one.event()
         one.camera.deliver(1)
         back = one.event()
@@ -206,6 +232,7 @@ def test_stopping_stops_the_camera_and_starting_starts_it_again() -> None:
         one.camera.deliver(1)
         one.event()
         one.acquisition.set_running(False).result(PATIENCE_S)
+        assert one.event() == LightOffEvent(Dark("stop"))
         assert one.acquisition.status().state == "stopped"
         assert one.camera.calls == ["start", "stop"]
 
@@ -220,6 +247,7 @@ def test_stopping_stops_the_camera_and_starting_starts_it_again() -> None:
 def test_a_loss_is_noticed_while_nothing_is_read() -> None:
     with running() as one:
         one.acquisition.set_running(False).result(PATIENCE_S)
+        assert one.event() == LightOffEvent(Dark("stop"))
         one.camera.gone = True
 
         assert isinstance(one.event(), CameraLostEvent)
@@ -270,13 +298,13 @@ def test_meanwhile_nothing_is_read_and_what_would_disturb_it_is_refused() -> Non
             begun.set()
             until(end, go_on)
 
-        occupied = one.acquisition.occupy("job-1", work)
+        occupied = one.acquisition.occupy("job-1", work, offs=0)
         assert begun.wait(PATIENCE_S)
         one.camera.deliver(1)
         for disturb in (
             lambda: one.acquisition.configure(Sequence()),
             lambda: one.acquisition.set_running(True),
-            lambda: one.acquisition.occupy("job-2", lambda camera, go_on: None),
+            lambda: one.acquisition.occupy("job-2", lambda camera, go_on: None, offs=0),
         ):
             with pytest.raises(Problem) as caught:
                 disturb()
@@ -284,7 +312,7 @@ def test_meanwhile_nothing_is_read_and_what_would_disturb_it_is_refused() -> Non
             assert caught.value.extensions["job"] == "job-1"
         assert one.acquisition.status().state == "calibrating"
         status: Any = one.acquisition.device_status().result(PATIENCE_S)
-        assert status == "fine"
+        assert status.interlock_closed
         assert one.events.empty()
         end.set()
         occupied.result(PATIENCE_S)
@@ -297,7 +325,7 @@ def test_meanwhile_nothing_is_read_and_what_would_disturb_it_is_refused() -> Non
 def test_switching_the_light_off_breaks_it_off(command: str) -> None:
     with running() as one:
         occupied = one.acquisition.occupy(
-            "job-1", lambda camera, go_on: until(threading.Event(), go_on)
+            "job-1", lambda camera, go_on: until(threading.Event(), go_on), offs=0
         )
         if command == "safe_off":
             one.acquisition.safe_off().result(PATIENCE_S)
@@ -312,7 +340,7 @@ def test_switching_the_light_off_breaks_it_off(command: str) -> None:
 def test_what_it_counted_anew_is_reported_and_frames_of_it_are_known() -> None:
     with running() as one:
         one.acquisition.occupy(
-            "job-1", lambda camera, go_on: camera.configure(APPLIED.sequence)
+            "job-1", lambda camera, go_on: camera.configure(APPLIED.sequence), offs=0
         ).result(PATIENCE_S)
         changed = one.event()
         one.camera.deliver(1, epoch=2)
@@ -330,7 +358,7 @@ def test_a_sequence_that_it_left_behind_is_put_back() -> None:
 
     with running() as one:
         with pytest.raises(CameraLost):
-            one.acquisition.occupy("job-1", leave).result(PATIENCE_S)
+            one.acquisition.occupy("job-1", leave, offs=0).result(PATIENCE_S)
         changed = one.event()
 
     assert isinstance(changed, SequenceChanged)
@@ -339,7 +367,7 @@ def test_a_sequence_that_it_left_behind_is_put_back() -> None:
 
 def test_one_that_was_taken_back_has_the_camera_no_more() -> None:
     one = Running()
-    occupied = one.acquisition.occupy("job-1", lambda camera, go_on: None)
+    occupied = one.acquisition.occupy("job-1", lambda camera, go_on: None, offs=0)
     assert occupied.cancel()
 
     one.acquisition.require_free()
@@ -384,3 +412,175 @@ def test_the_camera_is_switched_off_at_the_end_even_when_it_is_gone() -> None:
     one.acquisition.stop()
 
     assert one.camera.calls[-1] == "safe_off"
+
+
+# -- the one gate of the light ------------------------------------------------------------------
+
+
+def test_light_is_announced_before_it_begins() -> None:
+    with running(delay_s=3.0) as one:
+        announced = one.event()
+        one.now_s = 2.0
+        one.settle()
+        waiting, early = one.acquisition.status(), one.lit
+        one.now_s = 3.0
+        one.camera.deliver(1)
+        captured = one.event()
+
+    assert announced == LightArmingEvent(3.0)
+    assert (waiting.state, waiting.running, waiting.light_on_in_s) == ("arming", True, 1.0)
+    assert not early
+    assert numbers(captured) == [1]
+
+
+@pytest.mark.parametrize("command", ["safe_off", "stop"])
+def test_light_that_is_announced_can_be_called_off(command: str) -> None:
+    with running(delay_s=3.0) as one:
+        one.event()
+        if command == "safe_off":
+            one.acquisition.safe_off().result(PATIENCE_S)
+        else:
+            one.acquisition.set_running(False).result(PATIENCE_S)
+        off = one.event()
+        one.now_s = 100.0
+        one.settle()
+        status = one.acquisition.status()
+
+    assert isinstance(off, LightOffEvent)
+    assert (status.state, status.light_on_in_s) == ("stopped", None)
+    assert "start" not in one.camera.calls
+
+
+def test_a_restart_is_announced_anew_but_nothing_while_the_light_is_on() -> None:
+    with running(delay_s=3.0) as one:
+        assert one.event() == LightArmingEvent(3.0)
+        one.now_s = 3.0
+        one.camera.deliver(1)
+        assert numbers(one.event()) == [1]
+        one.acquisition.occupy("job", lambda camera, go_on: go_on(), offs=0).result(PATIENCE_S)
+        one.camera.deliver(2)
+        assert numbers(one.event()) == [2]
+
+        one.acquisition.set_running(False).result(PATIENCE_S)
+        assert one.event() == LightOffEvent(Dark("stop"))
+        one.acquisition.set_running(True).result(PATIENCE_S)
+
+        assert one.event() == LightArmingEvent(3.0)
+        assert not one.lit
+
+
+def test_a_camera_that_was_lost_does_not_light_where_it_is_found_but_is_announced() -> None:
+    with running(delay_s=3.0) as one:
+        one.event()
+        one.now_s = 3.0
+        one.camera.deliver(1)
+        one.event()
+        one.camera.script.put(CameraLost("unplugged"))
+        lost, announced = one.event(), one.event()
+        found = list(one.camera.calls)
+
+    assert isinstance(lost, CameraLostEvent)
+    assert announced == LightArmingEvent(3.0)
+    assert found == ["start", "stop", "reconnect"]
+
+
+def test_a_capture_that_was_not_read_for_as_long_as_the_heartbeat_is_announced_anew() -> None:
+    with running(delay_s=1.0) as one:
+        one.event()
+        one.now_s = 1.0
+        one.camera.deliver(1)
+        one.event()
+
+        def stand_still() -> None:
+            one.now_s += 2.0
+
+        one.acquisition.submit(stand_still).result(PATIENCE_S)
+
+        assert one.event() == LightArmingEvent(1.0)
+        assert one.camera.calls == ["start", "stop"]
+
+
+def test_a_job_announces_its_light_and_a_safe_off_before_it_ends_the_job() -> None:
+    one = Running(delay_s=3.0)
+    began = threading.Event()
+    one.acquisition.start(dark=Dark("start"))
+    try:
+        occupied = one.acquisition.occupy("job", lambda camera, go_on: began.set(), offs=0)
+        assert one.event() == LightArmingEvent(3.0)
+        assert one.acquisition.status().state == "arming"
+        one.acquisition.safe_off().result(PATIENCE_S)
+        with pytest.raises(JobCancelled):
+            occupied.result(PATIENCE_S)
+        assert one.acquisition.status().state == "stopped"
+    finally:
+        one.acquisition.stop()
+
+    assert not began.is_set()
+
+
+def test_a_job_that_waited_when_the_light_was_switched_off_does_not_light() -> None:
+    with running() as one:
+        asked = one.acquisition.offs
+        one.acquisition.safe_off().result(PATIENCE_S)
+        began = threading.Event()
+        waited = one.acquisition.occupy("job", lambda camera, go_on: began.set(), offs=asked)
+        with pytest.raises(JobCancelled):
+            waited.result(PATIENCE_S)
+        one.acquisition.occupy(
+            "job", lambda camera, go_on: began.set(), offs=one.acquisition.offs
+        ).result(PATIENCE_S)
+
+    assert began.is_set()
+
+
+def test_a_device_that_shuts_its_light_off_stays_dark_until_somebody_starts() -> None:
+    with running() as one:
+        one.camera.script.put(CameraFault("the interlock was opened"))
+        off = one.event()
+        one.settle()
+        status = one.acquisition.status()
+        one.camera.interlock_closed = False
+        with pytest.raises(CameraFault):
+            one.acquisition.set_running(True).result(PATIENCE_S)
+        assert one.camera.calls == ["start"]
+        one.camera.interlock_closed = True
+        one.acquisition.set_running(True).result(PATIENCE_S)
+        one.camera.deliver(1)
+        captured = one.event()
+
+    assert isinstance(off, LightOffEvent)
+    assert (status.state, status.off_because) == ("stopped", "device")
+    assert "the interlock was opened" in str(status.reason)
+    assert numbers(captured) == [1]
+
+
+def test_an_interlock_that_opens_before_announced_light_calls_it_off() -> None:
+    with running(delay_s=3.0) as one:
+        one.event()
+        one.camera.interlock_closed = False
+        off = one.event()
+        one.camera.interlock_closed = True
+        one.now_s = 3.0
+        one.settle()
+
+    assert isinstance(off, LightOffEvent)
+    assert off.dark.cause == "device"
+    assert "start" not in one.camera.calls
+
+
+def test_a_capture_that_nobody_uses_ends() -> None:
+    with running(unused_s=60.0) as one:
+        one.camera.deliver(1)
+        one.event()
+        one.now_s = 60.0
+        one.light.used()
+        one.now_s = 120.0
+        one.settle()
+        used = one.acquisition.status().running
+        one.now_s = 121.0
+        off = one.event()
+
+    assert used
+    assert isinstance(off, LightOffEvent)
+    assert off.dark.cause == "unused"
+    assert one.camera.calls[-2:] == ["stop", "safe_off"]

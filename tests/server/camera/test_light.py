@@ -2,10 +2,14 @@
 
 import queue
 from collections.abc import Callable
+from contextlib import suppress
 from typing import cast
 
+import pytest
+
 from tests.server.camera.test_acquisition import PATIENCE_S, ScriptedCamera
-from transientcam_driver import Camera
+from tests.waiting import wait_until
+from transientcam_driver import Camera, CameraError, CameraState, open_camera
 from transientcam_server.camera import (
     Acquisition,
     Event,
@@ -93,3 +97,31 @@ def test_the_thread_of_the_camera_switches_it_off_and_on_again() -> None:
     assert off == ["start", "stop"]
     assert (status.state, status.running, status.reason) == ("held", True, held.reason)
     assert camera.calls == ["start", "stop", "start", "stop", "safe_off"]
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [f"{name}:emulated?scene=wall" for name in ("kinect2", "tofcam660", "opt8241")] + ["sim:wall"],
+)
+def test_a_camera_that_is_stopped_while_it_is_lost_is_dark_when_it_is_found(spec: str) -> None:
+    """What the acquisition relies on: `reconnect` resumes only what was not stopped."""
+    with open_camera(spec) as camera:
+        simulation = camera.simulation
+        assert simulation is not None
+        camera.start()
+        simulation.unplug()
+        with suppress(CameraError):
+            for _ in range(1000):
+                camera.read_frame(timeout_s=1.0)
+        with pytest.raises(CameraError):
+            camera.stop()
+        simulation.replug()
+
+        def found() -> bool:
+            with suppress(CameraError):
+                camera.reconnect()
+            return camera.state is not CameraState.DISCONNECTED
+
+        wait_until(found)
+        assert camera.state is CameraState.IDLE
+        assert not camera.status().light_on

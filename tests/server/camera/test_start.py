@@ -1,11 +1,13 @@
 """What the camera captures from the start is a setting."""
 
 import logging
+import math
+from typing import Any
 
 import pytest
 
 from transientcam_driver import Sequence, open_camera
-from transientcam_server.camera import start_with
+from transientcam_server.camera import LightRules, start_with
 from transientcam_server.settings import SequenceSettings, Settings
 
 
@@ -39,3 +41,36 @@ def test_a_camera_that_cannot_do_it_does_what_is_nearest(caplog: pytest.LogCaptu
     assert found.harmonics <= most
     assert found.base_frequency_hz * found.harmonics <= camera.capabilities.max_frequency_hz
     assert "starts with" in caplog.text
+
+
+def rules(spec: str, **settings: Any) -> LightRules:
+    with open_camera("sim:wall") as camera:
+        return LightRules.of(camera, Settings(camera=spec, **settings))
+
+
+def test_a_simulated_camera_captures_from_the_start_without_delay_and_for_ever() -> None:
+    found = rules("sim:wall?seed=1")
+
+    assert found == LightRules("sim:wall?seed=1", True, 0.0, math.inf)
+
+
+@pytest.mark.parametrize("spec", ["usb", "usb:42", "kinect2:emulated", "tofcam660:10.0.0.1", "own"])
+def test_any_other_camera_starts_dark_and_is_known_by_its_serial_number(spec: str) -> None:
+    with open_camera("sim:wall") as camera:
+        about = camera.capabilities
+
+    assert rules(spec) == LightRules(f"{about.model} {about.serial}", False, 3.0, 300.0)
+
+
+def test_a_recording_is_replayed_from_the_start_and_nothing_is_kept_of_it() -> None:
+    assert rules("recording:a.h5") == LightRules(None, True, 0.0, math.inf)
+
+
+@pytest.mark.parametrize("spec", ["sim:wall", "usb", "recording:a.h5"])
+def test_what_is_set_goes_before_what_suits_the_camera(spec: str) -> None:
+    light = {"delay_s": 0.5, "unused_s": 7.0}
+    lit = rules(spec, capture_at_start=True, light=light)
+    dark = rules(spec, capture_at_start=False, light={"delay_s": 0.0, "unused_s": 0.0})
+
+    assert (lit.capture_at_start, lit.delay_s, lit.unused_s) == (True, 0.5, 7.0)
+    assert (dark.capture_at_start, dark.delay_s, dark.unused_s) == (False, 0.0, math.inf)

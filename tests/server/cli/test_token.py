@@ -100,3 +100,21 @@ def test_the_file_may_be_named_on_the_command_line(
 def test_a_name_that_is_none_is_wrong_usage(name: str, file: TokenFile) -> None:
     assert run(["token", "create", name]) == 2
     assert not file
+
+
+def test_a_token_may_light_unless_it_is_made_without_that_or_for_a_viewer(
+    capsys: pytest.CaptureFixture[str], file: TokenFile
+) -> None:
+    operator = ("--role", "operator")
+    made = [
+        create(capsys, "a", *operator),
+        create(capsys, "b", *operator, "--no-may-light"),
+        create(capsys, "c"),
+    ]
+
+    assert [each["may_light"] for each in made] == [True, False, False]
+    assert run(["token", "list"]) == 0
+    rows = capsys.readouterr().out.splitlines()[1:]
+    assert [row.split()[3] for row in rows] == ["yes", "no", "no"]
+    assert run(["token", "create", "d", "--role", "viewer", "--may-light"]) == 2
+    assert len(file.tokens()) == 3

@@ -42,9 +42,20 @@ def test_a_machine_that_is_set_up_has_no_faults(tmp_path: Path) -> None:
     assert {each[0] for each in seen.values()} <= {"ok", "warning"}
     assert "numba" in seen["packages"][2]
     assert set(seen) == {
-        *("packages", "kernels", "settings", "recordings", "calibrations", "tokens"),
+        *("packages", "kernels", "settings", "recordings", "calibrations", "light", "tokens"),
         *("disk", "files", "port"),
     }
+
+
+def test_a_place_where_nothing_can_be_kept_of_the_light_is_a_fault(tmp_path: Path) -> None:
+    (tmp_path / "state").write_text("a file", encoding="utf-8")
+    file = settings(tmp_path, f"[light]\ndirectory = '{tmp_path}/state/light'\n")
+
+    level, _, message, remedy = found(file)["light"]
+
+    assert (level, str(tmp_path / "state") in message) == ("fault", True)
+    assert remedy is not None
+    assert "light.directory" in remedy
 
 
 def test_every_mistake_in_the_settings_is_a_fault_with_its_place(tmp_path: Path) -> None:

@@ -29,10 +29,12 @@ LEASE = {"holder": "a test", "duration_s": 1.0, "on_lapse": "stop"}
 
 
 class Daemon:
-    """A daemon whose loop can be stopped, before an emulated camera."""
+    """A daemon whose loop can be stopped, before an emulated camera; its light is announced."""
 
-    def __init__(self, camera: EmulatedCamera) -> None:
+    def __init__(self, camera: EmulatedCamera, directory: Path, **settings: str) -> None:
         self.camera = camera
+        self.directory = directory
+        given = {"LIGHT__DIRECTORY": str(directory), "LIGHT__DELAY_S": "0.2", **settings}
         self.process = subprocess.Popen(
             [
                 *(sys.executable, Path(__file__).with_name("stuck_daemon.py")),
@@ -41,7 +43,9 @@ class Daemon:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
-            env=camera.environment | {"NUMBA_DISABLE_JIT": "1", "COLUMNS": "200"},
+            env=camera.environment
+            | {"NUMBA_DISABLE_JIT": "1", "COLUMNS": "200"}
+            | {f"TRANSIENTCAM_{name}": value for name, value in given.items()},
         )
         assert self.process.stdout is not None
         found = re.search(r"http://\S+", self.process.stdout.readline())
@@ -53,8 +57,12 @@ class Daemon:
     def put(self, path: str, document: dict[str, Any]) -> None:
         self.client.put(f"/api/v1/{path}", json=document).raise_for_status()
 
+    def acquisition(self) -> dict[str, Any]:
+        document: dict[str, Any] = self.client.get("/api/v1/acquisition").json()
+        return document
+
     def state(self) -> str:
-        return str(self.client.get("/api/v1/acquisition").json()["state"])
+        return str(self.acquisition()["state"])
 
     @contextmanager
     def stuck(self, directory: Path) -> Iterator[None]:
@@ -78,9 +86,9 @@ class Daemon:
 
 
 @pytest.fixture(scope="module")
-def running() -> Iterator[Daemon]:
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     with emulated_camera() as camera:
-        daemon = Daemon(camera)
+        daemon = Daemon(camera, tmp_path_factory.mktemp("light"))
         try:
             yield daemon
         finally:
@@ -105,6 +113,26 @@ def watching(lit: Daemon) -> Iterator[Client]:
 
 def goes_off(daemon: Daemon) -> None:
     wait_until(lambda: not daemon.camera.lit)
+
+
+def test_a_start_lights_nothing(running: Daemon) -> None:
+    found = running.acquisition()
+
+    assert (found["state"], found["running"], found["off_because"]) == ("stopped", False, "start")
+    assert found["off_kept"]
+    assert not running.camera.lit
+
+
+def test_light_is_announced_to_clients_and_can_be_called_off(running: Daemon) -> None:
+    with streaming(running.stream_url) as client:
+        client.subscribe("flags")
+        running.put("acquisition", {"running": True})
+        assert client.notice("light-arming").details == {"in_s": 0.2}
+        running.put("acquisition", {"running": False})
+        off = client.notice("light-off").details
+
+    assert off["because"] == "stop"
+    assert "off until the capture is started" in off["reason"]
 
 
 def test_a_client_that_is_gone_leaves_a_lease_that_lapses(lit: Daemon) -> None:
@@ -150,12 +178,18 @@ def test_safe_off_needs_nothing_but_a_request(lit: Daemon) -> None:
     assert not lit.camera.lit
 
 
-def test_an_open_interlock_puts_the_light_out_by_itself(lit: Daemon) -> None:
+def test_an_open_interlock_puts_the_light_out_until_somebody_starts(lit: Daemon) -> None:
     lit.camera.do("interlock", False)
 
     assert not lit.camera.lit
-    wait_until(lambda: lit.state() == "lost")
+    wait_until(lambda: lit.state() == "stopped")
+    refused = lit.client.put("/api/v1/acquisition", json={"running": True})
+    assert (refused.status_code, refused.json()["type"]) == (502, "/problems/camera-failed")
+    assert "interlock" in refused.json()["detail"]
     lit.camera.do("interlock", True)
+    assert lit.acquisition()["off_because"] == "device"
+    assert not lit.camera.lit
+    lit.put("acquisition", {"running": True})
     wait_until(lambda: lit.camera.lit)
 
 
@@ -187,9 +221,27 @@ def test_a_host_that_hangs_is_missed_by_the_device(lit: Daemon) -> None:
     wait_until(lambda: lit.camera.lit)
 
 
-def test_a_daemon_that_is_killed_is_missed_by_the_device(lit: Daemon) -> None:
+@pytest.mark.parametrize("off", ["safe-off", "interlock", "nothing"])
+def test_a_daemon_that_is_killed_is_missed_by_the_device_and_the_next_one_lights_nothing(
+    lit: Daemon, off: str
+) -> None:
     """The last one: nothing is left to test after it."""
+    if off == "safe-off":
+        lit.client.post("/api/v1/acquisition/safe-off").raise_for_status()
+    elif off == "interlock":
+        lit.camera.do("interlock", False)
+        wait_until(lambda: bool(lit.acquisition()["off_kept"]))
+        lit.camera.do("interlock", True)
     lit.process.kill()
-
     goes_off(lit)
-    assert lit.camera.watchdog_tripped
+    lit.close()
+
+    # only where nothing switched it off may a setting light it
+    settings = {} if off == "nothing" else {"CAPTURE_AT_START": "true"}
+    restarted = Daemon(lit.camera, lit.directory, **settings)
+    vars(lit).update(vars(restarted))
+    found = lit.acquisition()
+
+    because = {"interlock": "device", "nothing": "start"}.get(off, off)
+    assert (found["state"], found["off_because"], found["off_kept"]) == ("stopped", because, True)
+    assert not lit.camera.lit

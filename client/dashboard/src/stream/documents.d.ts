@@ -9,8 +9,8 @@ export interface AbsentDocument {
 /** Whether frames are captured, and how fast. */
 export interface AcquisitionDocument {
   readonly running: boolean;
-  readonly state: "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
-  /** Why the camera is lost, or its light is held off. */
+  readonly state: "arming" | "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
+  /** Why the camera is lost, or its light is off. */
   readonly reason: string | null;
   /** Measured over the last frames; null before there are two. */
   readonly rate_hz: number | null;
@@ -20,11 +20,22 @@ export interface AcquisitionDocument {
   readonly frame_age_s: number;
   /** Whether no frame arrived for much longer than one takes. */
   readonly stalled: boolean;
+  /** Time until the light goes on, while `state` is `arming`; null else. */
+  readonly light_on_in_s: number | null;
+  /** What ended the capture: `stop`, `safe-off`, `lapse` of a lease, the `device` (its interlock),
+   * or that it was `unused`; or why none began: `start`, where the service starts none by itself,
+   * and where what is kept of the light is `unreadable` or `unwritable`. Null while it is running,
+   * and of a relay. */
+  readonly off_because: "stop" | "safe-off" | "lapse" | "device" | "unused" | "start" | "unreadable" | "unwritable" | null;
+  /** Whether the light stays off over a restart of the service; false while the disk has not taken
+   * it. Null while the capture is running, and of a relay. */
+  readonly off_kept: boolean | null;
 }
 
 /** What the acquisition should do. */
 export interface AcquisitionRequest {
-  /** Whether frames are captured; the light is off while they are not. */
+  /** Whether frames are captured; the light is off while they are not, and starts with a delay
+   * after it was announced. Starting takes the right `may_light`. */
   readonly running: boolean;
 }
 
@@ -237,12 +248,14 @@ export interface CallerDocument {
   /** of the token; `anybody` where none is required */
   readonly name: string;
   readonly role: "viewer" | "operator" | "admin";
+  /** Whether it may do what switches the light on. */
+  readonly may_light: boolean;
 }
 
 /** The camera: what it can do, and how it is. */
 export interface CameraDocument {
-  readonly state: "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
-  /** Why it is lost, or its light is held off. */
+  readonly state: "arming" | "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
+  /** Why it is lost, or its light is off. */
   readonly reason: string | null;
   readonly simulated: boolean;
   /** As the camera itself states them; units are in the names. */
@@ -624,7 +637,7 @@ export interface NeighbourDocument {
   readonly api: string;
   readonly tls: boolean;
   /** What its camera does; empty where that is not announced. */
-  readonly state: "" | "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
+  readonly state: "" | "arming" | "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
   /** since it answered, in s */
   readonly seen_s: number;
 }
@@ -1339,6 +1352,17 @@ export type Notice =
   | {
       readonly type: "notice";
       readonly kind: "camera-back";
+    }
+  | {
+      readonly type: "notice";
+      readonly kind: "light-arming";
+      readonly in_s: number;
+    }
+  | {
+      readonly type: "notice";
+      readonly kind: "light-off";
+      readonly because: string;
+      readonly reason: string;
     }
   | {
       readonly type: "notice";

@@ -25,10 +25,11 @@ class Principal:
 
     name: str
     role: Role
+    may_light: bool
     token_id: str | None = None
 
 
-UNAUTHENTICATED: Final = Principal("anybody", Role.ADMIN)
+UNAUTHENTICATED: Final = Principal("anybody", Role.ADMIN, may_light=True)
 """Every client of a service that requires no token."""
 
 
@@ -78,7 +79,7 @@ class Guard:
             token = None
         if token is None:
             raise Problem(kinds.TOKEN_REFUSED, "This token is unknown, revoked or expired.")
-        return Principal(token.name, token.rank, token.id)
+        return Principal(token.name, token.rank, token.lights, token.id)
 
 
 class Authentication:

@@ -25,22 +25,25 @@ _Endpoint = TypeVar("_Endpoint", bound=Callable[..., Any])
 
 @dataclass(frozen=True, slots=True)
 class Needs:
-    """What a route requires: at least this role, and perhaps the lease."""
+    """What a route requires: at least this role, perhaps the lease and the right to light."""
 
     role: Role
     lease: bool
+    light: bool = False
 
 
 _TO_READ: Final = Needs(Role.VIEWER, lease=False)
 TO_CHANGE: Final = Needs(Role.OPERATOR, lease=True)
 """What a change of the camera or of what is kept requires."""
+TO_LIGHT: Final = Needs(Role.OPERATOR, lease=True, light=True)
+"""What switching the light on requires; switching it off never needs the right to light."""
 
 
-def needs(role: Role, *, lease: bool) -> Callable[[_Endpoint], _Endpoint]:
+def needs(role: Role, *, lease: bool, light: bool = False) -> Callable[[_Endpoint], _Endpoint]:
     """Declare what a route requires where its method does not imply it."""
 
     def mark(endpoint: _Endpoint) -> _Endpoint:
-        setattr(endpoint, _MARK, Needs(role, lease))
+        setattr(endpoint, _MARK, Needs(role, lease, light))
         return endpoint
 
     return mark
@@ -66,7 +69,7 @@ def require(request: Request, service: Service, wanted: Needs) -> None:
     Raises
     ------
     Problem
-        ``role-too-low``, or as `LeaseManager.check`.
+        ``role-too-low``, ``may-not-light``, or as `LeaseManager.check`.
     """
     principal: Principal = request.state.principal
     if principal.role < wanted.role:
@@ -77,6 +80,14 @@ def require(request: Request, service: Service, wanted: Needs) -> None:
             field="token",
             value=str(principal.role),
             limit=str(wanted.role),
+        )
+    if wanted.light and not principal.may_light:
+        raise Problem(
+            kinds.MAY_NOT_LIGHT,
+            f"{principal.name} has not the right may_light, which whatever starts the light takes.",
+            field="token",
+            value=False,
+            limit="may_light",
         )
     if wanted.lease:
         service.lease.check(request.headers.get(LEASE_HEADER))
@@ -122,6 +133,8 @@ def _describe(operation: dict[str, Any], wanted: Needs) -> None:
     document_problems(operation, kinds.TOKEN_REQUIRED, kinds.TOKEN_REFUSED)
     if wanted.role > Role.VIEWER:
         document_problems(operation, kinds.ROLE_TOO_LOW)
+    if wanted.light:
+        document_problems(operation, kinds.MAY_NOT_LIGHT)
     if wanted.lease:
         document_problems(operation, kinds.LEASE_HELD, kinds.LEASE_LOST)
         operation.setdefault("parameters", []).append(_LEASE_PARAMETER)

@@ -54,6 +54,13 @@ class Token(BaseModel):
     sha256: str = Field(pattern=r"^[0-9a-f]{64}$", repr=False)
     created: AwareDatetime
     expires: AwareDatetime | None = None
+    may_light: bool = True
+    """As it was made; those of before there was this right have it."""
+
+    @property
+    def lights(self) -> bool:
+        """Whether its bearer may do what switches the light on; a viewer never may."""
+        return self.may_light and self.rank > Role.VIEWER
 
     @property
     def rank(self) -> Role:
@@ -123,7 +130,13 @@ class TokenFile:
         return token is not None and not token.expired(now)
 
     def create(
-        self, name: str, role: Role, *, now: datetime, expires: datetime | None = None
+        self,
+        name: str,
+        role: Role,
+        *,
+        now: datetime,
+        expires: datetime | None = None,
+        may_light: bool = True,
     ) -> tuple[Token, str]:
         """Make a token and return what is kept of it, and the token itself, which is not."""
         with self._changing() as tokens:
@@ -136,6 +149,7 @@ class TokenFile:
                 sha256=_digest(text),
                 created=now,
                 expires=expires,
+                may_light=may_light and role > Role.VIEWER,
             )
             tokens[token_id] = token
         return token, text

@@ -5,6 +5,7 @@ from typing import Any, Literal
 from pydantic import ConfigDict
 
 from transientcam_server.api._documents.document import Document
+from transientcam_server.camera import Cause, State
 
 
 class CameraDocument(Document):
@@ -60,9 +61,9 @@ class CameraDocument(Document):
         restarts: int
         """How often it was started anew meanwhile."""
 
-    state: Literal["starting", "streaming", "stopped", "calibrating", "lost", "held"]
+    state: State
     reason: str | None = None
-    """Why it is lost, or its light is held off."""
+    """Why it is lost, or its light is off."""
     simulated: bool
     capabilities: dict[str, Any]
     """As the camera itself states them; units are in the names."""
@@ -82,9 +83,9 @@ class AcquisitionDocument(Document):
     """Whether frames are captured, and how fast."""
 
     running: bool
-    state: Literal["starting", "streaming", "stopped", "calibrating", "lost", "held"]
+    state: State
     reason: str | None = None
-    """Why the camera is lost, or its light is held off."""
+    """Why the camera is lost, or its light is off."""
     rate_hz: float | None = None
     """Measured over the last frames; null before there are two."""
     frames: int
@@ -93,6 +94,16 @@ class AcquisitionDocument(Document):
     """Since the last frame arrived."""
     stalled: bool
     """Whether no frame arrived for much longer than one takes."""
+    light_on_in_s: float | None = None
+    """Time until the light goes on, while `state` is `arming`; null else."""
+    off_because: Cause | None = None
+    """What ended the capture: `stop`, `safe-off`, `lapse` of a lease, the `device` (its interlock),
+    or that it was `unused`; or why none began: `start`, where the service starts none by itself,
+    and where what is kept of the light is `unreadable` or `unwritable`. Null while it is running,
+    and of a relay."""
+    off_kept: bool | None = None
+    """Whether the light stays off over a restart of the service; false while the disk has not taken
+    it. Null while the capture is running, and of a relay."""
 
 
 class AcquisitionRequest(Document):
@@ -103,4 +114,5 @@ class AcquisitionRequest(Document):
     )
 
     running: bool
-    """Whether frames are captured; the light is off while they are not."""
+    """Whether frames are captured; the light is off while they are not, and starts with a delay
+    after it was announced. Starting takes the right `may_light`."""

@@ -16,6 +16,8 @@ class InfoDocument(Document):
 
         name: str = Field(description="of the token; `anybody` where none is required")
         role: Literal["viewer", "operator", "admin"]
+        may_light: bool
+        """Whether it may do what switches the light on."""
 
     class ProductDocument(Document):
         """An array that can be requested of a frame."""

@@ -2,10 +2,10 @@
 
 import asyncio
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 
 from transientcam_server.api._auth import Role
-from transientcam_server.api._auth.permissions import needs
+from transientcam_server.api._auth.permissions import TO_LIGHT, needs, require
 from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._documents.camera import AcquisitionDocument, AcquisitionRequest
 from transientcam_server.api._problems import documented
@@ -27,17 +27,26 @@ async def read_acquisition(service: ServiceOf) -> AcquisitionDocument:
     responses=documented(
         kinds.BAD_REQUEST,
         kinds.INVALID_REQUEST,
+        kinds.MAY_NOT_LIGHT,
         kinds.CAMERA_BUSY,
         kinds.CAMERA_FAILED,
         kinds.CAMERA_LOST,
     ),
 )
-async def change_acquisition(service: ServiceOf, wanted: AcquisitionRequest) -> AcquisitionDocument:
+async def change_acquisition(
+    service: ServiceOf, wanted: AcquisitionRequest, http: Request
+) -> AcquisitionDocument:
     """Start or stop capturing; the camera's light is off while it does not.
 
-    A calibration that is being measured is ended by stopping.
+    Starting takes the right `may_light`. The light goes on once it was announced for the setting
+    `light.delay_s`: `state` is `arming` until then. Stopping ends calibrations that are measured or
+    wait for that, and holds over a restart of the service.
     """
-    await asyncio.wrap_future(service.acquisition.set_running(wanted.running))
+    if wanted.running:
+        require(http, service, TO_LIGHT)
+        await asyncio.wrap_future(service.acquisition.set_running(True))
+    else:
+        await service.off(service.acquisition.set_running(False))
     return _document(service)
 
 
@@ -50,10 +59,11 @@ async def change_acquisition(service: ServiceOf, wanted: AcquisitionRequest) -> 
 async def switch_off(service: ServiceOf) -> AcquisitionDocument:
     """Stop capturing and switch the light off, whichever client holds the lease.
 
-    Where the camera cannot be reached it is not started again when it is back; its own watchdog
-    switches the light off as soon as it receives nothing from here.
+    It stays off, also over a restart of the service or of the camera, until somebody starts the
+    capture. Where the camera cannot be reached its own watchdog switches the light off as soon as
+    it receives nothing from here.
     """
-    await asyncio.wrap_future(service.acquisition.safe_off())
+    await service.off(service.acquisition.safe_off())
     return _document(service)
 
 

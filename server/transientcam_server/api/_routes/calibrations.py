@@ -87,6 +87,7 @@ async def read_calibrations(service: ServiceOf) -> CalibrationsDocument:
         kinds.TOO_MANY_JOBS,
     ),
 )
+@needs(Role.OPERATOR, lease=True, light=True)
 async def measure_calibration(
     service: ServiceOf, response: Response, wanted: CalibrationRequest
 ) -> JobDocument:
@@ -94,10 +95,11 @@ async def measure_calibration(
 
     Put filter and diffuser before the lens first, so that the light shines at the sensor
     (Sec. 4.2). The job has the camera for itself, so that no frames come meanwhile; switching the
-    light off ends it. Its result holds the id of the calibration, in `calibration`, and in
-    `verdict` whether the images look like a diffuser's. If they don't, the calibration is kept, but
-    not used without `force`: `activated` says whether it is. `harmonics` has those of the
-    modulation, from a phase sweep, or `no_harmonics` why there are none.
+    light off ends it, also while it waits. It takes the right `may_light`, and announces the light.
+    Its result holds the id of the calibration, in `calibration`, and in `verdict` whether the
+    images look like a diffuser's. If they don't, the calibration is kept, but not used without
+    `force`: `activated` says whether it is. `harmonics` has those of the modulation, from a phase
+    sweep, or `no_harmonics` why there are none.
     """
     running = service.recordings.active_id
     if running is not None:

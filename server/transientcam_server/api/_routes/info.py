@@ -44,7 +44,11 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
             for name, reason in service.pipeline.absent.items()
         ],
         caller=InfoDocument.CallerDocument.model_validate(
-            {"name": principal.name, "role": str(principal.role)}
+            {
+                "name": principal.name,
+                "role": str(principal.role),
+                "may_light": principal.may_light,
+            }
         ),
         history=HistoryDocument.model_validate(service.history),
         clients=service.hub.clients,

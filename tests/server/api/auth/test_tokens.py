@@ -152,3 +152,30 @@ def test_a_directory_in_its_place_is_reported_in_a_sentence(tmp_path: Path) -> N
 def test_roles_are_ordered() -> None:
     assert Role.VIEWER < Role.OPERATOR < Role.ADMIN
     assert [Role.named(str(role)) for role in Role] == list(Role)
+
+
+@pytest.mark.parametrize("role", Role)
+def test_a_token_of_before_the_right_to_light_has_it_as_its_role_has(
+    file: TokenFile, role: Role
+) -> None:
+    _, text = file.create("a", role, now=NOW)
+    document = json.loads(file.path.read_bytes())
+    del document["tokens"][0]["may_light"]
+    file.path.write_text(json.dumps(document), encoding="utf-8")
+
+    token = file.find(text, now=NOW)
+
+    assert token is not None
+    assert token.lights == (role is not Role.VIEWER)
+
+
+def test_a_viewer_may_not_light_whatever_the_file_says(file: TokenFile) -> None:
+    _, text = file.create("a", Role.VIEWER, now=NOW)
+    document = json.loads(file.path.read_bytes())
+    document["tokens"][0]["may_light"] = True
+    file.path.write_text(json.dumps(document), encoding="utf-8")
+
+    token = file.find(text, now=NOW)
+
+    assert token is not None
+    assert not token.lights

@@ -15,7 +15,7 @@ def test_the_service_says_what_it_is_and_what_its_frames_have(http: httpx.Client
         "asyncapi": "/asyncapi.json",
         "encodings": list(wire.encoding_names()),
     }
-    assert info["caller"] == {"name": "anybody", "role": "admin"}
+    assert info["caller"] == {"name": "anybody", "role": "admin", "may_light": True}
     products = {product["name"]: product for product in info["products"]}
     assert set(products) == set(wire.PRODUCTS)
     images = ["msgpack", "npy", "npz", "png", "tiff", "csv"]

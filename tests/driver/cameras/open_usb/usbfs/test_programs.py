@@ -47,7 +47,9 @@ def daemon(camera: EmulatedCamera) -> Iterator[tuple[str, "subprocess.Popen[str]
         ],
         stdout=subprocess.PIPE,
         text=True,
-        env=camera.environment | {"NUMBA_DISABLE_JIT": "1", "COLUMNS": "200"},
+        env=camera.environment
+        | {"NUMBA_DISABLE_JIT": "1", "COLUMNS": "200"}
+        | {"TRANSIENTCAM_CAPTURE_AT_START": "true", "TRANSIENTCAM_LIGHT__DELAY_S": "0"},
     )
     assert process.stdout is not None
     try:
