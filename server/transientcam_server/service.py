@@ -36,6 +36,7 @@ from transientcam_server.camera import (
     OriginLease,
     SequenceChanged,
     SharedAcquisition,
+    Supervision,
     Timer,
     load_given,
     sensor_of,
@@ -143,7 +144,12 @@ class Service:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._light = LightGuard(unserved_s=settings.limits.unserved_s)
         self.acquisition = (
-            Acquisition(camera, report=self._from_acquisition, light=self._light)
+            Acquisition(
+                camera,
+                report=self._from_acquisition,
+                light=self._light,
+                supervision=Supervision(camera, silence_s=settings.limits.unserved_s),
+            )
             if self.relay is None
             else SharedAcquisition(self.relay, report=self._from_acquisition, light=self._light)
         )

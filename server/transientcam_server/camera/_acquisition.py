@@ -34,6 +34,7 @@ from transientcam_server.camera._events import (
 )
 from transientcam_server.camera._light import LightGuard
 from transientcam_server.camera._status import AcquisitionStatus, State
+from transientcam_server.camera._supervision import Supervision
 from transientcam_server.errors import JobCancelled, Problem, SequenceConflict, kinds
 
 _log = logging.getLogger("transientcam_server.camera.acquisition")
@@ -59,9 +60,11 @@ class Acquisition:
         *,
         report: Callable[[Event], None],
         light: LightGuard | None = None,
+        supervision: Supervision | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._light = LightGuard(unserved_s=math.inf, clock=clock) if light is None else light
+        self._supervision = supervision or Supervision(None, silence_s=math.inf)
         self._camera = camera
         self._report = report
         self._clock = clock
@@ -76,6 +79,7 @@ class Acquisition:
         self._connected = True
         self._lost: str | None = None
         self._held: str | None = None
+        self._switched_off: str | None = None
         self._started = False
         self._attempts = 0
         self._frames = 0
@@ -199,7 +203,7 @@ class Acquisition:
             rate_hz=rate_hz,
             frames=self._frames,
             frame_age_s=age_s,
-            reason=self._lost or self._held,
+            reason=self._lost or self._held or self._switched_off,
             stalled=state in ("starting", "streaming") and age_s > self._stall_after_s(),
         )
 
@@ -224,6 +228,7 @@ class Acquisition:
         while not self._stopping.is_set():
             try:
                 self._run_commands(wait_s=0.0)
+                self._beat()
                 self._step()
             except CameraError as error:
                 self._camera_lost(str(error))
@@ -232,6 +237,20 @@ class Acquisition:
                 _log.exception("the acquisition failed and is continued")
                 self._run_commands(wait_s=BACKOFF_S[-1])
         self._shut_down()
+
+    def _beat(self) -> None:
+        """Tell the supervisor that the light is under control, and hear what it has done."""
+        connected, supervision = self._connected, self._supervision
+        self._act_on_supervisor(
+            supervision.beat(lit=self._started) if connected else supervision.lost()
+        )
+
+    def _act_on_supervisor(self, reason: str | None) -> None:
+        """Stay dark until somebody starts, where the supervisor has switched off or is gone."""
+        if reason is not None:
+            _log.error("the light is off until the capture is started: %s", reason)
+            self._switched_off = reason
+            self._safe_off()
 
     def _step(self) -> None:
         if self._light_is_held():
@@ -246,9 +265,11 @@ class Acquisition:
             self._camera.status()  # detects an unplug while nothing is read
             self._camera_works()
         elif not self._started:
-            self._camera.start()
-            self._started = True
-            self._moved_s = self._clock()
+            self._act_on_supervisor(self._supervision.starting())
+            if self._running:
+                self._camera.start()
+                self._started = True
+                self._moved_s = self._clock()
         else:
             self._read()
 
@@ -311,6 +332,7 @@ class Acquisition:
     def _set_running(self, running: bool) -> None:
         if running != self._running:
             self._running = running
+            self._switched_off = None
             self._arrivals_s.clear()
             self._moved_s = self._clock()
             if not running and self._started:
@@ -324,7 +346,9 @@ class Acquisition:
     def _occupy(self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T]) -> _T:
         def go_on() -> None:
             self._act_on_lapse()
-            if self._interrupted.is_set() or self._light.unserved() is not None:
+            self._act_on_supervisor(self._supervision.starting())
+            dark = self._light.unserved() is not None or self._switched_off is not None
+            if dark or self._interrupted.is_set():
                 raise JobCancelled(job_id)
             self._run_commands(wait_s=0.0)  # those that do not need the camera, or cancel this job
 
@@ -404,8 +428,11 @@ class Acquisition:
         self._switch_off_at_end()
 
     def _switch_off_at_end(self) -> None:
+        dark = True
         try:
             self._camera.safe_off()
         except CameraError as error:
-            # it is unplugged, or its heartbeat ends and it turns its light off by itself
+            # it is unplugged, or its light goes off by its heartbeat or by its supervisor
             _log.info("the camera could not be stopped: %s", error)
+            dark = False
+        self._supervision.close(dark=dark)

@@ -25,7 +25,7 @@ class AcquisitionStatus:
     frame_age_s
         Since the last frame, or since the start where there was none.
     reason
-        Why the camera is lost or held.
+        Why the camera is lost or held, or was switched off by its supervisor.
     stalled
         Whether frames are to be captured and the camera is there, but none came for too long.
     """

@@ -62,8 +62,11 @@ class CameraDocument(Document):
 
     state: Literal["starting", "streaming", "stopped", "calibrating", "lost", "held"]
     reason: str | None = None
-    """Why it is lost, or its light is held off."""
+    """Why it is lost, its light is held off, or its supervisor switched it off."""
     simulated: bool
+    light_warning: str | None = None
+    """Of a camera without a watchdog of its own: what switches its light off when this service
+    fails, and what does not; null where the camera does so by itself, or has no light here."""
     capabilities: dict[str, Any]
     """As the camera itself states them; units are in the names."""
     intrinsics: IntrinsicsDocument
@@ -84,7 +87,7 @@ class AcquisitionDocument(Document):
     running: bool
     state: Literal["starting", "streaming", "stopped", "calibrating", "lost", "held"]
     reason: str | None = None
-    """Why the camera is lost, or its light is held off."""
+    """Why the camera is lost, its light is held off, or its supervisor switched it off."""
     rate_hz: float | None = None
     """Measured over the last frames; null before there are two."""
     frames: int

@@ -1,0 +1,96 @@
+"""Who switches the light off where the thread that owns the camera cannot: another process."""
+
+from collections.abc import Callable
+
+from transientcam_compiled import python
+from transientcam_driver import Camera, CameraError
+from transientcam_supervisor import Supervisor, SupervisorEnded
+
+
+class Supervision:
+    """A supervisor of a camera's light; none where there is no light, or it has no off switch.
+
+    For the thread that owns the camera.
+
+    Parameters
+    ----------
+    camera
+        Whose light it is; None for none.
+    silence_s
+        The light goes off after so long without a `beat`.
+    """
+
+    def __init__(self, camera: Camera | None, *, silence_s: float) -> None:
+        self._camera = camera if camera is not None and has_light(camera) else None
+        self._supervisor = Supervisor(python(), silence_s=silence_s)
+
+    def starting(self) -> str | None:
+        """Have the camera watched before its light is switched on; as `beat`.
+
+        Raises
+        ------
+        CameraError
+            There is no supervisor; the light has to stay off.
+        """
+        switch = None if self._camera is None else self._camera.off_switch
+        if switch is None or not switch.steps:
+            return None
+        try:
+            self._supervisor.watch(switch)
+        except SupervisorEnded as error:
+            raise CameraError(f"the light stays off: {error}") from error
+        return self._told(self._supervisor.starting)
+
+    def beat(self, *, lit: bool) -> str | None:
+        """Say that the light is under control; return why it has to be off until somebody starts.
+
+        Parameters
+        ----------
+        lit
+            Whether it may be on.
+        """
+        return self._told(self._supervisor.alive if lit else self._supervisor.dark)
+
+    def lost(self) -> str | None:
+        """Switch the light off by all means, as it is not known how the camera stands; as `beat`."""
+        if self._camera is None:
+            return None
+        try:
+            self._camera.stop()  # also so that `reconnect` does not start it unwatched
+        except CameraError:
+            return self._told(self._supervisor.switch_off)
+        return self.beat(lit=False)
+
+    def close(self, *, dark: bool) -> None:
+        """Need it no more; where the light is not known to be off, it is to switch it off."""
+        self._supervisor.close(dark=dark)
+
+    @staticmethod
+    def _told(tell: Callable[[], str | None]) -> str | None:
+        try:
+            return tell()
+        except SupervisorEnded as error:
+            return str(error)
+
+
+def has_light(camera: Camera) -> bool:
+    """Whether there is a real light at this machine."""
+    return camera.simulation is None and camera.off_switch is not None
+
+
+def light_warning(camera: Camera) -> str | None:
+    """Return what is to be known of a light that no watchdog of its own switches off, or None."""
+    switch = camera.off_switch
+    if camera.simulation is not None or switch is None:
+        return None
+    if camera.capabilities.heartbeat_s or switch.ends_s:
+        return None
+    if switch.steps:
+        return (
+            "The camera has no watchdog. A supervisor switches its light off when this service dies "
+            "or hangs; when this machine does, the light stays on until the camera has no power."
+        )
+    return (
+        "The camera has no watchdog, and no other process can switch its light off: when this "
+        "service dies or hangs, the light stays on until the camera has no power."
+    )
