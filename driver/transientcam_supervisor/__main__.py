@@ -1,7 +1,7 @@
 """The process that switches the light off: ``python -m transientcam_supervisor FD PID SILENCE_S``.
 
-FD is its end of a socket to the process PID, which owns the camera. The first byte of a message says
-what it is: see `_supervisor`.
+FD is its end of a socket to the process PID, which owns the camera. The first byte of a message
+says what it is: see `_supervisor`.
 """
 
 import ctypes
@@ -27,7 +27,7 @@ from transientcam_supervisor._supervisor import (
 )
 from transientcam_supervisor._switch import OffSwitch
 
-AGAIN_S: Final = 0.25
+AGAIN_S: Final = 0.1
 """From one attempt to the next, until the light is known to be off."""
 GIVE_UP_S: Final = 10.0
 """Without the owner: by then the camera is unplugged, or another owner has it."""

@@ -52,7 +52,7 @@ class Supervision:
         return self._told(self._supervisor.alive if lit else self._supervisor.dark)
 
     def lost(self) -> str | None:
-        """Switch the light off by all means, as it is not known how the camera stands; as `beat`."""
+        """Switch the light off by all means: how the camera stands is not known; as `beat`."""
         if self._camera is None:
             return None
         try:
@@ -87,8 +87,9 @@ def light_warning(camera: Camera) -> str | None:
         return None
     if switch.steps:
         return (
-            "The camera has no watchdog. A supervisor switches its light off when this service dies "
-            "or hangs; when this machine does, the light stays on until the camera has no power."
+            "The camera has no watchdog. A supervisor switches its light off when this service "
+            "dies or hangs; when this machine does, the light stays on until the camera has no "
+            "power."
         )
     return (
         "The camera has no watchdog, and no other process can switch its light off: when this "

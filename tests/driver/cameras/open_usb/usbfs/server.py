@@ -6,6 +6,7 @@ A command is a JSON list: what to do, and its arguments.
 import json
 import os
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,16 @@ from transientcam_driver.clock import RealClock
 from transientcam_simulation.emulated import build, find_scene, without_noise
 from transientcam_simulation.emulated._open_usb import EmulatedDevice
 from transientcam_simulation.emulated._open_usb.faults import Fault
+
+
+class Slow(RealClock):
+    """A tenth of real time: frames of 2.7 MB thirty times a second would take a whole core."""
+
+    def now_s(self) -> float:
+        return super().now_s() / 10
+
+    def wait(self, condition: threading.Condition, timeout_s: float) -> None:
+        super().wait(condition, timeout_s * 10)
 
 
 class Prototype:
@@ -47,7 +58,7 @@ class Kinect2:
     """A Kinect v2."""
 
     def __init__(self, root: Path) -> None:
-        camera = kinects.emulated()
+        camera = kinects.emulated(clock=Slow())
         self.mount = Usb3Mount(camera, kinects.SERIAL, root)
         self.device = self.mount.device
         self.lit: Callable[[], bool] = lambda: camera.lit
