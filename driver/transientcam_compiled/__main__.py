@@ -77,8 +77,10 @@ def be_a_child(parent: int, memory_bytes: int) -> None:
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("1000")
     with suppress(OSError, ValueError):  # less is allowed anyway
+        status = Path("/proc/self/status").read_text().split()
+        libraries_bytes = int(status[status.index("VmData:") + 1]) * 1024
         _, most = resource.getrlimit(resource.RLIMIT_DATA)
-        resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, most))
+        resource.setrlimit(resource.RLIMIT_DATA, (libraries_bytes + memory_bytes, most))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 MEMORY_BYTES: Final = 3 << 29
-"""What a process may have for its data: five times what planning or compiling takes."""
+"""What a process may have for data beyond its libraries: five times what a plan takes."""
 NICE: Final = 10
 """A tenth of the processor time beside others that need all of it, all that is left else."""
 _ASK_EVERY_S: Final = 0.25
@@ -46,7 +46,8 @@ class ChildProcess:
     idle
         Called there after each second without a call.
     memory_bytes
-        For its data (``RLIMIT_DATA``): what needs more raises `MemoryError` there.
+        For data beyond that of its libraries (``RLIMIT_DATA``): what needs more raises
+        `MemoryError` there.
     """
 
     def __init__(
@@ -69,7 +70,9 @@ class ChildProcess:
             Where the system gives no process, or where Python cannot be started once more.
         """
         if self._process is not None:
-            return
+            if self._process.poll() is None:
+                return
+            self.end()
         program = python()
         if program is None:
             raise OSError("there is no Python to start beside this program")
