@@ -135,8 +135,10 @@ class Supervisor:
             reason = self._news()
             if reason is not None:
                 return reason
-            self._link.setblocking(False)
-            self._link.send(message)
+            try:
+                self._link.send(message)
+            except ConnectionError:  # its last words may have come meanwhile
+                return self._news()
         except OSError as error:
             self.end()
             raise SupervisorEnded(f"the supervisor has ended: {error}") from error
@@ -177,6 +179,8 @@ class Supervisor:
                 if self._asked_s is not None and self._clock() - self._asked_s > patience_s:
                     raise TimeoutError(f"no answer for {patience_s:g} s") from None
                 return None
+            except ConnectionResetError:  # it left something unread; its own words are there
+                continue
             if not said:
                 raise ConnectionResetError("its end of the connection is closed")
             self._asked_s = None

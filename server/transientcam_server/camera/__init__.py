@@ -37,7 +37,7 @@ from transientcam_server.camera._origin_lease import OriginLease
 from transientcam_server.camera._shared import SharedAcquisition
 from transientcam_server.camera._source import sensor_of, snapshot_of, start_with
 from transientcam_server.camera._status import AcquisitionStatus
-from transientcam_server.camera._supervision import Supervision, light_warning
+from transientcam_server.camera._supervision import Supervision
 
 __all__ = [
     "DEFAULT_DURATION_S",
@@ -69,7 +69,6 @@ __all__ = [
     "Supervision",
     "Timer",
     "lease",
-    "light_warning",
     "load_given",
     "sensor_of",
     "snapshot_of",

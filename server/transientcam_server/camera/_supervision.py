@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from transientcam_compiled import python
 from transientcam_driver import Camera, CameraError
+from transientcam_driver.camera import has_light
 from transientcam_supervisor import Supervisor, SupervisorEnded
 
 
@@ -71,27 +72,3 @@ class Supervision:
             return tell()
         except SupervisorEnded as error:
             return str(error)
-
-
-def has_light(camera: Camera) -> bool:
-    """Whether there is a real light at this machine."""
-    return camera.simulation is None and camera.off_switch is not None
-
-
-def light_warning(camera: Camera) -> str | None:
-    """Return what is to be known of a light that no watchdog of its own switches off, or None."""
-    switch = camera.off_switch
-    if camera.simulation is not None or switch is None:
-        return None
-    if camera.capabilities.heartbeat_s or switch.ends_s:
-        return None
-    if switch.steps:
-        return (
-            "The camera has no watchdog. A supervisor switches its light off when this service "
-            "dies or hangs; when this machine does, the light stays on until the camera has no "
-            "power."
-        )
-    return (
-        "The camera has no watchdog, and no other process can switch its light off: when this "
-        "service dies or hangs, the light stays on until the camera has no power."
-    )

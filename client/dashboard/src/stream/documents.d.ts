@@ -10,7 +10,7 @@ export interface AbsentDocument {
 export interface AcquisitionDocument {
   readonly running: boolean;
   readonly state: "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
-  /** Why the camera is lost, or its light is held off. */
+  /** Why the camera is lost, its light is held off, or its supervisor switched it off. */
   readonly reason: string | null;
   /** Measured over the last frames; null before there are two. */
   readonly rate_hz: number | null;
@@ -242,9 +242,12 @@ export interface CallerDocument {
 /** The camera: what it can do, and how it is. */
 export interface CameraDocument {
   readonly state: "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
-  /** Why it is lost, or its light is held off. */
+  /** Why it is lost, its light is held off, or its supervisor switched it off. */
   readonly reason: string | null;
   readonly simulated: boolean;
+  /** Of a camera without a watchdog of its own: what switches its light off when this service
+   * fails, and what does not; null where the camera does so by itself, or has no light here. */
+  readonly light_warning: string | null;
   /** As the camera itself states them; units are in the names. */
   readonly capabilities: Readonly<Record<string, unknown>>;
   /** Where the pixels look: (column, row) along ((c - cx) / fx, (r - cy) / fy, 1), but for the

@@ -8,9 +8,9 @@ from typing import Any
 from fastapi import APIRouter
 
 from transientcam_driver import CameraError, Status
+from transientcam_driver.camera import light_warning
 from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._documents.camera import CameraDocument
-from transientcam_server.camera import light_warning
 from transientcam_server.relay import RelayCamera
 
 router = APIRouter(tags=["camera"])
