@@ -33,7 +33,15 @@ from transientcam_supervisor._device import Device
 SOON_S = 0.2
 NEVER_S = 3600.0
 OFF = b"off"
-FORBIDDEN = {"h5py", "numba", "numpy", "usb", "usb1", "transientcam_driver", "transientcam_compiled"}
+FORBIDDEN = {
+    "h5py",
+    "numba",
+    "numpy",
+    "usb",
+    "usb1",
+    "transientcam_driver",
+    "transientcam_compiled",
+}
 
 
 class Light:
