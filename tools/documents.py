@@ -18,7 +18,9 @@ from pathlib import Path
 from textwrap import indent
 from typing import Any
 
-from light_table import with_table
+from light_table import (  # type: ignore[import-not-found]  # beside this script, no package
+    with_table,
+)
 
 from transientcam_driver import open_camera
 from transientcam_server.api._app import API, build_app

@@ -56,7 +56,7 @@ def _cells(spec: str) -> Iterator[str]:
     if not switch.steps:
         yield from [alone] * 5
         return
-    yield "the supervisor, 0.3 s"
+    yield f"the supervisor, 0.3 s, or {silence_s:g} s + 0.3 s where a core is dumped"
     yield f"the supervisor, {silence_s:g} s + 0.3 s"
     yield f"the supervisor, {silence_s + switch.start_s:g} s + 0.3 s"
     yield f"the daemon, 0.2 s, or {2 * silence_s:g} s where it hangs"

@@ -172,9 +172,14 @@ def test_at_its_own_end_it_switches_the_light_off_and_says_so(
     os.kill(supervisor.pid, number)
 
     light.goes_off()
-    said: list[str | None] = []
-    wait_until(lambda: bool(said.append(supervisor.alive()) or said[-1]))
-    assert said[-1] == "the supervisor was ended"
+    said: list[str] = []
+
+    def says_why() -> bool:
+        said.extend(filter(None, [supervisor.alive()]))
+        return bool(said)
+
+    wait_until(says_why)
+    assert said == ["the supervisor was ended"]
 
 
 def test_it_outlives_its_owner_until_the_light_is_off(light: Light, supervisor: Supervisor) -> None:

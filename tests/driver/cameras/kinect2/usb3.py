@@ -7,6 +7,7 @@ link that the emulation has anyway.
 import errno
 import socket
 import struct
+import threading
 from collections import deque
 from pathlib import Path
 
@@ -92,6 +93,7 @@ class Usb3Mount(UsbfsMount):
         self.streaming = False
         self.link: EmulatedLink | None = None
         self.requests_to_stall = 0
+        self._switching = threading.Lock()
         super().__init__(OnBus(camera, serial), root)
 
     def client_of(self, connection: socket.socket) -> Client:
@@ -110,11 +112,12 @@ class Usb3Mount(UsbfsMount):
             self.streaming = streaming
             self.packets.clear()
             self.device.changed.notify_all()
-        link = self.linked()
-        link.set_stream_enabled(streaming)
-        link.stop_images()
-        if streaming:
-            link.start_images(self.push, lambda error: None)
+        with self._switching:
+            link = self.linked()
+            link.set_stream_enabled(streaming)
+            link.stop_images()
+            if streaming:
+                link.start_images(self.push, lambda error: None)
 
     def close(self) -> None:
         if self.link is not None and self.device.plugged:
@@ -232,7 +235,8 @@ class Usb3Client(Client):
         self, request_type: int, request: int, value: int, index: int, length: int, data: bytes
     ) -> bytes:
         if request == _GET_DESCRIPTOR and value >> 8 == _STRING:
-            return self._device.strings[value & 0xFF]
+            string: bytes = self._device.strings[value & 0xFF]
+            return string
         if request == _GET_INTERFACE:
             return bytes([self._usb.streaming])
         if (request_type, request, value) == (_TO_INTERFACE, _SET_FEATURE, _FUNCTION_SUSPEND):
