@@ -1,4 +1,4 @@
-"""Types of the documents for both clients, made of what the service states of itself.
+"""What is written of what the programs state: types for both clients, a table of operations.md.
 
 The models of `transientcam_server.api._documents` state each document once. OpenAPI and AsyncAPI
 documents follow from them, and of these the types of the Python client and of the dashboard: run
@@ -18,6 +18,10 @@ from pathlib import Path
 from textwrap import indent
 from typing import Any
 
+from light_table import (  # type: ignore[import-not-found]  # beside this script, no package
+    with_table,
+)
+
 from transientcam_driver import open_camera
 from transientcam_server.api._app import API, build_app
 from transientcam_server.api._docs.asyncapi import asyncapi
@@ -27,6 +31,7 @@ _ROOT = Path(__file__).parents[1]
 _DASHBOARD = _ROOT / "client/dashboard"
 PYTHON = _ROOT / "client/transientcam/documents.py"
 TYPESCRIPT = _DASHBOARD / "src/stream/documents.d.ts"
+OPERATIONS = _ROOT / "docs/operations.md"
 _WRITTEN = "`python tools/documents.py --write` writes this file"
 _OF_A_FRAME = (
     "PixelCountsDocument",
@@ -73,7 +78,11 @@ def files() -> dict[Path, str]:
     )
     ruff = (sys.executable, "-m", "ruff", "format", f"--stdin-filename={PYTHON}", "-")
     biome = (_DASHBOARD / "node_modules/.bin/biome", "format", f"--stdin-file-path={TYPESCRIPT}")
-    return {PYTHON: _formatted(python, ruff), TYPESCRIPT: _formatted(typescript, biome)}
+    return {
+        PYTHON: _formatted(python, ruff),
+        TYPESCRIPT: _formatted(typescript, biome),
+        OPERATIONS: with_table(OPERATIONS.read_text(encoding="utf-8")),
+    }
 
 
 def _operations(paths: _Schema) -> Iterator[tuple[str, _Schema]]:

@@ -12,7 +12,7 @@ for its results.
 from transientcam_compiled._cache import Cache, NotKept, only_from_cache
 from transientcam_compiled._kernels import THREAD, Kernels
 from transientcam_compiled._memory import empty
-from transientcam_compiled._process import ChildProcess, ProcessEnded, Tell
+from transientcam_compiled._process import ChildProcess, ProcessEnded, Tell, python
 from transientcam_compiled._spread import (
     BLOCK,
     Part,
@@ -46,6 +46,7 @@ __all__ = [
     "only_from_cache",
     "over",
     "over_all_cores",
+    "python",
     "use_all_cores",
     "use_one_thread",
 ]

@@ -1,29 +1,33 @@
 """The other side of `ChildProcess`: calls what arrives, until this process's parent is gone."""
 
+import ctypes
 import os
 import pickle
 import queue
+import resource
 import signal
 import sys
 import threading
+from contextlib import suppress
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Final, NoReturn
 
 from transientcam_compiled._process import NICE
 
 _LOOK_EVERY_S: Final = 1.0
 _IDLE_S: Final = 1.0
+_PR_SET_PDEATHSIG: Final = 1
 
 
-def serve(connection: Connection) -> NoReturn:
+def serve(connection: Connection, parent: int) -> NoReturn:
     """Call what arrives, and send what it says and then what it returns or raises.
 
-    The process ends with the other side. That is noticed while something is called, too: by the end
-    of the connection, or by another parent, where a process of the other side has inherited its
-    end.
+    The process ends with the other side, its parent. That is noticed while something is called,
+    too: by the end of the connection, or by another parent, where a process of the other side has
+    inherited its end.
     """
     received: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-    parent = os.getppid()
 
     def receive() -> None:
         try:
@@ -59,8 +63,29 @@ def serve(connection: Connection) -> NoReturn:
                 send("raised", error)
 
 
+def be_a_child(parent: int, memory_bytes: int) -> None:
+    """End with a parent, also where nothing here can run, and take from others what they leave.
+
+    What the system refuses, as the sandbox of a service may, is left.
+    """
+    with suppress(OSError, AttributeError):  # not Linux
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it ended before that
+        os._exit(0)
+    with suppress(OSError):
+        os.nice(NICE)
+    with suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text("1000")
+    with suppress(OSError, ValueError):  # less is allowed anyway
+        status = Path("/proc/self/status").read_text().split()
+        libraries_bytes = int(status[status.index("VmData:") + 1]) * 1024
+        _, most = resource.getrlimit(resource.RLIMIT_DATA)
+        resource.setrlimit(resource.RLIMIT_DATA, (libraries_bytes + memory_bytes, most))
+
+
 if __name__ == "__main__":
-    os.nice(NICE)
+    _connection, _parent, _memory_bytes = map(int, sys.argv[1:])
+    be_a_child(_parent, _memory_bytes)
     # Ctrl-C at a terminal is for the other side
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    serve(Connection(int(sys.argv[1])))
+    serve(Connection(_connection), _parent)

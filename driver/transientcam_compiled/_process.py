@@ -13,6 +13,8 @@ from multiprocessing import Pipe
 from pathlib import Path
 from typing import Any, Final
 
+MEMORY_BYTES: Final = 3 << 29
+"""What a process may have for data beyond its libraries: five times what a plan takes."""
 NICE: Final = 10
 """A tenth of the processor time beside others that need all of it, all that is left else."""
 _ASK_EVERY_S: Final = 0.25
@@ -33,7 +35,9 @@ class ChildProcess:
 
     It is a fresh Python with this `sys.path`, which runs no main module, so that nothing of a
     script runs twice. It has a low priority (`NICE`) and leaves Ctrl-C at a terminal to this one.
-    It ends with this one, however this one ends and whatever it does then. For one thread.
+    Where memory is short it is the first to go, and it gets no more than ``memory_bytes``.
+    It ends with the thread that started it, however that ends and whatever it does then. For one
+    thread.
 
     Parameters
     ----------
@@ -41,14 +45,20 @@ class ChildProcess:
         Returns the context that everything is called in there.
     idle
         Called there after each second without a call.
+    memory_bytes
+        For data beyond that of its libraries (``RLIMIT_DATA``): what needs more raises
+        `MemoryError` there.
     """
 
     def __init__(
         self,
         inside: Callable[[], AbstractContextManager[object]] = nullcontext,
         idle: Callable[[], object] = _nothing,
+        *,
+        memory_bytes: int = MEMORY_BYTES,
     ) -> None:
         self._inside, self._idle = inside, idle
+        self._memory_bytes = memory_bytes
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
@@ -60,16 +70,19 @@ class ChildProcess:
             Where the system gives no process, or where Python cannot be started once more.
         """
         if self._process is not None:
-            return
+            if self._process.poll() is None:
+                return
+            self.end()
         program = python()
         if program is None:
             raise OSError("there is no Python to start beside this program")
         ours, theirs = Pipe()
+        numbers = theirs.fileno(), os.getpid(), self._memory_bytes
         try:
             with theirs:
                 self._process = subprocess.Popen(  # noqa: S603 - this program
                     # -P: nothing of the directory that the program happens to run in
-                    [program, "-P", "-m", "transientcam_compiled", str(theirs.fileno())],
+                    [program, "-P", "-m", "transientcam_compiled", *map(str, numbers)],
                     env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
                     pass_fds=(theirs.fileno(),),
                     stdin=subprocess.DEVNULL,

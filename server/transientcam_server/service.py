@@ -41,6 +41,7 @@ from transientcam_server.camera import (
     OriginLease,
     SequenceChanged,
     SharedAcquisition,
+    Supervision,
     Timer,
     load_given,
     sensor_of,
@@ -162,6 +163,7 @@ class Service:
                 light=self._light,
                 delay_s=rules.delay_s,
                 darkness=self._darkness,
+                supervision=Supervision(camera, silence_s=settings.limits.unserved_s),
             )
             if self.relay is None
             else SharedAcquisition(self.relay, report=self._from_acquisition, light=self._light)

@@ -243,7 +243,8 @@ class LimitSettings(_Group):
     frames are sent or recorded. Nothing is refused; its next request is read later."""
     unserved_s: _Finite = Field(default=1.0, ge=0.5, le=60.0)
     """Time without any client being served, after which the light is switched off until they are:
-    no client could switch it off meanwhile."""
+    no client could switch it off meanwhile. After the same time without the camera's thread the
+    supervisor, a process of its own, switches it off until somebody starts."""
     head_s: _Finite = Field(default=10.0, gt=0.0, le=3600.0)
     """Time for the head of a request to arrive, and for a handshake of TLS."""
     body_s: _Finite = Field(default=30.0, gt=0.0, le=3600.0)

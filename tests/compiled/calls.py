@@ -1,6 +1,8 @@
 """What tests let another process call, or do before all else there."""
 
+import ctypes
 import os
+import resource
 import signal
 import threading
 from collections.abc import Iterator
@@ -37,6 +39,18 @@ def seen(tell: Tell) -> list[str]:
 
 def niceness(tell: Tell) -> int:
     return os.nice(0)
+
+
+def limits(tell: Tell) -> tuple[int, int]:
+    """How soon it is killed where memory is short, and what its data may take beside what it is."""
+    score = int(Path("/proc/self/oom_score_adj").read_text())
+    return score, resource.getrlimit(resource.RLIMIT_DATA)[0]
+
+
+def hold_the_interpreter(tell: Tell) -> None:
+    """Say which process this is, and let no other thread of it do anything any more."""
+    tell(os.getpid())
+    ctypes.PyDLL(None).sleep(3600)
 
 
 def pid(tell: Tell) -> int:

@@ -54,6 +54,18 @@ def test_it_takes_what_others_leave_of_the_processor(child: ChildProcess) -> Non
     assert child.call(calls.niceness, ask=go_on) == min(os.nice(0) + NICE, 19)
 
 
+def test_where_memory_is_short_it_goes_first_and_it_never_gets_much() -> None:
+    child = ChildProcess(memory_bytes=1 << 28)
+    small = child.call(calls.limits, ask=go_on)
+    child.end()
+    child = ChildProcess(memory_bytes=1 << 30)
+    large = child.call(calls.limits, ask=go_on)
+    child.end()
+
+    assert small[0] == large[0] == 1000
+    assert 0.7 * 2**30 < large[1] - small[1] < 0.8 * 2**30
+
+
 def test_it_runs_no_main_module_of_this_program(child: ChildProcess) -> None:
     found = Path(child.call(calls.main_module, ask=go_on))
 
@@ -157,11 +169,12 @@ def test_a_packed_program_is_not_started_again(monkeypatch: pytest.MonkeyPatch) 
     assert python() is None
 
 
-def test_it_ends_with_a_parent_that_is_killed_whatever_it_does() -> None:
+@pytest.mark.parametrize("does", ["go_on_for_ever", "hold_the_interpreter"])
+def test_it_ends_with_a_parent_that_is_killed_whatever_it_does(does: str) -> None:
     code = (
         "from tests.compiled import calls\n"
         "from transientcam_compiled import ChildProcess\n"
-        "ChildProcess().call(calls.go_on_for_ever, ask=lambda: None,\n"
+        f"ChildProcess().call(calls.{does}, ask=lambda: None,\n"
         "    told=lambda pid: print(pid, flush=True))\n"
     )
     root = Path(__file__).resolve().parents[2]

@@ -63,6 +63,8 @@ def test_the_unit_waits_for_ready_and_is_restarted_when_frames_end() -> None:
     assert int(section["WatchdogSec"]) > 10
     assert section["Restart"] == "on-failure"
     assert section["KillSignal"] == "SIGTERM"
+    assert section["OOMPolicy"] == "continue"
+    assert section.get("KillMode", "control-group") == "control-group"  # the supervisor's SIGTERM
 
 
 def test_usb_can_be_reached_and_kernels_can_be_kept() -> None:

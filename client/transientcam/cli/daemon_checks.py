@@ -136,6 +136,9 @@ def _camera(camera: Camera, seconds: float) -> Iterator[Finding]:
         yield Finding("fault", "camera", f"{name}: {about['reason']}", "plug it in again")
         return
     yield Finding("ok", "camera", name)
+    if (warning := about.get("light_warning")) is not None:  # older daemons say nothing of it
+        remedy = "docs/operations.md says what switches the light off, and after how long"
+        yield Finding("warning", "light", warning, remedy)
     yield from _products(camera.info)
     if not camera.acquisition["running"]:
         message = "the capture is stopped, so nothing can be measured"

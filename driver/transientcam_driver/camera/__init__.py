@@ -15,6 +15,7 @@ from transientcam_driver.camera._factory import FactoryCalibration, Lens
 from transientcam_driver.camera._frame import Counters, RawFrame
 from transientcam_driver.camera._hop import Hop
 from transientcam_driver.camera._host_camera import HostCamera
+from transientcam_driver.camera._light import has_light, light_warning
 from transientcam_driver.camera._opening import check_camera, kinds, open_camera, plugin_of
 from transientcam_driver.camera._plugin import CameraName, CameraPlugin, FoundCamera
 from transientcam_driver.camera._sensor import Sensor
@@ -52,7 +53,9 @@ __all__ = [
     "StatusFlag",
     "Truth",
     "check_camera",
+    "has_light",
     "kinds",
+    "light_warning",
     "open_camera",
     "plugin_of",
 ]

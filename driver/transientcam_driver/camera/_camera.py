@@ -9,6 +9,7 @@ from transientcam_driver.camera._frame import Counters, RawFrame
 from transientcam_driver.camera._simulation import Simulation
 from transientcam_driver.camera._status import Status
 from transientcam_driver.sequence import Sequence
+from transientcam_supervisor import OffSwitch
 
 
 class CameraState(StrEnum):
@@ -47,6 +48,14 @@ class Camera(Protocol):
     @property
     def factory(self) -> FactoryCalibration | None:
         """What the device reports of its pixels and its lens; None where it reports nothing."""
+        ...
+
+    @property
+    def off_switch(self) -> OffSwitch | None:
+        """How another process switches the light off; None where no light is at this machine.
+
+        It may be another one after `reconnect`.
+        """
         ...
 
     @property

@@ -13,6 +13,7 @@ from transientcam_driver.camera._status import Status
 from transientcam_driver.clock import Clock
 from transientcam_driver.errors import CameraClosed, CameraLost
 from transientcam_driver.sequence import Sequence
+from transientcam_supervisor import OffSwitch
 
 
 class HostCamera(ABC):
@@ -48,6 +49,11 @@ class HostCamera(ABC):
     def capabilities(self) -> Capabilities:
         """What the camera can do."""
         return self._capabilities
+
+    @property
+    def off_switch(self) -> OffSwitch | None:
+        """How another process switches the light off: none can, unless a camera says how."""
+        return OffSwitch()
 
     @property
     def state(self) -> CameraState:

@@ -7,13 +7,14 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Final
 
-from transientcam_driver.camera import open_camera, plugin_of
+from transientcam_driver.camera import light_warning, open_camera, plugin_of
 from transientcam_driver.contract import CLAUSES, Bench, ContractBroken, ContractSkipped
 from transientcam_driver.errors import DriverError
 
 Reported = tuple[str, str, str, str | None]
 
 _FRAMES: Final = 3
+_UNWATCHED: Final = "docs/operations.md says what switches the light off, and after how long"
 _REPORT: Final = "send this whole report, with --json, to the maintainer of the plug-in"
 
 
@@ -48,6 +49,8 @@ def _capabilities(spec: str) -> Iterator[Reported]:
         yield "ok", "camera", f"{can.model} {can.serial}, firmware {can.firmware}", None
         stated = ", ".join(f"{name}={value}" for name, value in asdict(can).items())
         yield "ok", "can do", stated, None
+        if (warning := light_warning(camera)) is not None:
+            yield "warning", "light", warning, _UNWATCHED
         applied = camera.applied
         camera.start()
         first = camera.read_frame(timeout_s=_time_s(applied.frame_rate_hz))

@@ -54,6 +54,11 @@ class Control:
                 self._link.control_out(Request.WRITE_REGISTER, slave, register, data)
                 self._words[slave, register] = word
 
+    def written(self, field: Field) -> bytes:
+        """Return the bytes that the register of a field was last written with."""
+        with self._lock:
+            return self._words[field.place].to_bytes(REGISTER_BYTES, "little")
+
     def set_supply(self, slave: int, register: int, value: int) -> None:
         """Write a byte of a supply or of the light driver."""
         with self._lock:

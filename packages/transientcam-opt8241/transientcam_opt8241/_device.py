@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.camera import AppliedSequence, Capabilities
+from transientcam_driver.cameras.open_usb import VENDOR_OUT
 from transientcam_driver.errors import CameraError, DeviceRefused, ImagesLost
 from transientcam_driver.sequence import ImageLabel, Sampling
 from transientcam_opt8241 import _registers as reg
 from transientcam_opt8241._control import LIGHT_DRIVER, MONITORS, Control
-from transientcam_opt8241._link import SLACK_BYTES, Link
+from transientcam_opt8241._link import SLACK_BYTES, Link, Request
 from transientcam_opt8241._pll import CLOCK_HZ, PllSetting
 from transientcam_opt8241._registers import Field
+from transientcam_supervisor import OffSwitch, UsbControl
 
 PRODUCT: Final = "Texas Instruments OPT8241-CDK"
 COLUMNS: Final = 320
@@ -74,7 +76,8 @@ _STARTED: Final[dict[Field, int]] = {
 class Opt8241:
     """One camera, claimed: a `TriggeredDevice`.
 
-    Its sensor runs, and its light is on, only from `trigger` until the frame is there.
+    Its sensor runs, and its light is on, only from `trigger` until the frame is there; without its
+    owner it runs on.
 
     Parameters
     ----------
@@ -98,6 +101,9 @@ class Opt8241:
         self._closed = False
         try:
             self._start_up()
+            stop = self._control.written(reg.TG_DIS)
+            halt = UsbControl(VENDOR_OUT, Request.WRITE_REGISTER, *reg.TG_DIS.place, stop)
+            self.off_switch = OffSwitch(link.node, (halt,))
             version = (self._control.get(each) for each in (reg.MAJOR, reg.MINOR))
             self.capabilities = self._capabilities(".".join(map(str, version)))
         except BaseException:

@@ -30,6 +30,11 @@ class Link(Protocol):
     """A claimed camera."""
 
     @property
+    def node(self) -> str:
+        """Device node of usbfs; empty without one."""
+        ...
+
+    @property
     def serial(self) -> str:
         """Serial number; where it has none, the place it is plugged in at."""
         ...

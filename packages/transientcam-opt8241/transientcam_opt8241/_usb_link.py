@@ -38,21 +38,21 @@ class UsbLink:
 
     def __init__(self, device: Any, serial: str) -> None:
         self._device = device
-        self._node = node_of(device)
+        self.node = node_of(device)
         self.serial = serial
         self._buffer = array.array("B")
         claim(device, UDEV_RULE)
 
     def control_in(self, request: Request, value: int, index: int, length: int) -> bytes:
         """Send a request and return the answer."""
-        with translated(request.name, self._node, UDEV_RULE):
+        with translated(request.name, self.node, UDEV_RULE):
             return bytes(
                 self._device.ctrl_transfer(VENDOR_IN, request, value, index, length, TIMEOUT_MS)
             )
 
     def control_out(self, request: Request, value: int, index: int, data: bytes) -> None:
         """Send a request."""
-        with translated(request.name, self._node, UDEV_RULE):
+        with translated(request.name, self.node, UDEV_RULE):
             self._device.ctrl_transfer(VENDOR_OUT, request, value, index, data, TIMEOUT_MS)
 
     def read(self, most_bytes: int, *, timeout_s: float) -> bytes | None:
@@ -61,13 +61,13 @@ class UsbLink:
         if len(self._buffer) != whole:
             self._buffer = array.array("B", bytes(whole))
         timeout_ms = max(1, round(timeout_s * 1e3))
-        with translated("reading a frame", self._node, UDEV_RULE):
+        with translated("reading a frame", self.node, UDEV_RULE):
             count = read_bulk(self._device, FRAME_ENDPOINT, self._buffer, timeout_ms)
         return self._buffer[:count].tobytes() or None
 
     def clear_halt(self) -> None:
         """Let the endpoint of the frames begin anew."""
-        with translated("clearing a halt", self._node, UDEV_RULE):
+        with translated("clearing a halt", self.node, UDEV_RULE):
             self._device.clear_halt(FRAME_ENDPOINT)
 
     def close(self) -> None:

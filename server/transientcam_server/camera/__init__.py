@@ -40,6 +40,7 @@ from transientcam_server.camera._origin_lease import OriginLease
 from transientcam_server.camera._shared import SharedAcquisition
 from transientcam_server.camera._source import LightRules, sensor_of, snapshot_of, start_with
 from transientcam_server.camera._status import AcquisitionStatus, State
+from transientcam_server.camera._supervision import Supervision
 
 __all__ = [
     "DEFAULT_DURATION_S",
@@ -75,6 +76,7 @@ __all__ = [
     "SharedAcquisition",
     "State",
     "StoredCalibration",
+    "Supervision",
     "Timer",
     "lease",
     "load_given",

@@ -40,6 +40,7 @@ from transientcam_server.camera._events import (
 )
 from transientcam_server.camera._light import Announcement, LightGuard
 from transientcam_server.camera._status import AcquisitionStatus, State
+from transientcam_server.camera._supervision import Supervision
 from transientcam_server.errors import JobCancelled, Problem, SequenceConflict, kinds
 
 _log = logging.getLogger("transientcam_server.camera.acquisition")
@@ -70,11 +71,13 @@ class Acquisition:
         light: LightGuard | None = None,
         delay_s: float = 0.0,
         darkness: Darkness | None = None,
+        supervision: Supervision | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._light = LightGuard(unserved_s=math.inf, clock=clock) if light is None else light
         self._announcement = Announcement(delay_s, clock=clock)
         self._darkness = darkness
+        self._supervision = supervision or Supervision(None, silence_s=math.inf)
         self._dark: Dark | None = None
         self._offs = 0
         self._camera = camera
@@ -252,6 +255,7 @@ class Acquisition:
         while not self._stopping.is_set():
             try:
                 self._run_commands(wait_s=0.0)
+                self._beat()
                 self._step()
             except CameraError as error:
                 if not self._shut_off_by_device(error):
@@ -261,6 +265,20 @@ class Acquisition:
                 _log.exception("the acquisition failed and is continued")
                 self._run_commands(wait_s=BACKOFF_S[-1])
         self._shut_down()
+
+    def _beat(self) -> None:
+        """Tell the supervisor that the light is under control, and hear what it has done."""
+        connected, supervision = self._connected, self._supervision
+        self._act_on_supervisor(
+            supervision.beat(lit=self._started) if connected else supervision.lost()
+        )
+
+    def _act_on_supervisor(self, reason: str | None) -> None:
+        """Stay dark until somebody starts, where the supervisor has switched off or is gone."""
+        if reason is not None:
+            self._offs += 1
+            self._started = False
+            self._go_dark(Dark("supervisor", reason))
 
     def _step(self) -> None:
         if self._light_is_held():
@@ -287,11 +305,17 @@ class Acquisition:
             self._read()
 
     def _may_light(self) -> bool:
-        """Announce the light; return whether it may begin: the one gate of all that lights."""
+        """Announce the light; return whether it may begin, watched: the one gate of all light."""
         if self._announcement.begin() and self._announcement.delay_s:
             _log.warning("the light goes on in %g s", self._announcement.delay_s)
             self._report(LightArmingEvent(self._announcement.delay_s))
-        return self._announcement.light_on_in_s is None
+        return self._announcement.light_on_in_s is None and self._is_watched()
+
+    def _is_watched(self) -> bool:
+        """Have the supervisor watch the light; return whether it does."""
+        reason = self._supervision.starting()
+        self._act_on_supervisor(reason)
+        return reason is None
 
     def _light_is_held(self) -> bool:
         """Switch the light off where it may not stay on; return whether it has to stay off."""
@@ -392,7 +416,7 @@ class Acquisition:
         self._moved_s = self._clock()
         try:
             self._end_light()
-            if dark.cause == "safe-off":
+            if dark.cause in ("safe-off", "supervisor"):
                 self._camera.safe_off()
         finally:
             _log.warning("%s", dark)
@@ -425,6 +449,7 @@ class Acquisition:
     ) -> _T:
         def go_on() -> None:
             self._act_on_lapse()
+            self._is_watched()
             self._run_commands(wait_s=0.0)  # those that do not need the camera, or cancel this job
             # behind the commands: one of them may have switched the light off
             if self._offs != offs or self._light.unserved() is not None:
@@ -509,8 +534,11 @@ class Acquisition:
         self._switch_off_at_end()
 
     def _switch_off_at_end(self) -> None:
+        dark = True
         try:
             self._camera.safe_off()
         except CameraError as error:
-            # it is unplugged, or its heartbeat ends and it turns its light off by itself
+            # it is unplugged, or its light goes off by its heartbeat or by its supervisor
             _log.info("the camera could not be stopped: %s", error)
+            dark = False
+        self._supervision.close(dark=dark)

@@ -19,10 +19,12 @@ import httpx
 import transientcam_moments as tm
 from transientcam.errors import TransientcamError
 from transientcam.transport import translated
+from transientcam_compiled import python
 from transientcam_server.daemon._configuration import load_settings
 from transientcam_server.daemon._server import listen
 from transientcam_server.errors import AddressUnavailable, SettingsError
 from transientcam_server.settings import Settings
+from transientcam_supervisor import OffSwitch, Supervisor, SupervisorEnded
 
 Reported = tuple[str, str, str, str | None]
 
@@ -36,6 +38,7 @@ def checks(config: Path | None = None) -> Iterator[Reported]:
     """Look at libraries, kernels, settings, directories, disk, limits and the port."""
     yield from _libraries()
     yield _kernels()
+    yield _supervisor()
     try:
         settings = load_settings({}, file=config, environment=os.environ)
     except SettingsError as error:
@@ -86,6 +89,17 @@ def _kernels() -> Reported:
         message = f"not compiled yet; the daemon does so as it starts, into {directory}"
         return "warning", "kernels", message, "transientcam compile does it now"
     return "ok", "kernels", f"{compiled} functions are kept in {directory}", None
+
+
+def _supervisor() -> Reported:
+    supervisor = Supervisor(python(), silence_s=1.0)
+    try:
+        supervisor.watch(OffSwitch())
+    except SupervisorEnded as error:
+        message = f"{error}: cameras with a light of their own stay dark"
+        return "fault", "supervisor", message, _REINSTALL
+    supervisor.close(dark=True)
+    return "ok", "supervisor", "a process that switches the light off can be started", None
 
 
 def _directories(settings: Settings) -> Iterator[Reported]:

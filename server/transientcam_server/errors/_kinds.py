@@ -295,6 +295,13 @@ PLANNING_BUSY: Final = ProblemKind(
     "One plan is computed at a time, and few requests wait for one: `limit` states how many. Try "
     "again when one of them was answered.",
 )
+PLANNING_ENDED: Final = ProblemKind(
+    "planning-ended",
+    503,
+    "Planning process ended",
+    "The process that computes plans ended before it answered: it was killed, or had too little "
+    "memory. Frames, recordings and other requests go on. Try again.",
+)
 TOO_LARGE: Final = ProblemKind(
     "too-large",
     413,

@@ -86,6 +86,7 @@ class ReplayCamera:
     """
 
     simulation: None = None
+    off_switch: None = None
 
     def __init__(
         self, path: Path, *, speed: float = 1.0, loop: bool = False, clock: Clock | None = None

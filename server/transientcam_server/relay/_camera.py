@@ -91,6 +91,11 @@ class RelayCamera(HostCamera):
             raise
 
     @property
+    def off_switch(self) -> None:
+        """None: the light is at the origin, which has a supervisor of its own."""
+        return
+
+    @property
     def path(self) -> tuple[str, ...]:
         """The ids of all services from this one to the camera."""
         return (self.service_id, *self.origin.path)

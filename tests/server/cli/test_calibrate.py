@@ -166,7 +166,8 @@ def test_options_that_do_not_go_together_are_refused(
 def test_a_daemon_that_cannot_measure_says_why(capfd: pytest.CaptureFixture[str]) -> None:
     with serving("sim:calibration") as daemon:
         end = threading.Event()
-        daemon.service.acquisition.occupy("another", lambda camera, go_on: end.wait())
+        acquisition = daemon.service.acquisition
+        acquisition.occupy("another", lambda _, go_on: end.wait(), offs=acquisition.offs)
         code = run(["calibrate", daemon.url])
         end.set()
 

@@ -42,8 +42,8 @@ def test_a_machine_that_is_set_up_has_no_faults(tmp_path: Path) -> None:
     assert {each[0] for each in seen.values()} <= {"ok", "warning"}
     assert "numba" in seen["packages"][2]
     assert set(seen) == {
-        *("packages", "kernels", "settings", "recordings", "calibrations", "light", "tokens"),
-        *("disk", "files", "port"),
+        *("packages", "kernels", "supervisor", "settings", "recordings", "calibrations"),
+        *("light", "tokens", "disk", "files", "port"),
     }
 
 

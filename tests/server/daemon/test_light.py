@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import psutil
 import pytest
 
 from tests.driver.cameras.open_usb.usbfs.processes import EmulatedCamera, emulated_camera
@@ -211,14 +212,22 @@ def test_requests_that_stall_put_the_light_out(lit: Daemon) -> None:
 
 
 def test_a_host_that_hangs_is_missed_by_the_device(lit: Daemon) -> None:
+    (supervisor,) = (
+        each
+        for each in psutil.Process(lit.process.pid).children()
+        if "transientcam_supervisor" in each.cmdline()
+    )
+    supervisor.suspend()
     lit.process.send_signal(signal.SIGSTOP)
     try:
         goes_off(lit)
         assert lit.camera.watchdog_tripped
     finally:
+        supervisor.resume()
         lit.process.send_signal(signal.SIGCONT)
 
-    wait_until(lambda: lit.camera.lit)
+    wait_until(lambda: lit.state() == "stopped")
+    assert not lit.camera.lit
 
 
 @pytest.mark.parametrize("off", ["safe-off", "interlock", "nothing"])

@@ -23,10 +23,10 @@ export interface AcquisitionDocument {
   /** Time until the light goes on, while `state` is `arming`; null else. */
   readonly light_on_in_s: number | null;
   /** What ended the capture: `stop`, `safe-off`, `lapse` of a lease, the `device` (its interlock),
-   * or that it was `unused`; or why none began: `start`, where the service starts none by itself,
-   * and where what is kept of the light is `unreadable` or `unwritable`. Null while it is running,
-   * and of a relay. */
-  readonly off_because: "stop" | "safe-off" | "lapse" | "device" | "unused" | "start" | "unreadable" | "unwritable" | null;
+   * that it was `unused`, or the `supervisor` beside this service; or why none began: `start`, where
+   * the service starts none by itself, and where what is kept of the light is `unreadable` or
+   * `unwritable`. Null while it is running, and of a relay. */
+  readonly off_because: "stop" | "safe-off" | "lapse" | "device" | "unused" | "supervisor" | "start" | "unreadable" | "unwritable" | null;
   /** Whether the light stays off over a restart of the service; false while the disk has not taken
    * it. Null while the capture is running, and of a relay. */
   readonly off_kept: boolean | null;
@@ -258,6 +258,9 @@ export interface CameraDocument {
   /** Why it is lost, or its light is off. */
   readonly reason: string | null;
   readonly simulated: boolean;
+  /** Of a camera without a watchdog of its own: what switches its light off when this service
+   * fails, and what does not; null where the camera does so by itself, or has no light here. */
+  readonly light_warning: string | null;
   /** As the camera itself states them; units are in the names. */
   readonly capabilities: Readonly<Record<string, unknown>>;
   /** Where the pixels look: (column, row) along ((c - cx) / fx, (r - cy) / fy, 1), but for the

@@ -18,8 +18,6 @@ IMAGE_PERIOD_S: Final = 1 / (FRAME_RATE_HZ * MEASURED)
 EXPOSURE_S: Final = round(IMAGE_PERIOD_S / 2, 9)
 """An assumption: how a thirtieth of a second is divided into exposures is not known."""
 MOST_TAKES: Final = 16
-UNREAD_S: Final = 2.0
-"""Without a reader for so long the light goes off."""
 
 
 def capabilities_of(identity: Identity) -> Capabilities:
@@ -42,6 +40,5 @@ def capabilities_of(identity: Identity) -> Capabilities:
         max_exposure_s=EXPOSURE_S,
         max_takes=MOST_TAKES,
         sampling=SAMPLING,
-        heartbeat_s=UNREAD_S,
         dark_dn=float(ZERO_DN),
     )

@@ -16,10 +16,11 @@ from transientcam_driver.camera import (
     Simulation,
     Status,
 )
-from transientcam_driver.cameras.kinect2._abilities import UNREAD_S, capabilities_of
+from transientcam_driver.cameras.kinect2._abilities import capabilities_of
 from transientcam_driver.cameras.kinect2._device import Kinect2
 from transientcam_driver.cameras.kinect2._frame_queue import Arrival, FrameQueue
 from transientcam_driver.cameras.kinect2._frames import UNKNOWN_C, FrameMaker
+from transientcam_driver.cameras.kinect2._off_switch import off_switch
 from transientcam_driver.cameras.kinect2._parameters import DepthParameters, Rows
 from transientcam_driver.cameras.kinect2._tables import P0Tables
 from transientcam_driver.cameras.kinect2._watch import Watch
@@ -31,8 +32,10 @@ from transientcam_driver.errors import (
     NotStreaming,
 )
 from transientcam_driver.sequence import Sequence
+from transientcam_supervisor import OffSwitch
 
 SILENCE_S: Final = 2.0
+UNREAD_S: Final = 2.0
 READ_S: Final = 0.1
 """Longest wait for a frame in one go: how long a loss may stay unnoticed."""
 
@@ -43,7 +46,7 @@ class Kinect2Camera(HostCamera):
     It captures at 16, 80 and 120 MHz, three phases each, 30 times a second; ``takes`` is the one
     choice: so many of its frames make one. The camera has no watchdog of its own: while it is
     started and no frame is read for ``unread_s``, a thread here switches it off, and the next
-    ``read_frame`` on again.
+    ``read_frame`` on again. That thread ends with this process; `off_switch` does not.
 
     Parameters
     ----------
@@ -106,6 +109,11 @@ class Kinect2Camera(HostCamera):
         self._watch = Watch(unread_s, self._unread)
 
     # --- state -------------------------------------------------------------------------------
+
+    @property
+    def off_switch(self) -> OffSwitch:
+        """Its commands, on an interface that is taken from this process."""
+        return off_switch(self._device.node)
 
     def status(self) -> Status:
         """Return what is known here; a camera that does not stream is asked whether it is there."""

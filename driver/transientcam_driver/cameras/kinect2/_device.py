@@ -61,6 +61,8 @@ _STOP: Final[tuple[Action, ...]] = (
     commands.MODE_OFF,
     lambda link: link.set_suspended(True),
 )
+STOP_REQUESTS: Final = tuple(each for each in _STOP if isinstance(each, Request))
+"""What is requested of the camera itself to switch its light off, in this order."""
 _CLOSE: Final[tuple[Action, ...]] = (commands.MODE_ON, commands.MODE_OFF)
 
 
@@ -102,6 +104,11 @@ class Kinect2:
         except BaseException:
             self.close()
             raise
+
+    @property
+    def node(self) -> str:
+        """Device node of usbfs; empty without one."""
+        return self._link.node
 
     def start(self, received: PacketTaker, failed: FailureTaker) -> None:
         """Switch the light on and hand over packets, as `Link.start_images` does.

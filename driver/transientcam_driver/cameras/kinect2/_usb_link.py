@@ -27,13 +27,13 @@ TRANSFERS: Final = 60
 LEAST_TRANSFERS: Final = 16
 PACKETS: Final = 8
 
-_COMMANDS, _ANSWERS = 0x02, 0x81
-_CONTROL, _STREAM = 0, 1  # interfaces
+COMMANDS, ANSWERS = 0x02, 0x81
+CONTROL, STREAM = 0, 1  # interfaces
 _EVENTS_S: Final = 0.1
-_TO_DEVICE, _TO_INTERFACE, _FROM_INTERFACE = 0x00, 0x01, 0x81
-_SET_FEATURE, _GET_INTERFACE, _SET_ISOCH_DELAY = 0x03, 0x0A, 0x31  # USB 3.2, table 9-5
-_FUNCTION_SUSPEND, _U1_ENABLE, _U2_ENABLE = 0, 48, 49
-_SUSPEND_AND_WAKE: Final = 0x0300  # USB 3.2, table 9-8, of interface 0
+_TO_DEVICE, TO_INTERFACE, _FROM_INTERFACE = 0x00, 0x01, 0x81
+SET_FEATURE, _GET_INTERFACE, _SET_ISOCH_DELAY = 0x03, 0x0A, 0x31  # USB 3.2, table 9-5
+FUNCTION_SUSPEND, _U1_ENABLE, _U2_ENABLE = 0, 48, 49
+SUSPEND_AND_WAKE: Final = 0x0300  # USB 3.2, table 9-8, of interface 0
 _ISOCH_DELAY_NS: Final = 40
 
 
@@ -59,7 +59,7 @@ class UsbLink:
     def __init__(self, context: Any, device: Any, *, transfers: int = TRANSFERS) -> None:
         self._usb1 = libusb()
         self._context = context
-        self._node = node_of(device)
+        self.node = node_of(device)
         self._count = transfers
         self._lock = threading.Lock()
         self._transfers: list[Any] = []
@@ -79,18 +79,18 @@ class UsbLink:
 
     def write(self, data: bytes) -> None:
         """Send a request to the command endpoint."""
-        with self._bulk("a request", _COMMANDS) as handle:
-            handle.bulkWrite(_COMMANDS, data, timeout=TIMEOUT_MS)
+        with self._bulk("a request", COMMANDS) as handle:
+            handle.bulkWrite(COMMANDS, data, timeout=TIMEOUT_MS)
 
     def read(self, most_bytes: int) -> bytes:
         """Return the next transfer of the answer endpoint."""
-        with self._bulk("an answer", _ANSWERS) as handle:
-            return bytes(handle.bulkRead(_ANSWERS, most_bytes, timeout=TIMEOUT_MS))
+        with self._bulk("an answer", ANSWERS) as handle:
+            return bytes(handle.bulkRead(ANSWERS, most_bytes, timeout=TIMEOUT_MS))
 
     def set_suspended(self, suspended: bool) -> None:
         """Suspend the function of the depth camera, or wake it up."""
-        options = _SUSPEND_AND_WAKE if suspended else 0
-        self._request(_TO_INTERFACE, _SET_FEATURE, _FUNCTION_SUSPEND, options)
+        options = SUSPEND_AND_WAKE if suspended else 0
+        self._request(TO_INTERFACE, SET_FEATURE, FUNCTION_SUSPEND, options)
 
     def set_stream_enabled(self, enabled: bool) -> None:
         """Give the depth endpoint its bandwidth, or take it away."""
@@ -98,8 +98,8 @@ class UsbLink:
         with self._translated("setting the alternate setting"):
             # libusb 1.0.26 unlocks what it has not locked where the device is gone, and aborts at
             # its close: look first
-            handle.controlRead(_FROM_INTERFACE, _GET_INTERFACE, 0, _STREAM, 1, timeout=TIMEOUT_MS)
-            handle.setInterfaceAltSetting(_STREAM, int(enabled))
+            handle.controlRead(_FROM_INTERFACE, _GET_INTERFACE, 0, STREAM, 1, timeout=TIMEOUT_MS)
+            handle.setInterfaceAltSetting(STREAM, int(enabled))
 
     def start_images(self, received: PacketTaker, failed: FailureTaker) -> None:
         """Keep transfers in flight, and hand over every packet of them.
@@ -146,7 +146,7 @@ class UsbLink:
         self.stop_images()
         handle, self._handle = self._handle, None
         if handle is not None:
-            for interface in (_CONTROL, _STREAM):
+            for interface in (CONTROL, STREAM):
                 with suppress(self._usb1.USBError):
                     handle.releaseInterface(interface)
             handle.close()
@@ -156,15 +156,15 @@ class UsbLink:
 
     def _prepare(self) -> None:
         handle = self._handle
-        handle.claimInterface(_CONTROL)  # first: a reset would disturb the program that has it
+        handle.claimInterface(CONTROL)  # first: a reset would disturb the program that has it
         handle.resetDevice()
         if handle.getConfiguration() != 1:
             handle.setConfiguration(1)
-        handle.claimInterface(_STREAM)
+        handle.claimInterface(STREAM)
         self._request(_TO_DEVICE, _SET_ISOCH_DELAY, _ISOCH_DELAY_NS)
         self.set_stream_enabled(False)
         for feature in (_U1_ENABLE, _U2_ENABLE):
-            self._request(_TO_DEVICE, _SET_FEATURE, feature)
+            self._request(_TO_DEVICE, SET_FEATURE, feature)
         self.set_suspended(True)
 
     def _request(self, kind: int, request: int, value: int, index: int = 0) -> None:
@@ -227,5 +227,5 @@ class UsbLink:
 
     @contextmanager
     def _translated(self, action: str) -> Iterator[None]:
-        with translated(action, self._node):
+        with translated(action, self.node):
             yield

@@ -19,7 +19,7 @@ from transientcam_driver.camera import (
     Status,
 )
 from transientcam_driver.cameras.open_usb._receiving import Receiver
-from transientcam_driver.cameras.open_usb._transport import Transport
+from transientcam_driver.cameras.open_usb._transport import VENDOR_OUT, Transport
 from transientcam_driver.cameras.open_usb.protocol import (
     CAPS_ROOM_BYTES,
     LAST_ERROR_BYTES,
@@ -47,6 +47,7 @@ from transientcam_driver.errors import (
     TransferStalled,
 )
 from transientcam_driver.sequence import Sequence
+from transientcam_supervisor import OffSwitch, UsbControl, UsbReset
 
 READ_S = 0.1
 """Longest single read: how long a stop or an interrupt may have to wait for a reader."""
@@ -108,6 +109,12 @@ class UsbCamera:
     def capabilities(self) -> Capabilities:
         """What the camera can do, by its own answer."""
         return self._capabilities
+
+    @property
+    def off_switch(self) -> OffSwitch:
+        """The request that is never refused; else a reset of the port (usb-protocol 9)."""
+        steps = UsbControl(VENDOR_OUT, Request.SAFE_OFF), UsbReset()
+        return OffSwitch(self._transport.node, steps)
 
     @property
     def state(self) -> CameraState:
@@ -369,6 +376,7 @@ class UsbCamera:
                 raise NotStreaming(self._state)
             silent_s = self._clock.now_s() - self._heartbeat_s
             if silent_s >= self._capabilities.heartbeat_s:
+                self._require_no_other_end()
                 self._start()  # the light is off by now, and images in the FIFO are old
             elif silent_s >= self._capabilities.heartbeat_s / _BEATS_PER_TIMEOUT:
                 self._request_out(Request.HEARTBEAT)
@@ -415,16 +423,21 @@ class UsbCamera:
         with self._control:
             if self._state is not CameraState.STREAMING:
                 return  # stopped meanwhile: _keep_alive raises
-            status = self.status()
-            if status.state is DeviceState.STREAMING:
-                return
-            if status.watchdog_tripped:
+            if self._require_no_other_end():
                 self._start()
-                return
-            self._state = CameraState.FAULTED
-            raise CameraFault(
-                "it stopped by itself" if status.interlock_closed else "the interlock was opened"
-            )
+
+    def _require_no_other_end(self) -> bool:
+        """Return whether the watchdog ended the capture; another end is not undone.
+
+        It may have been switched off by another process (`off_switch`).
+        """
+        status = self.status()
+        if status.state is DeviceState.STREAMING or status.watchdog_tripped:
+            return status.watchdog_tripped
+        self._state = CameraState.FAULTED
+        raise CameraFault(
+            "it stopped by itself" if status.interlock_closed else "the interlock was opened"
+        )
 
 
 def _release(transport: Transport) -> None:

@@ -64,6 +64,11 @@ class Transport(Protocol):
         """Serial number of the device at the other end."""
         ...
 
+    @property
+    def node(self) -> str:
+        """Device node of usbfs."""
+        ...
+
     def control_in(self, request: Request, *, value: int = 0, length: int) -> bytes:
         """Send a request and return the answer."""
         ...
@@ -98,7 +103,7 @@ class UsbTransport:
 
     def __init__(self, device: Any, serial: str) -> None:
         self._device = device
-        self._node = node_of(device)
+        self.node = node_of(device)
         self.serial = serial
         self._buffer = array.array("B", bytes(_SMALLEST_READ_BYTES))
         claim(device)
@@ -156,7 +161,7 @@ class UsbTransport:
 
     @contextmanager
     def _translated(self, action: str) -> Iterator[None]:
-        with translated(action, self._node):
+        with translated(action, self.node):
             yield
 
 

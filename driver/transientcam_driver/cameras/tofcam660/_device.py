@@ -23,10 +23,12 @@ from transientcam_driver.cameras.tofcam660._wire import (
     CalibrationEntry,
     Command,
     ImageType,
+    pack_request,
     unpack_calibration,
 )
 from transientcam_driver.errors import CameraError, DeviceRefused, ProtocolError
 from transientcam_driver.sequence import MAX_HARMONICS, SPEED_OF_LIGHT_M_S, ImageLabel, Sampling
+from transientcam_supervisor import OffSwitch, TcpMessage
 
 FREE_FREQUENCY: Final = (3, 27)
 CALIBRATION_DATA: Final = (3, 29)
@@ -41,6 +43,7 @@ SETTLE_S: Final = 0.1
 READOUT_S: Final = 10e-3
 """Of one image of the four, on its way: an assumption, not measured."""
 _LONGEST_US: Final = 0xFFFF
+_PHASES: Final = 4
 _GRAYSCALE_US: Final = 25  # of an image that is not taken; the vendor's first value
 _CODE_OF_24_MHZ: Final = 1
 # the vendor's constants: box of the calibration, chip to front, delay line, temperature
@@ -128,6 +131,16 @@ class Tofcam660:
             self.capabilities = self._capabilities(self.temperature_c())
 
     # --- as a TriggeredDevice ----------------------------------------------------------------
+
+    @property
+    def off_switch(self) -> OffSwitch:
+        """The end of streaming, on a connection of its own; the four images end by themselves."""
+        _, address = self._control.addresses
+        return OffSwitch(
+            f"{address}:{self._options.control_port}",
+            (TcpMessage(pack_request(Command.STOP_STREAM)),),
+            ends_s=_PHASES * (_LONGEST_US / 1e6 + READOUT_S),
+        )
 
     def configure(self, applied: AppliedSequence) -> None:
         """Set the integration time, which the four images of a frequency share."""

@@ -25,6 +25,7 @@ from transientcam_driver.errors import (
     NotStreaming,
 )
 from transientcam_driver.sequence import Sequence
+from transientcam_supervisor import OffSwitch
 
 READ_S: Final = 0.1
 """Longest single wait: how long a stop may have to wait for a reader."""
@@ -84,6 +85,11 @@ class TriggeredCamera(HostCamera):
         self._state = CameraState.IDLE
 
     # --- state -------------------------------------------------------------------------------
+
+    @property
+    def off_switch(self) -> OffSwitch:
+        """As the device states it."""
+        return self._device.off_switch
 
     def status(self) -> Status:
         """Read the device's temperature, and put this camera's state beside it."""

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.camera import AppliedSequence, Capabilities
 from transientcam_driver.sequence import ImageLabel
+from transientcam_supervisor import OffSwitch
 
 Images = NDArray[np.uint16]
 Group = tuple[ImageLabel, ...]
@@ -24,6 +25,11 @@ class TriggeredDevice(Protocol):
     @property
     def capabilities(self) -> Capabilities:
         """Limits and size of the device."""
+        ...
+
+    @property
+    def off_switch(self) -> OffSwitch:
+        """How another process ends an exposure; ``OffSwitch()`` where none can."""
         ...
 
     def configure(self, applied: AppliedSequence) -> None:

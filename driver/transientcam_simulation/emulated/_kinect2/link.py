@@ -35,6 +35,8 @@ class Plug(Protocol):
 class EmulatedLink:
     """One opening of an emulated camera; it stays dead once the cable was pulled."""
 
+    node = ""
+
     def __init__(self, plug: Plug) -> None:
         self._plug = plug
         self._enabled = False

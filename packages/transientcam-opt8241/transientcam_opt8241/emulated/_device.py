@@ -127,6 +127,8 @@ class EmulatedOpt8241(PluggedCamera["EmulatedLink"]):
 class EmulatedLink:
     """One opening of an emulated camera: `opt8241.link.Link` without a cable."""
 
+    node = ""
+
     def __init__(self, plug: EmulatedOpt8241) -> None:
         self._plug = plug
         self.serial = plug.serial

@@ -65,6 +65,9 @@ class CameraDocument(Document):
     reason: str | None = None
     """Why it is lost, or its light is off."""
     simulated: bool
+    light_warning: str | None = None
+    """Of a camera without a watchdog of its own: what switches its light off when this service
+    fails, and what does not; null where the camera does so by itself, or has no light here."""
     capabilities: dict[str, Any]
     """As the camera itself states them; units are in the names."""
     intrinsics: IntrinsicsDocument
@@ -98,9 +101,9 @@ class AcquisitionDocument(Document):
     """Time until the light goes on, while `state` is `arming`; null else."""
     off_because: Cause | None = None
     """What ended the capture: `stop`, `safe-off`, `lapse` of a lease, the `device` (its interlock),
-    or that it was `unused`; or why none began: `start`, where the service starts none by itself,
-    and where what is kept of the light is `unreadable` or `unwritable`. Null while it is running,
-    and of a relay."""
+    that it was `unused`, or the `supervisor` beside this service; or why none began: `start`, where
+    the service starts none by itself, and where what is kept of the light is `unreadable` or
+    `unwritable`. Null while it is running, and of a relay."""
     off_kept: bool | None = None
     """Whether the light stays off over a restart of the service; false while the disk has not taken
     it. Null while the capture is running, and of a relay."""

@@ -8,6 +8,7 @@ from typing import Any
 from fastapi import APIRouter
 
 from transientcam_driver import CameraError, Status
+from transientcam_driver.camera import light_warning
 from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._documents.camera import CameraDocument
 from transientcam_server.relay import RelayCamera
@@ -28,6 +29,7 @@ async def read_camera(service: ServiceOf) -> CameraDocument:
         state=acquisition.state,
         reason=acquisition.reason,
         simulated=camera.simulation is not None,
+        light_warning=light_warning(camera),
         capabilities=asdict(camera.capabilities),
         intrinsics=CameraDocument.IntrinsicsDocument(**asdict(service.intrinsics)),
         sensor=CameraDocument.SensorDocument(**asdict(service.sensor)),

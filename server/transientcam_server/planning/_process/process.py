@@ -13,6 +13,7 @@ import transientcam_moments as tm
 from transientcam_compiled import ChildProcess, ProcessEnded, Tell
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.planning._process.progress import Progress
+from transientcam_server.planning._process.queue import RETRY_AFTER_S
 
 _T = TypeVar("_T")
 
@@ -45,7 +46,7 @@ class PlanningProcess:
         Raises
         ------
         Problem
-            ``shutting-down`` from `close` on, ``internal-error`` where the process is gone.
+            ``shutting-down`` from `close` on, ``planning-ended`` where the process is gone.
         Exception
             What ``compute`` raises.
         """
@@ -65,8 +66,14 @@ class PlanningProcess:
             ask()
             try:
                 value: _T = self._child.call(_compute, compute, arguments, ask=ask, told=told)
-            except ProcessEnded:
-                raise Problem(kinds.INTERNAL_ERROR, "The process that plans has ended.") from None
+            except (ProcessEnded, MemoryError) as error:
+                raise Problem(
+                    kinds.PLANNING_ENDED,
+                    "The process that plans has ended."
+                    if isinstance(error, ProcessEnded)
+                    else "The process that plans has too little memory.",
+                    retry_after_s=RETRY_AFTER_S,
+                ) from None
         return value
 
     def prepare(self) -> None:

@@ -7,6 +7,7 @@ link that the emulation has anyway.
 import errno
 import socket
 import struct
+import threading
 from collections import deque
 from pathlib import Path
 
@@ -25,13 +26,14 @@ from transientcam_simulation.emulated._open_usb.descriptors import string_descri
 
 SUPER_SPEED_MBIT, SUPER_SPEED = 5000, 5
 PACKET_BYTES = 33_792
-_ISO_URB, _CONTROL_URB, _BULK_URB = 0, 2, 3
+_ISO_URB, _CONTROL_URB = 0, 2
 _URB_BYTES, _PACKET = 56, struct.Struct("<III")
 _COUNT_AT = 36
-_SETUP = struct.Struct("<BBHHH")
 _GET_DESCRIPTOR, _STRING, _GET_INTERFACE = 6, 3, 10
 _SET_FEATURE, _FUNCTION_SUSPEND = 3, 0
 _MOST_WAITING = 400
+_CONTROL, _STREAM = 0, 1  # interfaces
+_TO_INTERFACE = 0x01
 
 
 def _endpoint(address: int, attributes: int, per_interval: int) -> bytes:
@@ -89,10 +91,38 @@ class Usb3Mount(UsbfsMount):
     def __init__(self, camera: EmulatedKinect2, serial: str, root: Path) -> None:
         self.packets: deque[bytes] = deque()
         self.streaming = False
+        self.link: EmulatedLink | None = None
+        self.requests_to_stall = 0
+        self._switching = threading.Lock()
         super().__init__(OnBus(camera, serial), root)
 
     def client_of(self, connection: socket.socket) -> Client:
         return Usb3Client(self, connection)
+
+    def linked(self) -> EmulatedLink:
+        """Return the cable to the camera, which all open files share."""
+        with self.device.changed:
+            if self.link is None or not self.device.camera.is_at(self.link):
+                self.link = self.device.camera.connect()
+            return self.link
+
+    def set_streaming(self, streaming: bool) -> None:
+        """Let packets come, or none; the light is another matter."""
+        with self.device.changed:
+            self.streaming = streaming
+            self.packets.clear()
+            self.device.changed.notify_all()
+        with self._switching:
+            link = self.linked()
+            link.set_stream_enabled(streaming)
+            link.stop_images()
+            if streaming:
+                link.start_images(self.push, lambda error: None)
+
+    def close(self) -> None:
+        if self.link is not None and self.device.plugged:
+            self.set_streaming(False)
+        super().close()
 
     def push(self, packet: bytes) -> None:
         """Keep a packet; the camera waits where the other side does not read."""
@@ -117,15 +147,15 @@ class Usb3Client(Client):
     def __init__(self, mount: Usb3Mount, connection: socket.socket) -> None:
         super().__init__(mount, connection)
         self._usb = mount
-        self._link: EmulatedLink | None = None
 
     def serve(self) -> None:
         try:
             super().serve()
         finally:
-            if self._link is not None:
-                self._set_streaming(False)
-                self._link.close()
+            with self._device.changed:
+                left = _STREAM not in self._usb.owners and self._usb.streaming
+            if left and self._device.plugged:  # usb_unbind_interface: alternate setting 0
+                self._usb.set_streaming(False)
 
     def fill(self) -> bool:
         """Complete the oldest isochronous transfer if there are packets for all of it."""
@@ -142,29 +172,42 @@ class Usb3Client(Client):
         kind, endpoint = raw[0], raw[1]
         (buffer,), (length,) = struct.unpack_from("<Q", raw, 16), struct.unpack_from("<i", raw, 24)
         if kind == _ISO_URB:
+            self.claim(_STREAM)
             (count,) = struct.unpack_from("<i", raw, _COUNT_AT)
             raw += self.read_memory(address + _URB_BYTES, count * _PACKET.size)
             self.send_out(Urb(address, raw, kind, buffer, length))
+            return
+        if kind == _CONTROL_URB:
+            super().submit(address)
             return
         urb = Urb(address, raw, kind, buffer, length)
         sent = self.read_memory(buffer, length) if not endpoint & 0x80 else b""
         status = 0
         try:
-            if kind == _CONTROL_URB:
-                self._control_of_camera(urb, sent)
-            elif endpoint & 0x80:
-                urb.data = self._linked().read(length)
-                urb.actual = len(urb.data)
-            else:
-                self._linked().write(sent)
-                urb.actual = length
-        except CameraLost:
-            status = -errno.ESHUTDOWN
-        except CameraError:
-            status = -errno.EPIPE
+            urb.data = self.bulk(endpoint, length, sent)
+            urb.actual = len(urb.data) if endpoint & 0x80 else length
+        except Refused as refused:
+            if refused.number == errno.EBUSY:
+                raise
+            status = -refused.number
         with self._device.changed:
             self.in_flight[address] = urb
             self.complete(urb, status=status)
+
+    def bulk(self, endpoint: int, length: int, data: bytes) -> bytes:
+        self.claim(_CONTROL)
+        try:
+            if endpoint & 0x80:
+                return self._usb.linked().read(length)
+            if self._usb.requests_to_stall:
+                self._usb.requests_to_stall -= 1
+                raise Refused(errno.EPIPE)
+            self._usb.linked().write(data)
+        except CameraLost:
+            raise Refused(errno.ESHUTDOWN) from None
+        except CameraError:
+            raise Refused(errno.EPIPE) from None
+        return b""
 
     def deliver(self, urb: Urb) -> None:
         if urb.kind != _ISO_URB:
@@ -182,42 +225,24 @@ class Usb3Client(Client):
     def _ioctl(self, request: int, argument: int) -> int:
         if request == Ioctl.SETINTERFACE and not self.gone:
             interface, alternate = struct.unpack("<II", self.read_memory(argument, 8))
-            assert interface == 1
-            self._linked().set_stream_enabled(bool(alternate))
-            self._set_streaming(bool(alternate))
+            assert interface == _STREAM
+            self.claim(_STREAM)
+            self._usb.set_streaming(bool(alternate))
             return 0
-        result = super()._ioctl(request, argument)
-        if request in (Ioctl.CLAIMINTERFACE, Ioctl.DISCONNECT_CLAIM) and self._link is None:
-            self._link = self._usb.device.camera.connect()
-        return result
+        return super()._ioctl(request, argument)
 
-    def _set_streaming(self, streaming: bool) -> None:
-        with self._device.changed:
-            self._usb.streaming = streaming
-            self._usb.packets.clear()
-            self._device.changed.notify_all()
-        link = self._linked()
-        link.stop_images()
-        if streaming:
-            link.start_images(self._usb.push, lambda error: None)
-
-    def _linked(self) -> EmulatedLink:
-        if self._link is None:
-            raise Refused(errno.EIO)
-        return self._link
-
-    def _control_of_camera(self, urb: Urb, sent: bytes) -> None:
-        setup = self.read_memory(urb.buffer, _SETUP.size)
-        kind, request, value, index, _ = _SETUP.unpack(setup)
+    def control(
+        self, request_type: int, request: int, value: int, index: int, length: int, data: bytes
+    ) -> bytes:
         if request == _GET_DESCRIPTOR and value >> 8 == _STRING:
-            urb.data = self._device.strings[value & 0xFF]
-            urb.actual = len(urb.data)
-            urb.buffer += _SETUP.size
-        elif request == _GET_INTERFACE:
-            urb.data, urb.actual = bytes([self._usb.streaming]), 1
-            urb.buffer += _SETUP.size
-        elif (kind, request, value) == (1, _SET_FEATURE, _FUNCTION_SUSPEND):
-            self._linked().set_suspended(bool(index))
+            string: bytes = self._device.strings[value & 0xFF]
+            return string
+        if request == _GET_INTERFACE:
+            return bytes([self._usb.streaming])
+        if (request_type, request, value) == (_TO_INTERFACE, _SET_FEATURE, _FUNCTION_SUSPEND):
+            self.claim(_CONTROL)
+            self._usb.linked().set_suspended(bool(index))
+        return b""
 
 
 def _packets(urb: Urb) -> int:

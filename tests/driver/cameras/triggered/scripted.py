@@ -14,6 +14,7 @@ from transientcam_driver import (
     TriggeredCamera,
 )
 from transientcam_driver.clock import VirtualClock
+from transientcam_supervisor import OffSwitch
 
 SETTLES_S = 0.1
 EXPOSED_S = 0.01
@@ -67,6 +68,8 @@ class ScriptedDevice:
         self.cable = cable
         self.frequency_hz = 0.0
         self.labels: tuple[ImageLabel, ...] = ()
+
+    off_switch = OffSwitch()
 
     @property
     def capabilities(self) -> Capabilities:

@@ -12,12 +12,14 @@ from transientcam_driver.clock import VirtualClock
 from transientcam_server.imaging import Recipe, factory_gains
 from transientcam_server.planning import predict_takes
 from transientcam_server.settings import ReconstructionSettings
+from transientcam_supervisor import OffSwitch
 
 
 class FixedDevice:
     """Sends the images of two returns, at 16, 80 and 120 MHz."""
 
     capabilities = replace(GAPPED, settle_s=0.0, max_takes=6)
+    off_switch = OffSwitch()
 
     def configure(self, applied: AppliedSequence) -> None:
         self._frame = frame_of(applied)

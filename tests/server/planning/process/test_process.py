@@ -88,7 +88,16 @@ def test_a_process_that_was_killed_is_a_problem_of_that_call_alone(
     with pytest.raises(Problem) as raised:
         process.run(calls.end_at_once, progress=Progress())
 
-    assert raised.value.kind is kinds.INTERNAL_ERROR
+    assert (raised.value.kind, raised.value.kind.status) == (kinds.PLANNING_ENDED, 503)
+    assert raised.value.extensions == {"retry_after_s": 10}
+    assert process.run(calls.pid, progress=Progress()) > 0
+
+
+def test_too_little_memory_is_the_same(process: PlanningProcess) -> None:
+    with pytest.raises(Problem, match="too little memory") as raised:
+        process.run(calls.want_all_memory, progress=Progress())
+
+    assert raised.value.kind is kinds.PLANNING_ENDED
     assert process.run(calls.pid, progress=Progress()) > 0
 
 

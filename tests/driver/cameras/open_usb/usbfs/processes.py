@@ -35,10 +35,12 @@ _METHODS = (
 class EmulatedCamera:
     """The process of ``server.py``."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, kind: str = "usb") -> None:
         self.root = root
+        self.kind = kind
         self._process = subprocess.Popen(
-            [sys.executable, HERE / "server.py", root],
+            [sys.executable, HERE / "server.py", root, kind],
+            env=os.environ | {"PYTHONPATH": str(HERE.parents[4])},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
@@ -150,13 +152,13 @@ class _RemoteCamera:
 
 
 @contextmanager
-def emulated_camera() -> Iterator[EmulatedCamera]:
+def emulated_camera(kind: str = "usb") -> Iterator[EmulatedCamera]:
     """Plug a camera into a bus of its own; skip, or fail where CI is set, if there can be none."""
     if missing := missing_libraries():
         skip_or_fail(missing)
     # by a short path: names of sockets are limited to 107 characters
     with tempfile.TemporaryDirectory(prefix="usb-", dir="/tmp") as folder:
-        camera = EmulatedCamera(Path(folder))
+        camera = EmulatedCamera(Path(folder), kind)
         try:
             yield camera
         finally:

@@ -1,32 +1,92 @@
-"""The emulated camera as a process: ``python server.py ROOT``; commands come on standard input.
+"""An emulated camera as a process: ``server.py ROOT [KIND]``; commands come on standard input.
 
 A command is a JSON list: what to do, and its arguments.
 """
 
 import json
+import os
 import sys
+import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from usbfs import UsbfsMount  # type: ignore[import-not-found]  # beside this script, no package
-
+from tests.driver.cameras.kinect2 import standing as kinects
+from tests.driver.cameras.kinect2.usb3 import Usb3Mount
+from tests.driver.cameras.open_usb.usbfs.usbfs import UsbfsMount
+from tests.opt8241 import standing as opt8241s
+from tests.opt8241.usb2 import OnBus, Usb2Mount
 from transientcam_driver.camera import Status
 from transientcam_driver.cameras.open_usb.protocol import Request, unpack_status
 from transientcam_driver.clock import RealClock
 from transientcam_simulation.emulated import build, find_scene, without_noise
+from transientcam_simulation.emulated._open_usb import EmulatedDevice
 from transientcam_simulation.emulated._open_usb.faults import Fault
 
 
-def main() -> None:
-    scene = without_noise(find_scene("wall"))
-    device, _ = build(scene, width=163, height=120, seed=1, clock=RealClock())
-    mount = UsbfsMount(device, Path(sys.argv[1]))
+class Slow(RealClock):
+    """A tenth of real time: frames of 2.7 MB thirty times a second would take a whole core."""
 
-    def status() -> Status:
-        with device.changed:  # past the bus, which may stall
-            now_s = device.clock.now_s()
-            answer = device._firmware.control_in(Request.GET_STATUS, 0, 0, now_s=now_s)
+    def now_s(self) -> float:
+        return super().now_s() / 10
+
+    def wait(self, condition: threading.Condition, timeout_s: float) -> None:
+        super().wait(condition, timeout_s * 10)
+
+
+class Prototype:
+    """The open USB camera, and what can happen to it."""
+
+    def __init__(self, root: Path) -> None:
+        scene = without_noise(find_scene("wall"))
+        self.device: EmulatedDevice
+        self.device, _ = build(scene, width=163, height=120, seed=1, clock=RealClock())
+        self.mount = UsbfsMount(self.device, root)
+        self.stall = self.device.stall_next
+
+    def status(self) -> Status:
+        with self.device.changed:  # past the bus, which may stall
+            now_s = self.device.clock.now_s()
+            answer = self.device._firmware.control_in(Request.GET_STATUS, 0, 0, now_s=now_s)
         return unpack_status(answer)
+
+    def lit(self) -> bool:
+        return self.status().light_on
+
+
+class Kinect2:
+    """A Kinect v2."""
+
+    def __init__(self, root: Path) -> None:
+        camera = kinects.emulated(clock=Slow())
+        self.mount = Usb3Mount(camera, kinects.SERIAL, root)
+        self.device = self.mount.device
+        self.lit: Callable[[], bool] = lambda: camera.lit
+
+    def stall(self, requests: int) -> None:
+        self.mount.requests_to_stall = requests
+
+
+class Opt8241:
+    """An OPT8241-CDK."""
+
+    def __init__(self, root: Path) -> None:
+        self.device = OnBus(opt8241s.emulated())
+        self.mount = Usb2Mount(self.device, root)
+        self.lit: Callable[[], bool] = lambda: self.device.lit
+
+    def stall(self, requests: int) -> None:
+        with self.device.changed:
+            self.device.requests_to_stall = requests
+
+
+KINDS = {"usb": Prototype, "kinect2": Kinect2, "opt8241": Opt8241}
+
+
+def main() -> None:
+    root, kind = Path(sys.argv[1]), sys.argv[2]
+    camera: Any = KINDS[kind](root)
+    device, mount = camera.device, camera.mount
 
     def obey(command: str, *arguments: Any) -> object:
         match command:
@@ -39,15 +99,19 @@ def main() -> None:
             case "inject":
                 device.inject(Fault(arguments[0]), arguments[1])
             case "stall":
-                device.stall_next(arguments[0])
+                camera.stall(arguments[0])
             case "interlock":
                 device.set_interlock(closed=arguments[0])
             case "memory":
                 mount.memory_bytes = arguments[0]
+            case "signal":
+                with device.changed:  # no request is obeyed between the two
+                    device.changed.wait_for(camera.lit)
+                    os.kill(arguments[0], arguments[1])
             case "light":
-                return status().light_on
+                return camera.lit()
             case "watchdog":
-                return status().watchdog_tripped
+                return camera.status().watchdog_tripped
             case _:
                 return "unknown"
         return "done"

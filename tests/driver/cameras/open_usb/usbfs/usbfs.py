@@ -32,6 +32,9 @@ _IOCTL, _DONE, _READ_MEMORY, _WRITE_MEMORY = 1, 3, 5, 6
 _URB = struct.Struct("<BBxxiI4xQiiiiIIQ")
 _CONTROL_URB, _BULK_URB = 2, 3
 _SETUP = struct.Struct("<BBHHH")
+_SYNCHRONOUS_CONTROL, _SYNCHRONOUS_BULK = struct.Struct("<BBHHHI4xQ"), struct.Struct("<III4xQ")
+_CLAIM = struct.Struct("<II256s")
+_EXCEPT_DRIVER = 0x02
 
 
 def _number(direction: int, number: int, size: int) -> int:
@@ -40,8 +43,10 @@ def _number(direction: int, number: int, size: int) -> int:
 
 
 class Ioctl(IntEnum):
-    """The ioctls that libusb uses."""
+    """The ioctls that libusb and a supervisor use."""
 
+    CONTROL = _number(3, 0, 24)
+    BULK = _number(3, 2, 24)
     RESETEP = _number(2, 3, 4)
     SETINTERFACE = _number(2, 4, 8)
     SETCONFIGURATION = _number(2, 5, 4)
@@ -357,14 +362,22 @@ class Client:
                     self.complete(self.in_flight[argument], status=-errno.ENOENT)
             case Ioctl.GET_CAPABILITIES:
                 self.write_memory(argument, struct.pack("<I", CAPABILITIES))
-            case Ioctl.CLAIMINTERFACE | Ioctl.DISCONNECT_CLAIM:
-                with self._device.changed:
-                    interface = self._integer(argument)
-                    if self._mount.owners.setdefault(interface, self) is not self:
-                        raise Refused(errno.EBUSY)
+            case Ioctl.CONTROL:
+                return self._control_at_once(argument)
+            case Ioctl.BULK:
+                return self._bulk_at_once(argument)
+            case Ioctl.CLAIMINTERFACE:
+                self.claim(self._integer(argument))
+            case Ioctl.DISCONNECT_CLAIM:
+                claimed = self.read_memory(argument, _CLAIM.size)
+                interface, flags, driver = _CLAIM.unpack(claimed)
+                spared = flags & _EXCEPT_DRIVER and driver.rstrip(b"\0") == b"usbfs"
+                self.claim(interface, by_force=not spared)
             case Ioctl.RELEASEINTERFACE:
+                interface = self._integer(argument)
                 with self._device.changed:
-                    self._mount.owners.pop(self._integer(argument), None)
+                    if self._mount.owners.get(interface) is self:
+                        del self._mount.owners[interface]
             case Ioctl.CLEAR_HALT:
                 self._device.clear_halt()
             case Ioctl.RESET:
@@ -379,6 +392,49 @@ class Client:
                 raise Refused(errno.ENOTTY)
         return 0
 
+    def claim(self, interface: int, *, by_force: bool = False) -> None:
+        """Have an interface; by force from another one, whose transfers end."""
+        with self._device.changed:
+            owner = self._mount.owners.get(interface)
+            if owner not in (None, self):
+                if not by_force:
+                    raise Refused(errno.EBUSY)
+                for urb in tuple(owner.in_flight.values()):
+                    owner.complete(urb, status=-errno.ENOENT)
+            self._mount.owners[interface] = self
+
+    def control(
+        self, request_type: int, request: int, value: int, index: int, length: int, data: bytes
+    ) -> bytes:
+        """Let the device answer a control request; one to it needs no interface."""
+        answer: bytes = self._device.control(request_type, request, value, index, length, data)
+        return answer
+
+    def bulk(self, endpoint: int, length: int, data: bytes) -> bytes:
+        """Let the device answer a bulk transfer at once."""
+        raise Refused(errno.ENOTTY)
+
+    def _control_at_once(self, argument: int) -> int:
+        fields = _SYNCHRONOUS_CONTROL.unpack(self.read_memory(argument, _SYNCHRONOUS_CONTROL.size))
+        request_type, request, value, index, length, _, buffer = fields
+        sent = b"" if request_type & 0x80 else self.read_memory(buffer, length)
+        try:
+            answer = self.control(request_type, request, value, index, length, sent)
+        except Stall:
+            raise Refused(errno.EPIPE) from None
+        except Unplugged:
+            raise Refused(errno.ENODEV) from None
+        self.write_memory(buffer, answer)
+        return len(answer) if request_type & 0x80 else length
+
+    def _bulk_at_once(self, argument: int) -> int:
+        fields = _SYNCHRONOUS_BULK.unpack(self.read_memory(argument, _SYNCHRONOUS_BULK.size))
+        endpoint, length, _, buffer = fields
+        sent = b"" if endpoint & 0x80 else self.read_memory(buffer, length)
+        answer = self.bulk(endpoint, length, sent)
+        self.write_memory(buffer, answer)
+        return len(answer) if endpoint & 0x80 else length
+
     def submit(self, address: int) -> None:
         raw = self.read_memory(address, _URB.size)
         kind, _endpoint, _status, _flags, buffer, length, *_ = _URB.unpack(raw)
@@ -386,6 +442,7 @@ class Client:
         if kind == _CONTROL_URB:
             self._control(urb)
             return
+        self.claim(0)
         self.send_out(urb)
 
     def send_out(self, urb: Urb) -> None:
@@ -405,7 +462,7 @@ class Client:
         with self._device.changed:
             self.in_flight[urb.address] = urb
             try:
-                answer = self._device.control(
+                answer = self.control(
                     request_type, request, value, index, length, sent[_SETUP.size :]
                 )
             except Stall:

@@ -1,0 +1,314 @@
+"""How long a camera's light stays on where the daemon loses control of it.
+
+Each camera is a process of its own, and says itself when its light is on. The daemon is another one
+and reaches it by real calls of libusb; so does its supervisor. ``python -m
+tests.server.daemon.losing_control TIMES`` does everything so many times, and prints how long the
+light stayed on.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Final
+
+import httpx
+import psutil
+
+from tests.driver.cameras.open_usb.usbfs.processes import EmulatedCamera, emulated_camera
+from tests.waiting import wait_until
+
+KINDS: Final = ("usb", "kinect2", "opt8241")
+LIMIT_S: Final = 2.0
+DARK_S: Final = 0.3
+PATIENCE_S: Final = 60.0
+STALLED_REQUESTS: Final = 12
+LIGHT: Final = {"TRANSIENTCAM_KERNELS": "off", "NUMBA_DISABLE_JIT": "1"}
+
+
+class Zygote:
+    """The process that daemons are forks of."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, Path(__file__).with_name("zygote.py")],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            env=os.environ | LIGHT | {"LD_PRELOAD": "libumockdev-preload.so.0"},
+        )
+        assert self._hear() == "ready"
+
+    def daemon(self, camera: EmulatedCamera, state: Path, silence_s: float) -> dict[str, Any]:
+        """Start a daemon; return where it serves, and its process."""
+        environment = {
+            **camera.environment,
+            "STATE_DIRECTORY": str(state),
+            "TRANSIENTCAM_LIMITS__UNSERVED_S": str(silence_s),
+        }
+        arguments = ["serve", "--json", "--camera", camera.kind, "--port", "0"]
+        asked = {"arguments": [*arguments, "--log-level", "error"], "environment": environment}
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps(asked) + "\n")
+        self._process.stdin.flush()
+        told: dict[str, Any] = self._hear()
+        return told
+
+    def close(self) -> None:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.close()
+        self._process.wait(PATIENCE_S)
+        self._process.stdout.close()
+
+    def _hear(self) -> Any:
+        assert self._process.stdout is not None
+        return json.loads(self._process.stdout.readline())
+
+
+class Control:
+    """A daemon before a camera, both of which are there as soon as they are needed."""
+
+    def __init__(
+        self, zygote: Zygote, camera: EmulatedCamera, folder: Path, silence_s: float
+    ) -> None:
+        self.camera = camera
+        self._zygote = zygote
+        self._folder = folder
+        self._silence_s = silence_s
+        self._fifos = 0
+        self._client: httpx.Client | None = None
+        self.process: psutil.Process | None = None
+
+    def light(self) -> None:
+        """Have the light on."""
+        if self.process is None or not self.process.is_running():
+            self.start()
+        wait_until(self._lights)  # again where it has not noticed yet that it was switched off
+
+    def _lights(self) -> bool:
+        assert self._client is not None
+        self._client.put("/api/v1/acquisition", json={"running": True}).raise_for_status()
+        return self.camera.lit
+
+    def start(self) -> None:
+        self.close()
+        told = self._zygote.daemon(self.camera, self._folder, self._silence_s)
+        self.process = psutil.Process(told["pid"])
+        self._client = httpx.Client(base_url=told["url"], timeout=PATIENCE_S)
+
+    def safe_off(self) -> None:
+        """Request it, whether or not the daemon says that it could."""
+        assert self._client is not None
+        self._client.post("/api/v1/acquisition/safe-off")
+
+    def state(self) -> tuple[str, str | None]:
+        """Return what the daemon says of the capture, and why."""
+        assert self._client is not None
+        document = self._client.get("/api/v1/acquisition").json()
+        return document["state"], document["reason"]
+
+    def signal(self, number: signal.Signals) -> None:
+        """Send a signal while the light is on, to the microsecond."""
+        assert self.process is not None
+        self.camera.do("signal", self.process.pid, int(number))
+
+    @property
+    def supervisor(self) -> psutil.Process:
+        """The supervisor of the daemon."""
+        assert self.process is not None
+        return next(
+            each
+            for each in self.process.children()
+            if "transientcam_supervisor" in " ".join(each.cmdline())
+        )
+
+    @contextmanager
+    def stuck(self, where: str) -> Iterator[None]:
+        """Let threads wait to the end of the block."""
+        self._fifos += 1
+        fifo = self._folder / f"fifo-{self._fifos}"
+        os.mkfifo(fifo)
+        assert self._client is not None
+        asking = threading.Thread(
+            target=self._client.get, args=(f"/{where}",), kwargs={"params": {"fifo": str(fifo)}}
+        )
+        asking.start()
+        with fifo.open("wb"):  # opens once the other end is open: they wait
+            yield
+        asking.join()
+
+    def goes_off(self) -> float:
+        """Wait until the camera says that its light stays off; return when it was on last, in s.
+
+        One that exposes on request is dark between two requests, too.
+        """
+        begin_s = lit_s = time.monotonic()
+
+        def dark() -> bool:
+            nonlocal lit_s
+            asked_s = time.monotonic()
+            if self.camera.lit:
+                lit_s = asked_s
+            return time.monotonic() - lit_s > DARK_S
+
+        wait_until(dark)
+        return lit_s - begin_s
+
+    def close(self) -> None:
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+        if self.process is not None:
+            with suppress(psutil.NoSuchProcess):
+                self.process.kill()
+            self.process.wait(PATIENCE_S)
+            self.process = None
+
+
+def _killed(control: Control) -> float:
+    control.signal(signal.SIGKILL)
+    return control.goes_off()
+
+
+def _crashed(control: Control) -> float:
+    control.signal(signal.SIGSEGV)
+    return control.goes_off()
+
+
+def _out_of_memory(control: Control) -> float:
+    """Kill what the kernel would: the greatest ``oom_score`` first, until the daemon is gone."""
+    assert control.process is not None
+    daemon = control.process.pid
+    while True:
+        family = [daemon, *(each.pid for each in control.process.children())]
+        chosen = max(family, key=lambda pid: int(Path(f"/proc/{pid}/oom_score").read_text()))
+        if chosen == daemon:
+            return _killed(control)
+        with suppress(psutil.NoSuchProcess):
+            victim = psutil.Process(chosen)
+            assert "transientcam_supervisor" not in victim.cmdline()
+            victim.kill()
+            victim.wait(PATIENCE_S)
+
+
+def _stopped(control: Control) -> float:
+    control.signal(signal.SIGSTOP)
+    took_s = control.goes_off()
+    return took_s
+
+
+def _hung_disk(control: Control) -> float:
+    """Nothing that waits for the disk comes back, and the daemon is asked to end."""
+    with control.stuck("stuck-threads"):
+        control.signal(signal.SIGTERM)
+        return control.goes_off()
+
+
+def _stuck_loop(control: Control) -> float:
+    with control.stuck("stuck"):
+        return control.goes_off()
+
+
+def _stuck_camera(control: Control) -> float:
+    with control.stuck("stuck-camera"):
+        return control.goes_off()
+
+
+def _stalled(control: Control) -> float:
+    """The camera stalls requests, and somebody wants it off."""
+    control.camera.do("stall", STALLED_REQUESTS)
+    begin_s = time.monotonic()
+    control.safe_off()
+    asked_s = time.monotonic() - begin_s
+    return asked_s + control.goes_off()
+
+
+def _restarted(control: Control) -> float:
+    """Asked to end, as a service manager does before it starts the next one."""
+    control.signal(signal.SIGTERM)
+    return control.goes_off()
+
+
+def _supervisor_ended(control: Control) -> float:
+    control.supervisor.terminate()
+    return control.goes_off()
+
+
+def _supervisor_killed(control: Control) -> float:
+    control.supervisor.kill()
+    return control.goes_off()
+
+
+EVENTS: Final[dict[str, Callable[[Control], float]]] = {
+    "stuck loop": _stuck_loop,
+    "stuck camera thread": _stuck_camera,
+    "USB stall": _stalled,
+    "supervisor SIGTERM": _supervisor_ended,
+    "supervisor SIGKILL": _supervisor_killed,
+    "SIGSTOP": _stopped,
+    "hung disk, SIGTERM": _hung_disk,
+    "restart": _restarted,
+    "out of memory": _out_of_memory,
+    "SIGSEGV": _crashed,
+    "SIGKILL": _killed,
+}
+
+
+ENDING: Final = {"SIGSTOP", "hung disk, SIGTERM", "restart", "out of memory", "SIGSEGV", "SIGKILL"}
+"""After these the daemon is of no more use."""
+
+
+def lose(control: Control, event: str) -> float:
+    """Have the light on, let it happen, and return how long the light then stays on, in s."""
+    control.light()
+    took_s = EVENTS[event](control)
+    if event in ENDING:
+        control.close()
+    return took_s
+
+
+@contextmanager
+def controlled(zygote: Zygote, kind: str, *, silence_s: float = 1.0) -> Iterator[Control]:
+    """Have a camera of a kind, and daemons before it."""
+    with emulated_camera(kind) as camera, tempfile.TemporaryDirectory() as folder:
+        control = Control(zygote, camera, Path(folder), silence_s)
+        try:
+            yield control
+        finally:
+            control.close()
+
+
+def main() -> None:
+    """Do everything so many times as the command line says, and print a table."""
+    times = int(sys.argv[1])
+    kinds = sys.argv[2:] or KINDS
+    zygote = Zygote()
+    took_s: dict[tuple[str, str], list[float]] = {}
+    for kind in kinds:
+        with controlled(zygote, kind) as control:
+            for _ in range(times):
+                for event in EVENTS:
+                    took_s.setdefault((event, kind), []).append(lose(control, event))
+                    print(kind, event, took_s[event, kind][-1], file=sys.stderr)
+            print(kind, flush=True)
+    zygote.close()
+    print("| event | " + " | ".join(kinds) + " |")
+    for name in EVENTS:
+        cells = (took_s[name, kind] for kind in kinds)
+        shown = (
+            f"{sum(t < LIMIT_S for t in each)} of {len(each)}, {max(each):.2f} s" for each in cells
+        )
+        print(f"| {name} | " + " | ".join(shown) + " |")
+
+
+if __name__ == "__main__":
+    main()
