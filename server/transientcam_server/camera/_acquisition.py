@@ -218,7 +218,8 @@ class Acquisition:
         if len(arrivals_s) > 1 and arrivals_s[-1] > arrivals_s[0]:
             rate_hz = (len(arrivals_s) - 1) / (arrivals_s[-1] - arrivals_s[0])
         age_s = self._clock() - self._moved_s
-        state, dark, darkness = self._state(), self._dark, self._darkness
+        state, darkness = self._state(), self._darkness
+        dark = None if state in ("arming", "calibrating") else self._dark
         return AcquisitionStatus(
             state=state,
             running=self._running,

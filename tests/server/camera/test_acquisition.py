@@ -507,7 +507,8 @@ def test_a_job_announces_its_light_and_a_safe_off_before_it_ends_the_job() -> No
     try:
         occupied = one.acquisition.occupy("job", lambda camera, go_on: began.set(), offs=0)
         assert one.event() == LightArmingEvent(3.0)
-        assert one.acquisition.status().state == "arming"
+        status = one.acquisition.status()
+        assert (status.state, status.running, status.reason) == ("arming", False, None)
         one.acquisition.safe_off().result(PATIENCE_S)
         with pytest.raises(JobCancelled):
             occupied.result(PATIENCE_S)
