@@ -27,7 +27,7 @@ from transientcam_supervisor._supervisor import (
 )
 from transientcam_supervisor._switch import OffSwitch
 
-AGAIN_S: Final = 0.1
+AGAIN_S: Final = 0.05
 """From one attempt to the next, until the light is known to be off."""
 GIVE_UP_S: Final = 10.0
 """Without the owner: by then the camera is unplugged, or another owner has it."""

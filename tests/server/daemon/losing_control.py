@@ -92,7 +92,10 @@ class Control:
         """Have the light on."""
         if self.process is None or not self.process.is_running():
             self.start()
-        wait_until(self._lights)  # again where it has not noticed yet that it was switched off
+        try:
+            wait_until(self._lights)  # again where it has not noticed yet that it was switched off
+        except AssertionError:
+            raise AssertionError(f"it stays dark: {self.state()}") from None
 
     def _lights(self) -> bool:
         assert self._client is not None

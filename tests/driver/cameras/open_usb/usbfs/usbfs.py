@@ -14,6 +14,7 @@ import socket
 import struct
 import threading
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
@@ -312,7 +313,8 @@ class Client:
 
     def close(self) -> None:
         """Cut the connection."""
-        self._connection.shutdown(socket.SHUT_RDWR)
+        with suppress(OSError):  # its other end has closed it
+            self._connection.shutdown(socket.SHUT_RDWR)
 
     def fill(self) -> bool:
         """Complete the oldest bulk transfer if an image is there; the lock is held."""
