@@ -175,7 +175,7 @@ def test_another_mark_version_or_length_is_no_header_though_its_checksum_holds(
         body = bytearray(HEADER.pack()[:60])
         body[offset] = value
 
-        assert ImageHeader.unpack(body + struct.pack("<I", naive_crc(bytes(body)))) is None
+        assert ImageHeader.unpack(bytes(body) + struct.pack("<I", naive_crc(bytes(body)))) is None
 
 
 def test_capabilities_have_the_fields_at_the_offsets_of_the_specification() -> None:
