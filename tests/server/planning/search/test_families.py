@@ -216,3 +216,11 @@ def test_the_longest_candidate_is_within_the_budgets_and_the_time(
 ) -> None:
     assert longest(curve, curve[place].capture_s + more) == expected
     assert longest(curve) == 3
+
+
+def test_only_errors_of_range_are_bounded_without_a_draw(curve: tuple[Candidate, ...]) -> None:
+    one = curve[2]
+    least_m = Light(0.004).least_noise_m(one.family.estimator, one.family.first, one.member.scale)
+
+    assert one.least_error("range_std_m") == one.least_error("range_error_m") == least_m > 0
+    assert one.least_error("bound_width") == one.least_error("separation_m") == 0.0
