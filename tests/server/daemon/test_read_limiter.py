@@ -60,6 +60,7 @@ class Connection:
             self.protocol,
             requests=turns.account("client"),
             streams=loop.turns().account("client"),
+            first=loop.turns().account("client"),
             lost=self._count,
         )
         self.limiter.connection_made(cast("asyncio.Transport", self.transport))
@@ -191,7 +192,9 @@ def test_each_thread_reads_into_a_buffer_of_its_own() -> None:
 
     def buffer() -> memoryview:
         nothing = cast("Any", None)
-        limiter = ReadLimiter(nothing, requests=nothing, streams=nothing, lost=lambda: None)
+        limiter = ReadLimiter(
+            nothing, requests=nothing, streams=nothing, first=nothing, lost=lambda: None
+        )
         return limiter.get_buffer(0)
 
     here, there = buffer(), []
