@@ -148,7 +148,10 @@ class Acceptor:
             self._loop, share=lambda: STREAMS_SHARE, share_of_one=lambda: STREAMS_SHARE
         )
         self._first = FairQueue(
-            self._loop, share=lambda: PRIORITY_SHARE, share_of_one=lambda: PRIORITY_SHARE
+            self._loop,
+            share=lambda: PRIORITY_SHARE,
+            share_of_one=lambda: PRIORITY_SHARE,
+            goes_before=(self._requests, self._streams),
         )
         self._admission = Admission(limits, clock=self._loop.time)
         self._reserve = Reserve(
