@@ -29,9 +29,11 @@ from transientcam_server.camera import (
     Jobs,
     Lease,
     LeaseManager,
+    LightConfirmedEvent,
     LightGuard,
     LightHeldEvent,
     LightReleasedEvent,
+    LightUnconfirmedEvent,
     OriginChanged,
     OriginLease,
     SequenceChanged,
@@ -386,6 +388,10 @@ class Service:
                 self.hub.notify("light-held", {"reason": reason})
             case LightReleasedEvent():
                 self.hub.notify("light-released", {})
+            case LightUnconfirmedEvent(reason):
+                self.hub.notify("light-unconfirmed", {"reason": reason})
+            case LightConfirmedEvent():
+                self.hub.notify("light-confirmed", {})
             case OriginChanged():
                 self._adopt_calibration()
                 self._reconstruct_with(self._of_origin(self.pipeline.reconstruction.settings))

@@ -19,6 +19,7 @@ from transientcam_driver import (
     Camera,
     CameraError,
     FrameTimeout,
+    NotStreaming,
     RawFrame,
     Sequence,
     Status,
@@ -33,6 +34,7 @@ from transientcam_server.camera._events import (
     SequenceChanged,
 )
 from transientcam_server.camera._light import LightGuard
+from transientcam_server.camera._off_switch import OffSwitch
 from transientcam_server.camera._status import AcquisitionStatus, State
 from transientcam_server.errors import JobCancelled, Problem, SequenceConflict, kinds
 
@@ -63,6 +65,7 @@ class Acquisition:
     ) -> None:
         self._light = LightGuard(unserved_s=math.inf, clock=clock) if light is None else light
         self._camera = camera
+        self._off_switch = OffSwitch(camera.safe_off)
         self._report = report
         self._clock = clock
         self._commands: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
@@ -128,9 +131,16 @@ class Acquisition:
             return self.submit(lambda: self._set_running(running))
 
     def safe_off(self) -> "Future[None]":
-        """Stop capturing and switch the light off, by the request that no state refuses."""
+        """Stop capturing and switch the light off, by the request that no state refuses.
+
+        Done once the device has taken that request, which waits for no thread. The thread of the
+        camera repeats it, in case that it was starting the capture just then.
+        """
         self._interrupted.set()
-        return self.submit(self._safe_off)
+        self._running = False
+        off = self._off_switch.begin()
+        self.submit(self._safe_off)
+        return off
 
     def device_status(self) -> "Future[Status]":
         """Read the status of the device."""
@@ -225,6 +235,8 @@ class Acquisition:
             try:
                 self._run_commands(wait_s=0.0)
                 self._step()
+            except NotStreaming:  # the off switch was faster than the command behind it
+                self._started = False
             except CameraError as error:
                 self._camera_lost(str(error))
             except Exception:

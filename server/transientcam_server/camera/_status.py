@@ -25,9 +25,11 @@ class AcquisitionStatus:
     frame_age_s
         Since the last frame, or since the start where there was none.
     reason
-        Why the camera is lost or held.
+        Why the camera is lost or held, or the light may be on.
     stalled
         Whether frames are to be captured and the camera is there, but none came for too long.
+    switching_off
+        Whether the light was to go off and may be on: that is not confirmed yet.
     """
 
     state: State
@@ -37,3 +39,4 @@ class AcquisitionStatus:
     frame_age_s: float
     reason: str | None
     stalled: bool
+    switching_off: bool = False

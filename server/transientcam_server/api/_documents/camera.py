@@ -84,7 +84,7 @@ class AcquisitionDocument(Document):
     running: bool
     state: Literal["starting", "streaming", "stopped", "calibrating", "lost", "held"]
     reason: str | None = None
-    """Why the camera is lost, or its light is held off."""
+    """Why the camera is lost, its light is held off, or may be on."""
     rate_hz: float | None = None
     """Measured over the last frames; null before there are two."""
     frames: int
@@ -93,6 +93,9 @@ class AcquisitionDocument(Document):
     """Since the last frame arrived."""
     stalled: bool
     """Whether no frame arrived for much longer than one takes."""
+    switching_off: bool
+    """Whether the light was to go off and may still be on: a relay's origin has not confirmed it,
+    and is asked again until it does."""
 
 
 class AcquisitionRequest(Document):
