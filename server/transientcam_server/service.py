@@ -455,7 +455,7 @@ class Service:
         if change == "lapsed" and lease.on_lapse == "stop":
             self.acquisition.set_running(False).add_done_callback(_log_failure)
         if self.origin_lease is not None and change != "granted":
-            self.origin_lease.release()  # behind the change above; a new holder takes it anew
+            self.origin_lease.release()  # behind the stop above; a new holder takes it anew
 
     def _job_changed(self, job: Job) -> None:
         self.hub.notify("job-changed", {"job": job.to_document()})

@@ -130,3 +130,4 @@ class SharedAcquisition(Acquisition):
 
     def _switch_off_at_end(self) -> None:
         """Leave the light to the origin; `RelayCamera.close` ends what was switched on here."""
+        self._origin.on_unconfirmed = lambda ended: None  # nobody listens any more

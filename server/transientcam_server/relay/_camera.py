@@ -248,21 +248,23 @@ class RelayCamera(HostCamera):
             former.wait(self._link.timeout_s)  # refused while the origin has not confirmed that
         self._link.take_lease(f"{holder} (through a relay)", **terms)
 
-    def release_lease(self) -> None:
-        """Give the lease of the origin back, if this relay has it, behind stops that are made."""
+    def release_lease(self) -> "Future[None] | None":
+        """Give the lease of the origin back, if this relay has it, behind a stop that was made.
+
+        Never waits: it is renewed no more, and the origin is told until it confirms that.
+        """
         lease_id = self._link.abandon_lease()
         if lease_id is None:
-            return
-        stop = self._stop
+            return None
 
         async def release() -> None:
-            if stop.unconfirmed:  # it is made under this lease
+            if self._stop.unconfirmed:  # it is made under this lease
                 raise CameraLost("the stop before it is not confirmed")
             await self._link.send_apart(AsyncCamera.give_lease_back, lease_id=lease_id)
 
-        self._releasing = [each for each in self._releasing if each.unconfirmed]
-        self._releasing.append(Delivery(release))
-        self._releasing[-1].begin()
+        delivery = Delivery(release)
+        self._releasing = [*(each for each in self._releasing if each.unconfirmed), delivery]
+        return delivery.begin()
 
     # -- what the origin is at ------------------------------------------------------------------
 

@@ -50,11 +50,11 @@ class Delivery:
         send: Callable[[], Awaitable[None]],
         *,
         changed: Callable[[bool], None] = lambda ended: None,
-        pauses_s: tuple[float, ...] = PAUSES_S,
+        pauses_s: tuple[float, ...] | None = None,
     ) -> None:
         self._send = send
         self._changed = changed
-        self._pauses_s = pauses_s
+        self._pauses_s = PAUSES_S if pauses_s is None else pauses_s
         self._lock = threading.Lock()
         self._asked = 0
         self._waiting: list[tuple[int, Future[None]]] = []
