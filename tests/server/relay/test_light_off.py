@@ -14,6 +14,7 @@ from tests.server.relay.forwarder import Forwarder, forwarding
 from tests.server.streaming import VIDEO
 from tests.serving import Served, serving
 from tests.waiting import wait_until
+from transientcam_server.camera import _origin_lease as origin_lease
 from transientcam_server.relay import _delivery as delivery
 
 ORIGIN = "sim:wall?noise=off"
@@ -201,8 +202,9 @@ def test_it_goes_through_three_relays_at_once(lit: Served) -> None:
 
 
 def test_a_lease_is_given_back_as_soon_as_the_network_speaks(
-    lit: Served, link: Forwarder, relay: Served
+    lit: Served, link: Forwarder, relay: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(origin_lease, "RELEASED_S", 0.1)
     lease = {"holder": "bench", "duration_s": 3600.0}
     status, granted = send(relay, "POST", "/api/v1/lease", **lease)
     assert status == 201
