@@ -17,10 +17,11 @@ from typing import Any, Final
 
 from transientcam_server.daemon._fair_queue import Account, FairQueue
 from transientcam_server.daemon._metering import metered
+from transientcam_server.daemon._priority import switches_off
 from transientcam_server.daemon._rate_limit import RateLimiter
 from transientcam_server.daemon._read_limiter import PORTION_BYTES, ReadLimiter
 from transientcam_server.daemon._refusals import refusal
-from transientcam_server.daemon._reserve import LOOK_S, Candidate, Reserve
+from transientcam_server.daemon._reserve import LOOK_S, Candidate, Reserve, arrived
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.settings import LimitSettings
 
@@ -197,6 +198,8 @@ class Acceptor:
 
     def _begin(self, connection: socket.socket, host: str) -> None:
         problem = self._admission.admit(host)
+        if self._tls is None and switches_off(arrived(connection) or b""):
+            self._first.hold_others()  # from now on, not only when it is read in its turn
         if problem is None:
             release = partial(self._admission.release, host)
             self._start(self._connect(connection, host, release), self._requests.account(host))

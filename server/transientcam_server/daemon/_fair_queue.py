@@ -22,10 +22,10 @@ MOST_DEBT_S: Final = 0.1
 """What a single step took beyond this is not counted: no client waits long because of it."""
 MOST_LEAD_S: Final = 1.0
 """The same, of what one address has had before the others."""
-HOLD_S: Final = 0.05
-"""Time in which nothing else is begun while what goes first is under way."""
+HOLD_S: Final = 0.5
+"""Time at most in which nothing else is begun while what goes first is under way."""
 HELD_SHARE: Final = 0.2
-"""Of the time, at most: what goes first may come again and again."""
+"""Of the time, in the long run: what goes first may come again and again."""
 _LEAST_PAUSE_S: Final = 0.001
 _REMEMBERED: Final = 1024
 _T = TypeVar("_T")
@@ -56,6 +56,10 @@ class Account:
         """Count processor time that another thread has spent for it."""
         self.left_s = max(-MOST_DEBT_S, self.left_s - spent_s)
 
+    def done(self) -> None:
+        """Note that what was under way is done."""
+        self._turns.release_others()
+
     async def turn(self) -> None:
         """Wait until there is time."""
         come = asyncio.get_running_loop().create_future()
@@ -79,7 +83,7 @@ class FairQueue:
     spent
         Processor time of this thread in s.
     goes_before
-        Queues of the same loop that begin nothing for `HOLD_S` when something runs in this one.
+        Queues of the same loop that begin nothing while something of this one is under way.
     """
 
     def __init__(
@@ -98,7 +102,7 @@ class FairQueue:
         self._clock = clock
         self._spent = spent
         self._goes_before = goes_before
-        self._held_until_s = self._next_hold_s = clock()
+        self._held_s = self._held_until_s = self._next_hold_s = clock()
         self._accounts: dict[str, Account] = {}
         self._waiting: dict[Account, None] = {}
         self._now_s = 0.0
@@ -146,12 +150,26 @@ class FairQueue:
         for each in self._goes_before:
             each.hold()
 
+    def release_others(self) -> None:
+        """Let them go on."""
+        for each in self._goes_before:
+            each.release()
+
     def hold(self) -> None:
-        """Begin nothing for `HOLD_S`, unless that was so a moment ago."""
+        """Begin nothing until `release`, for `HOLD_S` at most, unless that was so a moment ago."""
         now_s = self._clock()
         if now_s >= self._next_hold_s:
-            self._held_until_s = now_s + HOLD_S
+            self._held_s, self._held_until_s = now_s, now_s + HOLD_S
             self._next_hold_s = now_s + HOLD_S / HELD_SHARE
+
+    def release(self) -> None:
+        """Go on."""
+        now_s = self._clock()
+        if now_s < self._held_until_s:
+            self._held_until_s = now_s
+            self._next_hold_s = self._held_s + (now_s - self._held_s) / HELD_SHARE
+            if self._waiting:
+                self._serve_within(0.0)
 
     def count(self, account: Account, step: Callable[[], _T]) -> _T:
         """Do as `Account.count` says; a step within a step is counted once."""

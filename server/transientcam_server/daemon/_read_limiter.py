@@ -78,6 +78,7 @@ class ReadLimiter(asyncio.BufferedProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Hand the loss on, and forget what was not handed over."""
         self._portion = b""
+        self.account.done()
         self._lost()
         self.protocol.connection_lost(exc)
 
@@ -117,6 +118,7 @@ class ReadLimiter(asyncio.BufferedProtocol):
 
     def expect(self, *, more: bool) -> None:
         """Look at the next request; ``more`` if a part of it came with the last one."""
+        self.account.done()
         self.account = self._requests
         self._begun = None if more or self._portion else b""
 

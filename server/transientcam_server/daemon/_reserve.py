@@ -25,6 +25,16 @@ HANDSHAKES_HZ: Final = 100.0
 _HANDSHAKES_AT_ONCE: Final = 16
 
 
+def arrived(connection: socket.socket) -> bytes | None:
+    """Return what has arrived, without taking it; None for nothing yet, empty at the end."""
+    try:
+        return connection.recv(PORTION_BYTES, socket.MSG_PEEK)
+    except (BlockingIOError, InterruptedError):
+        return None
+    except OSError:
+        return b""
+
+
 class Candidate:
     """A connection beyond a limit.
 
@@ -121,12 +131,9 @@ class Reserve:
 
     def _look(self, candidate: Candidate) -> bool:
         """Look at what has arrived, without taking it; return whether the connection has ended."""
-        try:
-            begin = candidate.connection.recv(PORTION_BYTES, socket.MSG_PEEK)
-        except (BlockingIOError, InterruptedError):
+        begin = arrived(candidate.connection)
+        if begin is None:
             return False
-        except OSError:
-            begin = b""
         if begin and self._tls:
             self._speaking.append(candidate)
             self._shake_hands()
