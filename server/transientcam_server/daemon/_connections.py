@@ -100,6 +100,7 @@ class BoundedConnection(HttpToolsProtocol):
         self._body_left = _length(self.headers)
         self._expect_within(self._limits.body_s)
         super().on_headers_complete()
+        self.transport.account.begun()
         if self.transport.beyond:
             self.cycle.keep_alive = False
 

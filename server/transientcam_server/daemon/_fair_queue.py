@@ -24,7 +24,7 @@ MOST_LEAD_S: Final = 1.0
 """The same, of what one address has had before the others."""
 HOLD_S: Final = 0.5
 """Time at most in which nothing else is begun while what goes first is under way."""
-HELD_SHARE: Final = 0.2
+HELD_SHARE: Final = 0.5
 """Of the time, in the long run: what goes first may come again and again."""
 _LEAST_PAUSE_S: Final = 0.001
 _REMEMBERED: Final = 1024
@@ -55,6 +55,13 @@ class Account:
     def charge(self, spent_s: float) -> None:
         """Count processor time that another thread has spent for it."""
         self.left_s = max(-MOST_DEBT_S, self.left_s - spent_s)
+
+    def begun(self) -> None:
+        """Note that a request was begun: it takes its time in the next turn of the loop.
+
+        Nothing more is begun in this one, or many would be done in one go, and all else wait.
+        """
+        self._turns.end_slice()
 
     def done(self) -> None:
         """Note that what was under way is done."""
@@ -144,6 +151,10 @@ class FairQueue:
             self._waiting[account] = None
         self._go_on_later()
         return False
+
+    def end_slice(self) -> None:
+        """Let the rest of the loop have its turn before more is begun."""
+        self._slice_s = 0.0
 
     def hold_others(self) -> None:
         """Let the queues that this one goes before begin nothing for a while, not all the time."""

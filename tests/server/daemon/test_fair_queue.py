@@ -257,3 +257,19 @@ def test_one_that_goes_first_all_the_time_leaves_most_of_it_to_others() -> None:
     allowed_s = SHARE * loop.now_s
     assert loop.spent_s >= 0.95 * (1.0 - HELD_SHARE) * allowed_s
     assert loop.spent_s < allowed_s
+
+
+def test_a_request_that_was_begun_is_done_before_another_one_is() -> None:
+    loop = Loop()
+    account = loop.turns().account("one")
+    begun: list[int] = []
+
+    def begin(number: int) -> None:
+        begun.append(number)
+        account.begun()
+
+    for number in range(3):
+        account.run(partial(begin, number))
+    for turns in range(1, 4):
+        assert begun == list(range(turns))
+        loop.turn()
