@@ -64,7 +64,7 @@ NOTICES: Final[dict[str, NoticeKind]] = {
             "the light was to go off and may be on",
             {"reason": "string"},
         ),
-        NoticeKind("light-confirmed", "it is off, or was started again"),
+        NoticeKind("light-confirmed", "that has ended: it is off, or was started again"),
         NoticeKind(
             "sequence-changed",
             "what is captured from now on",

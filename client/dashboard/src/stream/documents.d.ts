@@ -10,7 +10,7 @@ export interface AbsentDocument {
 export interface AcquisitionDocument {
   readonly running: boolean;
   readonly state: "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
-  /** Why the camera is lost, or its light is held off. */
+  /** Why the camera is lost, its light is held off, or may be on. */
   readonly reason: string | null;
   /** Measured over the last frames; null before there are two. */
   readonly rate_hz: number | null;
@@ -20,6 +20,9 @@ export interface AcquisitionDocument {
   readonly frame_age_s: number;
   /** Whether no frame arrived for much longer than one takes. */
   readonly stalled: boolean;
+  /** Whether the light was to go off and may still be on: a relay's origin has not confirmed it,
+   * and is asked again until it does. */
+  readonly switching_off: boolean;
 }
 
 /** What the acquisition should do. */
@@ -458,6 +461,10 @@ export interface GrantedLeaseDocument {
   readonly on_lapse: "stop" | "keep" | null;
   /** To be sent in the header Transientcam-Lease with every change; no other client sees it. */
   readonly lease_id: string;
+}
+
+export interface HTTPValidationError {
+  readonly detail?: readonly ValidationError[];
 }
 
 /** Odd harmonics of the modulation, over the fundamental; from a phase sweep.
@@ -1284,6 +1291,14 @@ export interface TruthDocument {
   readonly returns: readonly ReturnDocument[];
 }
 
+export interface ValidationError {
+  readonly loc: readonly (string | number)[];
+  readonly msg: string;
+  readonly type: string;
+  readonly input?: unknown;
+  readonly ctx?: Readonly<Record<string, unknown>>;
+}
+
 /** Whether a calibration was measured on a diffuser, by what its images look like.
  *
  * Through a diffuser all pixels see one return at the same time; a scene has ranges, and several
@@ -1348,6 +1363,15 @@ export type Notice =
   | {
       readonly type: "notice";
       readonly kind: "light-released";
+    }
+  | {
+      readonly type: "notice";
+      readonly kind: "light-unconfirmed";
+      readonly reason: string;
+    }
+  | {
+      readonly type: "notice";
+      readonly kind: "light-confirmed";
     }
   | {
       readonly type: "notice";
