@@ -463,10 +463,6 @@ export interface GrantedLeaseDocument {
   readonly lease_id: string;
 }
 
-export interface HTTPValidationError {
-  readonly detail?: readonly ValidationError[];
-}
-
 /** Odd harmonics of the modulation, over the fundamental; from a phase sweep.
  *
  * They are taken out of the moments, unless `modulation_harmonics` of the reconstruction is
@@ -1289,14 +1285,6 @@ export interface TruthDocument {
   readonly brightness: number;
   /** At most the 16 strongest. */
   readonly returns: readonly ReturnDocument[];
-}
-
-export interface ValidationError {
-  readonly loc: readonly (string | number)[];
-  readonly msg: string;
-  readonly type: string;
-  readonly input?: unknown;
-  readonly ctx?: Readonly<Record<string, unknown>>;
 }
 
 /** Whether a calibration was measured on a diffuser, by what its images look like.

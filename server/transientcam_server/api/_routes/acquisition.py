@@ -65,7 +65,9 @@ async def change_acquisition(
 @router.post(
     "/acquisition/safe-off",
     summary="Switch the light off, now",
-    responses=documented(kinds.CAMERA_FAILED, kinds.CAMERA_LOST, kinds.LIGHT_UNCONFIRMED),
+    responses=documented(
+        kinds.INVALID_REQUEST, kinds.CAMERA_FAILED, kinds.CAMERA_LOST, kinds.LIGHT_UNCONFIRMED
+    ),
 )
 @needs(Role.VIEWER, lease=False)
 async def switch_off(service: ServiceOf, prefer: _Prefer = None) -> AcquisitionDocument:
