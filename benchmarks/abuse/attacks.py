@@ -104,6 +104,29 @@ def _connects(address: _Address) -> Generator[None]:
         yield
 
 
+def _reconnects(address: _Address) -> Generator[None]:
+    """Ask for something over a new connection each time, as programs without a pool do."""
+    while True:
+        with _connect(address) as connection:
+            connection.sendall(_asking(address, "/livez"))
+            connection.recv(_BLOCK_BYTES)
+        yield
+
+
+def _pretends(address: _Address) -> Generator[None]:
+    """Begin to switch the light off, and never do it, over as many connections as there may be."""
+    kept = []
+    try:
+        for _ in range(_SILENT_AT_ONCE):
+            kept.append(_connect(address))
+            kept[-1].sendall(b"POST /api/v1/acquisition/safe-off HTTP/1.1\r\n")
+            yield
+        time.sleep(_TIMEOUT_S)
+    finally:
+        for each in kept:
+            each.close()
+
+
 def _silent(address: _Address) -> Generator[None]:
     """Connect where TLS is spoken, and say nothing."""
     kept = []
@@ -196,6 +219,8 @@ ATTACKS: Final[dict[str, _Attack]] = {
     "endless trailer value": _sending(_CHUNKED + "0\r\na: ", b"x"),
     "tiny chunks": _sending(_CHUNKED, b"1\r\n \r\n"),
     "connects": _connects,
+    "reconnecting readers": _reconnects,
+    "pretended safe-offs": _pretends,
     "silent TLS handshakes": _silent,
     "slow readers": _slow_reader,
     "big reads": _big_read,

@@ -15,12 +15,13 @@ FRAMES_BAR: Final = 0.9
 LIVEZ_BAR_S: Final = 1.0
 LIVEZ_CPU_BAR_S: Final = 0.1
 LIGHT_BAR_S: Final = 1.0
+BESIDE_BAR_S: Final = 0.2
 GROWN_BAR_BYTES: Final = 64 * _MIB
 END_BAR_S: Final = 5.0
 
 _COLUMNS: Final = heads(
     "attack | connections | frames:.0% | /livez | its processor time | lapse | "
-    "safe-off | memory, most / left, MiB | SIGTERM | bars"
+    "safe-off | safe-off beside it | memory, most / left, MiB | SIGTERM | bars"
 )
 
 
@@ -32,6 +33,7 @@ def missed(seen: AttackOutcome) -> list[str]:
         "processor": seen.livez_cpu_s is not None and seen.livez_cpu_s <= LIVEZ_CPU_BAR_S,
         "lapse": seen.lapse_s is not None and seen.lapse_s <= LIGHT_BAR_S,
         "safe-off": seen.safe_off_s is not None and seen.safe_off_s <= LIGHT_BAR_S,
+        "beside": seen.beside_s is not None and seen.beside_s <= BESIDE_BAR_S,
         "memory": seen.grown_bytes <= GROWN_BAR_BYTES and seen.left_bytes <= GROWN_BAR_BYTES,
         "SIGTERM": seen.end_s is not None and seen.end_s <= END_BAR_S,
     }
@@ -60,6 +62,8 @@ def tables(
             f"bar {LIVEZ_CPU_BAR_S:g} s.",
             "- lapse, safe-off: from when the light should have gone off to the last capture; bar "
             f"{LIGHT_BAR_S:g} s.",
+            "- safe-off beside it: from the attack's address, over a new connection, until it is "
+            f"answered with 200; the longest of some; bar {BESIDE_BAR_S:g} s.",
             f"- memory: growth at most, and {COMES_BACK_S:g} s after the attack; bar "
             f"{GROWN_BAR_BYTES // _MIB} MiB.",
             f"- SIGTERM: until the daemon has ended, under attack; bar {END_BAR_S:g} s.",
@@ -102,7 +106,10 @@ def _row(name: str, connections: int, seen: AttackOutcome) -> tuple[Cell, ...]:
         name,
         connections,
         seen.frames,
-        *map(_seconds, (seen.livez_s, seen.livez_cpu_s, seen.lapse_s, seen.safe_off_s)),
+        *map(
+            _seconds,
+            (seen.livez_s, seen.livez_cpu_s, seen.lapse_s, seen.safe_off_s, seen.beside_s),
+        ),
         f"{seen.grown_bytes / _MIB:.0f} / {seen.left_bytes / _MIB:.0f}",
         _seconds(seen.end_s),
         "missed: " + ", ".join(below) if below else "met",

@@ -15,6 +15,7 @@ from typing import Final
 import httpx
 import trustme
 
+from benchmarks.abuse.attacks import SOURCE
 from benchmarks.common.daemon import VIDEO, Process
 from benchmarks.service.viewers import Viewer, cut, watch
 from transientcam import wire
@@ -25,6 +26,7 @@ GIVE_UP_S: Final = 30.0
 LEASE_S: Final = 2.0
 _PROBE_EVERY_S = 0.2
 _LIGHT_OFF_S: Final = 1.5
+_SAFE_OFFS: Final = 10
 COMES_BACK_S: Final = 3.0
 _FIRST_FRAMES_S: Final = 1.0
 _WAITING_S: Final = 0.1
@@ -44,6 +46,9 @@ class AttackOutcome:
         The longest answer of /livez: real time, and processor time of the loop's thread meanwhile.
     lapse_s, safe_off_s
         From when the light should have gone off to the last capture.
+    beside_s
+        The longest of some safe-offs from the address of the attack, each over a new connection,
+        until it was answered with 200.
     grown_bytes, left_bytes
         Memory over that before: at most, and a while after.
     end_s
@@ -55,6 +60,7 @@ class AttackOutcome:
     livez_cpu_s: float | None = None
     lapse_s: float | None = None
     safe_off_s: float | None = None
+    beside_s: float | None = None
     grown_bytes: int = 0
     left_bytes: int = 0
     end_s: float | None = None
@@ -145,6 +151,7 @@ def measure(
             seen.frames = frames / before if before else 0.0
             seen.lapse_s = _lapse(client)
             seen.safe_off_s = _safe_off(client)
+            seen.beside_s = _beside(process.url)
         seen.livez_s = (
             None if None in probe.waits_s else max(filter(None, probe.waits_s), default=None)
         )
@@ -224,6 +231,23 @@ def _safe_off(client: httpx.Client) -> float | None:
         return _last_capture_after(client, asked_s)
     except (httpx.HTTPError, LookupError):
         return None
+
+
+def _beside(url: str) -> float | None:
+    """Switch off from the attack's address, again and again; return the longest answer."""
+    waits_s = []
+    transport = httpx.HTTPTransport(local_address=SOURCE, verify=False)
+    try:
+        with httpx.Client(base_url=url, timeout=GIVE_UP_S, transport=transport) as client:
+            for _ in range(_SAFE_OFFS):
+                begin_s = time.perf_counter()
+                headers = {"Connection": "close"}
+                client.post("/api/v1/acquisition/safe-off", headers=headers).raise_for_status()
+                waits_s.append(time.perf_counter() - begin_s)
+                time.sleep(_PROBE_EVERY_S)
+    except httpx.HTTPError:
+        return None
+    return max(waits_s)
 
 
 def _last_capture_after(client: httpx.Client, due_s: float) -> float:

@@ -13,6 +13,7 @@ from transientcam.requests import (
     Which,
     changes,
     frames,
+    give_lease_back,
     planning,
     recordings,
 )
@@ -142,6 +143,10 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
     def safe_off(self) -> _Document:
         """Switch the light off, whichever client holds the lease."""
         return self._ask(changes.safe_off())
+
+    def give_lease_back(self) -> _Document:
+        """End the lease whose id the requests of this object carry."""
+        return self._ask(give_lease_back())
 
     def timeline(self, recording: str) -> _Document:
         """Return which frames a recording has, and when they were captured."""

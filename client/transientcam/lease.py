@@ -21,6 +21,8 @@ class BaseLease:
     ----------
     holder
         Name shown to other clients.
+    id
+        The secret that changes under it carry; empty before it was granted.
     """
 
     def __init__(self, show: Callable[[str | None], None], terms: dict[str, Any]) -> None:
@@ -29,6 +31,7 @@ class BaseLease:
         self._renewed_every_s = terms["duration_s"] / _RENEWALS
         self._lost: ProblemError | None = None
         self.holder: str = terms["holder"]
+        self.id = ""
 
     @property
     def lost(self) -> bool:
@@ -36,7 +39,8 @@ class BaseLease:
         return self._lost is not None
 
     def _begin(self, granted: dict[str, Any]) -> None:
-        self._show(lease_id(granted))
+        self.id = lease_id(granted)
+        self._show(self.id)
         self._lost = None
 
     def _renewal_failed(self, error: TransientcamError) -> None:
@@ -68,6 +72,11 @@ class Lease(BaseLease):
         self._thread = threading.Thread(target=self._keep, name="transientcam-lease", daemon=True)
         self._thread.start()
         return self
+
+    def abandon(self) -> None:
+        """Renew it no more, and make changes without it; it is not given back here."""
+        self._end.set()
+        self._show(None)
 
     def __exit__(self, _kind: object, error: object, _traceback: object) -> None:
         self._end.set()

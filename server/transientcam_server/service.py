@@ -32,11 +32,13 @@ from transientcam_server.camera import (
     Lease,
     LeaseManager,
     LightArmingEvent,
+    LightConfirmedEvent,
     LightGuard,
     LightHeldEvent,
     LightOffEvent,
     LightReleasedEvent,
     LightRules,
+    LightUnconfirmedEvent,
     OriginChanged,
     OriginLease,
     SequenceChanged,
@@ -266,16 +268,13 @@ class Service:
         recorded = self.recordings.active_id is not None
         return recorded or bool(self.hub.clients or self.mjpeg_clients)
 
-    async def off(self, switching: "Future[None]") -> None:
-        """Wait until the light is off, and a moment until that is kept."""
-        try:
-            await asyncio.wrap_future(switching)
-        finally:
-            if self._darkness is not None:
-                written = asyncio.wrap_future(self._darkness.written)
-                with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(_KEPT_S):
-                        await asyncio.shield(written)
+    async def off_kept(self) -> None:
+        """Wait a moment until it is kept that the light is off."""
+        if self._darkness is not None:
+            written = asyncio.wrap_future(self._darkness.written)
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(_KEPT_S):
+                    await asyncio.shield(written)
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -432,6 +431,10 @@ class Service:
                 self.hub.notify("light-held", {"reason": reason})
             case LightReleasedEvent():
                 self.hub.notify("light-released", {})
+            case LightUnconfirmedEvent(reason):
+                self.hub.notify("light-unconfirmed", {"reason": reason})
+            case LightConfirmedEvent():
+                self.hub.notify("light-confirmed", {})
             case OriginChanged():
                 self._adopt_calibration()
                 self._reconstruct_with(self._of_origin(self.pipeline.reconstruction.settings))
@@ -506,7 +509,7 @@ class Service:
             stopping = self.acquisition.set_running(False, cause="lapse")
             stopping.add_done_callback(_log_failure)
         if self.origin_lease is not None and change != "granted":
-            self.origin_lease.release()  # behind the change above; a new holder takes it anew
+            self.origin_lease.release()  # behind the stop above; a new holder takes it anew
 
     def _job_changed(self, job: Job) -> None:
         self.hub.notify("job-changed", {"job": job.to_document()})

@@ -39,6 +39,7 @@ _REPORTS: Final[Mapping[str, Callable[[Mapping[str, Any]], Report]]] = {
     "camera-back": lambda said: Report("info", "camera", "the camera answers again"),
     "light-held": lambda said: Report("warning", "camera", f"the light is off: {said['reason']}"),
     "light-released": lambda said: Report("info", "camera", "the light goes on again"),
+    "light-unconfirmed": lambda said: Report("warning", "camera", said["reason"]),
     "dropped": lambda said: Report(
         "warning",
         "dropped",

@@ -66,6 +66,12 @@ NOTICES: Final[dict[str, NoticeKind]] = {
         ),
         NoticeKind("light-released", "the light goes on again"),
         NoticeKind(
+            "light-unconfirmed",
+            "the light was to go off and may be on",
+            {"reason": "string"},
+        ),
+        NoticeKind("light-confirmed", "that has ended: it is off, or was started again"),
+        NoticeKind(
             "sequence-changed",
             "what is captured from now on",
             {"sequence": "object", "channels": "array"},

@@ -22,6 +22,7 @@ from transientcam_driver import (
     CameraFault,
     CameraLost,
     FrameTimeout,
+    NotStreaming,
     RawFrame,
     Sequence,
     Status,
@@ -39,6 +40,7 @@ from transientcam_server.camera._events import (
     SequenceChanged,
 )
 from transientcam_server.camera._light import Announcement, LightGuard
+from transientcam_server.camera._off_switch import OffSwitch
 from transientcam_server.camera._status import AcquisitionStatus, State
 from transientcam_server.camera._supervision import Supervision
 from transientcam_server.errors import JobCancelled, Problem, SequenceConflict, kinds
@@ -81,6 +83,7 @@ class Acquisition:
         self._dark: Dark | None = None
         self._offs = 0
         self._camera = camera
+        self._off_switch = OffSwitch(camera.safe_off)
         self._report = report
         self._clock = clock
         self._commands: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
@@ -148,9 +151,18 @@ class Acquisition:
             return self.submit(lambda: self._set_running(running, cause))
 
     def safe_off(self) -> "Future[None]":
-        """Stop capturing and switch the light off, by the request that no state refuses."""
+        """Stop capturing and switch the light off, by the request that no state refuses.
+
+        Done once the device has taken that request, which waits for no thread. The thread of the
+        camera repeats it, in case that it was starting the capture just then.
+        """
         self._offs += 1
-        return self.submit(self._safe_off)
+        self._running, self._dark = False, Dark("safe-off")
+        if self._darkness is not None:
+            self._darkness.keep(self._dark)
+        off = self._off_switch.begin()
+        self.submit(self._safe_off)
+        return off
 
     @property
     def offs(self) -> int:
@@ -258,6 +270,8 @@ class Acquisition:
                 self._run_commands(wait_s=0.0)
                 self._beat()
                 self._step()
+            except NotStreaming:  # the off switch was faster than the command behind it
+                self._started = False
             except CameraError as error:
                 if not self._shut_off_by_device(error):
                     self._camera_lost(str(error))

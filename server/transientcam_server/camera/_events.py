@@ -53,6 +53,18 @@ class LightReleasedEvent:
 
 
 @dataclass(frozen=True, slots=True)
+class LightUnconfirmedEvent:
+    """The light was to go off, and that takes long to be confirmed: it may be on."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class LightConfirmedEvent:
+    """`LightUnconfirmedEvent` has ended: the light is off, or it was started again."""
+
+
+@dataclass(frozen=True, slots=True)
 class SequenceChanged:
     """Frames from now on are captured with another sequence."""
 
@@ -72,6 +84,8 @@ Event = (
     | LightOffEvent
     | LightHeldEvent
     | LightReleasedEvent
+    | LightUnconfirmedEvent
+    | LightConfirmedEvent
     | SequenceChanged
     | OriginChanged
 )

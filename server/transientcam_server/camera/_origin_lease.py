@@ -3,14 +3,18 @@
 import asyncio
 from concurrent.futures import Future
 from functools import partial
+from typing import Final
 
 from transientcam_server.camera._acquisition import Acquisition
 from transientcam_server.camera._lease import Lease
 from transientcam_server.relay import RelayCamera
 
+RELEASED_S: Final = 5.0
+"""Time to wait until the origin has confirmed that it has its lease back."""
+
 
 class OriginLease:
-    """Takes and gives back on the thread of the camera, in the order of all other changes."""
+    """Takes it on the thread of the camera, behind all other changes, and gives it back at once."""
 
     def __init__(self, relay: RelayCamera, acquisition: Acquisition) -> None:
         self._relay = relay
@@ -35,10 +39,12 @@ class OriginLease:
         await asyncio.wrap_future(self._acquisition.submit(take))
 
     def release(self) -> None:
-        """Give it back, behind the changes that were made under it."""
-        self._released = self._acquisition.submit(self._relay.release_lease)
+        """Give it back; the origin is told again and again until it confirms that."""
+        self._released = self._relay.release_lease()
 
     async def released(self) -> None:
-        """Wait until it is given back."""
+        """Wait until it is given back, or for `RELEASED_S`."""
         if self._released is not None:
-            await asyncio.wrap_future(self._released)
+            confirmed = asyncio.wrap_future(self._released)
+            confirmed.add_done_callback(lambda done: done.cancelled() or done.exception())
+            await asyncio.wait((confirmed,), timeout=RELEASED_S)

@@ -2,13 +2,20 @@
 
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 from typing import TypeVar
 
 from transientcam_driver import Camera, CameraState, NotStreaming, RawFrame
 from transientcam_server.camera._acquisition import Acquisition
 from transientcam_server.camera._darkness import KeptCause
-from transientcam_server.camera._events import Event, OriginChanged
+from transientcam_server.camera._events import (
+    Event,
+    LightConfirmedEvent,
+    LightUnconfirmedEvent,
+    OriginChanged,
+)
 from transientcam_server.camera._light import LightGuard
+from transientcam_server.camera._status import AcquisitionStatus
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.relay import RelayCamera
 
@@ -29,6 +36,31 @@ class SharedAcquisition(Acquisition):
         self._origin = camera
         self._known = camera.origin
         self._running = self._started = camera.state is CameraState.STREAMING
+        camera.on_unconfirmed = lambda ended: report(
+            LightConfirmedEvent() if ended else LightUnconfirmedEvent(self._unconfirmed)
+        )
+
+    def set_running(self, running: bool, *, cause: KeptCause = "stop") -> "Future[None]":
+        """Start behind other changes, or stop at once, as `safe_off`."""
+        if running:
+            offs = self._origin.offs
+            return self.submit(lambda: self._start(offs))
+        return self._off(self._origin.begin_stop())
+
+    def safe_off(self) -> "Future[None]":
+        """Switch the light off at the origin, at once; done once the origin has confirmed that.
+
+        It waits for no thread here, and is sent again until then.
+        """
+        return self._off(self._origin.begin_safe_off())
+
+    def status(self) -> AcquisitionStatus:
+        """Return the present status; never waits."""
+        status = super().status()
+        if not self._origin.switching_off:
+            return status
+        why = "" if status.reason is None else f" ({status.reason})"
+        return replace(status, switching_off=True, reason=f"{self._unconfirmed}{why}")
 
     def occupy(
         self, job_id: str, work: Callable[[Camera, Callable[[], None]], _T], *, offs: int
@@ -81,20 +113,31 @@ class SharedAcquisition(Acquisition):
         """Leave the light to the origin: only what clients ask for goes there."""
         self._started = False
 
-    def _set_running(self, running: bool, cause: KeptCause = "stop") -> None:
-        if running:
-            self._camera.start()
-        else:
-            self._camera.stop()
+    def _start(self, offs: tuple[int, int]) -> None:
+        self._origin.start_unless(offs)
         self._follow()
+
+    def _set_running(self, running: bool, cause: KeptCause = "stop") -> None:
+        """Stop where a lease has lapsed."""
+        self._off(self._origin.begin_stop())
+
+    def _off(self, off: "Future[None]") -> "Future[None]":
+        def follow(done: "Future[None]") -> None:
+            if done.exception() is None:
+                self._running = self._started = False
+
+        off.add_done_callback(follow)
+        return off
+
+    @property
+    def _unconfirmed(self) -> str:
+        url = self._origin.url
+        return f"the light may be on, and is being switched off: {url} has not confirmed it"
 
     def _camera_works(self) -> None:
         self._started = self._running
         super()._camera_works()
 
-    def _safe_off(self) -> None:
-        self._camera.safe_off()
-        self._follow()
-
     def _switch_off_at_end(self) -> None:
         """Leave the light to the origin; `RelayCamera.close` ends what was switched on here."""
+        self._origin.on_unconfirmed = lambda ended: None  # nobody listens any more

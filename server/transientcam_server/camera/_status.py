@@ -27,7 +27,7 @@ class AcquisitionStatus:
     frame_age_s
         Since the last frame, or since the start where there was none.
     reason
-        Why the camera is lost, held or stopped.
+        Why the camera is lost, held or stopped, or the light may be on.
     stalled
         Whether frames are to be captured and the camera is there, but none came for too long.
     light_on_in_s
@@ -35,6 +35,8 @@ class AcquisitionStatus:
     off_because, off_kept
         What ended the capture, or kept it from beginning, and whether that holds over a restart of
         the service; None while it is running, and of a relay.
+    switching_off
+        Whether the light was to go off and may be on: that is not confirmed yet.
     """
 
     state: State
@@ -47,3 +49,4 @@ class AcquisitionStatus:
     light_on_in_s: float | None = None
     off_because: Cause | None = None
     off_kept: bool | None = None
+    switching_off: bool = False

@@ -1,4 +1,8 @@
-"""Accepts connections, and counts them from there on: how many, and how fast they come."""
+"""Accepts connections, and counts them from there on: how many, and how fast they come.
+
+Those beyond a limit are refused unless they switch the light off
+(`transientcam_server.daemon._reserve`).
+"""
 
 import asyncio
 import contextlib
@@ -7,14 +11,17 @@ import socket
 import ssl
 import time
 from collections import Counter
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Coroutine
+from functools import partial
+from typing import Any, Final
 
-from transientcam_server.daemon._fair_queue import FairQueue
+from transientcam_server.daemon._fair_queue import Account, FairQueue
 from transientcam_server.daemon._metering import metered
+from transientcam_server.daemon._priority import switches_off
 from transientcam_server.daemon._rate_limit import RateLimiter
 from transientcam_server.daemon._read_limiter import PORTION_BYTES, ReadLimiter
 from transientcam_server.daemon._refusals import refusal
+from transientcam_server.daemon._reserve import LOOK_S, Candidate, Reserve, arrived
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.settings import LimitSettings
 
@@ -29,6 +36,8 @@ UNWATCHED_SHARE: Final = 0.9
 """The same while no frames are sent or recorded."""
 STREAMS_SHARE: Final = 0.2
 """Of it, for what the clients of streams send. The rest is for what these are sent."""
+PRIORITY_SHARE: Final = 0.2
+"""Of it, for requests that switch the light off; they wait for nothing else."""
 _REMEMBERED_ADDRESSES: Final = 1024
 
 
@@ -139,7 +148,19 @@ class Acceptor:
         self._streams = FairQueue(
             self._loop, share=lambda: STREAMS_SHARE, share_of_one=lambda: STREAMS_SHARE
         )
+        self._first = FairQueue(
+            self._loop,
+            share=lambda: PRIORITY_SHARE,
+            share_of_one=lambda: PRIORITY_SHARE,
+            goes_before=(self._requests, self._streams),
+        )
         self._admission = Admission(limits, clock=self._loop.time)
+        self._reserve = Reserve(
+            self._loop,
+            connect=self._connect_beyond,
+            refuse=self._refuse,
+            tls=tls is not None,
+        )
         self._refusals: dict[str, bytes] = {}
         self._handshakes: set[asyncio.Task[None]] = set()
         self._pause: asyncio.TimerHandle | None = None
@@ -154,6 +175,7 @@ class Acceptor:
         if self._pause is not None:
             self._pause.cancel()
         self._loop.remove_reader(self._listener)
+        self._reserve.close()
         if self._tls is not None:
             # without TLS they are done at once; uvloop would not notify their protocols
             for task in self._handshakes:
@@ -176,12 +198,25 @@ class Acceptor:
 
     def _begin(self, connection: socket.socket, host: str) -> None:
         problem = self._admission.admit(host)
+        if self._tls is None and switches_off(arrived(connection) or b""):
+            self._first.hold_others()  # from now on, not only when it is read in its turn
         if problem is None:
-            connecting = metered(self._connect(connection, host), self._requests.account(host))
-            task = self._loop.create_task(connecting)
-            self._handshakes.add(task)
-            task.add_done_callback(self._handshakes.discard)
-            return
+            release = partial(self._admission.release, host)
+            self._start(self._connect(connection, host, release), self._requests.account(host))
+        else:
+            self._reserve.take(connection, host, problem)
+
+    def _connect_beyond(self, candidate: Candidate) -> None:
+        release = partial(self._reserve.release, candidate)
+        connecting = self._connect(candidate.connection, candidate.host, release, candidate)
+        self._start(connecting, self._first.account(candidate.host))
+
+    def _start(self, connecting: Coroutine[Any, Any, None], account: Account) -> None:
+        task = self._loop.create_task(metered(connecting, account))
+        self._handshakes.add(task)
+        task.add_done_callback(self._handshakes.discard)
+
+    def _refuse(self, connection: socket.socket, problem: Problem) -> None:
         with contextlib.suppress(OSError):
             if self._tls is None:
                 connection.send(self._refusal(problem))
@@ -197,21 +232,39 @@ class Acceptor:
             known = self._refusals[problem.detail] = refusal(problem)
         return known
 
-    async def _connect(self, connection: socket.socket, host: str) -> None:
+    async def _connect(
+        self,
+        connection: socket.socket,
+        host: str,
+        release: Callable[[], None],
+        candidate: Candidate | None = None,
+    ) -> None:
         """Hand a connection to a protocol once its handshake is done."""
         counted = contextlib.ExitStack()
-        counted.callback(self._admission.release, host)
+        counted.callback(release)
+
+        def limited() -> ReadLimiter:
+            limiter = ReadLimiter(
+                self._protocol(),
+                requests=self._requests.account(host),
+                streams=self._streams.account(host),
+                first=self._first.account(host),
+                beyond=None if candidate is None else self._refusal(candidate.problem),
+                lost=counted.close,
+            )
+            if candidate is not None:
+                candidate.limiter = limiter
+                if candidate.refused:
+                    limiter.refuse()
+            return limiter
+
+        within_s = self._limits.head_s if candidate is None else min(LOOK_S, self._limits.head_s)
         try:
             await self._loop.connect_accepted_socket(
-                lambda: ReadLimiter(
-                    self._protocol(),
-                    requests=self._requests.account(host),
-                    streams=self._streams.account(host),
-                    lost=counted.close,
-                ),
+                limited,
                 connection,
                 ssl=self._tls,
-                ssl_handshake_timeout=None if self._tls is None else self._limits.head_s,
+                ssl_handshake_timeout=None if self._tls is None else within_s,
             )
         except (OSError, EOFError) as error:  # those of TLS among them
             _log.debug("no handshake with %s: %s", host, error)

@@ -47,7 +47,7 @@ class BoundedConnection(HttpToolsProtocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Register the connection."""
         super().connection_made(cast("asyncio.Transport", transport))
-        self.app = in_turns(self.app, self.transport.account)
+        self.app = in_turns(self.app, lambda: self.transport.account)
         self.flow = FlowControl(cast("asyncio.Transport", transport))
         self._stall_timer = StallTimer(
             cast("asyncio.Transport", transport), limit_s=self._limits.stalled_s, loop=self.loop
@@ -100,6 +100,9 @@ class BoundedConnection(HttpToolsProtocol):
         self._body_left = _length(self.headers)
         self._expect_within(self._limits.body_s)
         super().on_headers_complete()
+        self.transport.account.begun()
+        if self.transport.beyond:
+            self.cycle.keep_alive = False
 
     def on_body(self, body: bytes) -> None:
         """Take a part of the body: it allows for as much beside it, as the sizes of its chunks."""
@@ -115,12 +118,15 @@ class BoundedConnection(HttpToolsProtocol):
         self._expect_within(None)
         super().on_message_complete()
         self._in_works = self._unanswered
+        if not self._in_works:
+            self.transport.expect(more=bool(self._unparsed))
 
     def on_response_complete(self) -> None:
         """Parse on."""
         super().on_response_complete()
         if self._in_works:
             self._in_works = False
+            self.transport.expect(more=bool(self._unparsed))
             if self._unparsed:
                 self.transport.release(self._parse)
 

@@ -9,7 +9,7 @@ its connections take turns.
 import asyncio
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final, TypeVar
 
 BURST_S: Final = 0.01
@@ -22,6 +22,10 @@ MOST_DEBT_S: Final = 0.1
 """What a single step took beyond this is not counted: no client waits long because of it."""
 MOST_LEAD_S: Final = 1.0
 """The same, of what one address has had before the others."""
+HOLD_S: Final = 0.5
+"""Time at most in which nothing else is begun while what goes first is under way."""
+HELD_SHARE: Final = 0.5
+"""Of the time, in the long run: what goes first may come again and again."""
 _LEAST_PAUSE_S: Final = 0.001
 _REMEMBERED: Final = 1024
 _T = TypeVar("_T")
@@ -52,6 +56,17 @@ class Account:
         """Count processor time that another thread has spent for it."""
         self.left_s = max(-MOST_DEBT_S, self.left_s - spent_s)
 
+    def begun(self) -> None:
+        """Note that a request was begun: it takes its time in the next turn of the loop.
+
+        Nothing more is begun in this one, or many would be done in one go, and all else wait.
+        """
+        self._turns.end_slice()
+
+    def done(self) -> None:
+        """Note that what was under way is done."""
+        self._turns.release_others()
+
     async def turn(self) -> None:
         """Wait until there is time."""
         come = asyncio.get_running_loop().create_future()
@@ -74,6 +89,8 @@ class FairQueue:
         Real time in s.
     spent
         Processor time of this thread in s.
+    goes_before
+        Queues of the same loop that begin nothing while something of this one is under way.
     """
 
     def __init__(
@@ -84,12 +101,15 @@ class FairQueue:
         share_of_one: Callable[[], float],
         clock: Callable[[], float] = time.monotonic,
         spent: Callable[[], float] = time.thread_time,
+        goes_before: Sequence["FairQueue"] = (),
     ) -> None:
         self._loop = loop
         self._share = share
         self._share_of_one = share_of_one
         self._clock = clock
         self._spent = spent
+        self._goes_before = goes_before
+        self._held_s = self._held_until_s = self._next_hold_s = clock()
         self._accounts: dict[str, Account] = {}
         self._waiting: dict[Account, None] = {}
         self._now_s = 0.0
@@ -114,6 +134,7 @@ class FairQueue:
 
     def run(self, account: Account, work: Callable[[], None]) -> bool:
         """Do as `Account.run` says."""
+        self.hold_others()
         if (
             not self._waiting
             and self._slice_s > 0.0
@@ -130,6 +151,36 @@ class FairQueue:
             self._waiting[account] = None
         self._go_on_later()
         return False
+
+    def end_slice(self) -> None:
+        """Let the rest of the loop have its turn before more is begun."""
+        self._slice_s = 0.0
+
+    def hold_others(self) -> None:
+        """Let the queues that this one goes before begin nothing for a while, not all the time."""
+        for each in self._goes_before:
+            each.hold()
+
+    def release_others(self) -> None:
+        """Let them go on."""
+        for each in self._goes_before:
+            each.release()
+
+    def hold(self) -> None:
+        """Begin nothing until `release`, for `HOLD_S` at most, unless that was so a moment ago."""
+        now_s = self._clock()
+        if now_s >= self._next_hold_s:
+            self._held_s, self._held_until_s = now_s, now_s + HOLD_S
+            self._next_hold_s = now_s + HOLD_S / HELD_SHARE
+
+    def release(self) -> None:
+        """Go on."""
+        now_s = self._clock()
+        if now_s < self._held_until_s:
+            self._held_until_s = now_s
+            self._next_hold_s = self._held_s + (now_s - self._held_s) / HELD_SHARE
+            if self._waiting:
+                self._serve_within(0.0)
 
     def count(self, account: Account, step: Callable[[], _T]) -> _T:
         """Do as `Account.count` says; a step within a step is counted once."""
@@ -170,7 +221,7 @@ class FairQueue:
         now_s = self._clock()
         self._left_s = min(BURST_S, self._left_s + self._share() * (now_s - self._counted_s))
         self._counted_s = now_s
-        return self._left_s > 0.0
+        return self._left_s > 0.0 and now_s >= self._held_until_s
 
     def _has_time_for(self, account: Account) -> bool:
         now_s = self._clock()
@@ -188,7 +239,8 @@ class FairQueue:
     def _go_on_later(self) -> None:
         pauses_s = [0.0]
         if not self._has_time():
-            pauses_s += [_LEAST_PAUSE_S, -self._left_s / self._share()]
+            held_s = self._held_until_s - self._clock()
+            pauses_s += [_LEAST_PAUSE_S, -self._left_s / self._share(), held_s]
         if not any(map(self._has_time_for, self._waiting)):
             least_debt_s = min(-each.left_s for each in self._waiting)
             pauses_s += [_LEAST_PAUSE_S, least_debt_s / self._share_of_one()]

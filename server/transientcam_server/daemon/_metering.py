@@ -47,11 +47,14 @@ async def metered(coroutine: Coroutine[Any, Any, _T], account: Account) -> _T:
     return result
 
 
-def in_turns(app: ASGIApp, account: Account) -> ASGIApp:
-    """Return an application whose work counts, and whose long answers wait for their turns."""
+def in_turns(app: ASGIApp, account_of_request: Callable[[], Account]) -> ASGIApp:
+    """Return an application whose work counts, and whose long answers wait for their turns.
+
+    ``account_of_request`` is asked when a request begins.
+    """
 
     async def counted(scope: Scope, receive: Receive, send: Send) -> None:
-        begun = False
+        begun, account = False, account_of_request()
         _asking.set(account)  # the server runs each request in a context of its own
 
         async def send_in_turn(message: Message) -> None:

@@ -1,7 +1,8 @@
 """What clients send, in portions: a flood on one connection delays no other one.
 
 Between the transport of a connection and its protocol stands a `ReadLimiter`. It reads no more
-than `PORTION_BYTES` at once, and hands them over when `FairQueue` has time for its address.
+than `PORTION_BYTES` at once, and hands them over when `FairQueue` has time for its address. What
+switches the light off waits for nothing but its like.
 """
 
 import asyncio
@@ -10,6 +11,7 @@ from collections.abc import Callable
 from typing import Any, Final, cast
 
 from transientcam_server.daemon._fair_queue import Account
+from transientcam_server.daemon._priority import switches_off
 
 PORTION_BYTES: Final = 2048
 """Read of one connection at once: 340 of the smallest WebSocket frames, 1.5 ms of parsing."""
@@ -35,6 +37,11 @@ class ReadLimiter(asyncio.BufferedProtocol):
         An `asyncio.Protocol`; its transport is a `Valve`.
     requests, streams
         What the address of the client has of the time for requests, and for WebSockets.
+    first
+        What it has for requests that switch the light off.
+    beyond
+        How a connection beyond a limit is refused whose first request is another one; None within
+        the limits.
     lost
         Called once when the connection has ended.
     """
@@ -45,12 +52,19 @@ class ReadLimiter(asyncio.BufferedProtocol):
         *,
         requests: Account,
         streams: Account,
+        first: Account,
         lost: Callable[[], None],
+        beyond: bytes | None = None,
     ) -> None:
         self.protocol = protocol
         self.account = requests
+        self.beyond = beyond
+        self._requests = requests
         self._streams = streams
+        self._first = first
         self._lost = lost
+        self._refused = False
+        self._begun: bytes | None = b""  # what may become a request that goes first
         self._valve: Valve | None = None
         self._portion = b""
 
@@ -58,10 +72,13 @@ class ReadLimiter(asyncio.BufferedProtocol):
         """Hand the connection on."""
         self._valve = Valve(cast("asyncio.Transport", transport), self)
         self.protocol.connection_made(cast("asyncio.Transport", self._valve))
+        if self._refused:
+            self.refuse()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Hand the loss on, and forget what was not handed over."""
         self._portion = b""
+        self.account.done()
         self._lost()
         self.protocol.connection_lost(exc)
 
@@ -72,9 +89,45 @@ class ReadLimiter(asyncio.BufferedProtocol):
     def buffer_updated(self, nbytes: int) -> None:
         """Take a portion, and hand it over in turn."""
         assert self._valve is not None  # noqa: S101 - bytes come after the connection
-        self._portion += bytes(_portion.buffer[:nbytes])
-        if not self.account.run(self.hand_over):
+        portion = bytes(_portion.buffer[:nbytes])
+        self._portion += portion
+        goes_first = self._goes_first(portion)
+        if self.beyond is not None and not goes_first:
+            if goes_first is False:
+                self.refuse()
+            return
+        if not self.account.run(self.hand_over) and goes_first is not None:
             self._valve.shut("turn")
+
+    def _goes_first(self, portion: bytes) -> bool | None:
+        """Return whether what arrived completes a request that goes first; None if it may yet."""
+        if self._begun is None:
+            return self.first
+        self._begun += portion
+        goes_first = switches_off(self._begun)
+        if goes_first is not None:
+            self._begun = None
+        if goes_first:
+            self.account = self._first
+        return goes_first
+
+    @property
+    def first(self) -> bool:
+        """Whether a request is under way that goes before all others."""
+        return self.account is self._first
+
+    def expect(self, *, more: bool) -> None:
+        """Look at the next request; ``more`` if a part of it came with the last one."""
+        self.account.done()
+        self.account = self._requests
+        self._begun = None if more or self._portion else b""
+
+    def refuse(self) -> None:
+        """Answer with the refusal, and end the connection; as soon as there is one."""
+        self._refused = True
+        if self._valve is not None and not self._valve.is_closing():
+            self._valve.write(self.beyond or b"")
+            self._valve.close()
 
     def hand_over(self) -> None:
         """Hand the portion over, unless the protocol reads nothing for now."""
@@ -90,7 +143,7 @@ class ReadLimiter(asyncio.BufferedProtocol):
     def upgrade(self, protocol: asyncio.Protocol) -> None:
         """Hand everything to the protocol of a WebSocket from now on."""
         self.protocol = protocol
-        self.account = self._streams
+        self.account, self._begun = self._streams, None
 
     def eof_received(self) -> bool | None:
         """Hand it on."""
@@ -129,6 +182,15 @@ class Valve:
     def account(self) -> Account:
         """What the address of the client has of the loop's time."""
         return self._limiter.account
+
+    @property
+    def beyond(self) -> bool:
+        """Whether the connection is one beyond a limit, which has one request."""
+        return self._limiter.beyond is not None
+
+    def expect(self, *, more: bool) -> None:
+        """Note that the next request is expected; ``more`` if a part of it is here."""
+        self._limiter.expect(more=more)
 
     @property
     def held(self) -> bool:

@@ -391,6 +391,14 @@ CAMERA_LOST: Final = ProblemKind(
     "The camera was unplugged or does not answer. The service searches for it and resumes by "
     "itself when it is back.",
 )
+LIGHT_UNCONFIRMED: Final = ProblemKind(
+    "light-unconfirmed",
+    504,
+    "The light may be on",
+    "The service that is relayed has not confirmed in time that its light is off. The request is "
+    "sent there again until it does, or somebody starts the capture; `switching_off` of `GET "
+    "/api/v1/acquisition` is true until then.",
+)
 NO_FRAME_YET: Final = ProblemKind(
     "no-frame-yet",
     503,

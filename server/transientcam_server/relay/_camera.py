@@ -1,12 +1,15 @@
 """The camera of another service, as a `transientcam_driver.Camera`."""
 
+import logging
 import secrets
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from contextlib import suppress
 from typing import Any, Final
 
 import transientcam
+from transientcam import AsyncCamera
 from transientcam_driver import (
     AppliedSequence,
     CameraError,
@@ -22,10 +25,12 @@ from transientcam_driver import (
 from transientcam_driver.camera import HostCamera
 from transientcam_driver.clock import Clock, RealClock
 from transientcam_server.imaging import NOMINAL_ID
+from transientcam_server.relay._delivery import Delivery
 from transientcam_server.relay._frames import RAW, SUBSCRIBED, Collector, Parts, capture_of
 from transientcam_server.relay._origin import Described, Origin, require_same_camera
 from transientcam_server.relay._reports import RelayCounters, hops_of, status_of
 
+_log = logging.getLogger("transientcam_server.relay.camera")
 _SLICE_S: Final = 0.05
 """How long a reader may wait before it looks whether the camera was stopped."""
 SILENT_S: Final = 1.0
@@ -39,7 +44,9 @@ class RelayCamera(HostCamera):
 
     The camera is shared: it captures what and when the origin does, whichever client sets that.
     ``start``, ``stop``, ``safe_off`` and ``configure`` are made at the origin and raise
-    `OriginRefused` where it refuses; ``close`` switches off only what this relay has switched on.
+    `OriginRefused` where it refuses. What switches the light off goes there at once, whatever this
+    relay knows of the origin, and is sent again until it is confirmed; ``start`` ends that.
+    ``close`` switches off only what this relay has switched on.
 
     The connection is closed with the camera, also where this cannot be opened.
 
@@ -51,6 +58,9 @@ class RelayCamera(HostCamera):
         What is relayed, as it described itself last.
     relayed
         What was missed on the way.
+    on_unconfirmed
+        Called, on any thread, when the origin does not confirm that its light is off, with False,
+        and when that has ended, with True.
 
     Raises
     ------
@@ -82,6 +92,16 @@ class RelayCamera(HostCamera):
         self._former_id: str | None = None
         self._gone: str | None = None
         self._heard_s = 0.0
+        self._stop_lease: str | None = None
+        self._releasing: list[Delivery] = []
+        self._safe_off = Delivery(
+            lambda: origin.send_apart(AsyncCamera.safe_off), changed=self._takes_long
+        )
+        self._stop = Delivery(
+            lambda: origin.send_apart(AsyncCamera.stop, lease_id=self._stop_lease),
+            changed=self._takes_long,
+        )
+        self.on_unconfirmed: Callable[[bool], None] = lambda ended: None
         try:
             self.origin = origin.describe()
             self._capabilities = self.origin.capabilities
@@ -127,21 +147,51 @@ class RelayCamera(HostCamera):
         return self._applied
 
     def start(self) -> None:
-        """Let the origin capture; nothing is asked of one that does."""
+        """Let the origin capture; nothing is asked of one that does and is not to stop."""
+        self.start_unless(self.offs)
+
+    @property
+    def offs(self) -> tuple[int, int]:
+        """How often the light was to go off: it counts `safe_off` and `stop`."""
+        return self._safe_off.asked, self._stop.asked
+
+    def start_unless(self, offs: tuple[int, int]) -> None:
+        """As `start`, unless the light was to go off since there were so many ``offs``."""
         self._require_connected()
+        if self.offs != offs or not (
+            self.switching_off or self._state is not CameraState.STREAMING
+        ):
+            return
+        self._link.set_running(True)
+        for off, asked in zip((self._safe_off, self._stop), offs, strict=True):
+            off.end("the capture was started meanwhile", asked=asked)
         with self._control:
-            if self._state is not CameraState.STREAMING:
-                self._link.set_running(True)
-                self._switched_on = True
-                self._begin()
+            self._switched_on = True
+            self._begin()
 
     def stop(self) -> None:
         """Stop the capture at the origin, for all its clients."""
-        self._switch_off(lambda: self._link.set_running(False))
+        self._confirmed(self.begin_stop())
 
     def safe_off(self) -> None:
         """Switch the light off at the origin, whichever client holds the lease there."""
-        self._switch_off(self._link.safe_off)
+        self._confirmed(self.begin_safe_off())
+
+    def begin_stop(self) -> "Future[None]":
+        """As `stop`, without waiting: done once the origin has confirmed it, or refuses."""
+        lease_id = self._link.lease_id
+        if lease_id is not None or not self._stop.unconfirmed:
+            self._stop_lease = lease_id
+        return self._followed(self._stop.begin())
+
+    def begin_safe_off(self) -> "Future[None]":
+        """As `safe_off`, without waiting: in any state, and again until the origin confirms it."""
+        return self._followed(self._safe_off.begin())
+
+    @property
+    def switching_off(self) -> bool:
+        """Whether the light was to go off and the origin has not confirmed it."""
+        return self._safe_off.unconfirmed or self._stop.unconfirmed
 
     def status(self) -> Status:
         """Ask the origin for the status of its camera, and whether it captures."""
@@ -186,16 +236,40 @@ class RelayCamera(HostCamera):
                 self._link.set_running(False)
         self._closed = True
         self._state = CameraState.DISCONNECTED
+        if self.switching_off:
+            _log.error(
+                "%s has not confirmed that its light is off, and is not asked again", self.url
+            )
+        for each in (self._safe_off, self._stop, *self._releasing):
+            each.end("this service ends")
+            each.join()
         self._link.close()
 
     def take_lease(self, holder: str, **terms: Any) -> None:
         """Take the lease of the origin for a client of this relay; terms as `Camera.lease` has."""
         self._require_connected()
+        self.release_lease()
+        for former in self._releasing:
+            former.wait(self._link.timeout_s)  # refused while the origin has not confirmed that
         self._link.take_lease(f"{holder} (through a relay)", **terms)
 
-    def release_lease(self) -> None:
-        """Give the lease of the origin back, if this relay has it."""
-        self._link.release_lease()
+    def release_lease(self) -> "Future[None] | None":
+        """Give the lease of the origin back, if this relay has it, behind a stop that was made.
+
+        Never waits: it is renewed no more, and the origin is told until it confirms that.
+        """
+        lease_id = self._link.abandon_lease()
+        if lease_id is None:
+            return None
+
+        async def release() -> None:
+            if self._stop.unconfirmed:  # it is made under this lease
+                raise CameraLost("the stop before it is not confirmed")
+            await self._link.send_apart(AsyncCamera.give_lease_back, lease_id=lease_id)
+
+        delivery = Delivery(release)
+        self._releasing = [*(each for each in self._releasing if each.unconfirmed), delivery]
+        return delivery.begin()
 
     # -- what the origin is at ------------------------------------------------------------------
 
@@ -238,10 +312,26 @@ class RelayCamera(HostCamera):
     def _begin(self) -> None:
         self._state, self._heard_s = CameraState.STREAMING, self._clock.now_s()
 
-    def _switch_off(self, request: Callable[[], None]) -> None:
-        self._require_connected()
-        request()
-        self._follow(capturing=False)
+    def _followed(self, off: "Future[None]") -> "Future[None]":
+        """Note that the origin captures no more, once it says so; never waits for a lock."""
+
+        def follow(done: "Future[None]") -> None:
+            if done.exception() is None and self._state is CameraState.STREAMING:
+                self._state, self._switched_on = CameraState.IDLE, False
+
+        off.add_done_callback(follow)
+        return off
+
+    def _confirmed(self, off: "Future[None]") -> None:
+        try:
+            off.result(self._link.timeout_s)
+        except TimeoutError:
+            raise CameraLost(f"{self.url} has not confirmed it, and is asked again") from None
+
+    def _takes_long(self, ended: bool) -> None:
+        if not ended:
+            _log.warning("%s has not confirmed that its light is off: it is asked again", self.url)
+        self.on_unconfirmed(ended)
 
     def _refresh(self) -> None:
         """Take over what the origin has changed beside its sequence."""

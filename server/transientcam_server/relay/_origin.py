@@ -1,12 +1,15 @@
 """The service that is relayed: what its REST interface says, and errors as those of a camera."""
 
+import ssl
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from http import HTTPStatus
 from pathlib import Path
 from typing import Any, Final
 
+import httpx
 from pydantic import TypeAdapter, ValidationError
 
 import transientcam
@@ -14,9 +17,11 @@ import transientcam_moments as tm
 from transientcam.lease import Lease
 from transientcam.stream import Stream
 from transientcam.stream_state import NoticeHandler
+from transientcam.wire import LEASE_HEADER
 from transientcam_driver import CalibrationError, CameraError, CameraLost, Capabilities
 from transientcam_server.errors import OriginRefused
 from transientcam_server.imaging import FACTORY_ID, NOMINAL_ID, Calibration, load_calibration
+from transientcam_server.relay._delivery import ATTEMPT_S
 from transientcam_server.relay._frames import RAW, SUBSCRIBED
 from transientcam_server.settings import CorruptImages
 
@@ -25,6 +30,9 @@ _CORRUPT_IMAGES: Final[TypeAdapter[CorruptImages]] = TypeAdapter(CorruptImages)
 _SENSOR: Final = TypeAdapter(tm.noise.Sensor)
 _CREDITS: Final = 2
 """One frame travels while another is taken: more would only make frames older."""
+_TRANSIENT: Final = (HTTPStatus.REQUEST_TIMEOUT, HTTPStatus.TOO_MANY_REQUESTS)
+Change = Callable[[transientcam.AsyncCamera], Awaitable[object]]
+"""What is to be done at the origin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +88,7 @@ class Origin:
 
     Attributes
     ----------
-    product
+    product, timeout_s
         As given.
     """
 
@@ -88,7 +96,10 @@ class Origin:
         self, url: str, token: str | None, *, timeout_s: float, product: str = RAW
     ) -> None:
         self.product = product
+        self.timeout_s = timeout_s
+        self._token = token
         self._client = transientcam.Camera(url, token=token, timeout_s=timeout_s)
+        self._tls = httpx.create_ssl_context()
         self._lease: Lease | None = None
 
     @property
@@ -149,29 +160,56 @@ class Origin:
         with self._changing():
             _ = self._client.start() if running else self._client.stop()
 
-    def safe_off(self) -> None:
-        """Switch the light off, whichever client holds the lease."""
-        with self._changing():
-            self._client.safe_off()
+    @property
+    def lease_id(self) -> str | None:
+        """The id of the lease that this relay has there."""
+        return None if self._lease is None else self._lease.id
+
+    async def send_apart(self, change: Change, *, lease_id: str | None = None) -> None:
+        """Make a change over a connection of its own; what the origin may yet confirm is lost.
+
+        Raises
+        ------
+        OriginRefused
+            It refuses for good: another try would be refused, too.
+        """
+        headers = {"prefer": f"wait={ATTEMPT_S:g}"}
+        if lease_id is not None:
+            headers[LEASE_HEADER] = lease_id
+        camera = transientcam.AsyncCamera(
+            self.url,
+            token=self._token,
+            timeout_s=ATTEMPT_S,
+            transport=_WithHeaders(headers, verify=self._tls),
+        )
+        async with camera:
+            try:
+                await change(camera)
+            except transientcam.ProblemError as error:
+                if error.status in _TRANSIENT or error.status >= HTTPStatus.INTERNAL_SERVER_ERROR:
+                    raise CameraLost(str(error)) from error
+                raise OriginRefused(self.url, error.document) from error
 
     def take_lease(self, holder: str, **terms: Any) -> None:
-        """Take the lease on these terms, in the place of one that this relay has; it is renewed."""
-        self.release_lease()
+        """Take the lease on these terms; it is renewed."""
         lease = self._client.lease(holder, **terms)
         with self._changing():
             lease.__enter__()
         self._lease = lease
 
-    def release_lease(self) -> None:
-        """Give the lease back, if there is one; where that fails it lapses."""
+    def abandon_lease(self) -> str | None:
+        """Renew the lease no more, and return its id, if there is one."""
         lease, self._lease = self._lease, None
-        if lease is not None:
-            with suppress(transientcam.TransientcamError):
-                lease.__exit__(None, None, None)
+        if lease is None:
+            return None
+        lease.abandon()
+        return lease.id
 
     def close(self) -> None:
         """Close every connection; the origin goes on."""
-        self.release_lease()
+        if self._lease is not None:
+            with suppress(transientcam.TransientcamError):
+                self._lease.__exit__(None, None, None)
         self._client.close()
 
     def _require_products(self, info: Mapping[str, Any]) -> None:
@@ -214,6 +252,19 @@ class Origin:
             raise OriginRefused(self.url, error.document) from error
         except transientcam.TransientcamError as error:
             raise CameraLost(str(error)) from error
+
+
+class _WithHeaders(httpx.AsyncHTTPTransport):
+    """Sends some headers with every request."""
+
+    def __init__(self, headers: Mapping[str, str], *, verify: ssl.SSLContext) -> None:
+        super().__init__(verify=verify)
+        self._headers = headers
+
+    async def handle_async_request(self, request: httpx.Request) -> httpx.Response:
+        """Send a request with them."""
+        request.headers.update(self._headers)
+        return await super().handle_async_request(request)
 
 
 def _capabilities(document: Mapping[str, Any]) -> Capabilities:

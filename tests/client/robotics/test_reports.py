@@ -12,6 +12,7 @@ from transientcam.wire import Notice
         (Notice("camera-lost", {"reason": "unplugged"}), "error", "camera", "unplugged"),
         (Notice("camera-back", {}), "info", "camera", "again"),
         (Notice("light-held", {"reason": "no client"}), "warning", "camera", "no client"),
+        (Notice("light-unconfirmed", {"reason": "may be on"}), "warning", "camera", "may be on"),
         (Notice("light-released", {}), "info", "camera", "goes on"),
         (Notice("connection-lost", {"reason": "1006"}), "error", "connection", "1006"),
         (Notice("reconnected", {"attempts": 2}), "info", "connection", "again"),

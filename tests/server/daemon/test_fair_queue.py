@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any, cast
 
 import pytest
 
@@ -9,9 +10,12 @@ from tests.server.daemon.loops import SHARE, STEP_S, Client, Loop
 from transientcam_server.daemon._fair_queue import (
     BURST_OF_ONE_S,
     BURST_S,
+    HELD_SHARE,
+    HOLD_S,
     MOST_DEBT_S,
     MOST_LEAD_S,
     SLICE_S,
+    FairQueue,
 )
 
 
@@ -213,3 +217,59 @@ def test_a_step_that_fails_counts_too(fail: type[Exception]) -> None:
         account.count(failing)
     work: Callable[[], None] = _nothing
     assert not account.run(work)
+
+
+def test_while_another_queue_goes_first_nothing_is_begun_until_that_is_done_or_takes_long() -> None:
+    loop = Loop()
+    others = loop.turns()
+    first = FairQueue(
+        cast("Any", loop),
+        share=lambda: SHARE,
+        share_of_one=lambda: SHARE,
+        clock=lambda: loop.now_s,
+        spent=lambda: loop.spent_s,
+        goes_before=(others,),
+    )
+    done: list[str] = []
+    for hold_s in (HOLD_S, 0.0):
+        one = first.account("one")
+        one.run(partial(done.append, "first"))
+        others.account("one").run(partial(done.append, "other"))
+        assert done == ["first"]
+        if not hold_s:
+            one.done()
+        loop.pass_s(hold_s)
+        loop.pass_s(0.002)
+        assert done == ["first", "other"]
+        done.clear()
+        loop.pass_s(HOLD_S / HELD_SHARE)
+
+
+def test_one_that_goes_first_all_the_time_leaves_most_of_it_to_others() -> None:
+    loop = Loop()
+    others = loop.turns()
+    client = Client(loop, others.account("one"))
+    client.ask(16)
+    for _ in range(5000):
+        others.hold()
+        loop.pass_s(0.001)
+
+    allowed_s = SHARE * loop.now_s
+    assert loop.spent_s >= 0.95 * (1.0 - HELD_SHARE) * allowed_s
+    assert loop.spent_s < allowed_s
+
+
+def test_a_request_that_was_begun_is_done_before_another_one_is() -> None:
+    loop = Loop()
+    account = loop.turns().account("one")
+    begun: list[int] = []
+
+    def begin(number: int) -> None:
+        begun.append(number)
+        account.begun()
+
+    for number in range(3):
+        account.run(partial(begin, number))
+    for turns in range(1, 4):
+        assert begun == list(range(turns))
+        loop.turn()

@@ -34,7 +34,7 @@ class Served:
     async def answer(self, app: Application) -> None:
         async def receive() -> Any: ...
 
-        await in_turns(app, self.account)({}, receive, self.send)
+        await in_turns(app, lambda: self.account)({}, receive, self.send)
 
 
 def parts(count: int) -> list[dict[str, Any]]:

@@ -52,7 +52,14 @@ class Protocol(asyncio.Protocol):
 class Connection:
     """A client's end of a limiter."""
 
-    def __init__(self, loop: Loop, turns: FairQueue, *, costs_s: float = 0.0) -> None:
+    def __init__(
+        self,
+        loop: Loop,
+        turns: FairQueue,
+        *,
+        costs_s: float = 0.0,
+        first: FairQueue | None = None,
+    ) -> None:
         self.protocol = Protocol(loop, costs_s=costs_s)
         self.transport = Transport()
         self.lost = 0
@@ -60,6 +67,7 @@ class Connection:
             self.protocol,
             requests=turns.account("client"),
             streams=loop.turns().account("client"),
+            first=(first or loop.turns()).account("client"),
             lost=self._count,
         )
         self.limiter.connection_made(cast("asyncio.Transport", self.transport))
@@ -191,7 +199,9 @@ def test_each_thread_reads_into_a_buffer_of_its_own() -> None:
 
     def buffer() -> memoryview:
         nothing = cast("Any", None)
-        limiter = ReadLimiter(nothing, requests=nothing, streams=nothing, lost=lambda: None)
+        limiter = ReadLimiter(
+            nothing, requests=nothing, streams=nothing, first=nothing, lost=lambda: None
+        )
         return limiter.get_buffer(0)
 
     here, there = buffer(), []
@@ -200,3 +210,67 @@ def test_each_thread_reads_into_a_buffer_of_its_own() -> None:
     thread.join()
     assert buffer().obj is here.obj
     assert there[0].obj is not here.obj
+
+
+SAFE_OFF = b"POST /api/v1/acquisition/safe-off HTTP/1.1\r\nHost: lab\r\n\r\n"
+STOP = (
+    b"PUT /api/v1/acquisition HTTP/1.1\r\nContent-Length: 18\r\n\r\n",
+    b'{"running": false}',
+)
+READ = b"GET /livez HTTP/1.1\r\n\r\n"
+
+
+def without_time(loop: Loop) -> FairQueue:
+    """Turns that are all had."""
+    turns = loop.turns()
+    turns.account("client").charge(1e6)
+    turns.count(turns.account("client"), lambda: loop.work(1e6))
+    return turns
+
+
+def test_what_switches_the_light_off_waits_for_no_turn() -> None:
+    loop = Loop()
+    turns = without_time(loop)
+    others = [Connection(loop, turns) for _ in range(3)]
+    for each in others:
+        each.send(READ)
+    whole, in_parts = Connection(loop, turns), Connection(loop, turns)
+    whole.send(SAFE_OFF)
+    for part in STOP:
+        in_parts.send(part)
+
+    assert whole.protocol.received == [SAFE_OFF]
+    assert in_parts.protocol.received == [b"".join(STOP)]
+    assert [each.protocol.received for each in others] == [[]] * 3
+
+
+def test_it_has_a_share_of_its_own_and_no_more() -> None:
+    loop = Loop()
+    first = without_time(loop)
+    flooding = Connection(loop, loop.turns(), first=first)
+    flooding.send(SAFE_OFF)
+
+    assert flooding.protocol.received == []
+
+
+def test_after_it_a_connection_has_turns_like_any_other() -> None:
+    loop = Loop()
+    turns = without_time(loop)
+    connection = Connection(loop, turns)
+    connection.send(SAFE_OFF)
+    connection.limiter.expect(more=False)
+    connection.send(READ)
+    assert connection.protocol.received == [SAFE_OFF]
+
+    again = Connection(loop, turns)
+    again.limiter.expect(more=False)  # the answer to an earlier request was complete
+    again.send(SAFE_OFF)
+    assert again.protocol.received == [SAFE_OFF]
+
+
+def test_behind_another_request_it_has_that_ones_turn() -> None:
+    loop = Loop()
+    connection = Connection(loop, without_time(loop))
+    connection.send(READ + SAFE_OFF)
+
+    assert connection.protocol.received == []

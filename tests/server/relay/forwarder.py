@@ -8,10 +8,24 @@ from urllib.parse import urlsplit
 
 
 class Forwarder:
-    """Passes connections on to another address, as a proxy or a network between them does."""
+    """Passes connections on to another address, as a proxy or a network between them does.
+
+    Attributes
+    ----------
+    target
+        The other address.
+    admitting
+        Whether new connections are passed on; otherwise they are cut.
+    seen
+        The last bytes that came, from both sides, passed on or not.
+    """
 
     def __init__(self, url: str) -> None:
         self.target = url
+        self.admitting = True
+        self.seen = b""
+        self._passing = threading.Event()
+        self._passing.set()
         self._listener = socket.create_server(("127.0.0.1", 0))
         self._open: list[socket.socket] = []
         self._threads: list[threading.Thread] = []
@@ -22,6 +36,14 @@ class Forwarder:
         """Where clients connect."""
         return f"http://127.0.0.1:{self._listener.getsockname()[1]}"
 
+    def silence(self) -> None:
+        """Pass nothing on until `speak`: what is sent meanwhile waits, and nobody is told."""
+        self._passing.clear()
+
+    def speak(self) -> None:
+        """Pass on what waits, and what comes."""
+        self._passing.set()
+
     def cut(self) -> None:
         """Break every connection."""
         for each in self._open:
@@ -30,6 +52,7 @@ class Forwarder:
 
     def close(self) -> None:
         """End all."""
+        self.speak()
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()
@@ -46,6 +69,9 @@ class Forwarder:
             except OSError:
                 return
             self._open.append(client)
+            if not self.admitting:
+                client.shutdown(socket.SHUT_RDWR)
+                continue
             parts = urlsplit(self.target)
             try:
                 service = socket.create_connection((parts.hostname, parts.port))
@@ -59,6 +85,8 @@ class Forwarder:
     def _pass_on(self, source: socket.socket, sink: socket.socket) -> None:
         with suppress(OSError):
             while data := source.recv(1 << 16):
+                self.seen = (self.seen + data)[-(1 << 17) :]
+                self._passing.wait()
                 sink.sendall(data)
         with suppress(OSError):
             sink.shutdown(socket.SHUT_RDWR)

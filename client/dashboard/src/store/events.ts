@@ -108,6 +108,10 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
       return { words: `The light was switched off${notice.reason ? `: ${notice.reason}` : ""}.`, tone: "bad" };
     case "light-released":
       return { words: "The light is on again.", tone: "good" };
+    case "light-unconfirmed":
+      return { words: `${notice.reason.charAt(0).toUpperCase()}${notice.reason.slice(1)}.`, tone: "bad" };
+    case "light-confirmed":
+      return { words: "Whether the light is off is known again.", tone: "plain" };
     case "sequence-changed":
       return { words: sequenceWords(notice.sequence), tone: "plain" };
     case "reconstruction-changed":

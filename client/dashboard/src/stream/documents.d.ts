@@ -10,7 +10,7 @@ export interface AbsentDocument {
 export interface AcquisitionDocument {
   readonly running: boolean;
   readonly state: "arming" | "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
-  /** Why the camera is lost, or its light is off. */
+  /** Why the camera is lost, or its light is off or may be on. */
   readonly reason: string | null;
   /** Measured over the last frames; null before there are two. */
   readonly rate_hz: number | null;
@@ -30,6 +30,9 @@ export interface AcquisitionDocument {
   /** Whether the light stays off over a restart of the service; false while the disk has not taken
    * it. Null while the capture is running, and of a relay. */
   readonly off_kept: boolean | null;
+  /** Whether the light was to go off and may still be on: a relay's origin has not confirmed it,
+   * and is asked again until it does. */
+  readonly switching_off: boolean;
 }
 
 /** What the acquisition should do. */
@@ -1375,6 +1378,15 @@ export type Notice =
   | {
       readonly type: "notice";
       readonly kind: "light-released";
+    }
+  | {
+      readonly type: "notice";
+      readonly kind: "light-unconfirmed";
+      readonly reason: string;
+    }
+  | {
+      readonly type: "notice";
+      readonly kind: "light-confirmed";
     }
   | {
       readonly type: "notice";

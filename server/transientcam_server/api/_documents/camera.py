@@ -88,7 +88,7 @@ class AcquisitionDocument(Document):
     running: bool
     state: State
     reason: str | None = None
-    """Why the camera is lost, or its light is off."""
+    """Why the camera is lost, or its light is off or may be on."""
     rate_hz: float | None = None
     """Measured over the last frames; null before there are two."""
     frames: int
@@ -107,6 +107,9 @@ class AcquisitionDocument(Document):
     off_kept: bool | None = None
     """Whether the light stays off over a restart of the service; false while the disk has not taken
     it. Null while the capture is running, and of a relay."""
+    switching_off: bool
+    """Whether the light was to go off and may still be on: a relay's origin has not confirmed it,
+    and is asked again until it does."""
 
 
 class AcquisitionRequest(Document):
