@@ -9,7 +9,7 @@ import pytest
 from tests.server.camera.test_acquisition import PATIENCE_S, ScriptedCamera
 from transientcam_driver import Camera, CameraLost, NotStreaming, RawFrame
 from transientcam_driver.camera import CameraState
-from transientcam_server.camera import Acquisition
+from transientcam_server.camera import Acquisition, LightOffEvent
 from transientcam_server.camera._off_switch import OffSwitch
 
 
@@ -43,6 +43,7 @@ def test_the_light_goes_off_though_the_thread_of_the_camera_waits() -> None:
         assert acquisition.status().state == "stopped"
         acquisition.submit(lambda: None).result(PATIENCE_S)  # the thread goes on
         assert acquisition.status().state == "stopped"
+        assert isinstance(events.get_nowait(), LightOffEvent)
         assert events.empty()  # it is no camera that was lost
     finally:
         acquisition.stop()

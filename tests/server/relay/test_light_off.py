@@ -205,7 +205,7 @@ def test_a_lease_is_given_back_as_soon_as_the_network_speaks(
     lit: Served, link: Forwarder, relay: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(origin_lease, "RELEASED_S", 0.1)
-    lease = {"holder": "bench", "duration_s": 3600.0}
+    lease: dict[str, Any] = {"holder": "bench", "duration_s": 3600.0}
     status, granted = send(relay, "POST", "/api/v1/lease", **lease)
     assert status == 201
     link.silence()
