@@ -120,9 +120,13 @@ class Control:
         return document["state"], document["reason"]
 
     def signal(self, number: signal.Signals) -> None:
-        """Send a signal while the light is on, to the microsecond."""
+        """Send a signal while the light is on, to the microsecond.
+
+        A machine that is laden enough puts it out before that.
+        """
         assert self.process is not None
-        self.camera.do("signal", self.process.pid, int(number))
+        while not self.camera.signal(self.process.pid, int(number)):
+            self.light()
 
     @property
     def supervisor(self) -> psutil.Process:
@@ -191,16 +195,15 @@ def _out_of_memory(control: Control) -> float:
     """Kill what the kernel would: the greatest ``oom_score`` first, until the daemon is gone."""
     assert control.process is not None
     daemon = control.process.pid
+    children = {each.pid: each for each in control.process.children()}
     while True:
-        family = [daemon, *(each.pid for each in control.process.children())]
+        family = [daemon, *children]
         chosen = max(family, key=lambda pid: int(Path(f"/proc/{pid}/oom_score").read_text()))
         if chosen == daemon:
             return _killed(control)
-        with suppress(psutil.NoSuchProcess):
-            victim = psutil.Process(chosen)
-            assert "transientcam_supervisor" not in victim.cmdline()
-            victim.kill()
-            victim.wait(PATIENCE_S)
+        victim = children.pop(chosen)
+        assert "transientcam_supervisor" not in victim.cmdline()
+        victim.kill()
 
 
 def _stopped(control: Control) -> float:

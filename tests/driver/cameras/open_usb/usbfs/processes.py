@@ -71,6 +71,10 @@ class EmulatedCamera:
         """Let something happen to the camera."""
         assert self._ask(command, *arguments) == "done"
 
+    def signal(self, pid: int, number: int) -> bool:
+        """Send a signal to a process while the light is on; return False where it stays dark."""
+        return bool(self._ask("signal", pid, number))
+
     def close(self) -> None:
         """End the process; it must end well."""
         _end(self._process)

@@ -80,6 +80,7 @@ class Opt8241:
             self.device.requests_to_stall = requests
 
 
+LIT_WITHIN_S = 5.0
 KINDS = {"usb": Prototype, "kinect2": Kinect2, "opt8241": Opt8241}
 
 
@@ -106,8 +107,10 @@ def main() -> None:
                 mount.memory_bytes = arguments[0]
             case "signal":
                 with device.changed:  # no request is obeyed between the two
-                    device.changed.wait_for(camera.lit)
-                    os.kill(arguments[0], arguments[1])
+                    lit = device.changed.wait_for(camera.lit, LIT_WITHIN_S)
+                    if lit:
+                        os.kill(arguments[0], arguments[1])
+                return lit
             case "light":
                 return camera.lit()
             case "watchdog":
