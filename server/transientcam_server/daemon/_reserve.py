@@ -134,11 +134,15 @@ class Reserve:
         begin = arrived(candidate.connection)
         if begin is None:
             return False
-        if begin and self._tls:
+        if not begin:  # its client has gone
+            self.release(candidate)
+            candidate.connection.close()
+            return True
+        if self._tls:
             self._speaking.append(candidate)
             self._shake_hands()
             return False
-        if begin and switches_off(begin) is not False:
+        if switches_off(begin) is not False:
             self._hand_on(candidate)
             return False
         self._give_up(candidate)

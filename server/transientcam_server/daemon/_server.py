@@ -38,7 +38,8 @@ NOTSENT_LOWAT_BYTES: Final = 128 * 1024
 PING_S: Final = 10.0
 SHUTDOWN_S: Final = 2
 FREEZING_THREAD: Final = "freezing"
-_BACKLOG = 1024
+_BACKLOG = 4096
+"""Connections that wait to be accepted; one more is dropped, and tried again after 1 s."""
 
 
 def configure_logging(settings: Settings) -> None:
