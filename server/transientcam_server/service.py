@@ -192,7 +192,8 @@ class Service:
     async def running(self) -> AsyncIterator[None]:
         """Capture from entry to exit."""
         self._loop = asyncio.get_running_loop()
-        await asyncio.to_thread(self.recordings.open)
+        with contextlib.suppress(Problem):  # a disk that does not answer keeps nobody dark
+            await self.recordings.disk.run(self.recordings.open)
         self._light.turned()
         self.acquisition.start()
         turning = asyncio.create_task(self._keep_light())
@@ -285,12 +286,13 @@ class Service:
         """
         self.require_images("Images are recorded")
         if not history_s:
-            return await asyncio.to_thread(self.recordings.start, options)
+            return await self.recordings.disk.run(self.recordings.start, options)
         # it waits for its past, also where the client is gone
         return await asyncio.shield(self.workers.start(self._record_past(options, history_s)))
 
     async def _record_past(self, options: RecordingOptions, history_s: float) -> dict[str, Any]:
-        described = await asyncio.to_thread(self.recordings.start, replace(options, past=True))
+        starting = replace(options, past=True)
+        described = await self.recordings.disk.run(self.recordings.start, starting)
         past = [(each.raw, each.recipe.applied) for each in self.history.newest(history_s)]
         count = self.recordings.precede(described["id"], past)
         return described | {"history_frames": count}

@@ -376,6 +376,21 @@ CAMERA_LOST: Final = ProblemKind(
     "The camera was unplugged or does not answer. The service searches for it and resumes by "
     "itself when it is back.",
 )
+DISK_STALLED: Final = ProblemKind(
+    "disk-stalled",
+    503,
+    "Disk does not answer",
+    "Where recordings are kept, nothing was read or written for `limit` seconds, as of a disk on a "
+    "network that is gone. What was begun is done once the disk answers; capture goes on.",
+)
+STORE_GONE: Final = ProblemKind(
+    "store-gone",
+    410,
+    "Not there any more",
+    "The data of this key are not there: what they were of was deleted, or is another one than "
+    "when its metadata were read. It is not 404, which readers of Zarr take for zeros. Open it "
+    "anew.",
+)
 NO_FRAME_YET: Final = ProblemKind(
     "no-frame-yet",
     503,
