@@ -20,6 +20,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from queue import Empty
 from types import SimpleNamespace
@@ -49,7 +50,7 @@ from transientcam_server.recording import (
 )
 from transientcam_server.settings import RecordingSettings
 
-LASTS_S: Final = 10.0
+LASTS_S: Final = 8.0
 TICK_S: Final = 0.1
 FRAME_S: Final = 0.25
 HEARTBEAT_S: Final = 2.0
@@ -326,7 +327,7 @@ class World:
     def _around(self) -> Iterator[None]:
         ids = itertools.count()
         with ExitStack() as patched:
-            calls = {name: self.disk.around(getattr(os, name)) for name in CALLS}
+            calls: dict[str, Any] = {name: self.disk.around(getattr(os, name)) for name in CALLS}
             for patch in (
                 mock.patch.multiple(os, **calls),
                 mock.patch.object(layout, "image", return_value=_IMAGE),
@@ -545,7 +546,7 @@ class World:
     # -- the reader ------------------------------------------------------------------------------
 
     def _read(self) -> None:
-        """Open a recording as Zarr's readers do, and read all its frames after a while."""
+        """Open a recording as Zarr's readers do, and read some of its frames after a while."""
         self._again(self.draw.uniform(0.5, 1.5), self._read)
         if not self.counted:
             return
@@ -563,9 +564,11 @@ class World:
         if not isinstance(answer, bytes):
             return
         frames = json.loads(answer)["metadata"]["raw/.zarray"]["shape"][0]
-        for index in range(frames):
+        for index in self.draw.sample(range(frames), min(2, frames)):
             key = self._key(recording_id, f"raw/{index}.0.0.0")
-            self._ask("chunk", key, self._received)
+            self.clock.later(
+                self.draw.uniform(0.0, 2.0), partial(self._ask, "chunk", key, self._received)
+            )
 
     def _received(self, answer: Any) -> None:
         if isinstance(answer, Problem) and answer.kind.status == 404:

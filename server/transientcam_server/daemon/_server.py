@@ -276,6 +276,6 @@ def exit_without_joining() -> Iterator[Callable[[threading.Thread], None]]:
 
 
 def _left_behind() -> list[threading.Thread]:
-    """Return threads that compile, or compute what no client waits for any more."""
-    names = (WORKER_THREADS, tm.kernels.THREAD, DISK_THREADS)
+    """Return threads that compile, compute what no client waits for, or wait for the disk."""
+    names = (WORKER_THREADS, tm.kernels.THREAD, *DISK_THREADS)
     return [each for each in threading.enumerate() if each.name.startswith(names)]

@@ -7,7 +7,7 @@ died, `ReplayCamera` plays one as a camera. `Library` is the directory of a runn
 from transientcam_server.recording import _recovery as recovery, _swmr as swmr
 from transientcam_server.recording._columns import AXES, as_json, attributes_of, columns_of
 from transientcam_server.recording._disk import DiskFile, open_to_write
-from transientcam_server.recording._disk_threads import THREADS as DISK_THREADS, DiskThreads
+from transientcam_server.recording._disk_threads import DISK_THREADS, DiskThreads
 from transientcam_server.recording._frames import (
     Find,
     RecordedFramesCache,

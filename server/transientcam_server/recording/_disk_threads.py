@@ -15,8 +15,9 @@ from typing import Any, Final, TypeVar
 
 from transientcam_server.errors import Problem, kinds
 
-THREADS: Final = "disk"
-"""What the names of the threads begin with; the end of the process does not wait for them."""
+DISK_THREADS: Final = ("disk", "recorder", "recovery")
+"""What the names of threads begin with that may wait for a disk for ever; the end of the process
+does not wait for them."""
 _COUNT: Final = 6
 _LONGEST_S: Final = 60.0
 _T = TypeVar("_T")
@@ -76,7 +77,7 @@ class DiskThreads:
         if not self._idle.acquire(blocking=False) and self._threads < _COUNT:
             self._threads += 1
             threading.Thread(
-                target=self._serve, name=f"{THREADS}-{self._threads}", daemon=True
+                target=self._serve, name=f"{DISK_THREADS[0]}-{self._threads}", daemon=True
             ).start()
         result = asyncio.wrap_future(future)
         latest_s = self._clock() + max(_LONGEST_S, self._stalled_s)
@@ -103,13 +104,12 @@ class DiskThreads:
             if future.set_running_or_notify_cancel():
                 self._began_s[me] = self._clock()
                 try:
-                    result = work()
+                    done = partial(future.set_result, work())
                 except BaseException as error:
-                    future.set_exception(error)
-                else:
-                    future.set_result(result)
-                finally:
-                    del self._began_s[me]
+                    done = partial(future.set_exception, error)
+                del self._began_s[me]
+                done()
+                del done
             del next_one, future, work
             self._idle.release()
 

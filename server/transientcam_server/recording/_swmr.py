@@ -24,7 +24,7 @@ from h5py._objects import phil
 from isal import isal_zlib
 from numpy.typing import NDArray
 
-from transientcam_server.recording._disk import LIBVER, open_disk
+from transientcam_server.recording import _disk as disk
 
 File: TypeAlias = Any
 """An open h5py.File."""
@@ -74,7 +74,7 @@ def image_of(make: Callable[[File], None]) -> bytes:
     It is made in memory: HDF5 cannot close a file that it failed to write, as on a full disk.
     """
     name = f"image {next(_IMAGE_NUMBERS)}"  # by which HDF5 tells open files in memory apart
-    with open_file(name, "w", driver="core", backing_store=False, libver=LIBVER) as file:
+    with open_file(name, "w", driver="core", backing_store=False, libver=disk.LIBVER) as file:
         make(file)
         file.flush()
         image: bytes = file.id.get_file_image()
@@ -168,12 +168,12 @@ class Appender:
         seal: Seal = lambda row, chunk, values: b"",
     ) -> None:
         self._seal = seal
-        file, self._disk = open_disk(path, "r+")
+        file, self._disk = disk.open_disk(path, "r+")
         self._file = file
         self._blocks = {name: file[name] for name in blocks}
         self._series = {name: file[name] for name in series}
         self.rows: int = file[series[-1]].shape[0]
-        self.synchronised_rows = self.rows
+        self.synchronised_rows: int = self.rows
         """How many rows are on the disk, which a power cut does not take back."""
         file.swmr_mode = True
         self._disk.synchronise()  # or a power cut left it marked as open otherwise

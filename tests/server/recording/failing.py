@@ -56,7 +56,8 @@ class FailingDisk:
     @contextmanager
     def inserted(self) -> Iterator["FailingDisk"]:
         """Put it between this process and the system."""
-        with mock.patch.multiple(os, **{name: self._around(getattr(os, name)) for name in CALLS}):
+        failing: dict[str, Any] = {name: self._around(getattr(os, name)) for name in CALLS}
+        with mock.patch.multiple(os, **failing):
             yield self
 
     def _around(self, call: Callable[..., Any]) -> Callable[..., Any]:

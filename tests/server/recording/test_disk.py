@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import h5py
@@ -22,6 +23,7 @@ from transientcam_server.recording._seal import sealed_frames
 SLICES = 8
 LIVES_ON = """
 from pathlib import Path
+from typing import Any
 from tests.server.recording.made import frame, header
 from transientcam_server.recording import RecordingWriter
 writer = RecordingWriter(Path(r"{}"), header())
@@ -98,7 +100,9 @@ def test_a_disk_that_cannot_be_read_any_more_does_no_harm_either(tmp_path: Path)
     for number in range(3):
         writer.append(frame(number))
     gone = OSError(errno.EIO, os.strerror(errno.EIO))
-    calls = dict.fromkeys(("pread", "pwrite", "fsync", "ftruncate"), mock.Mock(side_effect=gone))
+    calls: dict[str, Any] = dict.fromkeys(
+        ("pread", "pwrite", "fsync", "ftruncate"), mock.Mock(side_effect=gone)
+    )
 
     with mock.patch.multiple(os, **calls):
         with pytest.raises(OSError, match="Input/output error"):

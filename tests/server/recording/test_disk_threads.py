@@ -1,11 +1,19 @@
 """Waiting for a disk that may not answer."""
 
 import asyncio
+import os
+import re
+import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 
+import httpx
 import pytest
 
+from tests.conftest import ROOT
 from tests.waiting import wait_until
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.recording import DiskThreads
@@ -99,3 +107,63 @@ def test_work_is_done_as_whoever_accounts_for_it_has_it(threads: DiskThreads) ->
     threads.around = lambda work: lambda: (work(), "counted")
 
     assert asyncio.run(threads.run(divmod, 7, 2)) == ((3, 1), "counted")
+
+
+@pytest.fixture
+def hung(tmp_path: Path) -> Iterator[tuple["subprocess.Popen[str]", httpx.Client]]:
+    """A daemon whose disk hangs once there is a file ``hangs``, and a client."""
+    with subprocess.Popen(
+        [
+            *(sys.executable, "-m", "tests.server.recording.hung_daemon", str(tmp_path / "hangs")),
+            *("serve", "--camera", "sim:mirrors", "--port", "0", "--log-level", "error"),
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ
+        | {
+            "PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path]),
+            "NUMBA_DISABLE_JIT": "1",
+            "COLUMNS": "200",
+            "STATE_DIRECTORY": str(tmp_path),
+            "TRANSIENTCAM_RECORDINGS__MIN_FREE_BYTES": "0",
+            "TRANSIENTCAM_RECORDINGS__STALLED_S": "0.3",
+        },
+    ) as process:
+        assert process.stdout is not None
+        found = re.search(r"http://\S+", process.stdout.readline())
+        assert found is not None
+        with httpx.Client(base_url=found.group(), timeout=60.0) as client:
+            yield process, client
+        process.kill()
+
+
+def test_a_service_whose_disk_hangs_serves_all_else_and_ends_when_it_is_to(
+    hung: tuple["subprocess.Popen[str]", httpx.Client], tmp_path: Path
+) -> None:
+    process, client = hung
+    recording = client.post("/api/v1/recordings", json={}).raise_for_status().json()["id"]
+    wait_until(lambda: client.get(f"/api/v1/recordings/{recording}").json()["frames"] > 0)
+    (tmp_path / "hangs").touch()
+
+    wait_until(lambda: client.get("/api/v1/recordings").status_code == 503)
+    for method, path in (
+        ("GET", "/api/v1/recordings"),
+        ("GET", f"/api/v1/recordings/{recording}"),
+        ("POST", f"/api/v1/recordings/{recording}/stop"),
+        ("GET", f"/api/v1/recordings/{recording}/zarr/.zmetadata"),
+        ("GET", f"/api/v1/recordings/{recording}/frames/1"),
+    ):
+        answer = client.request(method, path)
+        assert (answer.status_code, answer.json()["type"]) == (503, "/problems/disk-stalled"), path
+        assert int(answer.headers["retry-after"]) >= 1
+    assert client.get("/api/v1/frames/latest").status_code == 200
+    waiting = re.search(
+        r"^transientcam_disk_waiting_seconds (\S+)", client.get("/metrics").text, re.M
+    )
+    assert waiting is not None
+    assert float(waiting.group(1)) > 0.3
+    client.post("/api/v1/acquisition/safe-off").raise_for_status()
+
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(60.0) == 0
+    assert [path.name for path in (tmp_path / "recordings").iterdir()] == [f"{recording}.h5.part"]

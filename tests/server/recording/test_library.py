@@ -237,7 +237,7 @@ class Hanging:
 @pytest.fixture
 def hanging() -> Iterator[Hanging]:
     disk = Hanging()
-    calls = {name: disk.around(getattr(os, name)) for name in ("pwrite", "fsync")}
+    calls: dict[str, Any] = {name: disk.around(getattr(os, name)) for name in ("pwrite", "fsync")}
     with mock.patch.multiple(os, **calls):
         yield disk
         disk.free.set()
@@ -264,9 +264,10 @@ def test_a_recording_whose_disk_hangs_says_so_and_ends_without_it(
 
     part = tmp_path / f"{recording}{layout.PART_SUFFIX}"
     assert part.exists()
-    with Recording(Path(shutil.copy(part, tmp_path / "copy.h5.part"))) as kept:
-        assert kept.frames >= 1
+    copy = Path(shutil.copy(part, tmp_path / "copy.h5.part"))  # as a killed process leaves it
     hanging.free.set()
+    with Recording(copy) as kept:
+        assert kept.frames >= 1
     wait_until(lambda: library.active_id is None)
     assert not part.exists()
     assert library.disk_waiting_s == 0.0
