@@ -50,7 +50,7 @@ from transientcam_server.recording import (
 )
 from transientcam_server.settings import RecordingSettings
 
-LASTS_S: Final = 8.0
+LASTS_S: Final = 6.0
 TICK_S: Final = 0.1
 FRAME_S: Final = 0.25
 HEARTBEAT_S: Final = 2.0
@@ -370,7 +370,7 @@ class World:
 
     def _go_wrong(self) -> None:
         draw, now_s = self.draw, self.clock()
-        self._again(draw.uniform(0.5, 3.0), self._go_wrong)
+        self._again(draw.uniform(0.3, 2.0), self._go_wrong)
         what = draw.choice(
             (
                 "cut",
@@ -458,7 +458,7 @@ class World:
 
     def _operate(self) -> None:
         """Hold the lease, and do one thing after another."""
-        self._again(self.draw.uniform(0.2, 0.8), self._operate)
+        self._again(self.draw.uniform(0.2, 0.6), self._operate)
         self._lease()
         chosen = self.draw.choice(
             ("light", "light", "light", "record", "record", "look", "stop", "off", "delete")
@@ -547,7 +547,7 @@ class World:
 
     def _read(self) -> None:
         """Open a recording as Zarr's readers do, and read some of its frames after a while."""
-        self._again(self.draw.uniform(0.5, 1.5), self._read)
+        self._again(self.draw.uniform(0.5, 2.0), self._read)
         if not self.counted:
             return
         chosen = self.draw.choice(sorted(self.counted))
@@ -566,7 +566,7 @@ class World:
         frames = json.loads(answer)["metadata"]["raw/.zarray"]["shape"][0]
         for index in self.draw.sample(range(frames), min(2, frames)):
             key = self._key(recording_id, f"raw/{index}.0.0.0")
-            self.clock.later(
+            self._again(
                 self.draw.uniform(0.0, 2.0), partial(self._ask, "chunk", key, self._received)
             )
 

@@ -115,8 +115,12 @@ def reconstruct_recording(
     if part.exists():
         _repair(part, document)
     else:
-        with open_to_write(part, "x") as (file, _):
-            _lay_out(file, recording, reconstructor, document)
+        try:
+            with open_to_write(part, "x") as (file, _):
+                _lay_out(file, recording, reconstructor, document)
+        except BaseException:
+            part.unlink(missing_ok=True)  # nothing is in it that could be gone on with
+            raise
     rows = swmr.Appender(part, list(options.products), list(_SERIES))
     done = rows.rows
     previous = recording.frame(done - 1) if 0 < done < recording.frames else None
