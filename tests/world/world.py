@@ -14,8 +14,10 @@ import json
 import logging
 import os
 import random
+import secrets
 import shutil
 import tempfile
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -42,8 +44,6 @@ from transientcam_server.recording import (
     Recording,
     RecordingOptions,
     _layout as layout,
-    _library as library,
-    _recorder as recorder,
     recover,
     recovery,
     swmr,
@@ -331,9 +331,9 @@ class World:
             for patch in (
                 mock.patch.multiple(os, **calls),
                 mock.patch.object(layout, "image", return_value=_IMAGE),
-                mock.patch.object(recorder.threading, "Thread", _Stepped),
+                mock.patch.object(threading, "Thread", _Stepped),
                 mock.patch.object(
-                    library.secrets, "token_hex", side_effect=(f"{each:06x}" for each in ids)
+                    secrets, "token_hex", side_effect=(f"{each:06x}" for each in ids)
                 ),
             ):
                 patched.enter_context(patch)
@@ -461,7 +461,7 @@ class World:
         self._again(self.draw.uniform(0.2, 0.6), self._operate)
         self._lease()
         chosen = self.draw.choice(
-            ("light", "light", "light", "record", "record", "look", "stop", "off", "delete")
+            ("light", "light", "light", "record", "look", "stop", "off", "delete")
         )
         getattr(self, f"_{chosen}")()
 

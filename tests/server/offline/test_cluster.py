@@ -122,7 +122,7 @@ def test_a_run_that_was_interrupted_is_gone_on_with(
     output = str(tmp_path / "a.zarr")
     with pytest.raises(KeyboardInterrupt):
         reconstruct_on(client, str(source), output, OPTIONS, progress=interrupt)
-    begun = zarr.open_group(output, mode="r")
+    begun: Any = zarr.open_group(output, mode="r")
     assert begun.attrs["state"] == "unfinished"
     missing = begun["frame"][:] == cluster.MISSING
     for name in OPTIONS.products:

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -85,13 +86,14 @@ def test_an_fsync_that_failed_is_not_tried_again(tmp_path: Path) -> None:
         writer.synchronise(10.0)
 
     assert writer.synchronised_frames == 0
-    for refused in (
+    refused: list[Callable[[], None]] = [
         lambda: writer.synchronise(20.0),
         lambda: writer.append(frame(1)),
         lambda: writer.close({}),
-    ):
+    ]
+    for each in refused:
         with pytest.raises(OSError, match="Input/output error"):
-            refused()
+            each()
     assert [path.name for path in tmp_path.iterdir()] == ["a.h5.part"]
 
 
