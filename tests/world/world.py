@@ -20,7 +20,7 @@ import tempfile
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -136,6 +136,10 @@ class Device:
         self._ask()
 
     def reconnect(self) -> None:
+        self.opened()
+
+    def opened(self) -> None:
+        """Be opened, by which drivers switch the light off."""
         self._ask()
         self._lit = False
 
@@ -205,6 +209,8 @@ class Daemon:
             clock=clock,
         )
         self.acquisition._commands = _Commands()  # type: ignore[assignment]
+        with suppress(CameraLost):
+            world.device.opened()
         self.acquisition.set_running(False)
         self.lease = LeaseManager(
             report=self._lease_changed,
@@ -588,7 +594,7 @@ class World:
             self._fail("it is lit although nobody drives the camera")
         if self.dark_since_s is not None and now_s - self.dark_since_s > OFF_WITHIN_S:
             self._fail("it is lit after safe-off")
-        if self._dead_since_s is None and now_s - self._holds_until_s > LEASE_S + OFF_WITHIN_S:
+        if self._dead_since_s is None and now_s - self._holds_until_s > OFF_WITHIN_S:
             self._fail("it is lit after its lease lapsed")
 
 
