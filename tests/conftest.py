@@ -51,6 +51,7 @@ _LIBRARY_THREADS = (
     "zarr_io",
     "asyncio_",  # the executor of zarr's loop
     "requests_",  # that of a daemon's
+    "disk-",  # where it waits for the disk
     "fsspecIO",
     "Dask-",
     "IO loop",

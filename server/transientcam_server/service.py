@@ -81,6 +81,7 @@ VERSION: Final = version("transientcam")
 _CLOSING_S = 1.0
 _TURN_S = 0.2
 _WORKERS_END_S = 1.0
+_OPEN_S = 5.0
 _KEPT_S = 0.1
 """An answer to what switched the light off waits for the disk no longer."""
 WORKER_THREADS: Final = "worker"
@@ -215,8 +216,9 @@ class Service:
     async def running(self) -> AsyncIterator[None]:
         """Capture from entry to exit."""
         self._loop = asyncio.get_running_loop()
-        await asyncio.to_thread(self.recordings.open)
-        dark = None if self._darkness is None else await asyncio.to_thread(self._darkness.open)
+        with contextlib.suppress(Problem):  # a disk that does not answer keeps nobody dark
+            await self.recordings.disk.run(self.recordings.open)
+        dark = await self._kept_dark()
         if dark is None and self.relay is None and not self._rules.capture_at_start:
             dark = Dark("start")
         if dark is not None:
@@ -267,6 +269,15 @@ class Service:
         """Whether frames are sent to a client or recorded."""
         recorded = self.recordings.active_id is not None
         return recorded or bool(self.hub.clients or self.mjpeg_clients)
+
+    async def _kept_dark(self) -> Dark | None:
+        """Return why the light was off when the service last ran, None where it was not."""
+        if self._darkness is None:
+            return None
+        try:
+            return await asyncio.wait_for(asyncio.to_thread(self._darkness.open), _OPEN_S)
+        except TimeoutError:
+            return Dark("unreadable", f"the disk did not answer within {_OPEN_S:g} s")
 
     async def off_kept(self) -> None:
         """Wait a moment until it is kept that the light is off."""
@@ -326,12 +337,13 @@ class Service:
         """
         self.require_images("Images are recorded")
         if not history_s:
-            return await asyncio.to_thread(self.recordings.start, options)
+            return await self.recordings.disk.run(self.recordings.start, options)
         # it waits for its past, also where the client is gone
         return await asyncio.shield(self.workers.start(self._record_past(options, history_s)))
 
     async def _record_past(self, options: RecordingOptions, history_s: float) -> dict[str, Any]:
-        described = await asyncio.to_thread(self.recordings.start, replace(options, past=True))
+        starting = replace(options, past=True)
+        described = await self.recordings.disk.run(self.recordings.start, starting)
         past = [(each.raw, each.recipe.applied) for each in self.history.newest(history_s)]
         count = self.recordings.precede(described["id"], past)
         return described | {"history_frames": count}

@@ -227,6 +227,8 @@ class RecordingSettings(_Group):
     """Recordings end when the disk has no more than this left."""
     queue_bytes: int = Field(default=256 * 1024**2, ge=0)
     """Frames that wait for the disk before some are dropped."""
+    stalled_s: _Finite = Field(default=5.0, gt=0.0, le=3600.0)
+    """Requests that wait so long for a disk that does nothing are refused."""
 
 
 class LimitSettings(_Group):

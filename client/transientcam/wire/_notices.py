@@ -83,6 +83,11 @@ NOTICES: Final[dict[str, NoticeKind]] = {
             {"count": "integer", "total": "integer"},
         ),
         NoticeKind(
+            "disk-stalled",
+            "the disk of the recordings does not answer",
+            {"recording": "string"},
+        ),
+        NoticeKind(
             "recording-stopped",
             "a recording ended",
             {

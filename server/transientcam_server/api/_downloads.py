@@ -1,6 +1,5 @@
 """Files as answers: whole, or the parts that a broken download still lacks."""
 
-import asyncio
 import os
 import re
 from pathlib import Path
@@ -11,6 +10,7 @@ from fastapi.responses import FileResponse, Response
 from starlette.types import Message, Receive, Scope, Send
 
 from transientcam_server.errors import Problem, ProblemKind, kinds
+from transientcam_server.recording import DiskThreads
 
 _RANGES: Final = re.compile(
     r"bytes=\s*({0}-{0}?|-{0})(\s*,\s*({0}-{0}?|-{0}))*\s*".replace("{0}", r"(\d{1,18})"), re.ASCII
@@ -33,6 +33,7 @@ async def answer(
     path: Path,
     wanted: str | None,
     *,
+    disk: DiskThreads,
     gone: ProblemKind,
     media_type: str,
     filename: str | None = None,
@@ -44,6 +45,8 @@ async def answer(
 
     Parameters
     ----------
+    disk
+        Where it is waited for.
     gone
         What a file that was deleted since it was found is answered with.
     filename
@@ -54,10 +57,11 @@ async def answer(
     Raises
     ------
     Problem
-        ``range-not-satisfiable``, or ``gone``; the latter also while the answer is sent.
+        ``disk-stalled``, ``range-not-satisfiable``, or ``gone``; the latter also while the answer
+        is sent.
     """
     try:
-        status = await asyncio.to_thread(path.stat)
+        status = await disk.run(path.stat)
     except FileNotFoundError:
         raise _deleted(gone) from None
     return _File(

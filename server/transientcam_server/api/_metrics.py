@@ -303,7 +303,12 @@ class RecordingCollector(Collector):
         for reason, count in totals.ended.items():
             ended.add_metric((reason,), count)
         yield ended
-        free_bytes = self._library.free_bytes()
+        yield GaugeMetricFamily(
+            "transientcam_disk_waiting_seconds",
+            "How long the disk of the recordings has not answered.",
+            self._library.disk_waiting_s,
+        )
+        free_bytes = self._library.known_free_bytes
         if free_bytes is not None:
             yield GaugeMetricFamily(
                 "transientcam_recording_disk_free_bytes",

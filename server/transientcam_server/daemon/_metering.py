@@ -74,20 +74,25 @@ class CountingExecutor(ThreadPoolExecutor):
 
     def submit(self, fn: Callable[..., _T], /, *arguments: Any, **keywords: Any) -> Future[_T]:
         """Run a function; called on the event loop."""
-        account = _asking.get()
-        if account is None:
-            return super().submit(fn, *arguments, **keywords)
-        loop = asyncio.get_running_loop()
+        return super().submit(counted(partial(fn, *arguments, **keywords)))
 
-        def counted() -> _T:
-            begin_s = time.thread_time()
-            try:
-                return fn(*arguments, **keywords)
-            finally:
-                with contextlib.suppress(RuntimeError):  # the loop has ended
-                    loop.call_soon_threadsafe(account.charge, time.thread_time() - begin_s)
 
-        return super().submit(counted)
+def counted(work: Callable[[], _T]) -> Callable[[], _T]:
+    """Return work for another thread that counts for the address that asks; call it on the loop."""
+    account = _asking.get()
+    if account is None:
+        return work
+    loop = asyncio.get_running_loop()
+
+    def counting() -> _T:
+        begin_s = time.thread_time()
+        try:
+            return work()
+        finally:
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                loop.call_soon_threadsafe(account.charge, time.thread_time() - begin_s)
+
+    return counting
 
 
 async def _sent(send: Callable[[Message], Awaitable[None]], message: Message) -> None:

@@ -24,10 +24,11 @@ from transientcam_server.daemon._acceptor import Acceptor
 from transientcam_server.daemon._announcement import announced
 from transientcam_server.daemon._connections import BoundedConnection
 from transientcam_server.daemon._memory import give_back_large_blocks
-from transientcam_server.daemon._metering import CountingExecutor
+from transientcam_server.daemon._metering import CountingExecutor, counted
 from transientcam_server.daemon._streams import BoundedStream
 from transientcam_server.daemon._systemd import ServiceManager, supervised
 from transientcam_server.errors import AddressUnavailable
+from transientcam_server.recording import DISK_THREADS
 from transientcam_server.service import WORKER_THREADS, Service
 from transientcam_server.settings import Settings
 
@@ -133,6 +134,7 @@ class Server(uvicorn.Server):
         asyncio.get_running_loop().set_default_executor(
             CountingExecutor(thread_name_prefix="requests")
         )
+        self._service.recordings.disk.around = counted
         await super().startup([])  # it would accept without counting, and 1024 at once
         if self.started and sockets:
             self._acceptor = self._accept_from(sockets[0])
@@ -275,6 +277,6 @@ def exit_without_joining() -> Iterator[Callable[[threading.Thread], None]]:
 
 
 def _left_behind() -> list[threading.Thread]:
-    """Return threads that compile, or compute what no client waits for any more."""
-    names = (WORKER_THREADS, tm.kernels.THREAD)
+    """Return threads that compile, compute what no client waits for, or wait for the disk."""
+    names = (WORKER_THREADS, tm.kernels.THREAD, *DISK_THREADS)
     return [each for each in threading.enumerate() if each.name.startswith(names)]

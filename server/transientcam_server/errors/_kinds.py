@@ -399,6 +399,21 @@ LIGHT_UNCONFIRMED: Final = ProblemKind(
     "sent there again until it does, or somebody starts the capture; `switching_off` of `GET "
     "/api/v1/acquisition` is true until then.",
 )
+DISK_STALLED: Final = ProblemKind(
+    "disk-stalled",
+    503,
+    "Disk does not answer",
+    "Where recordings are kept, nothing was read or written for `limit` seconds, as of a disk on a "
+    "network that is gone. What was begun is done once the disk answers; capture goes on.",
+)
+STORE_GONE: Final = ProblemKind(
+    "store-gone",
+    410,
+    "Not there any more",
+    "The data of this key are not there: what they were of was deleted, or is another one than "
+    "when its metadata were read. It is not 404, which readers of Zarr take for zeros. Open it "
+    "anew.",
+)
 NO_FRAME_YET: Final = ProblemKind(
     "no-frame-yet",
     503,

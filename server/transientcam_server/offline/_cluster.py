@@ -21,6 +21,7 @@ from transientcam_server.offline._formats import (
     Block,
     Content,
     create_zarr,
+    every_chunk,
     finish_zarr,
     library,
     naming_address,
@@ -124,9 +125,9 @@ def _write_block(job: Job, output: str, first: int, last: int) -> None:
         found = computed(job, begin, end)
         with naming_address(output):
             for name, values in found.items():
-                group[name][begin:end] = values
+                every_chunk(group[name])[begin:end] = values
     with naming_address(output):
-        group[COUNTING][first:last] = recording.series(COUNTING)[first:last]
+        every_chunk(group[COUNTING])[first:last] = recording.series(COUNTING)[first:last]
 
 
 @lru_cache(maxsize=2)

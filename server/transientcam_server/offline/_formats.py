@@ -20,8 +20,13 @@ from numpy.typing import NDArray
 from transientcam.errors import TransientcamError
 from transientcam_server.errors import MissingExtra, NotConvertible, ServerError, StorageError
 from transientcam_server.imaging import Column, in_words
-from transientcam_server.recording import as_json
+from transientcam_server.recording import EVERY_CHUNK, DiskFile, as_json
 
+STATE: Final = "state"
+"""Attribute of a store: `UNFINISHED` until all frames are in it, then `COMPLETE`."""
+UNFINISHED: Final = "unfinished"
+COMPLETE: Final = "complete"
+WHOLE: Final = {"write_empty_chunks": True}
 Row = tuple[str, int, NDArray[Any]]
 """Name of a block, number of the frame, and its values."""
 Put = Callable[[str, int, NDArray[Any]], None]
@@ -38,7 +43,7 @@ class Block:
     shape: tuple[int, ...]
     dtype: str
     attributes: Mapping[str, Any] = field(default_factory=dict)
-    missing: int | None = None
+    missing: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,34 +149,37 @@ def _npz(path: Path, content: Content) -> Iterator[Put]:
 @contextmanager
 def _netcdf(path: Path, content: Content) -> Iterator[Put]:
     h5netcdf = library("h5netcdf", "a .nc")
-    with h5netcdf.File(path, "w") as file:
-        file.dimensions = _sizes(content)
-        file.attrs.update(content.attributes)
-        for name, column in content.columns.items():
-            variable = file.create_variable(name, column.axes, data=column.values)
-            variable.attrs.update(column.attributes)
-        for name, block in content.blocks.items():
-            variable = file.create_variable(
-                name,
-                block.axes,
-                block.dtype,
-                chunks=(1, *block.shape[1:]),
-                compression="gzip",
-                compression_opts=1,
-                shuffle=True,
-            )
-            variable.attrs.update(block.attributes)
+    with DiskFile(path, "w") as disk:
+        with h5netcdf.File(disk, "w") as file:
+            file.dimensions = _sizes(content)
+            file.attrs.update(content.attributes)
+            for name, column in content.columns.items():
+                variable = file.create_variable(name, column.axes, data=column.values)
+                variable.attrs.update(column.attributes)
+            for name, block in content.blocks.items():
+                variable = file.create_variable(
+                    name,
+                    block.axes,
+                    block.dtype,
+                    chunks=(1, *block.shape[1:]),
+                    compression="gzip",
+                    compression_opts=1,
+                    shuffle=True,
+                )
+                variable.attrs.update(block.attributes)
 
-        def put(name: str, index: int, values: NDArray[Any]) -> None:
-            file[name][index] = values
+            def put(name: str, index: int, values: NDArray[Any]) -> None:
+                file[name][index] = values
+                disk.require_written()
 
-        yield put
+            yield put
+        disk.synchronise()
 
 
 @contextmanager
 def _zarr(path: Path, content: Content) -> Iterator[Put]:
     group = create_zarr(str(path), content)
-    blocks = {name: group[name] for name in content.blocks}
+    blocks = {name: every_chunk(group[name]) for name in content.blocks}
 
     def put(name: str, index: int, values: NDArray[Any]) -> None:
         blocks[name][index] = values
@@ -204,7 +212,8 @@ def create_zarr(
         If zarr is not installed.
     """
     zarr = library("zarr", "a .zarr")
-    group = zarr.create_group(store=place, attributes=dict(content.attributes), overwrite=overwrite)
+    attributes = {**content.attributes, STATE: UNFINISHED, EVERY_CHUNK: True}
+    group = zarr.create_group(store=place, attributes=attributes, overwrite=overwrite)
     for name, column in content.columns.items():
         group.create_array(
             name,
@@ -225,9 +234,15 @@ def create_zarr(
     return group
 
 
+def every_chunk(array: Any) -> Any:
+    """Return an array of Zarr that writes chunks of the fill value, too, as its store states."""
+    return array.with_config(WHOLE)
+
+
 def finish_zarr(place: str) -> None:
     """Write the metadata of all arrays into one document, which a complete store has."""
     zarr = library("zarr", "a .zarr")
+    zarr.open_group(place, mode="r+").attrs[STATE] = COMPLETE
     with warnings.catch_warnings():
         # the third version of the format has consolidated metadata as an extension, which zarr and
         # xarray look for; without, each array costs a request to a remote store

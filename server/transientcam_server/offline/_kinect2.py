@@ -8,7 +8,7 @@ Neither times nor the lens are in it; a lens is in a file of its own, in
 
 import re
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
@@ -107,8 +107,10 @@ def import_kinect2(
                 )
                 progress(done, len(numbers))
         except BaseException:
-            writer.close({"reason": "failed"})
-            output.unlink(missing_ok=True)
+            with suppress(OSError):  # which may be what it failed by
+                writer.close({"reason": "failed"})
+            for left in (writer.part, output):
+                left.unlink(missing_ok=True)
             raise
         writer.close({"reason": "imported"})
     return len(numbers)

@@ -7,6 +7,7 @@ import importlib
 import io
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam.robotics import Calibration, Message, Pinhole, messages_of, viewable
-from transientcam_server.errors import InputError
+from transientcam_server.errors import InputError, StorageError
 from transientcam_server.imaging import Column, in_words, known_intrinsics
 from transientcam_server.offline._computing import KNOWN
 from transientcam_server.offline._formats import Content, library, whole
@@ -55,6 +56,7 @@ def write_mcap(
         profile="ros2" if schemas == "ros2" else None
     )
     with (
+        _in_own_words(output),
         whole(output) as scratch,
         foxglove.open_mcap(scratch, context=log.context, writer_options=options) as writer,
     ):
@@ -70,6 +72,15 @@ def write_mcap(
             for message in messages_of(arrays, lens, intensity=intensity):
                 log(message, int(arrived_ns[index]))
             progress(index + 1, recording.frames)
+
+
+@contextmanager
+def _in_own_words(output: Path) -> Iterator[None]:
+    """Say of what a failure of the writer is: it has no type for one of the disk."""
+    try:
+        yield
+    except RuntimeError as error:
+        raise StorageError(str(output), str(error)) from error
 
 
 def lens_of(recording: Recording) -> Pinhole:

@@ -20,6 +20,7 @@ from transientcam_server.offline._formats import SINKS, Block, Content, Row, sin
 from transientcam_server.recording import (
     FORMAT,
     Recording,
+    open_to_write,
     recorded_recipe,
     require_sound_heaps,
     salvage,
@@ -112,11 +113,15 @@ def reconstruct_recording(
     part = output.with_name(output.name + ".part")
     document = document_of(recording, options)
     if part.exists():
-        file = _resumed(part, document)
+        _repair(part, document)
     else:
-        file = swmr.open_file(part, "x", libver=swmr.LIBVER)
-        _lay_out(file, recording, reconstructor, document)
-    rows = swmr.Appender(file, list(options.products), list(_SERIES))
+        try:
+            with open_to_write(part, "x") as (file, _):
+                _lay_out(file, recording, reconstructor, document)
+        except BaseException:
+            part.unlink(missing_ok=True)  # nothing is in it that could be gone on with
+            raise
+    rows = swmr.Appender(part, list(options.products), list(_SERIES))
     done = rows.rows
     previous = recording.frame(done - 1) if 0 < done < recording.frames else None
     try:
@@ -193,7 +198,9 @@ def content_of(
         attributes = {"units": description.unit, "long_name": description.summary}
         axes = ("frame", *description.axes)
         sizes = (recording.frames, *shape)
-        blocks[product.name] = Block(axes, sizes, description.dtype, attributes)
+        dtype = np.dtype(description.dtype)
+        missing = np.nan if dtype.kind in "fc" else np.iinfo(dtype).max  # never a likely value
+        blocks[product.name] = Block(axes, sizes, description.dtype, attributes, missing)
         for name, size in zip(description.axes, shape, strict=True):
             values = reconstructor.time_s if name == "time" else np.arange(size)
             columns[name] = Column((name,), values)
@@ -229,8 +236,8 @@ def _lay_out(
             blocks.dims[axis].attach_scale(file[name])
 
 
-def _resumed(part: Path, document: Mapping[str, str]) -> swmr.File:
-    """Open an unfinished file to append to, repaired first."""
+def _repair(part: Path, document: Mapping[str, str]) -> None:
+    """Repair an unfinished file, to append to it."""
     scratch = part.with_name(part.name + ".resuming")
     try:
         with part.open("rb") as stream:
@@ -245,7 +252,6 @@ def _resumed(part: Path, document: Mapping[str, str]) -> swmr.File:
         raise InputError(str(part), "its content", swmr.in_words(error), "products") from error
     finally:
         scratch.unlink(missing_ok=True)
-    return swmr.open_file(part, "r+", libver=swmr.LIBVER)
 
 
 def require_same(part: Path | str, begun: Mapping[str, Any], document: Mapping[str, str]) -> None:

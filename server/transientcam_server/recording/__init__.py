@@ -6,6 +6,8 @@ died, `ReplayCamera` plays one as a camera. `Library` is the directory of a runn
 
 from transientcam_server.recording import _recovery as recovery, _swmr as swmr
 from transientcam_server.recording._columns import AXES, as_json, attributes_of, columns_of
+from transientcam_server.recording._disk import DiskFile, open_to_write
+from transientcam_server.recording._disk_threads import DISK_THREADS, DiskThreads
 from transientcam_server.recording._frames import (
     Find,
     RecordedFramesCache,
@@ -17,6 +19,7 @@ from transientcam_server.recording._heaps import require_sound_heaps
 from transientcam_server.recording._layout import Header
 from transientcam_server.recording._library import Library, RecordingOptions
 from transientcam_server.recording._product_stores import (
+    EVERY_CHUNK,
     FORMAT,
     METADATA,
     ProductStore,
@@ -30,12 +33,16 @@ from transientcam_server.recording._replay import ReplayCamera
 from transientcam_server.recording._salvage import salvage
 from transientcam_server.recording._storage import Storage, open_unknown
 from transientcam_server.recording._writer import RecordingWriter
-from transientcam_server.recording._zarr_keys import ZarrKeys
+from transientcam_server.recording._zarr_keys import ZarrKeys, is_of_chunk
 
 __all__ = [
     "AXES",
+    "DISK_THREADS",
+    "EVERY_CHUNK",
     "FORMAT",
     "METADATA",
+    "DiskFile",
+    "DiskThreads",
     "Find",
     "Header",
     "Library",
@@ -53,7 +60,9 @@ __all__ = [
     "as_json",
     "attributes_of",
     "columns_of",
+    "is_of_chunk",
     "open_found",
+    "open_to_write",
     "open_unknown",
     "recorded_recipe",
     "recover",

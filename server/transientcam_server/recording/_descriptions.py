@@ -17,6 +17,7 @@ _UNREADABLE: Final[dict[str, Any]] = {
     "name": "",
     "started_s": None,
     "frames": 0,
+    "synced_frames": None,
     "dropped_frames": 0,
     "duration_s": 0.0,
     "reason": None,
@@ -75,6 +76,7 @@ def of_recorder(recorder: Recorder, part: Path) -> dict[str, Any]:
     document = _of_header(recorder.header) | {
         "state": "recording" if progress.reason is None else "finishing",
         "frames": progress.frames,
+        "synced_frames": progress.synchronised_frames,
         "dropped_frames": progress.dropped_frames,
         "duration_s": progress.duration_s,
         "size_bytes": progress.size_bytes,
@@ -137,6 +139,8 @@ def _read(path: Path) -> dict[str, Any]:
                 "id": id_of(path),
                 "state": "interrupted" if unfinished else "complete",
                 "frames": recording.frames,
+                # what its writer brought to the disk of an unfinished one, nobody else knows
+                "synced_frames": None if unfinished else recording.frames,
                 "dropped_frames": int(recording.series("dropped_frames").sum()),
                 "duration_s": float(end.get("duration_s", between_s)),
                 "reason": end.get("reason", "interrupted"),

@@ -1,7 +1,7 @@
 """Frames of recordings, computed as those of the camera are, also while one is being recorded.
 
-Everything here runs on the event loop; files are read on workers. A file is open only while it
-is read, since an open file could not be renamed, recovered or annotated.
+Everything here runs on the event loop; files are read on threads of their own. A file is open only
+while it is read, since an open file could not be renamed, recovered or annotated.
 """
 
 import asyncio
@@ -20,6 +20,7 @@ from pydantic import ValidationError
 from transientcam_driver import Capabilities, RawFrame
 from transientcam_server.errors import DamagedFrame, NotARecording, Problem, kinds
 from transientcam_server.imaging import Frame, Pipeline, SettingsVersion
+from transientcam_server.recording._disk_threads import DiskThreads
 from transientcam_server.recording._layout import Header
 from transientcam_server.recording._library import Library
 from transientcam_server.recording._reader import Recording
@@ -51,13 +52,20 @@ class RecordedFrames:
     """The frames of one recording, counted from 1, with results kept for the last few."""
 
     def __init__(
-        self, find: Find, header: Header, pipeline: Pipeline, *, lens: LensSettings
+        self,
+        find: Find,
+        header: Header,
+        pipeline: Pipeline,
+        *,
+        lens: LensSettings,
+        disk: DiskThreads,
     ) -> None:
         self.pipeline = pipeline.beside(
             RecordedCamera(header.capabilities), sensor=recorded_sensor(header)
         )
         self._camera_pipeline = pipeline
         self._find = find
+        self._disk = disk
         self._header = header
         self._lens = lens
         self._frames: OrderedDict[tuple[int, int, str], asyncio.Task[Frame]] = OrderedDict()
@@ -86,15 +94,14 @@ class RecordedFrames:
 
     async def host_time_s(self) -> NDArray[np.float64]:
         """Return when each of the frames that were written so far arrived, Unix time."""
-        times, _ = await self.pipeline.workers.run(_read_times, self._find)
-        return times
+        return await self._disk.run(_read_times, self._find)
 
     async def _read(self, number: int, reconstruction: SettingsVersion) -> Frame:
-        raw, _ = await self.pipeline.workers.run_long(_read_frame, self._find, number)
+        raw = await self._disk.run(_read_frame, self._find, number)
         recipe = recorded_recipe(self._header, reconstruction, lens=self._lens)
         previous = None
         if recipe.fills and number > 1:
-            previous, _ = await self.pipeline.workers.run_long(_read_frame, self._find, number - 1)
+            previous = await self._disk.run(_read_frame, self._find, number - 1)
         return self.pipeline.recorded_frame(number, raw, recipe, previous=previous, past=True)
 
     def _reconstruction(self, settings: SettingsChoice) -> SettingsVersion:
@@ -125,11 +132,12 @@ class RecordedFramesCache:
             ``recording-damaged``.
         """
         find = partial(self._library.find, recording_id)
-        await self._pipeline.workers.run(find)  # raises if it was deleted since
+        disk = self._library.disk
+        await disk.run(find)  # raises if it was deleted since
         found = self._opened.get(recording_id)
         if found is None:
-            header, _ = await self._pipeline.workers.run(_read_header, find)
-            found = RecordedFrames(find, header, self._pipeline, lens=self._lens)
+            header = await disk.run(_read_header, find)
+            found = RecordedFrames(find, header, self._pipeline, lens=self._lens, disk=disk)
             self._opened[recording_id] = found
         self._opened.move_to_end(recording_id)
         while len(self._opened) > _OPENED:
@@ -159,7 +167,7 @@ def timeline(host_time_s: NDArray[Any]) -> dict[str, Any]:
     }
 
 
-# -- on workers --------------------------------------------------------------------------------
+# -- on threads of the disk --------------------------------------------------------------------
 
 
 def _read_header(find: Find) -> Header:

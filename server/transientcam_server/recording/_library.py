@@ -4,6 +4,7 @@ An id from a client never becomes a path: it is looked up among the files that e
 """
 
 import logging
+import math
 import secrets
 import threading
 import time
@@ -21,6 +22,7 @@ from transientcam_server.recording import (
 )
 from transientcam_server.recording._descriptions import Descriptions, of_recorder, of_removed
 from transientcam_server.recording._directory import Directory, id_of
+from transientcam_server.recording._disk_threads import DiskThreads
 from transientcam_server.recording._layout import Header
 from transientcam_server.recording._problems import (
     not_stored,
@@ -34,6 +36,8 @@ from transientcam_server.settings import RecordingSettings
 
 _log = logging.getLogger("transientcam_server.recording.library")
 _STOP_WITHIN_S: Final = 60.0
+_END_S: Final = 2.0
+"""What a disk that does nothing is waited for at the end of the service."""
 _REMOVED: Final = 16
 """How many recordings whose files were removed are remembered."""
 Notify = Callable[[str, Mapping[str, Any]], None]
@@ -57,7 +61,8 @@ class Library:
     header
         Returns the header of a new recording for its id, name and time of start.
     notify
-        Called for ``recording-started``, ``recording-dropped`` and ``recording-stopped``, on the
+        Called for ``recording-started``, ``recording-dropped``, ``recording-stopped`` and
+        ``disk-stalled``, on the
         thread on which it happens.
     """
 
@@ -78,6 +83,11 @@ class Library:
         self._active: Recorder | None = None
         self._problems: dict[str, dict[str, Any]] = {}
         self._removed: dict[str, dict[str, Any]] = {}
+        self.known_free_bytes: int | None = None
+        """Free space of the disk when it was last asked for."""
+        self._stalled = False
+        self.disk = DiskThreads(stalled_s=settings.stalled_s, activity=self._activity)
+        """Where requests wait for what is here."""
         self._descriptions = Descriptions()
         self._counted: tuple[Totals, Recorder | None] = Totals(), None
         self._recovering: frozenset[str] = frozenset()
@@ -104,14 +114,19 @@ class Library:
             self._recovery.start()
 
     def close(self) -> None:
-        """Finish the recording that runs, and wait for it and for the recovery."""
+        """Finish the recording that runs and wait for it, and the recovery, while the disk works.
+
+        A recording whose disk does not answer is left to the next start.
+        """
         self._closing.set()
         recorder = self._active
         if recorder is not None:
             recorder.stop("shutdown")
-            recorder.join()
+            if not self._wait(recorder, max(0.0, _END_S - recorder.waiting_s)):
+                _log.warning("the disk does not answer: the recording is left to be recovered")
         if self._recovery is not None:
-            self._recovery.join()
+            self._recovery.join(_END_S)
+        self.disk.close()
 
     # -- recording -----------------------------------------------------------------------------
 
@@ -131,9 +146,10 @@ class Library:
     def free_bytes(self) -> int | None:
         """Return the free space of the disk; None where there is no directory yet."""
         try:
-            return self._directory.free_bytes()
+            self.known_free_bytes = self._directory.free_bytes()
         except OSError:
-            return None
+            self.known_free_bytes = None
+        return self.known_free_bytes
 
     @property
     def totals(self) -> Totals:
@@ -148,6 +164,11 @@ class Library:
         recorder = self._active
         if recorder is not None:
             recorder.offer(raw, applied)
+            if recorder.waiting_s < self._settings.stalled_s:
+                self._stalled = False
+            elif not self._stalled:
+                self._stalled = True
+                self._notify("disk-stalled", {"recording": recorder.header.recording_id})
 
     def start(self, options: RecordingOptions) -> dict[str, Any]:
         """Start a recording and describe it.
@@ -186,7 +207,7 @@ class Library:
         recorder = self._recorder_of(recording_id)
         if recorder is not None:
             recorder.stop()
-            recorder.wait(_STOP_WITHIN_S)
+            self._wait(recorder, self._settings.stalled_s)
         return self.describe(recording_id)
 
     # -- keeping -------------------------------------------------------------------------------
@@ -258,7 +279,7 @@ class Library:
         recorder = self._recorder_of(recording_id)
         if recorder is None or not recorder.annotate(annotations):
             if recorder is not None:
-                recorder.wait(_STOP_WITHIN_S)
+                self._wait(recorder, self._settings.stalled_s)
             path = self.path(recording_id)
             try:
                 annotate(path, annotations)
@@ -282,7 +303,18 @@ class Library:
         self._descriptions.keep(self._directory.ids())
         return document
 
+    @property
+    def disk_waiting_s(self) -> float:
+        """How long the disk has not answered what was asked of it longest ago."""
+        recorder = self._active
+        return max(self.disk.waiting_s, 0.0 if recorder is None else recorder.waiting_s)
+
     # -- inside --------------------------------------------------------------------------------
+
+    def _activity(self) -> object:
+        """Return what changes while the disk does something."""
+        recorder = self._active
+        return len(self._descriptions), recorder and recorder.progress.frames
 
     def _recorder(self, options: RecordingOptions, started_s: float) -> Recorder:
         moment = layout.utc(started_s)
@@ -332,7 +364,11 @@ class Library:
     def _ended(self, recorder: Recorder) -> None:
         progress, recording_id = recorder.progress, recorder.header.recording_id
         if progress.problem is not None:
-            self._problems[recording_id] = {"reason": "failed", "problem": progress.problem}
+            self._problems[recording_id] = {
+                "reason": "failed",
+                "problem": progress.problem,
+                "synced_frames": progress.synchronised_frames,
+            }
             if self._directory.find(recording_id) is None:
                 self._keep_removed(recorder)
         self._counted = self._counted[0].after(progress), recorder
@@ -351,6 +387,16 @@ class Library:
         self._removed[recording_id] = of_removed(recorder)
         while len(self._removed) > _REMOVED:
             del self._removed[next(iter(self._removed))]
+
+    def _wait(self, recorder: Recorder, stalled_s: float) -> bool:
+        """Wait until a recorder has ended, or its disk does nothing; return whether it has."""
+        for _ in range(math.ceil(_STOP_WITHIN_S / max(stalled_s, 0.1))):
+            before = recorder.progress.frames
+            if recorder.wait(stalled_s):
+                return True
+            if recorder.progress.frames == before:
+                break
+        return False
 
     def _recorder_of(self, recording_id: str) -> Recorder | None:
         """Return the recorder of a recording that has not ended."""

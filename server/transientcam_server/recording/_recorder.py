@@ -45,6 +45,7 @@ class Progress:
     """Size of a recording so far; ``reason`` and ``problem`` once it has ended."""
 
     frames: int
+    synchronised_frames: int
     dropped_frames: int
     size_bytes: int
     duration_s: float
@@ -134,6 +135,7 @@ class Recorder:
         self._reported_dropped = 0
         self._began_s = clock()
         self._ended_s: float | None = None
+        self._busy_since_s: float | None = None
         self._checked_s = -float("inf")
         self._size_bytes = writer.bytes_written
         self._finished = threading.Event()
@@ -199,9 +201,11 @@ class Recorder:
         """Wait until it has ended; return whether it has."""
         return self._finished.wait(timeout_s)
 
-    def join(self) -> None:
-        """Wait for the thread."""
-        self._thread.join()
+    @property
+    def waiting_s(self) -> float:
+        """How long it has waited for the disk; 0 while it does not."""
+        since_s = self._busy_since_s
+        return 0.0 if since_s is None else self._clock() - since_s
 
     @property
     def progress(self) -> Progress:
@@ -209,6 +213,7 @@ class Recorder:
         until_s = self._clock() if self._ended_s is None else self._ended_s
         return Progress(
             frames=self._writer.frames,
+            synchronised_frames=self._writer.synchronised_frames,
             dropped_frames=self._dropped,
             size_bytes=self._size_bytes,
             duration_s=self._past_s + until_s - self._began_s,
@@ -220,12 +225,20 @@ class Recorder:
     # -- on the thread -------------------------------------------------------------------------
 
     def _run(self) -> None:
+        while self._turn():
+            pass
+        self._finish()
+
+    def _turn(self) -> bool:
+        """Do one step; false after the last, which may have failed."""
         try:
-            while self._step():
-                pass
+            return self._step()
         except Exception as error:
             self._fail(error)
-        self._ended_s = self._clock()
+            return False
+
+    def _finish(self) -> None:
+        self._ended_s = self._busy_since_s = self._clock()
         try:
             self._writer.close(self._end())
         except Exception as error:
@@ -234,10 +247,12 @@ class Recorder:
         try:
             self._on_end(self)
         finally:
+            self._busy_since_s = None
             self._finished.set()
 
     def _step(self) -> bool:
         """Write the next frame; false once there are no more to come."""
+        self._busy_since_s = None
         with self._changed:
             idle = self._awaits_past or not (self._past or self._waiting)
             if idle and not (self._work or self._reason):
@@ -246,6 +261,7 @@ class Recorder:
             self._work.clear()
             ending = self._reason is not None
             frame = self._next() if ending or not self._awaits_past else None
+        self._busy_since_s = self._clock()
         for each in work:
             each()
         if frame is not None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from transientcam_server.errors import NotARecording
 from transientcam_server.recording import _layout as layout, _swmr as swmr
+from transientcam_server.recording._disk import DiskFile, open_to_write
 from transientcam_server.recording._seal import SealedFrame, seal
 from transientcam_server.recording._storage import Storage, is_one_chunk_a_row
 
@@ -36,7 +37,7 @@ def salvage(source: swmr.File, target: Path, rows: int, *, row_axis: str) -> Non
     growing = [name for name, each in datasets.items() if each.maxshape[:1] == (None,)]
     if row_axis not in growing:
         raise ValueError(f"no series {row_axis}")
-    with swmr.open_file(target, "w", libver=swmr.LIBVER) as copy:
+    with open_to_write(target, "w") as (copy, disk):
         copy.attrs.update(source.attrs)
         first: dict[swmr.Dataset, str] = {}  # datasets are equal where they are the same one
         for name, dataset in datasets.items():
@@ -50,10 +51,9 @@ def salvage(source: swmr.File, target: Path, rows: int, *, row_axis: str) -> Non
                 copy[name].resize(rows, 0)
                 copy[name][:] = storage.values(name)[:rows]
             else:
-                _copy_blocks(dataset, copy, rows)
+                _copy_blocks(dataset, copy, rows, disk)
             _copy_attributes(dataset, copy[name])
         _restore_scales(datasets, copy)
-    swmr.synchronise(target)
 
 
 def rebuild(part: Path, target: Path, frames: Sequence[SealedFrame]) -> None:
@@ -75,20 +75,20 @@ def rebuild(part: Path, target: Path, frames: Sequence[SealedFrame]) -> None:
     except Exception as error:  # h5py raises anything of a damaged file
         raise NotARecording(str(part), str(error)) from error
     target.write_bytes(layout.image(header, annotations))
-    with swmr.open_file(target, "r+", libver=swmr.LIBVER) as file, part.open("rb") as stream:
+    with open_to_write(target, "r+") as (file, disk), part.open("rb") as stream:
         raw = file["raw"]
         raw.resize(len(frames), 0)
         for row, frame in enumerate(frames):
             stream.seek(frame.offset)
             chunk = stream.read(frame.size)
             raw.id.write_direct_chunk((row, 0, 0, 0), chunk + seal(row, chunk, frame.values))
+            disk.require_written()
         for name, (kind, _) in layout.SERIES.items():
             file[name].resize(len(frames), 0)
             file[name][:] = np.array([frame.values[name] for frame in frames], kind)
-    swmr.synchronise(target)
 
 
-def _copy_blocks(dataset: swmr.Dataset, copy: swmr.File, rows: int) -> None:
+def _copy_blocks(dataset: swmr.Dataset, copy: swmr.File, rows: int, disk: DiskFile) -> None:
     if not is_one_chunk_a_row(dataset):
         raise ValueError(f"{dataset.name} was not written as a recording's blocks are")
     blocks = swmr.create_blocks(copy, dataset.name, dataset.shape[1:], dataset.dtype)
@@ -97,6 +97,7 @@ def _copy_blocks(dataset: swmr.Dataset, copy: swmr.File, rows: int) -> None:
         place = (row, *(0,) * (dataset.ndim - 1))
         mask, chunk = dataset.id.read_direct_chunk(place)
         blocks.id.write_direct_chunk(place, chunk, filter_mask=mask)
+        disk.require_written()
 
 
 def _copy_attributes(dataset: swmr.Dataset, copy: swmr.Dataset) -> None:

@@ -24,6 +24,8 @@ from h5py._objects import phil
 from isal import isal_zlib
 from numpy.typing import NDArray
 
+from transientcam_server.recording import _disk as disk
+
 File: TypeAlias = Any
 """An open h5py.File."""
 Dataset: TypeAlias = Any
@@ -32,7 +34,6 @@ Seal: TypeAlias = Callable[[int, bytes, Mapping[str, object]], bytes]
 open_file: Final[Callable[..., Any]] = h5py.File
 """Opens a file; h5py has no types, so that files and datasets are `Any`."""
 
-LIBVER: Final = ("v110", "v110")
 _SERIES_CHUNK: Final = 1024
 _LEVEL: Final = 1
 _FSYNC_EVERY_S: Final = 1.0
@@ -67,18 +68,13 @@ def open_unfinished(path: Path) -> File:
     return open_file(h5py.h5f.open(os.fsencode(path), flags, access))
 
 
-def open_to_append(path: Path) -> File:
-    """Open a whole file for an `Appender`; the lock is the recording's own."""
-    return open_file(path, "r+", libver=LIBVER, locking=False)
-
-
 def image_of(make: Callable[[File], None]) -> bytes:
     """Return the bytes of a new file that ``make`` lays out.
 
     It is made in memory: HDF5 cannot close a file that it failed to write, as on a full disk.
     """
     name = f"image {next(_IMAGE_NUMBERS)}"  # by which HDF5 tells open files in memory apart
-    with open_file(name, "w", driver="core", backing_store=False, libver=LIBVER) as file:
+    with open_file(name, "w", driver="core", backing_store=False, libver=disk.LIBVER) as file:
         make(file)
         file.flush()
         image: bytes = file.id.get_file_image()
@@ -153,8 +149,8 @@ class Appender:
 
     Parameters
     ----------
-    file
-        Open for writing with `LIBVER`, complete but for its rows.
+    path
+        Of a file of `LIBVER`, complete but for its rows; the lock is the recording's own.
     blocks, series
         Names of the datasets that grow by one each row; ``series`` in the order of writing, the
         one whose length counts the rows last.
@@ -165,21 +161,22 @@ class Appender:
 
     def __init__(
         self,
-        file: File,
+        path: Path,
         blocks: Sequence[str],
         series: Sequence[str],
         *,
         seal: Seal = lambda row, chunk, values: b"",
     ) -> None:
         self._seal = seal
+        file, self._disk = disk.open_disk(path, "r+")
         self._file = file
         self._blocks = {name: file[name] for name in blocks}
         self._series = {name: file[name] for name in series}
-        self._count = file[series[-1]]
-        self.rows: int = self._count.shape[0]
+        self.rows: int = file[series[-1]].shape[0]
+        self.synchronised_rows: int = self.rows
+        """How many rows are on the disk, which a power cut does not take back."""
         file.swmr_mode = True
-        # fsync takes any descriptor of the file
-        self._descriptor = os.open(file.filename, os.O_RDONLY)
+        self._disk.synchronise()  # or a power cut left it marked as open otherwise
         self._synchronised_s: float | None = None
 
     def append(self, blocks: Mapping[str, NDArray[Any]], series: Mapping[str, object]) -> None:
@@ -191,6 +188,7 @@ class Appender:
             If it cannot be written.
         """
         row = self.rows
+        self._disk.require_written()
         for name, dataset in self._blocks.items():
             block = np.ascontiguousarray(blocks[name], dtype=dataset.dtype)
             dataset.resize(row + 1, 0)
@@ -202,31 +200,46 @@ class Appender:
             dataset.resize(row + 1, 0)
             dataset[row] = series[name]
             dataset.flush()
+        self._disk.require_written()
         self.rows = row + 1
 
     def synchronise(self, now_s: float) -> None:
         """Flush the file to the disk, unless that was done within the last second."""
         if self._synchronised_s is None or now_s - self._synchronised_s >= _FSYNC_EVERY_S:
-            os.fsync(self._descriptor)
-            self._synchronised_s = now_s
+            rows = self.rows
+            self._disk.synchronise()
+            self._synchronised_s, self.synchronised_rows = now_s, rows
 
-    def bytes_written(self) -> int:
-        """Return the size of the file."""
-        return os.fstat(self._descriptor).st_size
+    @property
+    def size_bytes(self) -> int:
+        """Size of the file."""
+        return self._disk.size_bytes
 
     def overwrite(self, name: str, value: bytes) -> None:
-        """Replace the fixed-length text of a scalar dataset."""
+        """Replace the fixed-length text of a scalar dataset.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
+        """
         dataset = self._file[name]
         dataset[()] = value
         dataset.flush()
+        self._disk.require_written()
 
     def close(self) -> None:
-        """Finish the file, on the disk."""
-        try:
+        """Finish the file, on the disk.
+
+        Raises
+        ------
+        OSError
+            If it, or what was appended, cannot be written.
+        """
+        with self._disk:
             self._file.close()
-            os.fsync(self._descriptor)
-        finally:
-            os.close(self._descriptor)
+            self._disk.synchronise()
+        self.synchronised_rows = self.rows
 
 
 def synchronise(path: Path) -> None:

@@ -41,9 +41,7 @@ class RecordingWriter:
         try:
             _require_none(path, self.part)
             _write(self._lock.descriptor, empty)
-            file = swmr.open_to_append(made)
-            self._rows = swmr.Appender(file, ["raw"], list(layout.SERIES), seal=seal)
-            swmr.synchronise(made)  # or a power cut left it marked as open otherwise
+            self._rows = swmr.Appender(made, ["raw"], list(layout.SERIES), seal=seal)
             made = made.rename(self.part)
             swmr.synchronise(path.parent)
         except BaseException:
@@ -62,9 +60,14 @@ class RecordingWriter:
         return self._rows.rows
 
     @property
+    def synchronised_frames(self) -> int:
+        """How many frames are on the disk, which a power cut does not take back."""
+        return self._rows.synchronised_rows
+
+    @property
     def bytes_written(self) -> int:
         """Size of the file."""
-        return self._rows.bytes_written()
+        return self._rows.size_bytes
 
     def append(self, raw: RawFrame, *, dropped_frames: int = 0) -> None:
         """Write a frame; once this returns, the death of this process does not take it back.
@@ -98,10 +101,7 @@ class RecordingWriter:
             try:
                 self._rows.overwrite("end", layout.encoded(end))
             finally:
-                try:
-                    self._rows.close()
-                except RuntimeError as error:  # h5py's when closing fails to write
-                    raise OSError(str(error)) from error
+                self._rows.close()
             self.part.rename(self.path)
             swmr.synchronise(self.path.parent)
 

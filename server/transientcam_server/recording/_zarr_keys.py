@@ -31,6 +31,12 @@ _SERIES_ROWS: Final = 1024
 _NUMBERS: Final = re.compile(r"(0|[1-9]\d{0,9})(\.(0|[1-9]\d{0,9}))*", re.ASCII)
 
 
+def is_of_chunk(key: str) -> bool:
+    """Return whether a key is that of a chunk, in version 2 or 3, and not that of a document."""
+    rest = key.partition("/")[2]
+    return f"{rest}/".startswith("c/") or _NUMBERS.fullmatch(rest) is not None
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
     """Where in the file the bytes of a chunk are."""

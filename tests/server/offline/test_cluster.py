@@ -122,6 +122,12 @@ def test_a_run_that_was_interrupted_is_gone_on_with(
     output = str(tmp_path / "a.zarr")
     with pytest.raises(KeyboardInterrupt):
         reconstruct_on(client, str(source), output, OPTIONS, progress=interrupt)
+    begun: Any = zarr.open_group(output, mode="r")
+    assert begun.attrs["state"] == "unfinished"
+    missing = begun["frame"][:] == cluster.MISSING
+    for name in OPTIONS.products:
+        values = begun[name][:][missing]
+        assert np.isnan(values).all() if values.dtype.kind in "fc" else (values == 255).all()
     other = BatchOptions(OPTIONS.products, ReconstructionSettings(bias=0.01))
     with pytest.raises(InputError, match="reconstruction"):
         reconstruct_on(client, str(source), output, other)
@@ -130,6 +136,7 @@ def test_a_run_that_was_interrupted_is_gone_on_with(
 
     assert frames == FRAMES
     assert before >= FRAMES % BLOCK_FRAMES
+    assert zarr.open_group(output, mode="r").attrs["state"] == "complete"
     assert_same(output, serial)
 
 

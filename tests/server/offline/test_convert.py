@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from zarr.core.sync import cleanup_resources
 
 import transientcam_moments as tm
+from tests.server.recording.failing import FailingDisk, Fault
 from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, frame, record
 from transientcam_server.errors import DamagedFrame, MissingExtra, NotConvertible
 from transientcam_server.offline import convert_recording
@@ -197,3 +198,17 @@ def test_what_is_there_is_not_replaced(source: Path, tmp_path: Path) -> None:
     (tmp_path / "a.npz").write_text("mine")
     with Recording(source) as recording, pytest.raises(FileExistsError):
         convert_recording(recording, tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize("at", [1, 4, 20])
+def test_a_disk_that_is_full_leaves_nothing_of_a_netcdf(
+    source: Path, tmp_path: Path, at: int
+) -> None:
+    with (
+        Recording(source) as recording,
+        FailingDisk(Fault(at, "ENOSPC", for_ever=True)).inserted(),
+        pytest.raises(OSError, match="No space left on device"),
+    ):
+        convert_recording(recording, tmp_path / "a.nc")
+
+    assert [path.name for path in tmp_path.iterdir()] == [source.name]

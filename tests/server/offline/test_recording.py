@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import transientcam_moments as tm
+from tests.server.recording.failing import FailingDisk, Fault
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.errors import InputError
@@ -84,6 +85,26 @@ def test_an_interrupted_run_is_gone_on_with_and_ends_the_same(path: Path, tmp_pa
         assert dict(one.attrs) == dict(other.attrs)
         for name in one:
             np.testing.assert_array_equal(one[name][()], other[name][()])
+
+
+def test_a_run_that_a_full_disk_ended_is_gone_on_with(path: Path, tmp_path: Path) -> None:
+    output, options = tmp_path / "a.h5", BatchOptions(products=("range",))
+    with Recording(path) as recording:
+        with FailingDisk(Fault()).inserted() as disk:
+            reconstruct_recording(recording, output, options)
+        output.unlink()
+        for at, left in ((1, []), (disk.calls - 15, ["a.h5.part"])):
+            with (
+                FailingDisk(Fault(at, "ENOSPC", for_ever=True)).inserted(),
+                pytest.raises(OSError, match="No space left on device"),
+            ):
+                reconstruct_recording(recording, output, options)
+            assert [each.name for each in tmp_path.iterdir()] == left
+        assert reconstruct_recording(recording, output, options) < recording.frames
+
+    with h5py.File(output) as file:
+        assert len(file["range"]) == FRAMES
+        assert np.isfinite(file["range"][()]).any(axis=(1, 2)).all()
 
 
 def test_what_was_begun_otherwise_is_not_gone_on_with(path: Path, tmp_path: Path) -> None:

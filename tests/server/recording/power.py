@@ -45,11 +45,18 @@ class Acknowledged:
 
 
 @dataclass(frozen=True)
+class Stated:
+    """So many frames are stated to be on the disk."""
+
+    frames: int
+
+
+@dataclass(frozen=True)
 class Renamed:
     """The file has its final name; until the directory is synchronised, maybe not on the disk."""
 
 
-Event = Write | Synchronised | Acknowledged | Renamed
+Event = Write | Synchronised | Acknowledged | Stated | Renamed
 
 
 def traced(path: Path, *, frames: int) -> list[Event]:
@@ -86,6 +93,8 @@ def _events(lines: list[str], name: str) -> Iterator[Event]:
         elif what == "write" and arguments.startswith("1<"):
             if (said := _bytes(rest.split('"')[1]).strip()).isdigit():  # not by a child of NumPy's
                 yield Acknowledged(int(said))
+            elif said.startswith(b"synced "):
+                yield Stated(int(said.split()[1]))
         elif not there.endswith(names):
             continue
         elif what == "fsync":
@@ -172,30 +181,36 @@ class Cut:
     """The power is cut before an event: what was acknowledged, and what the disk has."""
 
     acknowledged: int
+    stated: int
     content: bytes
 
     @property
     def must_be_there(self) -> int:
-        """Frames acknowledged more than a second before; the last one is just acknowledged."""
-        return max(0, self.acknowledged - int(RATE_HZ))
+        """Frames stated to be on the disk, and those acknowledged more than a second before.
+
+        The last one is just acknowledged.
+        """
+        return max(self.stated, self.acknowledged - int(RATE_HZ))
 
 
 def cut(events: list[Event], at: int, keep: Keep, draw: random.Random) -> Cut:
     """Cut the power before an event."""
-    acknowledged = 0
+    acknowledged = stated = 0
     content = bytearray()
     pending: list[Write] = []
     for event in events[:at]:
         match event:
             case Acknowledged(frames):
                 acknowledged = frames
+            case Stated(frames):
+                stated = frames
             case Write():
                 pending.append(event)
             case Synchronised():
                 _apply(pending, content)
                 pending.clear()
     _apply(keep(pending, draw), content)
-    return Cut(acknowledged, bytes(content))
+    return Cut(acknowledged, stated, bytes(content))
 
 
 def _apply(writes: list[Write], content: bytearray) -> None:
@@ -220,6 +235,7 @@ def main() -> None:
         writer.append(frame(number))
         os.write(1, b"%d\n" % (number + 1))
         writer.synchronise((number + 1) / RATE_HZ)
+        os.write(1, b"synced %d\n" % writer.synchronised_frames)
     writer.close({"reason": "stopped"})
 
 

@@ -1,5 +1,6 @@
 """What the service keeps of recordings, beside their files."""
 
+import os
 import re
 import shutil
 import threading
@@ -7,16 +8,20 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 
+from tests.server.recording.failing import FailingDisk, Fault
 from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, frame, header, record
 from tests.server.recording.test_recovery import abandoned
+from tests.waiting import wait_until
 from transientcam_server.errors import Problem
 from transientcam_server.recording import (
     Header,
     Library,
     Limits,
+    Recording,
     RecordingOptions,
     _descriptions as descriptions,
     _layout as layout,
@@ -282,3 +287,91 @@ def test_recordings_are_listed_newest_first(tmp_path: Path) -> None:
     library = Library(RecordingSettings(directory=tmp_path), header=new_header)
 
     assert [each["id"] for each in library.describe_all()] == ["c", "d", "b", "a", "e"]
+
+
+class Hanging:
+    """A disk that takes no more, until it is let."""
+
+    def __init__(self) -> None:
+        self.free = threading.Event()
+        self.free.set()
+        self.waits = threading.Event()
+
+    def around(self, call: Any) -> Any:
+        """Return a call of the system that waits."""
+
+        def waiting(*arguments: Any) -> Any:
+            if not self.free.is_set():
+                self.waits.set()
+            self.free.wait()
+            return call(*arguments)
+
+        return waiting
+
+
+@pytest.fixture
+def hanging() -> Iterator[Hanging]:
+    disk = Hanging()
+    calls: dict[str, Any] = {name: disk.around(getattr(os, name)) for name in ("pwrite", "fsync")}
+    with mock.patch.multiple(os, **calls):
+        yield disk
+        disk.free.set()
+
+
+def test_a_recording_whose_disk_hangs_says_so_and_ends_without_it(
+    tmp_path: Path, hanging: Hanging
+) -> None:
+    notices: list[str] = []
+    settings = RecordingSettings(directory=tmp_path, min_free_bytes=0, stalled_s=0.05)
+    library = Library(settings, header=new_header, notify=lambda kind, _: notices.append(kind))
+    recording = library.start(RecordingOptions())["id"]
+    library.offer(frame(0), APPLIED)
+    wait_until(lambda: library.totals.frames == 1)
+    hanging.free.clear()
+    library.offer(frame(1), APPLIED)
+    assert hanging.waits.wait(30.0)
+
+    wait_until(lambda: library.disk_waiting_s > 0.1)
+    for _ in range(2):
+        library.offer(frame(2), APPLIED)
+    assert notices == ["recording-started", "disk-stalled"]
+    library.close()
+
+    part = tmp_path / f"{recording}{layout.PART_SUFFIX}"
+    assert part.exists()
+    copy = Path(shutil.copy(part, tmp_path / "copy.h5.part"))  # as a killed process leaves it
+    hanging.free.set()
+    with Recording(copy) as kept:
+        assert kept.frames >= 1
+    wait_until(lambda: library.active_id is None)
+    assert not part.exists()
+    assert library.disk_waiting_s == 0.0
+
+
+def test_frames_on_the_disk_are_said(tmp_path: Path) -> None:
+    settings = RecordingSettings(directory=tmp_path, min_free_bytes=0)
+    library = Library(settings, header=new_header)
+    recording = library.start(RecordingOptions())["id"]
+    library.offer(frame(0), APPLIED)
+    wait_until(lambda: library.totals.frames == 1)
+
+    running = library.describe(recording)
+    assert 0 <= running["synced_frames"] <= running["frames"]
+    assert library.stop(recording)["synced_frames"] == 1
+    library.close()
+
+
+def test_a_recording_that_failed_says_why_and_what_is_on_the_disk(tmp_path: Path) -> None:
+    settings = RecordingSettings(directory=tmp_path, min_free_bytes=0)
+    library = Library(settings, header=new_header)
+    recording = library.start(RecordingOptions())["id"]
+    with FailingDisk(Fault(1, "EIO", for_ever=True)).inserted():
+        library.offer(frame(0), APPLIED)
+        wait_until(lambda: library.active_id is None)
+
+    failed = library.describe(recording)
+    assert (failed["state"], failed["reason"]) == ("interrupted", "failed")
+    assert failed["problem"] == "Input/output error"
+    assert failed["synced_frames"] == 0
+    library.start(RecordingOptions())  # the next one may work
+    library.close()

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.server.recording.made import assert_same, frame, header
-from tests.server.recording.power import DISKS, Event, Write, cut, moments, traced
+from tests.server.recording.power import DISKS, Event, Stated, Write, cut, moments, traced
 from transientcam_server.errors import NotARecording
 from transientcam_server.recording import Recording, RecordingWriter, recover
 from transientcam_server.recording._seal import sealed_frames
@@ -38,6 +38,17 @@ def test_no_frame_of_more_than_a_second_ago_is_lost_in_a_power_cut(
             assert recording.frames >= found.must_be_there
             for index, raw in enumerate(recording):
                 assert_same(raw, frame(index))
+
+
+def test_frames_that_are_stated_to_be_on_the_disk_are_more_and_more(events: list[Event]) -> None:
+    stated = [event.frames for event in events if isinstance(event, Stated)]
+
+    assert stated == sorted(stated)
+    assert 0 < stated[0] < stated[-1] <= FRAMES
+    for at, event in enumerate(events):
+        if isinstance(event, Stated):
+            found = cut(events, at + 1, DISKS["nothing"], random.Random(0))
+            assert found.stated == event.frames <= found.acknowledged
 
 
 def test_what_was_written_is_all_that_the_file_holds(events: list[Event], tmp_path: Path) -> None:

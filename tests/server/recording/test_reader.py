@@ -17,8 +17,10 @@ from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, assert_same, fra
 from transientcam_driver import RawFrame
 from transientcam_server.errors import DamagedFrame, NotARecording
 from transientcam_server.recording import (
+    DiskFile,
     Recording,
     RecordingWriter,
+    _disk as disk,
     _layout as recording_layout,
     swmr,
 )
@@ -151,14 +153,14 @@ def test_two_files_may_be_made_in_memory_at_a_time() -> None:
 def test_a_recording_may_begin_while_all_that_is_there_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    open_to_append, read = swmr.open_to_append, list[Recording]()
+    open_disk, read = disk.open_disk, list[Recording]()
 
-    def listed_meanwhile(path: Path) -> swmr.File:
-        # HDF5 opens no file to write that it has open to read
+    def listed_meanwhile(path: Path, mode: str) -> tuple[swmr.File, DiskFile]:
+        # a file of this process, open to read, is not in the way of its writer
         read.extend(Recording(each) for each in Directory(tmp_path).files())
-        return open_to_append(path)
+        return open_disk(path, mode)
 
-    monkeypatch.setattr(swmr, "open_to_append", listed_meanwhile)
+    monkeypatch.setattr(disk, "open_disk", listed_meanwhile)
     record(tmp_path / "a.h5", 1)
 
     record(tmp_path / "b.h5", 2)

@@ -61,7 +61,6 @@ def start(tmp_path: Path) -> Iterator[Start]:
     yield begin
     for recorder in started:
         recorder.stop()
-        recorder.join()
 
 
 def test_what_is_offered_before_the_stop_is_in_the_file(start: Start, tmp_path: Path) -> None:
@@ -278,7 +277,6 @@ def test_a_disk_that_is_really_full_loses_no_frame_that_was_acknowledged(
         for number in range(200):
             recorder.offer(frame(number), APPLIED)
         assert recorder.wait(PATIENCE_S)
-        recorder.join()
     acknowledged = recorder.progress.frames
 
     assert recorder.progress.reason == "failed"

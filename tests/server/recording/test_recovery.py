@@ -18,8 +18,10 @@ from tests.conftest import ROOT
 from tests.server.recording.made import HEIGHT, WIDTH, assert_same, frame, header, record
 from transientcam_server.errors import NotARecording, RecordingInUse
 from transientcam_server.recording import (
+    DiskFile,
     Recording,
     RecordingWriter,
+    _disk as disk,
     _layout as layout,
     _lock as lock,
     recover,
@@ -195,13 +197,13 @@ def test_a_copy_that_a_killed_recovery_left_is_removed_with_its_recording_gone(
 def test_what_another_service_begins_is_left_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    open_to_append = swmr.open_to_append
+    open_disk = disk.open_disk
 
-    def started_meanwhile(path: Path) -> swmr.File:
+    def started_meanwhile(path: Path, mode: str) -> tuple[swmr.File, DiskFile]:
         assert unfinished(tmp_path) == []  # as another service does when it starts
-        return open_to_append(path)
+        return open_disk(path, mode)
 
-    monkeypatch.setattr(swmr, "open_to_append", started_meanwhile)
+    monkeypatch.setattr(disk, "open_disk", started_meanwhile)
 
     record(tmp_path / "a.h5", 1)
 

@@ -136,6 +136,8 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
         words: `The disk was too slow for ${grouped(notice.count)} ${notice.count === 1 ? "frame" : "frames"} of the recording.`,
         tone: "bad",
       };
+    case "disk-stalled":
+      return { words: "The disk of the recordings does not answer. Frames may be dropped.", tone: "bad" };
     case "recording-stopped": {
       const why = END_REASONS[notice.reason ?? ""] ?? "ended";
       const tone = notice.problem ? "bad" : "good";

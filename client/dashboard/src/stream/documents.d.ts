@@ -902,6 +902,9 @@ export interface ProductDocument {
 export interface ProductStoreDocument {
   /** Name of the store, without `.zarr`. */
   readonly id: string;
+  /** Names what it holds. At `/products/{id}~{generation}/zarr` a reader gets an error instead of
+   * the data of another store that has taken its place. */
+  readonly generation: string;
   /** Id of the recording whose products these are; it may have been deleted. */
   readonly recording: string;
   /** What people call that. */
@@ -1052,7 +1055,11 @@ export interface RecordingDocument {
   readonly name: string;
   /** `interrupted`: its writer died, and the next start of the service recovers it. */
   readonly state: "recording" | "finishing" | "complete" | "interrupted" | "recovering" | "damaged";
+  /** Written: they survive the death of the service. */
   readonly frames: number;
+  /** Of these, brought to the disk: they survive a power cut, too. Null of an unfinished one that
+   * is not written here. */
+  readonly synced_frames: number | null;
   /** Frames the disk was too slow for; each frame in the file states how many before it. */
   readonly dropped_frames: number;
   readonly size_bytes: number;
@@ -1404,6 +1411,11 @@ export type Notice =
       readonly kind: "recording-dropped";
       readonly count: number;
       readonly total: number;
+    }
+  | {
+      readonly type: "notice";
+      readonly kind: "disk-stalled";
+      readonly recording: string;
     }
   | {
       readonly type: "notice";

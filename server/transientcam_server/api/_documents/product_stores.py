@@ -12,6 +12,9 @@ class ProductStoreDocument(Document):
 
     id: str
     """Name of the store, without `.zarr`."""
+    generation: str
+    """Names what it holds. At `/products/{id}~{generation}/zarr` a reader gets an error instead of
+    the data of another store that has taken its place."""
     recording: str = Field(validation_alias="recording_id")
     """Id of the recording whose products these are; it may have been deleted."""
     name: str = Field(validation_alias="title")

@@ -33,6 +33,10 @@ class RecordingDocument(Document):
     state: Literal["recording", "finishing", "complete", "interrupted", "recovering", "damaged"]
     """`interrupted`: its writer died, and the next start of the service recovers it."""
     frames: int
+    """Written: they survive the death of the service."""
+    synced_frames: int | None = None
+    """Of these, brought to the disk: they survive a power cut, too. Null of an unfinished one that
+    is not written here."""
     dropped_frames: int
     """Frames the disk was too slow for; each frame in the file states how many before it."""
     size_bytes: int

@@ -234,6 +234,7 @@ async def read_calibration_file(
     return await downloads.answer(
         stored.path,
         wanted,
+        disk=service.recordings.disk,
         gone=kinds.UNKNOWN_CALIBRATION,
         media_type=NPZ,
         filename=f"{stored.id}.npz",

@@ -1,5 +1,6 @@
 """Metrics, for Prometheus."""
 
+import contextlib
 from typing import Any, Final
 
 from fastapi import APIRouter, Response
@@ -7,7 +8,7 @@ from fastapi import APIRouter, Response
 from transientcam_server.api._dependencies import MetricsOf, ServiceOf
 from transientcam_server.api._metrics import CONTENT_TYPE
 from transientcam_server.api._problems import documented
-from transientcam_server.errors import kinds
+from transientcam_server.errors import Problem, kinds
 
 router = APIRouter(tags=["health"])
 
@@ -28,4 +29,6 @@ _TEXT: Final[dict[int | str, dict[str, Any]]] = {
 async def read_metrics(service: ServiceOf, metrics: MetricsOf) -> Response:
     """Return what Prometheus scrapes; where tokens are required, one of a viewer is enough."""
     await service.calibrations.drift()  # counted anew every few seconds at most
+    with contextlib.suppress(Problem):  # a disk that does not answer says so itself
+        await service.recordings.disk.run(service.recordings.free_bytes)
     return Response(metrics.exposition(), media_type=CONTENT_TYPE)

@@ -1,6 +1,5 @@
 """Products of whole recordings as Zarr stores, as `transientcam reconstruct` wrote them."""
 
-import asyncio
 import pathlib
 from typing import Annotated, Any, Final
 
@@ -12,7 +11,7 @@ from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._documents.product_stores import ProductStoresDocument
 from transientcam_server.api._problems import documented
 from transientcam_server.errors import Problem, kinds
-from transientcam_server.recording import METADATA, ProductStores
+from transientcam_server.recording import METADATA, ProductStores, is_of_chunk
 from transientcam_server.service import Service
 
 router = APIRouter(prefix="/products", tags=["recordings"])
@@ -31,6 +30,8 @@ _DOCUMENT: Final[dict[str, Any]] = {
 }
 _PROBLEMS: Final = documented(
     kinds.NOT_FOUND,
+    kinds.STORE_GONE,
+    kinds.DISK_STALLED,
     kinds.UNKNOWN_PRODUCT_STORE,
     kinds.PRODUCT_STORE_UNFINISHED,
     kinds.INVALID_REQUEST,
@@ -43,14 +44,14 @@ def _found(media_type: str, content: dict[str, Any]) -> dict[int | str, dict[str
     return {200: whole | etags.READING[200], 304: etags.READING[304]} | _PROBLEMS
 
 
-@router.get("", summary="All stores of products")
+@router.get("", summary="All stores of products", responses=documented(kinds.DISK_STALLED))
 async def read_product_stores(service: ServiceOf) -> ProductStoresDocument:
     """List the Zarr stores of products that lie beside the recordings.
 
     `transientcam reconstruct corner.h5 -o corner.zarr` writes one; the service reads them alone.
     """
     directory = service.recordings.directory
-    found = await asyncio.to_thread(ProductStores(directory).all)
+    found = await service.recordings.disk.run(ProductStores(directory).all)
     return ProductStoresDocument.model_validate({"directory": str(directory), "stores": found})
 
 
@@ -122,7 +123,8 @@ async def read_product_chunk(
 ) -> Response:
     """Return a chunk, byte for byte as it was written.
 
-    One that is not found has the array's fill value in all places, by Zarr's rules.
+    One that is not found (404) has the array's fill value in all places, by Zarr's rules. One
+    that is not there any more is 410.
     """
     return await _answer(service, store, f"{array}/c/{chunk}", wanted, if_none_match)
 
@@ -130,14 +132,18 @@ async def read_product_chunk(
 async def _answer(
     service: Service, store: str, key: str, wanted: str | None, if_none_match: str | None
 ) -> Response:
-    path, tag = await asyncio.to_thread(
-        _find, ProductStores(service.recordings.directory), store, key
-    )
+    disk = service.recordings.disk
+    path, tag = await disk.run(_find, ProductStores(service.recordings.directory), store, key)
     if etags.names(if_none_match, tag):
         return Response(status_code=304, headers={"ETag": tag})
     media_type = _JSON if key.endswith(METADATA) else _BYTES
     return await downloads.answer(
-        path, wanted, gone=kinds.NOT_FOUND, media_type=media_type, tag=tag
+        path,
+        wanted,
+        disk=disk,
+        gone=kinds.STORE_GONE if is_of_chunk(key) else kinds.NOT_FOUND,
+        media_type=media_type,
+        tag=tag,
     )
 
 
@@ -147,7 +153,7 @@ def _find(stores: ProductStores, store_id: str, key: str) -> tuple[pathlib.Path,
     if store is None:
         shown = store_id[:64]
         raise Problem(
-            kinds.UNKNOWN_PRODUCT_STORE,
+            kinds.STORE_GONE if is_of_chunk(key) else kinds.UNKNOWN_PRODUCT_STORE,
             f"There is no store of products {shown!r}.",
             field="store",
             value=shown,
@@ -162,4 +168,6 @@ def _find(stores: ProductStores, store_id: str, key: str) -> tuple[pathlib.Path,
             return path, etags.of_file(path)
     except OSError:
         pass  # it was deleted meanwhile
-    raise Problem(kinds.NOT_FOUND, f"The store has no key {key!r}.", field="key", value=key)
+    gone = is_of_chunk(key) and not store.may_be_left_out(key)
+    kind = kinds.STORE_GONE if gone else kinds.NOT_FOUND
+    raise Problem(kind, f"The store has no key {key!r}.", field="key", value=key)

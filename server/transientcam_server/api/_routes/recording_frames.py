@@ -24,6 +24,7 @@ _MISSING: Final = (
     kinds.RECORDING_UNFINISHED,
     kinds.RECORDING_DAMAGED,
     kinds.SHUTTING_DOWN,
+    kinds.DISK_STALLED,
 )
 
 

@@ -1,6 +1,5 @@
 """Recordings as Zarr stores: xarray and Dask read of one what they index, and download no more."""
 
-import asyncio
 from functools import partial
 from typing import Annotated, Any, Final
 
@@ -12,7 +11,8 @@ from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._problems import documented
 from transientcam_server.api._routes.recordings import RecordingName
 from transientcam_server.errors import DamagedFrame, Problem, kinds
-from transientcam_server.recording import Find, ZarrKeys, open_found
+from transientcam_server.recording import Find, ZarrKeys, is_of_chunk, open_found
+from transientcam_server.service import Service
 
 router = APIRouter(prefix="/recordings/{recording}/zarr", tags=["recordings"])
 
@@ -32,6 +32,8 @@ _DOCUMENT: Final[dict[str, Any]] = {
 }
 _PROBLEMS: Final = documented(
     kinds.NOT_FOUND,
+    kinds.STORE_GONE,
+    kinds.DISK_STALLED,
     kinds.UNKNOWN_RECORDING,
     kinds.RECORDING_UNFINISHED,
     kinds.RECORDING_DAMAGED,
@@ -69,8 +71,7 @@ async def read_document(
     `xarray.open_zarr(".../recordings/{id}/zarr")` opens it. While it is recorded it grows: open it
     again to see more frames.
     """
-    find = partial(service.recordings.find, recording)
-    return await _answer(find, document, if_none_match)
+    return await _answer(service, recording, document, if_none_match)
 
 
 @router.get(
@@ -102,18 +103,19 @@ async def read_part(
 
     Chunks of `raw` are those of the file, byte for byte: shuffled and deflated, a frame each.
     """
-    find = partial(service.recordings.find, recording)
-    return await _answer(find, f"{array}/{part}", if_none_match, wanted, if_range)
+    return await _answer(service, recording, f"{array}/{part}", if_none_match, wanted, if_range)
 
 
 async def _answer(
-    find: Find,
+    service: Service,
+    recording: str,
     key: str,
     if_none_match: str | None,
     wanted: str | None = None,
     if_range: str | None = None,
 ) -> Response:
-    data, tag = await asyncio.to_thread(_read, find, key)
+    find = partial(service.recordings.find, recording)
+    data, tag = await service.recordings.disk.run(_read, find, key)
     if etags.names(if_none_match, tag):
         return Response(status_code=304, headers={"ETag": tag})
     if key.rpartition("/")[2].startswith("."):
@@ -124,14 +126,25 @@ async def _answer(
 
 def _read(find: Find, key: str) -> tuple[bytes, str]:
     """Return what stands at a key, and its ETag."""
-    with open_found(find) as recording:
-        try:
+    try:
+        with open_found(find) as recording:
             data = ZarrKeys(recording).value(key)
-        except KeyError:
-            raise Problem(
-                kinds.NOT_FOUND, f"The recording has no key {key!r}.", field="key", value=key
-            ) from None
-        except DamagedFrame as error:
-            detail = f"Frame {error.frame + 1} cannot be read: {error.reason}."
-            raise Problem(kinds.RECORDING_DAMAGED, detail, field="key", value=key) from error
+    except KeyError:
+        raise _missing(f"The recording has no key {key!r}.", key) from None
+    except DamagedFrame as error:
+        detail = f"Frame {error.frame + 1} cannot be read: {error.reason}."
+        raise Problem(kinds.RECORDING_DAMAGED, detail, field="key", value=key) from error
+    except Problem as error:
+        if error.kind is kinds.UNKNOWN_RECORDING and is_of_chunk(key):
+            raise _missing(error.detail, key) from error
+        raise
     return data, etags.of_bytes(data)
+
+
+def _missing(detail: str, key: str) -> Problem:
+    """Return the problem of a key at which nothing stands.
+
+    Readers ask for some documents by trial, and for no chunk but those that the metadata name.
+    """
+    kind = kinds.STORE_GONE if is_of_chunk(key) else kinds.NOT_FOUND
+    return Problem(kind, detail, field="key", value=key)

@@ -1,6 +1,5 @@
 """Recordings: start one, stop it, look through them, take them home."""
 
-import asyncio
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Path, status
@@ -35,14 +34,14 @@ RecordingName = Annotated[
 ]
 
 
-@router.get("/recordings", summary="All recordings")
+@router.get("/recordings", summary="All recordings", responses=documented(kinds.DISK_STALLED))
 async def read_recordings(service: ServiceOf) -> RecordingsDocument:
     """List the recordings, the newest first, with the one that runs."""
     library = service.recordings
-    described = await asyncio.to_thread(library.describe_all)
+    described = await library.disk.run(library.describe_all)
     return RecordingsDocument(
         directory=str(library.directory),
-        free_bytes=await asyncio.to_thread(library.free_bytes),
+        free_bytes=await library.disk.run(library.free_bytes),
         active=library.active_id,
         limits=RecordingLimitsDocument.model_validate(service.settings.recordings),
         recordings=[document(each) for each in described],
@@ -60,6 +59,7 @@ async def read_recordings(service: ServiceOf) -> RecordingsDocument:
         kinds.ONLY_MOMENTS,
         kinds.INVALID_REQUEST,
         kinds.RECORDING_NOT_STORED,
+        kinds.DISK_STALLED,
     ),
 )
 @needs(Role.OPERATOR, lease=False)  # it does not disturb the client that controls the camera
@@ -78,11 +78,11 @@ async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> Recor
 @router.get(
     "/recordings/{recording}",
     summary="A recording",
-    responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST),
+    responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST, kinds.DISK_STALLED),
 )
 async def read_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
     """Describe a recording."""
-    return document(await asyncio.to_thread(service.recordings.describe, recording))
+    return document(await service.recordings.disk.run(service.recordings.describe, recording))
 
 
 @router.patch(
@@ -94,6 +94,7 @@ async def read_recording(service: ServiceOf, recording: RecordingName) -> Record
         kinds.RECORDING_UNFINISHED,
         kinds.INVALID_REQUEST,
         kinds.RECORDING_NOT_STORED,
+        kinds.DISK_STALLED,
     ),
 )
 @needs(Role.OPERATOR, lease=False)
@@ -102,18 +103,18 @@ async def annotate_recording(
 ) -> RecordingDocument:
     """Replace what is written about a recording, also while it runs."""
     annotate = service.recordings.annotate
-    return document(await asyncio.to_thread(annotate, recording, change.annotations))
+    return document(await service.recordings.disk.run(annotate, recording, change.annotations))
 
 
 @router.post(
     "/recordings/{recording}/stop",
     summary="Stop a recording",
-    responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST),
+    responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST, kinds.DISK_STALLED),
 )
 @needs(Role.OPERATOR, lease=False)
 async def stop_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
     """End a recording and wait until it is on the disk; one that has ended stays as it is."""
-    return document(await asyncio.to_thread(service.recordings.stop, recording))
+    return document(await service.recordings.disk.run(service.recordings.stop, recording))
 
 
 @router.delete(
@@ -124,12 +125,13 @@ async def stop_recording(service: ServiceOf, recording: RecordingName) -> Record
         kinds.RECORDING_UNFINISHED,
         kinds.INVALID_REQUEST,
         kinds.RECORDING_NOT_STORED,
+        kinds.DISK_STALLED,
     ),
 )
 @needs(Role.ADMIN, lease=False)
 async def delete_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
     """Delete a recording for good; the answer says what it was."""
-    return document(await asyncio.to_thread(service.recordings.delete, recording))
+    return document(await service.recordings.disk.run(service.recordings.delete, recording))
 
 
 @router.get(
@@ -142,6 +144,7 @@ async def delete_recording(service: ServiceOf, recording: RecordingName) -> Reco
         kinds.RECORDING_UNFINISHED,
         kinds.RANGE_NOT_SATISFIABLE,
         kinds.INVALID_REQUEST,
+        kinds.DISK_STALLED,
     ),
 )
 async def read_recording_file(
@@ -150,8 +153,13 @@ async def read_recording_file(
     wanted: downloads.Range = None,
 ) -> FileResponse:
     """Download a recording as HDF5; h5py, xarray and MATLAB open it."""
-    path = await asyncio.to_thread(service.recordings.path, recording)
-    name = await asyncio.to_thread(service.recordings.download_name, recording)
+    path = await service.recordings.disk.run(service.recordings.path, recording)
+    name = await service.recordings.disk.run(service.recordings.download_name, recording)
     return await downloads.answer(
-        path, wanted, gone=kinds.UNKNOWN_RECORDING, media_type=HDF5, filename=name
+        path,
+        wanted,
+        disk=service.recordings.disk,
+        gone=kinds.UNKNOWN_RECORDING,
+        media_type=HDF5,
+        filename=name,
     )

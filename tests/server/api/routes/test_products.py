@@ -117,17 +117,73 @@ def test_a_chunk_that_was_written_anew_has_another_tag(http: httpx.Client, direc
         ".zmetadata",
         "range/.zarray",
         "none/zarr.json",
-        "range/c/3/0/0",
-        "range/c/01/0/0",
-        "range/c/1/0",
-        "range/c/1/0/zarr.json",
-        "range/c/..%2F..%2F..%2Fkept.h5",
         "..%2Fkept.h5",
         "range/..%2F..%2Fkept.h5",
     ],
 )
 def test_what_is_no_key_is_not_found(http: httpx.Client, key: str) -> None:
     assert http.get(f"{STORE}/{key}").json()["type"] == "/problems/not-found"
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "kept/zarr/range/c/3/0/0",
+        "kept/zarr/range/c/01/0/0",
+        "kept/zarr/range/c/1/0",
+        "kept/zarr/none/c/0",
+        "kept/zarr/range/c/1/0/zarr.json",
+        "kept/zarr/range/c/..%2F..%2F..%2Fkept.h5",
+        f"none/zarr/{CHUNK}",
+        f"kept~0123456789ab/zarr/{CHUNK}",
+    ],
+)
+def test_a_chunk_that_no_metadata_name_is_gone(http: httpx.Client, key: str) -> None:
+    answer = http.get(f"{PRODUCTS}/{key}")
+
+    assert (answer.status_code, answer.json()["type"]) == (410, "/problems/store-gone")
+
+
+def test_a_store_that_another_has_replaced_is_not_read_further(
+    daemon: Served, http: httpx.Client, directory: Path
+) -> None:
+    store = directory / "replaced.zarr"
+    shutil.copytree(directory / "kept.zarr", store)
+    stores = http.get(PRODUCTS).json()["stores"]
+    (generation,) = (each["generation"] for each in stores if each["id"] == "replaced")
+    url = f"{daemon.url}{PRODUCTS}/replaced~{generation}/zarr"
+    dataset = xarray.open_zarr(url, chunks=None)
+    assert np.isfinite(dataset["range"][0].to_numpy()).any()
+    document = json.loads((store / "zarr.json").read_text())
+    document["attributes"]["title"] = "of other settings"
+    (store / "zarr.json").write_text(json.dumps(document))
+
+    with pytest.raises(aiohttp.ClientResponseError, match="410"):
+        dataset["range"][1].to_numpy()
+
+
+def test_a_chunk_that_is_being_deleted_is_no_zeros(daemon: Served, directory: Path) -> None:
+    store = directory / "halved.zarr"
+    shutil.copytree(directory / "kept.zarr", store)
+    dataset = xarray.open_zarr(f"{daemon.url}{PRODUCTS}/halved/zarr", chunks=None)
+    shutil.rmtree(store / "range" / "c" / "1")
+
+    with pytest.raises(aiohttp.ClientResponseError, match="410"):
+        dataset["range"][1].to_numpy()
+
+
+def test_a_chunk_that_older_versions_left_out_has_the_fill_value(
+    http: httpx.Client, directory: Path
+) -> None:
+    store = directory / "older.zarr"
+    shutil.copytree(directory / "kept.zarr", store)
+    document = json.loads((store / "zarr.json").read_text())
+    del document["attributes"]["every_chunk_is_written"]
+    (store / "zarr.json").write_text(json.dumps(document))
+    (store / CHUNK).unlink()
+
+    assert http.get(f"{PRODUCTS}/older/zarr/{CHUNK}").status_code == 404
+    assert http.get(f"{PRODUCTS}/older/zarr/range/c/3/0/0").status_code == 410
 
 
 def test_a_link_does_not_lead_out_of_a_store(http: httpx.Client, directory: Path) -> None:

@@ -108,9 +108,42 @@ def test_what_a_client_has_is_not_sent_again_and_ranges_are(http: httpx.Client) 
     assert http.head(key).headers["content-length"] == str(size)
 
 
-@pytest.mark.parametrize("key", ["raw/4.0.0.0", "raw/0", "none/.zarray", ".zarray", "zarr.json"])
-def test_a_key_that_is_not_there_is_not_found(http: httpx.Client, key: str) -> None:
+@pytest.mark.parametrize("key", ["none/.zarray", ".zarray", "zarr.json", "raw/zarr.json"])
+def test_a_document_that_is_not_there_is_not_found(http: httpx.Client, key: str) -> None:
     assert http.get(f"{STORE}/{key}").json()["type"] == "/problems/not-found"
+
+
+@pytest.mark.parametrize(
+    "key", ["kept/zarr/raw/4.0.0.0", "kept/zarr/raw/0", "none/zarr/raw/0.0.0.0"]
+)
+def test_a_chunk_that_is_not_there_is_gone_and_not_only_not_found(
+    http: httpx.Client, key: str
+) -> None:
+    answer = http.get(f"{RECORDINGS}/{key}")
+
+    assert (answer.status_code, answer.json()["type"]) == (410, "/problems/store-gone")
+
+
+def test_a_recording_that_was_deleted_while_it_was_read_is_no_zeros(
+    daemon: Served, directory: Path
+) -> None:
+    path = record(directory / "short.h5", 2)
+    dataset = xarray.open_zarr(f"{daemon.url}{RECORDINGS}/short/zarr", chunks=None)
+    assert dataset["raw"][0].to_numpy().any()
+    path.unlink()
+
+    with pytest.raises(aiohttp.ClientResponseError, match="410"):
+        dataset["raw"][1].to_numpy()
+    with pytest.raises(FileNotFoundError):
+        xarray.open_zarr(f"{daemon.url}{RECORDINGS}/short/zarr", chunks=None)
+
+
+def test_a_recording_whose_daemon_is_gone_is_no_zeros(directory: Path) -> None:
+    with serving(recordings={"directory": directory, "min_free_bytes": 0}) as served:
+        dataset = xarray.open_zarr(served.url + STORE, chunks=None)
+
+    with pytest.raises(aiohttp.ClientConnectionError):
+        dataset["raw"][1].to_numpy()
 
 
 def test_what_is_no_recording_has_no_keys(http: httpx.Client, directory: Path) -> None:

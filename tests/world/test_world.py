@@ -1,0 +1,19 @@
+"""What holds in every world, whatever goes wrong in it."""
+
+import pytest
+
+from tests.world.world import tried_all
+
+SEEDS = 1000
+PARTS = 20
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_no_world_shows_a_violation(part: int) -> None:
+    size = SEEDS // PARTS
+    happened, violations = tried_all(range(part * size, (part + 1) * size))
+
+    assert violations == []
+    # the draws reach what they are about
+    for each in ("chunk", "safe-off", "restart", "cut", "half open", "unplug", "410", "507"):
+        assert happened[each], each
