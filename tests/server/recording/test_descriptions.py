@@ -58,6 +58,7 @@ def test_a_whole_recording_is_described_by_its_header_and_end(tmp_path: Path) ->
         "id": "a",
         "state": "complete",
         "frames": 3,
+        "synced_frames": 3,
         "dropped_frames": 0,
         "duration_s": pytest.approx(0.3),
         "reason": "stopped",
@@ -151,6 +152,7 @@ def test_a_recording_that_runs_is_described_by_its_progress(tmp_path: Path) -> N
         "id": header().recording_id,
         "state": "recording",
         "frames": 1,
+        "synced_frames": 1,
         "dropped_frames": 2,
         "duration_s": 1.5,
         "size_bytes": writer.bytes_written,
@@ -171,4 +173,4 @@ def test_a_recording_that_runs_is_described_by_its_progress(tmp_path: Path) -> N
         "problem": None,
     }
     recorder.start()
-    recorder.join()
+    assert recorder.wait(30.0)

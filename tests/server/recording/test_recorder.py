@@ -289,7 +289,7 @@ def test_a_disk_that_is_really_full_loses_no_frame_that_was_acknowledged(
 
 
 def test_totals_are_sums_over_recordings_and_count_why_they_ended() -> None:
-    running = Progress(5, 2, 700, 1.5, None, None, finished=False)
+    running = Progress(5, 0, 2, 700, 1.5, None, None, finished=False)
     stopped = replace(running, reason="stopped", finished=True)
 
     totals = Totals().with_running(running)
@@ -333,7 +333,7 @@ def test_what_was_dropped_is_told_once_a_second_and_in_all_at_the_end(tmp_path: 
     write(2)
     recorder.stop()
     recorder.start()
-    recorder.join()
+    assert recorder.wait(PATIENCE_S)
     assert told == [(2, 2), (3, 5), (1, 6)]
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.series("dropped_frames").tolist() == [0, 2, 3, 0]
@@ -358,4 +358,4 @@ def test_it_ends_when_less_is_free_than_is_to_stay_so(
     assert recorder.progress.reason == reason
     recorder.stop()
     recorder.start()
-    recorder.join()
+    assert recorder.wait(PATIENCE_S)

@@ -73,10 +73,13 @@ def test_an_error_is_told_in_the_systems_words(error: Exception, words: str | No
 @pytest.fixture
 def appender(tmp_path: Path) -> Any:
     path = tmp_path / "a.h5"
-    with h5py.File(path, "w", libver=swmr.LIBVER) as file:
+
+    def make(file: swmr.File) -> None:
         swmr.create_blocks(file, "raw", (3, 4), "<u2", unit="DN")
         swmr.create_series(file, "row", "<u8")
-    return swmr.Appender(swmr.open_to_append(path), ["raw"], ["row"])
+
+    path.write_bytes(swmr.image_of(make))
+    return swmr.Appender(path, ["raw"], ["row"])
 
 
 def test_a_file_is_brought_to_the_disk_once_a_second(
@@ -99,7 +102,7 @@ def test_rows_follow_one_another_also_of_a_file_that_is_opened_again(
     for row in range(3):
         assert appender.rows == row
         appender.append({"raw": BLOCK[0] + row}, {"row": 7 + row})
-    assert appender.bytes_written() == (tmp_path / "a.h5").stat().st_size
+    assert appender.size_bytes == (tmp_path / "a.h5").stat().st_size
     appender.close()
 
     with h5py.File(tmp_path / "a.h5") as file:
@@ -108,6 +111,6 @@ def test_rows_follow_one_another_also_of_a_file_that_is_opened_again(
         assert file["raw"].chunks == (1, 3, 4)
         assert file["raw"].maxshape == (None, 3, 4)
         assert dict(file["raw"].attrs) == {"unit": "DN"}
-    again = swmr.Appender(swmr.open_to_append(tmp_path / "a.h5"), ["raw"], ["row"])
+    again = swmr.Appender(tmp_path / "a.h5", ["raw"], ["row"])
     assert again.rows == 3
     again.close()
