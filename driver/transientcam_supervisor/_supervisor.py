@@ -67,6 +67,7 @@ class Supervisor:
         self._switch: OffSwitch | None = None
         self._asked_s: float | None = None
         """When the oldest message was sent that is not answered."""
+        self._alive_s: float | None = None
 
     @property
     def pid(self) -> int | None:
@@ -104,6 +105,7 @@ class Supervisor:
 
     def starting(self) -> str | None:
         """Say that the light is about to be switched on; as `alive`."""
+        self._alive_s = None
         return self._say(STARTING)
 
     def alive(self) -> str | None:
@@ -117,14 +119,22 @@ class Supervisor:
         SupervisorEnded
             It is gone, or answers nothing: it was stopped.
         """
-        return self._say(ALIVE)
+        now_s = self._clock()
+        pause_s = 0.0 if self._alive_s is None else now_s - self._alive_s
+        self._alive_s = now_s if self._process is not None else None
+        reason = self._say(ALIVE)
+        if reason is None and pause_s > self._silence_s:  # both were stopped, as with the machine
+            return f"the light was out of control for {pause_s:.1f} s"
+        return reason
 
     def dark(self) -> str | None:
         """Say that the light is off; as `alive`."""
+        self._alive_s = None
         return self._say(DARK)
 
     def switch_off(self) -> str | None:
         """Let it switch off what may be on; as `alive`."""
+        self._alive_s = None
         return self._say(OFF_NOW)
 
     def _say(self, message: bytes) -> str | None:

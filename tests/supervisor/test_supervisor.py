@@ -236,6 +236,19 @@ def test_one_that_says_nothing_is_taken_for_gone(light: Light) -> None:
         supervisor.dark()
 
 
+def test_a_pause_of_both_is_noticed_by_the_owner(light: Light) -> None:
+    now_s = 0.0
+    supervisor = Supervisor(sys.executable, silence_s=100.0, clock=lambda: now_s)
+    supervisor.watch(light.switch)
+    assert supervisor.alive() is None
+    now_s = 100.5
+
+    assert supervisor.alive() == "the light was out of control for 100.5 s"
+    assert supervisor.dark() is None
+    assert supervisor.alive() is None
+    supervisor.close(dark=True)
+
+
 @pytest.mark.parametrize("program", [None, "/nowhere/python"])
 def test_without_a_program_there_is_none(light: Light, program: str | None) -> None:
     with pytest.raises(SupervisorEnded, match=r"no Python|cannot be started"):
