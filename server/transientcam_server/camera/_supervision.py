@@ -1,6 +1,5 @@
 """Who switches the light off where the thread that owns the camera cannot: another process."""
 
-import time
 from collections.abc import Callable
 
 from transientcam_compiled import python
@@ -20,20 +19,9 @@ class Supervision:
         Whose light it is; None for none.
     silence_s
         The light goes off after so long without a `beat`.
-    clock
-        Time in s.
     """
 
-    def __init__(
-        self,
-        camera: Camera | None,
-        *,
-        silence_s: float,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
-        self._silence_s = silence_s
-        self._clock = clock
-        self._lit_s: float | None = None
+    def __init__(self, camera: Camera | None, *, silence_s: float) -> None:
         self._camera = camera if camera is not None and has_light(camera) else None
         self._supervisor = Supervisor(python(), silence_s=silence_s)
 
@@ -45,7 +33,6 @@ class Supervision:
         CameraError
             There is no supervisor; the light has to stay off.
         """
-        self._lit_s = None
         switch = None if self._camera is None else self._camera.off_switch
         if switch is None or not switch.steps:
             return None
@@ -62,17 +49,8 @@ class Supervision:
         ----------
         lit
             Whether it may be on.
-
-        A supervisor that was suspended together with this process, as where the host was, hears the
-        next beat as soon as it looks, and no silence: that is noticed here.
         """
-        now_s = self._clock()
-        silent_s = 0.0 if self._lit_s is None else now_s - self._lit_s
-        self._lit_s = now_s if lit and self._camera is not None else None
-        told = self._told(self._supervisor.alive if lit else self._supervisor.dark)
-        if told is None and silent_s > self._silence_s:
-            return f"nothing controlled the light for {silent_s:.1f} s"
-        return told
+        return self._told(self._supervisor.alive if lit else self._supervisor.dark)
 
     def lost(self) -> str | None:
         """Switch the light off by all means: how the camera stands is not known; as `beat`."""

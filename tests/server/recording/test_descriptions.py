@@ -31,6 +31,7 @@ NOTHING: dict[str, Any] = {
     "name": "",
     "started_s": None,
     "frames": 0,
+    "synced_frames": None,
     "dropped_frames": 0,
     "duration_s": 0.0,
     "reason": None,
