@@ -53,6 +53,11 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         """Address of the daemon."""
         return self._address.url
 
+    @property
+    def has_token(self) -> bool:
+        """Whether requests carry a token."""
+        return self._token is not None
+
     def validate(self, settings: Mapping[str, Any]) -> _Document:
         """Return what a sequence would really be set to, without setting it."""
         return self._ask(changes.validate_sequence(settings))

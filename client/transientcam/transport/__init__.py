@@ -8,6 +8,7 @@ from transientcam.transport._address import parse_address
 from transientcam.transport._deadline import Deadline
 from transientcam.transport._errors import media_type, translated
 from transientcam.transport._options import (
+    QUIET,
     DownloadProgress,
     Progress,
     answer_of,
@@ -18,6 +19,7 @@ from transientcam.transport._options import (
 )
 
 __all__ = [
+    "QUIET",
     "Deadline",
     "DownloadProgress",
     "Progress",

@@ -1,5 +1,6 @@
 """The options of httpx and websockets, for the synchronous and the asynchronous client."""
 
+import logging
 from collections.abc import Callable
 from importlib.metadata import version
 from typing import Any, Final
@@ -13,6 +14,9 @@ from transientcam.transport._tls import shared_context
 from transientcam.wire import LEASE_HEADER, MAX_SERVER_MESSAGE_BYTES, SUBPROTOCOL
 
 USER_AGENT: Final = f"transientcam/{version('transientcam')}"
+QUIET: Final = logging.getLogger("transientcam.websockets")
+"""Of websockets, which would log every head and message: tokens and addresses with secrets."""
+QUIET.setLevel(logging.CRITICAL)
 _CLOSE_WITHIN_S = 1.0
 _QUEUED_MESSAGES = 256
 
@@ -80,6 +84,7 @@ def stream_options(url: str, *, timeout_s: float, threaded: bool = False) -> dic
     options: dict[str, Any] = {
         "subprotocols": [Subprotocol(SUBPROTOCOL)],
         "user_agent_header": USER_AGENT,
+        "logger": QUIET,
         "open_timeout": timeout_s,
         "close_timeout": _CLOSE_WITHIN_S,
         "max_size": MAX_SERVER_MESSAGE_BYTES,  # the default of 1 MiB is less than many a frame
