@@ -16,6 +16,7 @@ from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamErr
 from transientcam.frame import Frame
 from transientcam.lease import AsyncLease, OnLapse
 from transientcam.requests import (
+    MOST_DOCUMENT_BYTES,
     PROGRESS_EVERY_S,
     WAIT_S,
     OnProgress,
@@ -40,9 +41,10 @@ from transientcam.transport import (
     Deadline,
     DownloadProgress,
     Progress,
-    answer_of,
+    exchange_async,
     http_options,
-    request_options,
+    read_async,
+    require_plain,
     set_lease,
     stream_options,
     translated,
@@ -169,8 +171,8 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
         with translated(self.url):
             async with self._http.stream("GET", url) as response:
                 if response.status_code != httpx.codes.OK:
-                    await response.aread()
-                    raise problem(answer_of(response))
+                    raise problem(await read_async(response, most_bytes=MOST_DOCUMENT_BYTES))
+                require_plain(response)
                 received = DownloadProgress(response, progress)
                 with part.open("wb") as file:
                     async for piece in response.aiter_bytes():
@@ -212,12 +214,9 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
 
     async def _ask(self, request: Request[_T]) -> _T:
         with translated(self.url):
-            response = await self._http.request(
-                request.method,
-                f"{self._address.api}/{request.path}",
-                **request_options(request, timeout_s=self._timeout_s),
-            )
-        return request.result(answer_of(response))
+            url = f"{self._address.api}/{request.path}"
+            answer = await exchange_async(self._http, url, request, timeout_s=self._timeout_s)
+        return request.result(answer)
 
 
 class AsyncStream(BaseStream):

@@ -7,11 +7,20 @@ Nothing here sends or receives: it converts between the network libraries and th
 from transientcam.transport._address import parse_address
 from transientcam.transport._deadline import Deadline
 from transientcam.transport._errors import media_type, translated
+from transientcam.transport._exchange import (
+    answer_of,
+    bounded,
+    exchange,
+    exchange_async,
+    read,
+    read_async,
+    require_plain,
+    within,
+)
 from transientcam.transport._options import (
     QUIET,
     DownloadProgress,
     Progress,
-    answer_of,
     http_options,
     request_options,
     set_lease,
@@ -24,11 +33,18 @@ __all__ = [
     "DownloadProgress",
     "Progress",
     "answer_of",
+    "bounded",
+    "exchange",
+    "exchange_async",
     "http_options",
     "media_type",
     "parse_address",
+    "read",
+    "read_async",
     "request_options",
+    "require_plain",
     "set_lease",
     "stream_options",
     "translated",
+    "within",
 ]
