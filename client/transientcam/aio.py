@@ -44,6 +44,7 @@ from transientcam.transport import (
     exchange_async,
     http_options,
     read_async,
+    require_direct,
     require_plain,
     set_lease,
     stream_options,
@@ -292,6 +293,7 @@ class AsyncStream(BaseStream):
             connection: ClientConnection = await self._stack.enter_async_context(
                 connect(self._url, **stream_options(self._url, timeout_s=self._timeout_s))
             )
+            require_direct(connection, self._url)
             await connection.send(self._state.opening(connection.subprotocol))
         if self.closed:  # meanwhile, by another task
             raise StreamClosed(CloseCode.NORMAL, "it was closed here")

@@ -50,8 +50,8 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
 
     @property
     def url(self) -> str:
-        """Address of the daemon."""
-        return self._address.url
+        """Address of the daemon, without a user's name and password."""
+        return self._address.shown
 
     @property
     def has_token(self) -> bool:

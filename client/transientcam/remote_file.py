@@ -8,7 +8,7 @@ import httpx
 
 from transientcam.errors import ProtocolError
 from transientcam.requests import MOST_DOCUMENT_BYTES, problem
-from transientcam.transport import bounded, http_options, read, translated, within
+from transientcam.transport import bounded, http_options, read, translated, within, without_secrets
 
 _BLOCK_BYTES: Final = 16 * 1024
 """What reads less than that gets a whole block; what reads more gets no byte beside."""
@@ -46,7 +46,9 @@ class RemoteFile(io.RawIOBase):
         transport: httpx.BaseTransport | None = None,
     ) -> None:
         super().__init__()
-        self.url = url
+        self._url = url
+        self.url = without_secrets(url)
+        """Of the file, as it may be shown."""
         self._timeout_s = timeout_s
         self._http = bounded(
             httpx.Client(**http_options(token=token, timeout_s=timeout_s), transport=transport)
@@ -130,7 +132,7 @@ class RemoteFile(io.RawIOBase):
         with (
             translated(self.url),
             within(self._timeout_s),
-            self._http.stream("GET", self.url, headers=headers) as response,
+            self._http.stream("GET", self._url, headers=headers) as response,
         ):
             if response.status_code == httpx.codes.OK:  # the whole file, which is not read
                 limit = "the part requested" if self._tag is None else "the file that was opened"

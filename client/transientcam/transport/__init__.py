@@ -4,7 +4,7 @@ Nothing here sends or receives: it converts between the network libraries and th
 `transientcam.requests`.
 """
 
-from transientcam.transport._address import parse_address
+from transientcam.transport._address import parse_address, without_secrets
 from transientcam.transport._deadline import Deadline
 from transientcam.transport._errors import media_type, translated
 from transientcam.transport._exchange import (
@@ -22,7 +22,7 @@ from transientcam.transport._options import (
     DownloadProgress,
     Progress,
     http_options,
-    request_options,
+    require_direct,
     set_lease,
     stream_options,
 )
@@ -41,10 +41,11 @@ __all__ = [
     "parse_address",
     "read",
     "read_async",
-    "request_options",
+    "require_direct",
     "require_plain",
     "set_lease",
     "stream_options",
     "translated",
     "within",
+    "without_secrets",
 ]

@@ -7,7 +7,9 @@ from typing import Any, Final
 
 import httpx
 from websockets.typing import Subprotocol
+from websockets.uri import parse_uri
 
+from transientcam.errors import ProtocolError
 from transientcam.requests import Request
 from transientcam.transport._tls import shared_context
 from transientcam.wire import LEASE_HEADER, MAX_SERVER_MESSAGE_BYTES, SUBPROTOCOL
@@ -65,6 +67,20 @@ class DownloadProgress:
         self._done += count
         if self._progress is not None:
             self._progress(self._done, self._total)
+
+
+def require_direct(connection: Any, url: str) -> None:
+    """Refuse a connection that was redirected, before a token is sent over it.
+
+    Raises
+    ------
+    ProtocolError
+        If ``connection``, of websockets, is not one to ``url``.
+    """
+    found = connection.protocol.uri
+    if found != parse_uri(url):
+        place = f"{found.host}:{found.port}"
+        raise ProtocolError("location", place, "absent: redirects are not followed")
 
 
 def stream_options(url: str, *, timeout_s: float, threaded: bool = False) -> dict[str, Any]:
