@@ -4,11 +4,11 @@ import json
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from transientcam.camera import Camera
 from transientcam.cli.options import JsonOption, TokenOption, UrlArgument
 from transientcam.cli.showing import shown_on
+from transientcam.cli.terminal import Terminal, echo
 from transientcam.robotics import SHOWN, FoxgloveBridge
 
 
@@ -54,7 +54,7 @@ def foxglove(
     Without --control it only subscribes, and only to what is looked at. The address that it prints
     has a secret where it uses a token, has control, or is reached by other machines.
     """
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     with (
         Camera(url, token=token) as camera,
         FoxgloveBridge(
@@ -70,7 +70,7 @@ def foxglove(
         ) as bridge,
     ):
         if as_json:
-            typer.echo(json.dumps({"type": "serving", "url": bridge.url}))
+            echo(json.dumps({"type": "serving", "url": bridge.url}))
         else:
             console.print(f"open {bridge.url} in Foxglove (Open connection, Foxglove WebSocket)")
         bridge.run()

@@ -8,11 +8,11 @@ from typing import Annotated, Final
 
 import rerun as rr
 import typer
-from rich.console import Console
 
 from transientcam.camera import Camera
 from transientcam.cli.options import JsonOption, TokenOption, UrlArgument, require_suffix
 from transientcam.cli.showing import shown_on
+from transientcam.cli.terminal import Terminal
 from transientcam.robotics import BINS, LOGGED, RerunBridge, blueprint
 
 _HERE: Final = "rerun+http://127.0.0.1:9876/proxy"
@@ -60,7 +60,7 @@ def rerun(
     if token is not None and not somewhere:
         message = "a viewer asks nobody for a token: say --spawn, --connect or --save"
         raise typer.BadParameter(message, param_hint="--token")
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     with Camera(url, token=token) as camera, rr.RecordingStream("transientcam") as recording:
         bridge = RerunBridge(
             camera,

@@ -67,7 +67,9 @@ def translate(error: Exception, url: str) -> TransientcamError:
             return ServerUnreachable(url, f"what answers there does not speak HTTP ({error})")
         case httpx.TimeoutException() | TimeoutError():
             return ServerUnreachable(url, "no answer in time")
-        case ws.ProxyError() | ws.InvalidProxy():
+        case ws.InvalidProxy():  # its sentence has the proxy's address, maybe with a password
+            return ServerUnreachable(url, f"the proxy failed ({error.msg})")
+        case ws.ProxyError():
             return ServerUnreachable(url, f"the proxy failed ({error})")
         case httpx.TransportError() | OSError():
             return ServerUnreachable(url, _reason(error))

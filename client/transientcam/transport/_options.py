@@ -9,7 +9,7 @@ import httpx
 from websockets.typing import Subprotocol
 from websockets.uri import parse_uri
 
-from transientcam.errors import ProtocolError
+from transientcam.errors import ParameterError, ProtocolError
 from transientcam.requests import Request
 from transientcam.transport._tls import shared_context
 from transientcam.wire import LEASE_HEADER, MAX_SERVER_MESSAGE_BYTES, SUBPROTOCOL
@@ -23,10 +23,19 @@ _QUEUED_MESSAGES = 256
 
 
 def http_options(*, token: str | None, timeout_s: float) -> dict[str, Any]:
-    """Return the options of an httpx client."""
+    """Return the options of an httpx client.
+
+    Raises
+    ------
+    ParameterError
+        If the token is none; it is not shown.
+    """
     # what is unpacked here has no bound: the bytes of an answer count as they travel
     headers = {"user-agent": USER_AGENT, "accept-encoding": "identity"}
     if token is not None:
+        # what is no header is quoted in the error of the library
+        if not token or not token.isascii() or not token.isprintable() or " " in token:
+            raise ParameterError("token", "…", "printable ASCII without spaces")
         headers["authorization"] = f"Bearer {token}"
     return {"headers": headers, "timeout": timeout_s}
 

@@ -24,7 +24,8 @@ from transientcam_server.settings import Settings
 
 ENVIRONMENT_PREFIX: Final = "TRANSIENTCAM_"
 OTHER_VARIABLES: Final = frozenset(
-    f"{ENVIRONMENT_PREFIX}{name}" for name in ("TOKEN", "RELAY_TOKEN", "URL", "KERNELS", "TEST_DATA")
+    f"{ENVIRONMENT_PREFIX}{name}"
+    for name in ("TOKEN", "RELAY_TOKEN", "URL", "KERNELS", "TEST_DATA")
 )
 """Those that begin so, too, but are not for the daemon's settings."""
 DEFAULT_FILES: Final = (Path("transientcam.toml"), Path("/etc/transientcam/transientcam.toml"))
