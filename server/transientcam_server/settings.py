@@ -214,6 +214,8 @@ class LimitSettings(_Group):
     unserved_s: _Finite = Field(default=1.0, ge=0.5, le=60.0)
     """Time without any client being served, after which the light is switched off until they are:
     no client could switch it off meanwhile."""
+    plan_s: _Finite = Field(default=300.0, gt=0.0, le=86400.0)
+    """Time for a plan, or a look at the scene, to be computed; then it is given up."""
     head_s: _Finite = Field(default=10.0, gt=0.0, le=3600.0)
     """Time for the head of a request to arrive, and for a handshake of TLS."""
     body_s: _Finite = Field(default=30.0, gt=0.0, le=3600.0)

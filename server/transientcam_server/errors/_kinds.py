@@ -287,6 +287,13 @@ PLANNING_BUSY: Final = ProblemKind(
     "One plan is computed at a time, and few requests wait for one: `limit` states how many. Try "
     "again when one of them was answered.",
 )
+PLAN_TOO_LONG: Final = ProblemKind(
+    "plan-too-long",
+    504,
+    "The plan takes too long",
+    "What is planned was given up after `limit` seconds, the setting `limits.plan_s`. Fewer takes, "
+    "a smaller budget or an estimator that is named take less.",
+)
 TOO_LARGE: Final = ProblemKind(
     "too-large",
     413,

@@ -31,6 +31,7 @@ _REFUSALS: Final = (
     kinds.NO_FRAME_YET,
     kinds.SHUTTING_DOWN,
     kinds.PLANNING_BUSY,
+    kinds.PLAN_TOO_LONG,
 )
 
 
