@@ -109,9 +109,7 @@ def _loop(store: Path) -> None:
 
 
 @pytest.mark.parametrize("make", [_pipe, _directory, _loop, lambda store: None])
-def test_what_has_no_metadata_yet_is_no_store(
-    tmp_path: Path, make: Callable[[Path], None]
-) -> None:
+def test_what_has_no_metadata_yet_is_no_store(tmp_path: Path, make: Callable[[Path], None]) -> None:
     store = tmp_path / "made.zarr"
     store.mkdir()
     make(store)
