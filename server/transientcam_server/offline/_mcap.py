@@ -7,6 +7,7 @@ import importlib
 import io
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
@@ -55,6 +56,7 @@ def write_mcap(
         profile="ros2" if schemas == "ros2" else None
     )
     with (
+        _in_words(output),
         whole(output) as scratch,
         foxglove.open_mcap(scratch, context=log.context, writer_options=options) as writer,
     ):
@@ -70,6 +72,17 @@ def write_mcap(
             for message in messages_of(arrays, lens, intensity=intensity):
                 log(message, int(arrived_ns[index]))
             progress(index + 1, recording.frames)
+
+
+@contextmanager
+def _in_words(output: Path) -> Iterator[None]:
+    """Turn what the SDK raises where a disk is full, or fails, into the system's error."""
+    try:
+        yield
+    except RuntimeError as error:
+        if type(error) is not RuntimeError:  # one of another kind, a `RecursionError` say
+            raise
+        raise OSError(None, f"cannot be written ({error})", str(output)) from error
 
 
 def lens_of(recording: Recording) -> Pinhole:

@@ -1,6 +1,8 @@
 """Recordings as .mcap: read back by other people's readers, and held against the recording."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -218,3 +220,19 @@ def test_what_no_message_can_hold_is_refused_with_what_can(
 def test_other_formats_hold_raw_images_only(source: Path, tmp_path: Path) -> None:
     with Recording(source) as recording, pytest.raises(InputError, match="reconstruct"):
         convert_recording(recording, tmp_path / "a.npz", products=["range"])
+
+
+def test_a_disk_that_takes_no_more_is_an_error_in_words(source: Path, tmp_path: Path) -> None:
+    program = f"""
+import resource, sys
+from transientcam.cli import run
+resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
+sys.exit(run(["convert", {str(source)!r}, "-o", {str(tmp_path / "a.mcap")!r}]))
+"""
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+
+    assert ended.returncode == 1
+    assert "Traceback" not in ended.stderr
+    assert "cannot be written" in ended.stderr
+    assert "a.mcap" in ended.stderr
+    assert list(tmp_path.iterdir()) == []
