@@ -226,7 +226,7 @@ def test_a_disk_that_takes_no_more_is_an_error_in_words(source: Path, tmp_path: 
     program = f"""
 import resource, sys
 from transientcam.cli import run
-resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
 sys.exit(run(["convert", {str(source)!r}, "-o", {str(tmp_path / "a.mcap")!r}]))
 """
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
