@@ -174,12 +174,12 @@ class ViewerServer:
 
     def publish(self, topic: str, time_ns: int, data: bytes) -> None:
         """Send a message to who is subscribed to its topic."""
-        self._soon(lambda: [each.message(topic, time_ns, data) for each in self._viewers])
+        self._each(lambda viewer: viewer.message(topic, time_ns, data))
 
     def publish_status(self, text: str, level: str, about: str) -> None:
         """Show all viewers a status; it takes the place of the one before about the same."""
         document = {"op": "status", "level": _LEVELS[level], "message": text, "id": about}
-        self._soon(lambda: [each.send(**document) for each in self._viewers])
+        self._each(lambda viewer: viewer.send(**document))
 
     def publish_parameters(self, parameters: list[dict[str, Any]]) -> None:
         """Send parameters to who follows them."""
@@ -216,6 +216,13 @@ class ViewerServer:
 
     def _on_loop(self, work: Any) -> Any:
         return asyncio.run_coroutine_threadsafe(work, self._loop).result()
+
+    def _each(self, do: Callable[[_Viewer], None]) -> None:
+        def do_each() -> None:
+            for viewer in self._viewers:
+                do(viewer)
+
+        self._soon(do_each)
 
     def _soon(self, work: Callable[[], object]) -> None:
         if not self._loop.is_closed():
