@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import httpcore
 import pytest
 
 from transientcam import AsyncCamera, Camera, ProtocolError, ServerUnreachable
@@ -162,12 +163,12 @@ def test_what_is_read_of_a_request_is_bounded_by_what_is_left_of_it(
     monkeypatch.setattr(
         exchange_module, "Deadline", lambda s: Deadline(s, clock=lambda: next(now_s))
     )
-    assert _left_s(5.0, exchange_module.httpcore.ReadTimeout) == 5.0
+    assert _left_s(5.0, httpcore.ReadTimeout) == 5.0
     with within(10.0):
-        assert _left_s(5.0, exchange_module.httpcore.ReadTimeout) == 5.0
-        assert _left_s(5.0, exchange_module.httpcore.ReadTimeout) == 1.0
-        with pytest.raises(exchange_module.httpcore.ReadTimeout):
-            _left_s(5.0, exchange_module.httpcore.ReadTimeout)
+        assert _left_s(5.0, httpcore.ReadTimeout) == 5.0
+        assert _left_s(5.0, httpcore.ReadTimeout) == 1.0
+        with pytest.raises(httpcore.ReadTimeout):
+            _left_s(5.0, httpcore.ReadTimeout)
 
 
 @pytest.mark.parametrize("token", ["", "a b", "tok\nen", "tok\r\nX: y", "t\xf6ken", "a\x00b"])
