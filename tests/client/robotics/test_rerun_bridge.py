@@ -218,7 +218,7 @@ def test_a_viewer_that_is_started_is_reached_from_this_machine_only(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     started: list[list[str]] = []
-    monkeypatch.setattr(verb.subprocess, "Popen", lambda command, **_: started.append(command))
+    monkeypatch.setattr(subprocess, "Popen", lambda command, **_: started.append(command))
 
     verb._start_viewer()
 
