@@ -1,17 +1,21 @@
 """Parts of an image for several threads: kernels release the interpreter while they run."""
 
 import itertools
+import math
 import os
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
-from contextlib import contextmanager
-from functools import partial
-from typing import Protocol
+from contextlib import contextmanager, suppress
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Final, Protocol
 
 from transientcam_compiled._affinity import ThreadsApart
 
+_CONTROL_GROUP: Final = Path("/sys/fs/cgroup")
 BLOCK = 1 << 15
 """Pixels that stay in the caches from one kernel to the next.
 
@@ -88,7 +92,7 @@ class _Shared:
     def get(self) -> Executor:
         with self.lock:
             if self.executor is None:
-                others = max(1, _cores() - 1)
+                others = max(1, cores() - 1)
                 self.executor = ThreadsApart(others, SHARED_THREADS)
             return self.executor
 
@@ -122,7 +126,7 @@ def use_all_cores() -> Iterator[None]:
 def on_threads(threads: int | None) -> Spread:
     """Return a way to do an image on so many threads, or on all cores, of which one is this."""
     if threads is None:
-        threads = _HERE.threads or _cores()
+        threads = _HERE.threads or cores()
     return at_once if threads == 1 else over(_SHARED.get(), threads)
 
 
@@ -131,18 +135,31 @@ def over_all_cores() -> Spread:
 
     Also on a thread that `use_one_thread` was called on.
     """
-    return on_threads(_cores())
+    return on_threads(cores())
 
 
 def start_threads() -> None:
     """Start the threads that all calls share, so that no call waits until they run."""
-    on_threads(None)(lambda start, stop: None, 1024 * _cores())
+    on_threads(None)(lambda start, stop: None, 1024 * cores())
 
 
-def _cores() -> int:
-    """Return how many cores this process may use; not every system can say."""
-    affinity = getattr(os, "sched_getaffinity", None)
-    return (os.cpu_count() or 1) if affinity is None else len(affinity(0))
+def cores() -> int:
+    """Return how many cores this process may use, by its affinity and by a container's quota."""
+    affinity = getattr(os, "sched_getaffinity", None)  # not every system can say
+    allowed = (os.cpu_count() or 1) if affinity is None else len(affinity(0))
+    return max(1, min(allowed, quota_of(_CONTROL_GROUP)))
+
+
+@lru_cache(maxsize=1)
+def quota_of(control_group: Path) -> int:
+    """Return how many cores a quota leaves, rounded up; as many as there may be without one.
+
+    ``control_group`` has ``cpu.max``: a quota, or "max", and the period it is for.
+    """
+    with suppress(OSError, ValueError):
+        quota, period = (control_group / "cpu.max").read_text().split()
+        return math.ceil(int(quota) / int(period))
+    return sys.maxsize
 
 
 def blocks(start: int, stop: int) -> Iterator[tuple[int, int]]:

@@ -1,15 +1,17 @@
 """The settings of the service; `transientcam_server.daemon._configuration` reads them."""
 
 import os
+from collections.abc import Callable
 from ipaddress import ip_address
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from platformdirs import user_config_path, user_data_path
 from pydantic import BaseModel, ConfigDict, Field
 
 import transientcam_moments as tm
 from transientcam.wire import FIRST_MESSAGE_WITHIN_S, MAX_SUBSCRIPTIONS
+from transientcam_compiled import cores
 from transientcam_moments.comparisons import TECHNIQUES
 from transientcam_moments.reconstruction import ESTIMATORS, least_harmonics
 
@@ -162,10 +164,21 @@ class HistorySettings(_Group):
     """Their images take no more memory than this."""
 
 
+NO_HOME: Final = Path("/nonexistent/without-a-home-directory")
+"""In the place of the directories of a user that has none: nothing is kept there."""
+
+
+def _of_user(directory: Callable[[str], Path]) -> Path:
+    try:
+        return directory("transientcam")
+    except RuntimeError:  # a user that no password file knows, without HOME
+        return NO_HOME
+
+
 def default_state_directory() -> Path:
     """Return the state directory: the service manager's, or the user's."""
     state = os.environ.get("STATE_DIRECTORY", "").partition(":")[0]  # systemd
-    return Path(state) if state else user_data_path("transientcam")
+    return Path(state) if state else _of_user(user_data_path)
 
 
 def default_recordings_directory() -> Path:
@@ -254,9 +267,7 @@ class Settings(_Group):
     """A certificate and those it rests on, in PEM; https and wss instead of http and ws."""
     tls_key: Path | None = None
     """Its private key, in PEM, where it is not in the same file."""
-    tokens_file: Path = Field(
-        default_factory=lambda: user_config_path("transientcam") / "tokens.json"
-    )
+    tokens_file: Path = Field(default_factory=lambda: _of_user(user_config_path) / "tokens.json")
     """File in which `transientcam token` keeps names and hashes of the tokens."""
     require_token: bool = False
     """Require a token even if only this machine reaches the service, as behind a proxy."""
@@ -266,7 +277,7 @@ class Settings(_Group):
     """A file written by `transientcam calibrate`; the one that was active last without it."""
     log_format: Literal["auto", "text", "json"] = "auto"
     """``auto`` is text on a terminal and JSON elsewhere."""
-    workers: int = Field(default_factory=lambda: max(2, os.cpu_count() or 2), ge=2, le=256)
+    workers: int = Field(default_factory=lambda: max(2, cores()), ge=2, le=256)
     """Threads that reconstruct and encode; at least 2, so that one long answer delays no other."""
     sequence: SequenceSettings = SequenceSettings()
     reconstruction: ReconstructionSettings = ReconstructionSettings()

@@ -101,8 +101,38 @@ def test_the_light_goes_off_whichever_client_has_control(page: Page, served: Ser
     open_page(page)
     lease(served, "POST", holder="the night shift", duration_s=600)
     expect(page.locator("[data-field=control]")).to_contain_text("the night shift")
-    control(page, "Light off")
+    page.get_by_role("button", name="Light off", exact=True).click()
     expect(page.locator("[data-field=state]")).to_have_text("Stopped")
+    assert httpx.get(f"{served.url}/api/v1/acquisition").json()["running"] is False
+
+
+@pytest.mark.parametrize("by", ["click", "key"])
+def test_the_light_goes_off_beside_an_open_dialog(page: Page, served: Served, by: str) -> None:
+    open_page(page)
+    button = page.locator("button.light-off")
+    place = button.bounding_box()
+    page.locator("[data-field=control]").click()
+    inside = page.get_by_role("dialog", name="Control").locator("button.light-off")
+    expect(inside).to_be_visible()
+    assert inside.bounding_box() == place
+    if by == "click":
+        inside.click()
+    else:
+        page.get_by_role("dialog", name="Control").get_by_role("button", name="Close").press("x")
+    expect(page.locator("[data-field=state]")).to_have_text("Stopped")
+    assert httpx.get(f"{served.url}/api/v1/acquisition").json()["running"] is False
+
+
+def test_a_request_for_light_off_that_is_lost_is_repeated(
+    page: Page, served: Served, watch: Watch
+) -> None:
+    open_page(page)
+    watch.refusals_expected = True
+    page.route("**/acquisition/safe-off", lambda route: route.fulfill(status=429), times=1)
+    page.get_by_role("button", name="Light off", exact=True).click()
+    expect(page.locator("[data-banner=light]")).to_contain_text("The light may be on.")
+    expect(page.locator("[data-field=state]")).to_have_text("Stopped")
+    expect(page.locator("[data-banner=light]")).to_have_count(0)
     assert httpx.get(f"{served.url}/api/v1/acquisition").json()["running"] is False
 
 
@@ -231,7 +261,7 @@ def test_a_viewer_may_switch_the_light_off(page_of_guarded: Any) -> None:
     page.goto("/?debug")
     show_token(page, tokens[Role.VIEWER])
     page.locator(".panel-map canvas[data-frame]").wait_for()
-    control(page, "Light off")
+    page.get_by_role("button", name="Light off", exact=True).click()
     expect(page.locator("[data-field=state]")).to_have_text("Stopped")
 
 

@@ -30,9 +30,9 @@ pytestmark = pytest.mark.shared_daemon
 F_HZ = 23e6
 BINS = 256
 FLAG_COLOURS = {
+    4: "e69f00",
     8: "cc79a7",
     2: "1b2a6b",
-    4: "e69f00",
     64: "d55e00",
     128: "56b4e9",
     32: "f0e442",

@@ -13,6 +13,7 @@ from transientcam_driver.camera import CameraName, ExplainedEffect, Explanation
 from transientcam_driver.cli.options import JsonOption
 from transientcam_driver.errors import DriverError, SpecError
 from transientcam_driver.sequence import Sequence
+from transientcam_driver.texts import read_text
 from transientcam_simulation import list_scenes, world_of
 from transientcam_simulation.emulated import MEASURED, prototype
 from transientcam_simulation.entries.sim import resolution, scene_of
@@ -86,7 +87,7 @@ def _sequence(path: Path | None, options: dict[str, Any]) -> Sequence:
 
 def _document(path: Path) -> Any:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(read_text(path))
     except (OSError, ValueError) as error:
         raise SpecError(str(path), f"no sequence document: {error}") from error
 

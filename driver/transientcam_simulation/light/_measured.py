@@ -171,7 +171,7 @@ def _brightness(path: Path, values: NDArray[np.float32]) -> float:
 
 
 def _read(path: Path, bin_s: float | None) -> _Part:
-    """Read one .npz; time zero is its first bin, or that of its optical path lengths."""
+    """Read one .npz; time zero begins its first bin, or is that of its optical path lengths."""
     content = _content(path)
     if "h" in content:
         start_s = _scalar(path, content, "start_opl_m") / SPEED_OF_LIGHT_M_S
@@ -183,7 +183,9 @@ def _read(path: Path, bin_s: float | None) -> _Part:
         raise SceneError(path, "its arrays", sorted(content), allowed)
     step_s = bin_s if bin_s is not None else _scalar(path, content, "bin_s")
     dimensions = 1 if name == "counts" else 3
-    return _Part(_values(path, content, name, dimensions), 0.0, _positive(path, "bin_s", step_s))
+    step_s = _positive(path, "bin_s", step_s)
+    # photons of bin k come from k to k + 1 times its width on
+    return _Part(_values(path, content, name, dimensions), step_s / 2, step_s)
 
 
 def _content(path: Path) -> dict[str, Any]:

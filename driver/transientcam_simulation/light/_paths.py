@@ -5,7 +5,6 @@ straight from the source reflected in M1, then in M2, and so on, as far as each 
 within its rectangle and nothing stands in between.
 """
 
-import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_compiled import cores
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import Scatter, SparseResponses, ask
 from transientcam_simulation.scene import (
@@ -153,7 +153,7 @@ def light_rays(scene: Scene, directions: Points) -> Lit:
     blocks = [directions[k : k + _BLOCK] for k in range(0, len(directions), _BLOCK)]
     if len(blocks) < 2:
         return follow(directions)
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
+    with ThreadPoolExecutor(cores()) as threads:
         return joined(list(threads.map(follow, blocks)))
 
 

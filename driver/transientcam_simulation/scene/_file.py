@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.camera import Sensor
 from transientcam_driver.errors import SceneError
+from transientcam_driver.texts import read_text
 from transientcam_simulation.base import (
     PROFILES,
     DarkCurrent,
@@ -133,10 +134,10 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
 
 def _open(path: Path) -> Table:
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(read_text(path))
     except OSError as error:
         raise SceneError(path, "the file", error.strerror, "readable") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise SceneError(path, "the file", str(error), "valid TOML") from error
     return Table(path, "", content)
 

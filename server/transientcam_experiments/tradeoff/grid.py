@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from transientcam_driver import Sequence, SubPhases
+from transientcam_driver.texts import read_text
 from transientcam_server.errors import InputError
 
 
@@ -102,8 +103,8 @@ def load_grid(name: str) -> Grid:
     if not path.is_file():
         raise InputError(name, "grid", "missing", f"one of {', '.join(GRIDS)}, or a .toml")
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        document = tomllib.loads(read_text(path))
+    except ValueError as error:
         raise InputError(name, "grid", "no TOML", str(error)) from error
     tables = document.get("sequence")
     if not isinstance(tables, list) or not tables:

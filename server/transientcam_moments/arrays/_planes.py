@@ -27,7 +27,12 @@ def namespace(array: Array) -> Any:
 
 
 def as_array(values: Array) -> Array:
-    """Return `values` as it is when it is an array, else as a NumPy array; in native byte order."""
+    """Return `values` as it is when it is an array, else as a NumPy array; in native byte order.
+
+    What NumPy masks is NaN, and whole numbers become real ones for it.
+    """
+    if isinstance(values, np.ma.MaskedArray):
+        values = np.ma.filled(values.astype(np.result_type(values.dtype, np.float32)), np.nan)
     array = values if hasattr(values, "__array_namespace__") else np.asarray(values)
     if isinstance(array, np.ndarray) and not array.dtype.isnative:  # as FITS and HDF5 keep them
         return array.astype(array.dtype.newbyteorder("="))

@@ -36,6 +36,7 @@ from transientcam_moments.images._phase_steps import (
     phase_weights,
 )
 from transientcam_moments.images._repair import Repair, repair
+from transientcam_moments.images._saturation import Recovered, recover_saturated
 from transientcam_moments.images._smoothing import SIGMA_PX, gaussian_taps, smooth
 from transientcam_moments.images._sweep import (
     SweepPhasors,
@@ -54,6 +55,7 @@ __all__ = [
     "Average",
     "Corrected",
     "HarmonicCorrection",
+    "Recovered",
     "Repair",
     "Replacement",
     "SweepPhasors",
@@ -75,6 +77,7 @@ __all__ = [
     "nominal_calibration",
     "phase_noise",
     "phase_weights",
+    "recover_saturated",
     "repair",
     "saturated",
     "smooth",

@@ -28,6 +28,9 @@ from transientcam_moments.images import (
 )
 from transientcam_moments.noise._sensor import Sensor
 
+_FEW = 1 / 16
+"""Share of the pixels up to which their neighbourhoods are quicker to average one by one."""
+
 
 class MomentNoise(NamedTuple):
     """Noise of moments: independent between planes, and between real and imaginary part.
@@ -303,6 +306,9 @@ def smoothed_at(
         there = np.maximum(brightness.reshape(-1)[pixels], 0)
         other = None if ambient is None else np.asarray(ambient).reshape(-1)[pixels]
         return _of_light(noise_of, there, other)
+    if pixels.size > _FEW * brightness.size:
+        whole = smoothed_of(noise_of, brightness, sigma_px, ambient=ambient).variance
+        return MomentNoise(whole.reshape((len(whole), -1))[:, pixels])
     height, width = brightness.shape
     row, column = np.divmod(pixels, width)
     taps = gaussian_taps(sigma_px / math.sqrt(2))

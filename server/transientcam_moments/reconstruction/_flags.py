@@ -18,9 +18,14 @@ class Flags(IntFlag):
     Few sharp returns leave none, and noise takes it from others: normal.
     """
     NO_SIGNAL = 2
-    """No light: b_0 is not above the least brightness."""
+    """No light: b_0 is not above the least brightness, or no moment is above the noise, where that
+    is known."""
     SATURATED = 4
-    """An image was at the end of its scale."""
+    """An image was at the end of its scale.
+
+    What it would hold follows from the other images of the pixel; where it does not, the pixel has
+    no moments and is NON_FINITE, too.
+    """
     NON_FINITE = 8
     """A moment is NaN, infinite or so large that densities overflow its precision."""
     DEGENERATE = 16

@@ -38,6 +38,7 @@ from transientcam_moments.moment_problem import (
     smallest_eigenvalue,
 )
 from transientcam_moments.noise import MomentNoise, moment_noise, scatter, smoothed_of
+from transientcam_moments.reconstruction._detection import undetected, undetected_pixels
 from transientcam_moments.reconstruction._flags import INVALID, Flags, flags
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, OWN, Settings
@@ -220,12 +221,31 @@ class Reconstruction:
         )
         # biasing made the matrix definite; what is left of its defect is the flag for biasing
         found = xp.where(found == int(Flags.DEGENERATE), 0, found)
+        if self._undetected is not None:
+            found = found | xp.where(self._undetected, int(Flags.NO_SIGNAL), 0)
         found = found | xp.where(self._biased[1], int(Flags.BIASED), 0)
         if self._saturated is not None:
             found = found | xp.where(xp.asarray(self._saturated), int(Flags.SATURATED), 0)
         if self._bad is not None:
             found = found | xp.where(xp.asarray(self._bad), int(Flags.REPLACED), 0)
         return found.astype(xp.uint8)
+
+    @cached_property
+    def _undetected(self) -> Array | None:
+        """Where the moments are no more than noise; None where none are, or it isn't known."""
+        sensor, moments = self.settings.sensor, self.smoothed
+        if sensor is None or self.settings.zeroth is None or self.settings.takes is None:
+            return None
+        if not isinstance(moments, np.ndarray):
+            return undetected(moments, self.noise) if self.noise is not None else None
+        return undetected_pixels(
+            moments,
+            self._least_brightness,
+            self.settings,
+            sensor,
+            self._calibration,
+            self.ambient,
+        )
 
     def add_flag(self, flag: Flags, where: Array) -> None:
         """Add a flag to pixels, of which something is known that the moments do not show.
@@ -241,7 +261,7 @@ class Reconstruction:
 
     @property
     def has_range(self) -> Array:
-        """Where there is light and all moments are finite."""
+        """Where there is light, more than noise where that is known, and all moments are finite."""
         return (self._flags_of_moments & int(INVALID)) == 0
 
     @cached_property

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from functools import cached_property
 
+import numpy as np
+
 from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels.one_pass import Planes
 from transientcam_moments.arrays import Array
@@ -72,6 +74,11 @@ class PassedReconstruction(Reconstruction):
             self.indirect = planes.indirect
             if settings.base_frequency_hz is not None:
                 self.range_m = planes.range_m
+        if self._undetected is not None:
+            no_signal = np.where(self._undetected, np.uint8(Flags.NO_SIGNAL), np.uint8(0))
+            self._flags_of_moments = planes.flags | no_signal
+            if "range_m" in vars(self):
+                self.range_m = np.where(self._undetected, np.float32(np.nan), planes.range_m)
 
     @cached_property
     def measured(self) -> Array:

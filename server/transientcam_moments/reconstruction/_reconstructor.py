@@ -17,6 +17,7 @@ from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.images import (
     ZEROTH_IMAGES,
     HarmonicCorrection,
+    Recovered,
     Repair,
     Replacement,
     average_takes,
@@ -30,6 +31,7 @@ from transientcam_moments.images import (
     is_four_bucket,
     matters,
     measure,
+    recover_saturated,
     repair,
     saturated,
     smooth,
@@ -139,6 +141,9 @@ class Reconstructor:
         repaired = self._repaired(takes, previous)
         if repaired is not None:
             takes = repaired.images
+        recovered = self._recovered(takes, zeroth)
+        if recovered is not None:
+            takes = recovered.images
         # behind the smoothing, where a waveform is known: harmonics are taken out there
         one_pass = None if self._waveform is not None else self._pass_of_images(takes, zeroth)
         if one_pass is not None:
@@ -153,7 +158,12 @@ class Reconstructor:
                 other_light=self._other_light(takes, zeroth),
             )
         moments, kept = self._measured(takes, None if repaired is None else repaired.left_out)
-        if saturated_pixels is None:
+        if recovered is not None:
+            used = True if self._bad is None else ~self._bad  # values of bad pixels are not
+            moments[:, recovered.undetermined & used] = np.nan
+            if saturated_pixels is None:
+                saturated_pixels = recovered.saturated & used
+        elif saturated_pixels is None:
             stack = takes.reshape((-1, *moments.shape[1:]))
             saturated_pixels = saturated(stack, full_scale=self.settings.full_scale)
             if self._bad is not None:  # their own values are not used
@@ -292,6 +302,16 @@ class Reconstructor:
             full_scale=self.settings.full_scale,
             previous=before,
         )
+
+    def _recovered(self, takes: Array, zeroth: str) -> Recovered | None:
+        """Return the images with what saturated ones would hold; None where there are none.
+
+        Nor of other arrays than NumPy's: what to do depends on the values.
+        """
+        if not isinstance(takes, np.ndarray):
+            return None
+        first = ZEROTH_IMAGES[zeroth] if zeroth == "on-off" else 0
+        return recover_saturated(takes, first, self.settings.sampled_rad, self.settings.full_scale)
 
     def _other_light(self, takes: Array, zeroth: str) -> Callable[[Array], Array | None] | None:
         """Return what tells light that is not the camera's, of the first take's first frequency.

@@ -76,6 +76,7 @@ class GappedReconstruction(Reconstruction):
         found = xp.where(finite, 0, int(Flags.NON_FINITE))
         for flag, where in (
             (Flags.NO_SIGNAL, dark),
+            (Flags.NO_SIGNAL, self._undetected),
             (Flags.SATURATED, self._saturated),
             (Flags.REPLACED, self._bad),
         ):

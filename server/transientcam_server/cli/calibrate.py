@@ -14,6 +14,7 @@ import typer
 
 from transientcam.cli.options import TokenOption, require_suffix
 from transientcam.cli.terminal import Terminal, echo
+from transientcam_driver.texts import read_text
 
 if TYPE_CHECKING:
     from transientcam_driver import Camera
@@ -243,10 +244,10 @@ def _measure(camera: "Camera", order: _Order) -> "tuple[Calibration, str | None]
 
 
 def _document(text: str) -> dict[str, Any]:
-    source = text if text.lstrip().startswith("{") else Path(text).read_text(encoding="utf-8")
     try:
+        source = text if text.lstrip().startswith("{") else read_text(Path(text))
         document = json.loads(source)
-    except json.JSONDecodeError as error:
+    except ValueError as error:
         raise typer.BadParameter(f"is no JSON: {error}", param_hint="--sequence") from error
     if not isinstance(document, dict):
         raise typer.BadParameter("is no JSON object", param_hint="--sequence")

@@ -17,10 +17,11 @@ from typing import Any, Final
 
 from pydantic import BaseModel, ValidationError
 
+from transientcam_driver.texts import read_text
 from transientcam_server.api import TokenFile
 from transientcam_server.errors import SettingsError, SettingsMistake, TokenFileError
 from transientcam_server.relay import uses_token
-from transientcam_server.settings import Settings
+from transientcam_server.settings import NO_HOME, Settings
 
 ENVIRONMENT_PREFIX: Final = "TRANSIENTCAM_"
 OTHER_VARIABLES: Final = frozenset(
@@ -78,6 +79,7 @@ def load(
     """
     loaded = _load(command_line, file=file, environment=environment)
     mistakes = [
+        *_homeless(loaded.settings),
         *_unsafe(loaded.settings, loaded.places),
         *_lent(loaded.settings, loaded.places, environment),
         *_bad_certificate(loaded.settings, loaded.places),
@@ -95,7 +97,11 @@ def tokens_file_of(file: Path | None, *, environment: Mapping[str, str]) -> Path
     SettingsError
         As `load_settings`, but it does not matter whether there are tokens yet.
     """
-    return _load({}, file=file, environment=environment).settings.tokens_file
+    settings = _load({}, file=file, environment=environment).settings
+    mistakes = [each for each in _homeless(settings) if each.place == "tokens_file"]
+    if mistakes:
+        raise SettingsError(mistakes)
+    return settings.tokens_file
 
 
 def _load(
@@ -130,11 +136,13 @@ class _MergedSettings:
         if path is None:
             return
         try:
-            values = tomllib.loads(path.read_text(encoding="utf-8"))
+            values = tomllib.loads(read_text(path))
         except OSError as error:
             self._refuse(str(path), None, f"cannot be read: {error.strerror}")
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        except tomllib.TOMLDecodeError as error:
             self._refuse(str(path), None, f"is no TOML: {error}")
+        except ValueError as error:
+            self._refuse(str(path), None, str(error))
         else:
             self._merge(values, lambda location: f"{path}: {'.'.join(location)}")
 
@@ -193,6 +201,18 @@ def _takes_json(location: list[str]) -> bool:
     for name in location:
         default = getattr(default, name, None)
     return isinstance(default, BaseModel | tuple)
+
+
+def _homeless(settings: Settings) -> Iterator[SettingsMistake]:
+    """Name directories that nobody set, where there is no home directory for their defaults."""
+    variables = "set it, STATE_DIRECTORY or HOME"
+    for place, path, remedy in (
+        ("tokens_file", settings.tokens_file, "set it, XDG_CONFIG_HOME or HOME"),
+        ("recordings.directory", settings.recordings.directory, variables),
+        ("calibrations.directory", settings.calibrations.directory, variables),
+    ):
+        if NO_HOME in path.parents:
+            yield SettingsMistake(place, None, f"this user has no home directory: {remedy}")
 
 
 def _meant(name: str, known: list[str]) -> str:

@@ -5,6 +5,7 @@
 - What mitransient renders: ``transient`` (H, W, T, channels), with ``start_opl`` and
   ``bin_width_opl`` as its film calls them.
 - An HDF5 file of tal: ``H`` (T, x, y) with ``t_start`` and ``delta_t``.
+- The arrays of the first three in a file of MATLAB (-v7.3).
 
 The time axis of the last three is an optical path length in m.
 """
@@ -28,9 +29,16 @@ _Array = NDArray[Any]
 KEYS: Final = ("counts", "meas", "h", "transient", "H")
 """Any of them makes a file one of impulse responses."""
 _OF_TAL: Final = ("H", "H_format", "t_start", "delta_t")
+_OF_MATLAB: Final = (
+    *("counts", "meas", "bin_s", "h", "start_opl_m", "bin_opl_m"),
+    *("transient", "start_opl", "bin_width_opl"),
+)
+_MATLAB: Final = b"MATLAB 7.3 MAT-file"
+"""What a file begins with that MATLAB wrote with -v7.3: HDF5 with the axes turned round."""
 _CHANNELS: Final = 3
 _DEFLATE_AT_MOST: Final = 1032
 """How many times its size what deflate has packed can be (the zlib home page)."""
+_MATRIX: Final = 2
 _LASERS: Final = (2, 4)
 """The values of tal's ``H_format`` with an axis of laser positions (`tal.enums.HFormat`)."""
 
@@ -116,9 +124,10 @@ def _of_hdf5(path: Path) -> dict[str, _Array]:
     try:
         with open_unknown(path) as file:
             storage = Storage(file, path.stat().st_size * _DEFLATE_AT_MOST)
+            matlab = _is_matlab(path)
             return {
-                name: storage.values(name)
-                for name in _OF_TAL
+                name: storage.values(name).T if matlab else storage.values(name)
+                for name in (_OF_MATLAB if matlab else _OF_TAL)
                 # tal writes an empty value for what it does not know
                 if name in storage and storage.dataset(name).shape is not None
             }
@@ -127,11 +136,18 @@ def _of_hdf5(path: Path) -> dict[str, _Array]:
         raise InputError(str(path), "content", found, "an HDF5 file of tal with H") from error
 
 
+def _is_matlab(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(_MATLAB)) == _MATLAB
+
+
 def _of_counts(
     path: Path, arrays: Mapping[str, _Array], *, background: str
 ) -> tuple[_Array, _Array]:
     key = "counts" if "counts" in arrays else "meas"
     counts = arrays[key]
+    if counts.ndim == _MATRIX and 1 in counts.shape:  # MATLAB has no vectors
+        counts = counts.reshape(-1)
     if counts.ndim not in (1, 3) or counts.shape[-1] < 2 or not counts.size:
         raise InputError(str(path), key, f"of shape {counts.shape}", "(n_bins,) or (H, W, n_bins)")
     if counts.dtype.kind not in "fiu":
@@ -144,7 +160,7 @@ def _of_counts(
     if background == "median":
         # fewer photons than the background are noise of it, not negative light
         counts = np.maximum(counts - np.median(counts, axis=-1, keepdims=True), 0.0)
-    return np.arange(counts.shape[-1]) * bin_s, counts
+    return (np.arange(counts.shape[-1]) + 0.5) * bin_s, counts  # photons lie anywhere in their bin
 
 
 def _of_lengths(

@@ -9,6 +9,7 @@ from transientcam import ParameterError
 from transientcam.transport import parse_address
 from transientcam_driver import Camera, CameraName, CameraPlugin, SpecError
 from transientcam_driver.clock import Clock
+from transientcam_driver.texts import read_text
 from transientcam_server.relay._camera import RelayCamera
 from transientcam_server.relay._frames import SUBSCRIBED
 from transientcam_server.relay._origin import Origin
@@ -57,8 +58,8 @@ def _token(name: CameraName, environment: Mapping[str, str]) -> str | None:
     if path is None:
         return environment.get(TOKEN_VARIABLE) or None
     try:
-        token = Path(path).read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
+        token = read_text(Path(path)).strip()
+    except (OSError, ValueError) as error:
         raise SpecError(name.spec, f"token_file cannot be read: {error}") from error
     if not token:
         raise SpecError(name.spec, f"token_file {path} is empty")

@@ -173,7 +173,7 @@ def test_measured_files_may_be_given_by_name(open_virtual: OpenCamera, tmp_path:
     assert camera.simulation is not None
     assert camera.simulation.scene == "measured"
     time_s, density = camera.simulation.truth().impulse_response(0, 0)
-    assert time_s[density > 0] == pytest.approx([4e-9])
+    assert time_s[density > 0] == pytest.approx([4.5e-9])
 
 
 def test_the_snr_of_the_papers_single_take_is_good_but_visibly_noisy(

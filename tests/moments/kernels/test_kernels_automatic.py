@@ -217,7 +217,7 @@ def in_fresh_process(setting: str) -> str:
 def test_a_fresh_process_changes_over_by_itself_with_its_threads_running() -> None:
     kernels, loaded, shared = in_fresh_process("on").rsplit(" ", 2)
     assert (kernels, loaded) == ("['levinson m=1 float32']", "True")
-    assert (int(shared) > 0) == (_spread._cores() > 1)
+    assert (int(shared) > 0) == (_spread.cores() > 1)
 
 
 @pytest.mark.parametrize("setting", ["off", "manual"])
@@ -275,7 +275,7 @@ def test_a_worker_uses_no_other_thread_unless_it_says_so(monkeypatch: pytest.Mon
         tm.kernels.use_one_thread()
         found.extend((on_threads(None), on_threads(3)))
         with tm.kernels.use_all_cores():
-            monkeypatch.setattr(_spread, "_cores", lambda: 3)
+            monkeypatch.setattr(_spread, "cores", lambda: 3)
             found.append(on_threads(None))
         found.append(on_threads(None))
 

@@ -271,3 +271,38 @@ def test_settings_are_frozen() -> None:
 
     with pytest.raises(ValueError, match="frozen"):
         settings.port = 1
+
+
+@pytest.fixture
+def homeless(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Be a user that no password file knows, without HOME and all that may stand in for it."""
+    for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "STATE_DIRECTORY"):
+        monkeypatch.delenv(name, raising=False)
+
+    def unknown(*_: object) -> None:
+        raise KeyError("uid not found")
+
+    monkeypatch.setattr("pwd.getpwuid", unknown)
+
+
+@pytest.mark.usefixtures("homeless")
+def test_a_user_without_a_home_is_told_which_settings_are_missing() -> None:
+    with pytest.raises(SettingsError) as caught:
+        load()
+
+    places = [each.place for each in caught.value.mistakes]
+    assert places == ["tokens_file", "recordings.directory", "calibrations.directory"]
+    assert "HOME" in str(caught.value)
+
+
+@pytest.mark.usefixtures("homeless")
+def test_a_user_without_a_home_needs_none_where_the_directories_are_set(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("STATE_DIRECTORY", str(tmp_path))
+    tokens = str(tmp_path / "tokens.json")
+
+    settings = load(environment={"TRANSIENTCAM_TOKENS_FILE": tokens})
+
+    assert settings.tokens_file == Path(tokens)
+    assert settings.recordings.directory == tmp_path / "recordings"

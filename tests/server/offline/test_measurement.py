@@ -1,6 +1,7 @@
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -154,8 +155,35 @@ def test_counts_of_many_pixels_are_an_image(tmp_path: Path) -> None:
 
     b = load_measurement(file, frequency_hz=F_HZ, harmonics=2).moments
 
-    expected = moments_of_returns([7 * 16e-12], [5.0], uniform=0.0, harmonics=2)
+    expected = moments_of_returns([7.5 * 16e-12], [5.0], uniform=0.0, harmonics=2)
     np.testing.assert_allclose(b[:, 1, 2], expected[:, 0, 0], rtol=1e-9)
+
+
+def test_photons_that_lie_evenly_in_their_bin_are_not_taken_for_early(tmp_path: Path) -> None:
+    bin_s, early_s = 250e-12, 3.1e-9
+    times_s = early_s + bin_s * np.random.default_rng(1).random(10_000) * 4
+    counts, _ = np.histogram(times_s, bins=np.arange(65) * bin_s)
+    file = written(tmp_path / "a.npz", counts=counts, bin_s=bin_s)
+
+    b = load_measurement(file, frequency_hz=F_HZ, harmonics=1).moments[1, 0, 0]
+
+    mean_s = np.angle(b) / (2 * np.pi * F_HZ)
+    assert mean_s == pytest.approx(times_s.mean(), abs=0.02 * bin_s)
+
+
+@pytest.mark.parametrize("vector", [False, True])
+def test_arrays_of_matlab_are_turned_back(tmp_path: Path, vector: bool) -> None:
+    meas = np.zeros((2, 3, 64))
+    meas[1, 2, 7] = meas[0, 1, 9] = 5
+    name, array = ("counts", meas[1, 2][None]) if vector else ("meas", meas)
+    file = tmp_path / "a.mat"
+    with h5py.File(file, "w", userblock_size=512) as opened:
+        opened[name], opened["bin_s"] = array.T, np.array([[16e-12]])
+    with file.open("r+b") as opened:
+        opened.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64")
+    plain = written(tmp_path / "a.npz", **{name: meas[1, 2] if vector else meas}, bin_s=16e-12)
+
+    np.testing.assert_array_equal(load_measurement(file).moments, load_measurement(plain).moments)
 
 
 def test_the_background_of_photon_counts_is_removed_where_that_is_wanted(tmp_path: Path) -> None:

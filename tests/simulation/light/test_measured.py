@@ -32,7 +32,7 @@ def counts_file(folder: Path, counts: Any, bin_s: float = 1e-10, name: str = "co
 
 def naive_moment(counts: list[float], bin_s: float, shift_s: float, f_hz: float) -> complex:
     total = sum(counts)
-    angles = [2 * math.pi * f_hz * (k * bin_s + shift_s) for k in range(len(counts))]
+    angles = [2 * math.pi * f_hz * ((k + 0.5) * bin_s + shift_s) for k in range(len(counts))]
     return sum(
         n / total * complex(math.cos(a), math.sin(a)) for n, a in zip(counts, angles, strict=True)
     )
@@ -57,18 +57,18 @@ def test_the_median_is_taken_for_background_and_nothing_falls_below_zero(tmp_pat
     time_s, density = load_responses(scene(file), width=2, height=2).of_pixel(0, 0)
 
     assert density * 1e-10 == pytest.approx(np.array([0, 0, 0, 100, 50, 0, 1]) / 151, abs=1e-6)
-    assert time_s == pytest.approx(np.arange(7) * 1e-10)
+    assert time_s == pytest.approx((np.arange(7) + 0.5) * 1e-10)
 
 
 @pytest.mark.parametrize(
     ("choice", "zero_s"),
     [
         ({}, 0.0),
-        ({"time_zero": "peak"}, 2e-10),
+        ({"time_zero": "peak"}, 2.5e-10),
         ({"time_zero_s": 7e-10}, 7e-10),
     ],
 )
-def test_time_zero_is_the_first_bin_the_peak_or_a_time(
+def test_time_zero_begins_the_first_bin_or_is_the_peak_or_a_time(
     tmp_path: Path, choice: dict[str, Any], zero_s: float
 ) -> None:
     counts = [0.0, 1.0, 9.0, 2.0]
@@ -86,7 +86,7 @@ def test_time_zero_may_be_the_peak_of_another_file(tmp_path: Path) -> None:
 
     moment = load_responses(scene(file), width=1, height=1).moments(500e6)[0, 0]
 
-    assert moment == pytest.approx(naive_moment(counts, 1e-10, -4e-10, 500e6), rel=1e-6)
+    assert moment == pytest.approx(naive_moment(counts, 1e-10, -4.5e-10, 500e6), rel=1e-6)
 
 
 def test_responses_add_up_and_each_is_a_return_of_the_truth(tmp_path: Path) -> None:
@@ -96,7 +96,7 @@ def test_responses_add_up_and_each_is_a_return_of_the_truth(tmp_path: Path) -> N
     responses = load_responses(scene(near, far), width=WIDTH, height=HEIGHT)
     delay_s, weight = responses.returns()
 
-    assert delay_s[:, 0, 0] == pytest.approx([3.1e-9, 9.1e-9])
+    assert delay_s[:, 0, 0] == pytest.approx([3.15e-9, 9.15e-9])
     assert weight[:, 0, 0] == pytest.approx([0.2, 0.5])
     assert responses.moments(0.0) == pytest.approx(np.full((HEIGHT, WIDTH), 0.7))
 
@@ -130,7 +130,7 @@ def test_a_cube_at_the_sensors_resolution_is_taken_pixel_by_pixel(tmp_path: Path
         scene(ResponseFile(path, normalise=False)), width=WIDTH, height=HEIGHT
     )
 
-    phasors = np.exp(2j * np.pi * 70e6 * 2e-10 * np.arange(9))
+    phasors = np.exp(2j * np.pi * 70e6 * 2e-10 * (np.arange(9) + 0.5))
     assert responses.moments(70e6) == pytest.approx((cube * phasors).sum(axis=-1), rel=1e-5)
     _, density = responses.of_pixel(3, 2)
     assert density * 2e-10 == pytest.approx(cube[2, 3], rel=1e-5)
@@ -149,9 +149,9 @@ def test_first_return_of_a_cube_is_its_first_peak_with_the_mass_of_its_lobe(tmp_
         scene(ResponseFile(path, normalise=False)), width=3, height=1
     ).returns()
 
-    assert delay_s[0, 0, :2] == pytest.approx([2e-9, 4e-9])
+    assert delay_s[0, 0, :2] == pytest.approx([2.5e-9, 4.5e-9])
     assert weight[0, 0] == pytest.approx([11.0, 5.2, 0.0])
-    assert (delay_s[1, 0, 0], weight[1, 0, 0]) == pytest.approx((6e-9, 7.5))
+    assert (delay_s[1, 0, 0], weight[1, 0, 0]) == pytest.approx((6.5e-9, 7.5))
     assert np.isnan(delay_s[:, 0, 2]).all()
 
 

@@ -5,7 +5,18 @@ import type { Backdrop, DensityRenderer, Exposure } from "./renderer";
 import { FRAGMENT_SHADER, VERTEX_SHADER } from "./shader";
 import { layersOf, packTexels } from "./texels";
 
-const UNIFORMS = ["coefficients", "backdrop", "colours", "layers", "z", "baseFrequencyHz", "white", "backdropWhite", "tone", "asNumbers"] as const;
+const UNIFORMS = [
+  "coefficients",
+  "backdrop",
+  "colours",
+  "layers",
+  "z",
+  "baseFrequencyHz",
+  "white",
+  "backdropWhite",
+  "tone",
+  "asNumbers",
+] as const;
 
 type Uniforms = Record<(typeof UNIFORMS)[number], WebGLUniformLocation | null>;
 

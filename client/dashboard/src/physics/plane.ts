@@ -37,7 +37,8 @@ function leastDirection([xx, yy, zz]: Vector, [xy, yz, xz]: Vector): Vector | nu
   const mean = (xx + yy + zz) / 3;
   const p = Math.sqrt(((xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2 * (xy ** 2 + yz ** 2 + xz ** 2)) / 6);
   if (!(p > 0)) return null;
-  const determinant = (xx - mean) * ((yy - mean) * (zz - mean) - yz ** 2) - xy * (xy * (zz - mean) - yz * xz) + xz * (xy * yz - (yy - mean) * xz);
+  const determinant =
+    (xx - mean) * ((yy - mean) * (zz - mean) - yz ** 2) - xy * (xy * (zz - mean) - yz * xz) + xz * (xy * yz - (yy - mean) * xz);
   const angle = Math.acos(Math.min(1, Math.max(-1, determinant / (2 * p ** 3)))) / 3;
   const least = mean + 2 * p * Math.cos(angle + (2 * Math.PI) / 3);
   // Every row of the matrix less the eigenvalue is perpendicular to the eigenvector.
@@ -46,7 +47,9 @@ function leastDirection([xx, yy, zz]: Vector, [xy, yz, xz]: Vector): Vector | nu
     [xy, yy - least, yz],
     [xz, yz, zz - least],
   ];
-  const found = [cross(rows[0], rows[1]), cross(rows[1], rows[2]), cross(rows[2], rows[0])].sort((a, b) => Math.hypot(...b) - Math.hypot(...a))[0];
+  const found = [cross(rows[0], rows[1]), cross(rows[1], rows[2]), cross(rows[2], rows[0])].sort(
+    (a, b) => Math.hypot(...b) - Math.hypot(...a),
+  )[0];
   const length = Math.hypot(...found);
   if (!(length > FLAT * (mean + 2 * p) ** 2)) return null;
   return [found[0] / length, found[1] / length, found[2] / length];

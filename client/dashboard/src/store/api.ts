@@ -115,8 +115,8 @@ export class Api {
   }
 
   /** Stops the capture and switches the light off, whichever client controls the camera. */
-  safeOff(): Promise<AcquisitionDocument> {
-    return this.#json("POST /acquisition/safe-off");
+  safeOff(signal: AbortSignal): Promise<AcquisitionDocument> {
+    return this.#json("POST /acquisition/safe-off", { signal, keepalive: true });
   }
 
   /** The number of a frame after `frame`, as soon as there is one; the service waits for it some seconds. */
@@ -297,7 +297,10 @@ export class Api {
   }
 
   /** What the service answers an operation of its interface; no more is checked than that it did not refuse. */
-  async #json<Name extends Operation>(operation: Name, details: RequestDetails<Name extends keyof Bodies ? Bodies[Name] : unknown> = {}): Promise<Answers[Name]> {
+  async #json<Name extends Operation>(
+    operation: Name,
+    details: RequestDetails<Name extends keyof Bodies ? Bodies[Name] : unknown> = {},
+  ): Promise<Answers[Name]> {
     const [method, path] = operation.split(" ");
     return (await this.#answer(method, details.at ?? path, details)).json() as Promise<Answers[Name]>;
   }

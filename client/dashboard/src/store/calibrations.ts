@@ -99,5 +99,8 @@ function outcomeOf({ state, problem, result }: JobDocument): { words: string; go
   const verdict = result?.verdict as VerdictDocument | undefined;
   if (verdict === undefined || verdict.verdict === "diffusor") return { words: `Measured: ${words}`, good: true };
   const use = result?.activated === true ? "It is used, as it was forced." : "It is kept, but not used.";
-  return { words: `Measured on ${verdict.verdict === "scene" ? "a scene, not a diffuser" : "what may be no diffuser"}: ${use}`, good: false };
+  return {
+    words: `Measured on ${verdict.verdict === "scene" ? "a scene, not a diffuser" : "what may be no diffuser"}: ${use}`,
+    good: false,
+  };
 }

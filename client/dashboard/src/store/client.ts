@@ -1,14 +1,14 @@
 /** Between the worker and the store: takes what arrives into the store once an animation frame. */
-import { effect } from "@preact/signals";
+import { effect, untracked } from "@preact/signals";
 import type { AppliedDocument, CameraDocument } from "../stream/documents";
 import { Fluency } from "../stream/fluency";
 import type { ErrorMessage, Hello, Notice, Problem } from "../stream/protocol";
 import type { FrameReport } from "../stream/summary";
 import type { Command, Report } from "../stream/worker";
 import type { AnimationLoop } from "./animation";
-import { kindOf, LIVE, RequestError } from "./api";
+import { kindOf, LIVE, liveFrame, RequestError } from "./api";
 import { inWords, lossWords, sequenceKey } from "./events";
-import { frameOf } from "./frames";
+import { frameOf, isWhole } from "./frames";
 import type { Store } from "./store";
 
 /** What of a Worker is used. */
@@ -36,6 +36,8 @@ export class StreamClient {
   #looking: ReturnType<typeof setTimeout> | undefined;
   #session = "";
   readonly #fluency = new Fluency();
+  /** The worker knows that no light moves. */
+  #rests = false;
 
   constructor(store: Store, worker: WorkerPort, loop: AnimationLoop, now_s: Clock = () => Date.now() / 1000) {
     this.#store = store;
@@ -75,7 +77,8 @@ export class StreamClient {
       this.#looking = setTimeout(() => this.#send({ type: "look", sight }), 1000 * SETTLED_S);
     });
     effect(() => {
-      if (!this.#store.held.value) this.#loop.wake();
+      if (this.#store.held.value) void untracked(() => this.#complete());
+      this.#loop.wake();
     });
     let replayed = false;
     effect(() => {
@@ -177,6 +180,21 @@ export class StreamClient {
       }
     } catch (error) {
       if (!(error instanceof RequestError)) throw error; // the stream says what is wrong
+    }
+  }
+
+  /** Fetches all pixels of frames that are held and were sent in part. */
+  async #complete(): Promise<void> {
+    const { frames, held } = this.#store;
+    for (const product of frames.wanted.peek()) {
+      const shown = frames.of(product).peek();
+      if (shown === null || shown.origin !== LIVE || isWhole(shown.meta)) continue;
+      try {
+        const [report] = await this.#bring(liveFrame(shown.meta.frame), [product]);
+        if (held.peek() && frames.of(product).peek() === shown) frames.put(frameOf(report));
+      } catch (error) {
+        if (!(error instanceof RequestError)) throw error; // the service has it no more: it stays as it is
+      }
     }
   }
 
@@ -296,10 +314,14 @@ export class StreamClient {
   #count(): boolean {
     const { player, frames, held, replay } = this.#store;
     const moves = (player.playing.peek() || player.scrubbed.peek()) && frames.of("coefficients").peek() !== null;
-    if (!moves || held.peek() || replay.active.peek()) {
+    const measures = this.#store.measures.pins.peek().length > 0 || this.#store.measures.region.peek() !== null;
+    if (!moves || measures || held.peek() || replay.active.peek()) {
       this.#fluency.restart();
+      if (!this.#rests) this.#send({ type: "rested" });
+      this.#rests = true;
       return false;
     }
+    this.#rests = false;
     const report = this.#fluency.refreshed(this.#now_s());
     if (report !== null) this.#send({ type: "moved", ...report });
     return true;

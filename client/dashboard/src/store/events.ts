@@ -59,7 +59,8 @@ export class Events {
 
   /** Shows an event; one of the same key that was shown just before stays in its place, with the remedy of either. */
   tell(words: string, tone: EventTone = "plain", more: Pick<Happening, "key" | "remedy"> = {}): void {
-    const shown = more.key === undefined ? undefined : this.all.peek().find(({ key, at_s }) => key === more.key && this.#now_s() - at_s < BURST_S);
+    const shown =
+      more.key === undefined ? undefined : this.all.peek().find(({ key, at_s }) => key === more.key && this.#now_s() - at_s < BURST_S);
     if (shown !== undefined) {
       this.all.value = this.all.peek().map((each) => (each === shown ? { ...each, ...more } : each));
       return;
@@ -117,14 +118,20 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
     }
     case "calibration-changed":
       return UNMEASURED[notice.calibration_id] !== undefined
-        ? { words: `${UNMEASURED[notice.calibration_id]} are used from now on.${notice.reason ? ` ${notice.reason}` : ""}`, tone: notice.reason ? "bad" : "plain" }
+        ? {
+            words: `${UNMEASURED[notice.calibration_id]} are used from now on.${notice.reason ? ` ${notice.reason}` : ""}`,
+            tone: notice.reason ? "bad" : "plain",
+          }
         : { words: `The calibration ${notice.calibration_id} is used from now on.`, tone: "good" };
     case "lease-changed":
       return { words: leaseWords(notice), tone: "plain" };
     case "recording-started":
       return { words: "A recording began.", tone: "plain" };
     case "recording-dropped":
-      return { words: `The disk was too slow for ${grouped(notice.count)} ${notice.count === 1 ? "frame" : "frames"} of the recording.`, tone: "bad" };
+      return {
+        words: `The disk was too slow for ${grouped(notice.count)} ${notice.count === 1 ? "frame" : "frames"} of the recording.`,
+        tone: "bad",
+      };
     case "recording-stopped": {
       const why = END_REASONS[notice.reason ?? ""] ?? "ended";
       const tone = notice.problem ? "bad" : "good";

@@ -1,10 +1,11 @@
 import { computed, type Signal, signal } from "@preact/signals";
 
 import type { Coefficients } from "../physics/maximumEntropy";
-import type { Numbers } from "../stream/compact";
+import { type Cut, has, type Numbers, spread } from "../stream/compact";
 import type { FrameDocument, FrameMeta } from "../stream/documents";
 import { coefficientsOf, type FrameReport, type LightSummary, type MapSummary } from "../stream/summary";
 import { LIVE } from "./api";
+import type { Pixel } from "./pixel";
 
 /** The newest frame of one product. */
 export interface Frame {
@@ -84,6 +85,42 @@ export class Frames {
     const wanted = [...this.#claims.keys()].sort();
     if (wanted.join() !== this.#claimed.peek().join()) this.#claimed.value = wanted;
   }
+}
+
+/** Whether the service sent this pixel of a frame: where it did not, nothing is known of it. */
+export function wasSent(frame: Frame, { x, y }: Pixel): boolean {
+  return has(cutOf(frame), x, y);
+}
+
+/** Whether the service sent all pixels of a frame. */
+export function isWhole({ region, decimation, width, height }: FrameMeta): boolean {
+  return decimation === 1 && region[2] === width && region[3] === height;
+}
+
+/** Values of a map as they are drawn: pixels that were not sent like those beside them. */
+export function drawnOf(frame: Frame): Numbers {
+  const { values, shape } = frame;
+  let drawn = DRAWN.get(values);
+  if (drawn === undefined) {
+    drawn = spread(values, cutOf(frame), shape[1]);
+    DRAWN.set(values, drawn);
+  }
+  return drawn;
+}
+
+/** The values of a map that were sent. */
+export function sentOf(frame: Frame): Numbers {
+  const { values, shape } = frame;
+  const cut = cutOf(frame);
+  return values.filter((_: number, at: number) => has(cut, at % shape[1], Math.floor(at / shape[1])));
+}
+
+const DRAWN = new WeakMap<Numbers, Numbers>();
+
+function cutOf({ meta, shape }: Frame): Cut {
+  const [height, width] = shape.slice(-2);
+  const { region = [0, 0, width, height], decimation = 1 }: Partial<FrameMeta> = meta;
+  return { region: region as unknown as Cut["region"], decimation };
 }
 
 /** A frame as views see it. */

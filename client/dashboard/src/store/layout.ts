@@ -62,9 +62,15 @@ export const SPACE = LAYOUTS.Space;
 /** Whether a remembered value is a layout of known views, each at most once. */
 export function isLayout(value: unknown): value is Layout {
   const share = (part: unknown): boolean => typeof part === "number" && part > 0 && Number.isFinite(part);
-  const isSlot = (part: unknown): boolean => isPart(part) && share(part.share) && typeof part.view === "string" && (VIEW_NAMES as readonly string[]).includes(part.view);
+  const isSlot = (part: unknown): boolean =>
+    isPart(part) && share(part.share) && typeof part.view === "string" && (VIEW_NAMES as readonly string[]).includes(part.view);
   const isGroup = (part: unknown, isInside: (each: unknown) => boolean): boolean =>
-    isPart(part) && share(part.share) && Array.isArray(part.slots) && part.slots.length > 0 && part.slots.length <= MOST_SLOTS && part.slots.every(isInside);
+    isPart(part) &&
+    share(part.share) &&
+    Array.isArray(part.slots) &&
+    part.slots.length > 0 &&
+    part.slots.length <= MOST_SLOTS &&
+    part.slots.every(isInside);
   const isPlace = (part: unknown): boolean => isSlot(part) || isGroup(part, isSlot);
   if (!Array.isArray(value) || value.length === 0 || value.length > MOST_ROWS) return false;
   if (!value.every((each) => isGroup(each, isPlace))) return false;
@@ -135,7 +141,8 @@ export function below(layout: Layout, view: string, wanted: string): Layout | nu
   const home = layout.find(({ slots }) => slots.some((place) => holds(place, view)));
   const place = home?.slots.find((each) => holds(each, view));
   if (home === undefined || place === undefined) return null;
-  if (home.slots.length === 1 && !isStack(place)) return layout.length >= MOST_ROWS ? null : layout.flatMap((each) => (each === home ? withRowBelow(each, wanted) : [each]));
+  if (home.slots.length === 1 && !isStack(place))
+    return layout.length >= MOST_ROWS ? null : layout.flatMap((each) => (each === home ? withRowBelow(each, wanted) : [each]));
   if (slotsOf(place).length >= MOST_SLOTS) return null;
   const halved = (slot: Slot): Slot[] =>
     slot.view === view
@@ -167,7 +174,8 @@ export const LAYOUT: Setting<Layout> = {
   text: (layout) => {
     const short = (share: number): string => String(Number(share.toPrecision(3)));
     const slotText = ({ view, share }: Slot): string => `${view}.${short(share)}`;
-    const placeText = (place: Slot | Stack): string => (isStack(place) ? [short(place.share), ...place.slots.map(slotText)].join("_") : slotText(place));
+    const placeText = (place: Slot | Stack): string =>
+      isStack(place) ? [short(place.share), ...place.slots.map(slotText)].join("_") : slotText(place);
     return layout.map(({ share, slots }) => `${short(share)}:${slots.map(placeText).join(",")}`).join("/");
   },
   parse: (text) => {

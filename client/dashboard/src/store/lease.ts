@@ -131,7 +131,12 @@ export class Lease {
       this.lost.value = null; // the client that took control gave it back
     }
     if (!held) this.control.value = { kind: "free" };
-    else this.control.value = { kind: this.#api.credentials.leaseId.peek() === null ? "other" : "us", holder: holder ?? "Another client", expires_s };
+    else
+      this.control.value = {
+        kind: this.#api.credentials.leaseId.peek() === null ? "other" : "us",
+        holder: holder ?? "Another client",
+        expires_s,
+      };
   }
 
   #arm(control: Control, within_s = Infinity): void {

@@ -9,7 +9,11 @@ import { aBoolean, aNumber, oneOf, type Setting, type Settings } from "./setting
 export const PLAYS = ["density", "gate", "cumulative"] as const;
 export type Play = (typeof PLAYS)[number];
 
-export const NAMES: Readonly<Record<Play, string>> = { density: "Light in flight", gate: "Light of the last nanosecond", cumulative: "Light so far" };
+export const NAMES: Readonly<Record<Play, string>> = {
+  density: "Light in flight",
+  gate: "Light of the last nanosecond",
+  cumulative: "Light so far",
+};
 
 /** Length of the gate, in time of flight. */
 const GATE_S = 1e-9;

@@ -18,10 +18,34 @@ export interface MapProduct {
 
 /** The maps on offer, in the order of their tabs. */
 export const MAP_PRODUCTS: readonly MapProduct[] = [
-  { product: "range", name: "Range", hint: "Distance to what the first light came from", unit: "m", colours: "viridis", scale: "linear", decimals: 3 },
+  {
+    product: "range",
+    name: "Range",
+    hint: "Distance to what the first light came from",
+    unit: "m",
+    colours: "viridis",
+    scale: "linear",
+    decimals: 3,
+  },
   { product: "direct", name: "Direct", hint: "Light of the first return", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
-  { product: "indirect", name: "Indirect", hint: "Light that took a longer way", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
-  { product: "brightness", name: "Brightness", hint: "All light: the zeroth moment", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
+  {
+    product: "indirect",
+    name: "Indirect",
+    hint: "Light that took a longer way",
+    unit: "DN",
+    colours: "grey",
+    scale: "linear",
+    decimals: 1,
+  },
+  {
+    product: "brightness",
+    name: "Brightness",
+    hint: "All light: the zeroth moment",
+    unit: "DN",
+    colours: "grey",
+    scale: "linear",
+    decimals: 1,
+  },
   {
     product: "validity",
     name: "Validity",

@@ -87,7 +87,11 @@ export class Measures {
   /** The region around a pixel of a picture; none where there is one. */
   toggleRegion({ x, y }: Pixel, width: number, height: number): void {
     if (this.region.peek() !== null) this.region.value = null;
-    else this.region.value = regionOf({ x: Math.max(0, x - REACH), y: Math.max(0, y - REACH) }, { x: Math.min(width - 1, x + REACH), y: Math.min(height - 1, y + REACH) });
+    else
+      this.region.value = regionOf(
+        { x: Math.max(0, x - REACH), y: Math.max(0, y - REACH) },
+        { x: Math.min(width - 1, x + REACH), y: Math.min(height - 1, y + REACH) },
+      );
   }
 }
 

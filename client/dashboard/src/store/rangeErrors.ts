@@ -36,7 +36,8 @@ export class RangeErrors {
     this.now = computed(() => {
       const meta = status.newest.value;
       const stated = this.#stated.value;
-      if (meta !== null && stated !== null && stated.sequence_id === meta.sequence_id && !replaying.value) return { error_m: stated.error_m, of: "noise and bias" };
+      if (meta !== null && stated !== null && stated.sequence_id === meta.sequence_id && !replaying.value)
+        return { error_m: stated.error_m, of: "noise and bias" };
       const own_m = meta?.accuracy?.range_error_m;
       if (own_m != null) return { error_m: own_m, of: "noise and bias" };
       const noise_m = meta?.predicted_range_std_m?.median;
@@ -46,7 +47,9 @@ export class RangeErrors {
       const shown = frames.of(PRODUCT).value;
       if (shown !== null && shown.origin === LIVE) untracked(() => this.#take(shown.meta));
     });
-    const live = computed(() => (status.connection.value.kind === "open" && !replaying.value ? (status.newest.value?.sequence_id ?? null) : null));
+    const live = computed(() =>
+      status.connection.value.kind === "open" && !replaying.value ? (status.newest.value?.sequence_id ?? null) : null,
+    );
     effect(() => {
       void this.#scene.value;
       clearTimeout(this.#timer);

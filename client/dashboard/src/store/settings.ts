@@ -64,7 +64,11 @@ export class Settings {
    *
    * `of` names what they belong to where there are several of a kind; only those that were changed are said.
    */
-  together(link: string, settings: readonly Setting<unknown>[], { of = "", followed = false }: { readonly of?: string; readonly followed?: boolean } = {}): void {
+  together(
+    link: string,
+    settings: readonly Setting<unknown>[],
+    { of = "", followed = false }: { readonly of?: string; readonly followed?: boolean } = {},
+  ): void {
     const head = of === "" ? "" : `${of},`;
     const parts = settings.map((setting) => ({ setting, value: this.of(setting) }));
     this.add({
@@ -133,7 +137,8 @@ export function oneOf<T extends string>(words: readonly T[]): Kind<T> {
 
 /** A finite number between two ends. */
 export function aNumber(least = -Infinity, most = Infinity): Kind<number> {
-  const accepts = (value: unknown): value is number => typeof value === "number" && Number.isFinite(value) && value >= least && value <= most;
+  const accepts = (value: unknown): value is number =>
+    typeof value === "number" && Number.isFinite(value) && value >= least && value <= most;
   return { accepts, text: String, parse: (text) => (text !== "" && accepts(Number(text)) ? Number(text) : undefined) };
 }
 

@@ -41,7 +41,8 @@ export function flowTrouble({ rate_hz, latency_s, last_s }: Flow, expected_hz: n
   if (rate_hz !== null && expected_hz !== null && rate_hz < LEAST_SHARE * expected_hz) {
     return `${rate_hz.toFixed(1)} of ${expected_hz.toFixed(1)} frames a second are shown: the service, the network or this browser is too slow.`;
   }
-  if (latency_s !== null && latency_s > LATE_S && latency_s < CREDIBLE_LATENCY_S) return `Frames are shown ${latency_s.toFixed(1)} s after they were captured.`;
+  if (latency_s !== null && latency_s > LATE_S && latency_s < CREDIBLE_LATENCY_S)
+    return `Frames are shown ${latency_s.toFixed(1)} s after they were captured.`;
   return null;
 }
 

@@ -15,6 +15,7 @@ import { LAYOUT, type Layout, OVERVIEW, SPACE, viewsOf } from "./layout";
 import { Layouts } from "./layouts";
 import { Lease } from "./lease";
 import { TransientLook } from "./lightLook";
+import { LightOff } from "./lightOff";
 import { Looks } from "./looks";
 import { MAP_PRODUCTS } from "./mapCatalogue";
 import { Measures } from "./measures";
@@ -43,6 +44,8 @@ export class Store {
   readonly caller: Caller;
   /** Who controls the camera. */
   readonly lease: Lease;
+  /** Switches the light off, whoever does. */
+  readonly lightOff: LightOff;
   /** Why nothing can be changed from here; null where everything may. */
   readonly obstacle = computed(() => this.caller.obstacle.value ?? this.lease.obstacle.value);
   readonly recordings: Recordings;
@@ -87,7 +90,9 @@ export class Store {
   });
   readonly player = new Player(this.period_s);
   /** A calibration has the camera for itself, so that no frames come. */
-  readonly calibrating = computed(() => this.status.cameraState.value === "calibrating" || this.calibrations.job.value?.state === "running");
+  readonly calibrating = computed(
+    () => this.status.cameraState.value === "calibrating" || this.calibrations.job.value?.state === "running",
+  );
   /** How light in flight is shown. */
   readonly light: TransientLook;
   /** What only the service knows of the selected pixel. */
@@ -118,12 +123,16 @@ export class Store {
   /** The one view that is shown alone; null while all are. */
   readonly alone: Signal<string | null>;
 
-  constructor({ api = new Api(undefined, new Credentials(browserShelf("sessionStorage"))), shelf = browserShelf("localStorage") }: { api?: Api; shelf?: Shelf | null } = {}) {
+  constructor({
+    api = new Api(undefined, new Credentials(browserShelf("sessionStorage"))),
+    shelf = browserShelf("localStorage"),
+  }: { api?: Api; shelf?: Shelf | null } = {}) {
     this.api = api;
     const settings = new Settings(shelf);
     this.settings = settings;
     this.caller = new Caller(api);
     this.lease = new Lease(api);
+    this.lightOff = new LightOff(api, (state) => this.status.cameraIs(state, Date.now() / 1000));
     this.recordings = new Recordings(api);
     this.reconstruction = new Reconstruction(api);
     this.calibrations = new Calibrations(api);
@@ -141,8 +150,21 @@ export class Store {
     const aMap = oneOf(MAP_PRODUCTS.map(({ product }) => product));
     const secondMap = (map: string): string => (viewsOf(this.layout.value).includes("second-map") ? map : "");
     this.mapProduct = settings.of({ key: "map.product", link: "map", followed: true, initial: "range", ...aMap });
-    this.secondMapProduct = settings.of({ key: "second-map.product", link: "map2", followed: true, initial: "indirect", ...aMap, text: secondMap });
-    this.selected = settings.of<Pixel | null>({ link: "pixel", followed: true, initial: null, text: (pixel) => (pixel === null ? "" : pixelText(pixel)), parse: pixelOf });
+    this.secondMapProduct = settings.of({
+      key: "second-map.product",
+      link: "map2",
+      followed: true,
+      initial: "indirect",
+      ...aMap,
+      text: secondMap,
+    });
+    this.selected = settings.of<Pixel | null>({
+      link: "pixel",
+      followed: true,
+      initial: null,
+      text: (pixel) => (pixel === null ? "" : pixelText(pixel)),
+      parse: pixelOf,
+    });
     this.alone = settings.of<string | null>({ link: "view", followed: true, initial: null, ...oneOf<string>(VIEW_NAMES) });
     this.layout = settings.of(LAYOUT);
     effect(() => {

@@ -60,7 +60,10 @@ export interface PlotPoint {
 }
 
 /** The lines of a figure over the last minute, the newest sample at the right; broken where it is not known. Its height is from zero to `most`. */
-export function linesOf(samples: readonly Sample[], trend: Trend): { readonly most: number; readonly lines: readonly (readonly PlotPoint[])[] } {
+export function linesOf(
+  samples: readonly Sample[],
+  trend: Trend,
+): { readonly most: number; readonly lines: readonly (readonly PlotPoint[])[] } {
   const values = samples.map((sample) => sample[trend]);
   const most = Math.max(0, ...values.filter(Number.isFinite));
   const end_s = samples.at(-1)?.at_s ?? 0;

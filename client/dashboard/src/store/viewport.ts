@@ -31,7 +31,9 @@ export class Viewport {
       text: (view) => (view === WHOLE ? "" : [view.zoom, view.left, view.top].map((each) => Number(each.toPrecision(4))).join()),
       parse: (text) => {
         const numbers = text.split(",").map(Number);
-        return numbers.length === 3 && numbers.every(Number.isFinite) && numbers[0] > 1 ? windowAt(numbers[0], numbers[1], numbers[2]) : undefined;
+        return numbers.length === 3 && numbers.every(Number.isFinite) && numbers[0] > 1
+          ? windowAt(numbers[0], numbers[1], numbers[2])
+          : undefined;
       },
     });
   }

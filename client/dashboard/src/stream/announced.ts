@@ -28,7 +28,11 @@ export class Announced {
   /** Counts what began anew: what was requested before is not wanted any more. */
   #round = 0;
 
-  constructor(bring: (announcement: Announcement) => Promise<ArrayBuffer>, take: (body: ArrayBuffer) => void, miss: (announcement: Announcement, error: unknown) => void) {
+  constructor(
+    bring: (announcement: Announcement) => Promise<ArrayBuffer>,
+    take: (body: ArrayBuffer) => void,
+    miss: (announcement: Announcement, error: unknown) => void,
+  ) {
     this.#bring = bring;
     this.#take = take;
     this.#miss = miss;

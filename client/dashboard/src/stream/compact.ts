@@ -68,24 +68,55 @@ export interface Cut {
   readonly decimation: number;
 }
 
-/** An array of part of a frame, (..., rows, columns), as one of all of its pixels: left out ones like the next above and left, none outside of the region. */
-export function whole(data: Numbers, shape: readonly number[], { region: [x0, y0, columns, rows], decimation }: Cut, width: number, height: number): Numbers {
+/** Whether an array that is cut so has this pixel. */
+export function has({ region: [x0, y0, columns, rows], decimation }: Cut, x: number, y: number): boolean {
+  const [column, row] = [x - x0, y - y0];
+  return column >= 0 && column < columns && row >= 0 && row < rows && column % decimation === 0 && row % decimation === 0;
+}
+
+/** Values of a map as it is drawn: a pixel that was left out like the next one above and left. */
+export function spread(values: Numbers, { region: [x0, y0, columns, rows], decimation }: Cut, width: number): Numbers {
+  if (decimation === 1) return values;
+  const drawn = values.slice();
+  for (let y = 0; y < rows; y++) {
+    const to = (y0 + y) * width + x0;
+    const from = to - (y % decimation) * width;
+    for (let x = 0; x < columns; x++) drawn[to + x] = values[from + x - (x % decimation)];
+  }
+  return drawn;
+}
+
+/**
+ * An array of part of a frame, (..., rows, columns), as one of all of its pixels.
+ *
+ * One that was left out has no value in a map; planes of coefficients and flags, which are drawn, have that of the next
+ * one above and left. Outside of the region there are none.
+ */
+export function whole(
+  data: Numbers,
+  shape: readonly number[],
+  { region: [x0, y0, columns, rows], decimation }: Cut,
+  width: number,
+  height: number,
+): Numbers {
   const [cutRows, cutColumns] = shape.slice(-2);
   const planes = data.length / (cutRows * cutColumns);
   const made = data.constructor as new (length: number) => Numbers;
   const all = new made(planes * width * height);
-  const covered = columns === width && rows === height;
-  if (!covered && (all instanceof Float32Array || all instanceof Float64Array)) all.fill(NaN);
+  const real = all instanceof Float32Array || all instanceof Float64Array;
+  const gaps = real && shape.length === 2;
+  if (real && (gaps || columns < width || rows < height)) all.fill(NaN);
   const column = Uint16Array.from({ length: columns }, (_, x) => Math.floor(x / decimation));
   for (let plane = 0; plane < planes; plane++) {
     for (let y = 0; y < rows; y++) {
       const to = (plane * height + y0 + y) * width + x0;
       if (y % decimation > 0) {
-        all.copyWithin(to, to - width, to - width + columns);
+        if (!gaps) all.copyWithin(to, to - width, to - width + columns);
         continue;
       }
       const from = (plane * cutRows + y / decimation) * cutColumns;
-      for (let x = 0; x < columns; x++) all[to + x] = data[from + column[x]];
+      const step = gaps ? decimation : 1;
+      for (let x = 0; x < columns; x += step) all[to + x] = data[from + column[x]];
     }
   }
   return all;

@@ -9,7 +9,18 @@ import { type Demand, DemandControl, EVERYTHING } from "./demand";
 import type { CameraDocument } from "./documents";
 import type { FluencyReport } from "./fluency";
 import { PaceControl } from "./pace";
-import { ANNOUNCING, decodeMessage, encodeAck, encodeSubscribe, type Hello, LEAST_PRODUCTS, ProtocolError, type ServerMessage, SUBPROTOCOL, type Subscription } from "./protocol";
+import {
+  ANNOUNCING,
+  decodeMessage,
+  encodeAck,
+  encodeSubscribe,
+  type Hello,
+  LEAST_PRODUCTS,
+  ProtocolError,
+  type ServerMessage,
+  SUBPROTOCOL,
+  type Subscription,
+} from "./protocol";
 
 /** What of a WebSocket is used. */
 export interface Socket {
@@ -151,6 +162,13 @@ export class StreamConnection {
     if (this.#adapts && this.#open && this.#pace.judge(report)) this.#askAnew();
   }
 
+  /** Light stands still, or something is measured: however slow pictures were, they are not what is waited for. */
+  rested(): void {
+    if (this.#pace.maxRate_hz === null) return;
+    this.#pace = new PaceControl();
+    this.#askAnew();
+  }
+
   /** Tries at once instead of waiting out the pause between attempts. */
   retryNow(): void {
     if (this.#socket !== null) return;
@@ -254,14 +272,20 @@ export class StreamConnection {
   #askAnew(): void {
     const pictures_hz = this.#pace.maxRate_hz === null ? null : this.#pace.before_hz;
     this.#link.limited = pictures_hz !== null;
-    this.#emit({ type: "demand", demand: this.#demand, carried_bytes_s: this.#link.demand === EVERYTHING ? null : this.#carried_bytes_s, pictures_hz });
+    this.#emit({
+      type: "demand",
+      demand: this.#demand,
+      carried_bytes_s: this.#link.demand === EVERYTHING ? null : this.#carried_bytes_s,
+      pictures_hz,
+    });
     if (this.#open) this.#subscribe();
   }
 
   /** What a message says of the link. */
   #weigh(message: ServerMessage, bytes: number): void {
     if (!this.#adapts) return;
-    if (message.type === "notice" && message.kind === "dropped") this.#link.dropped(message.channel, message.unacknowledged ?? message.count);
+    if (message.type === "notice" && message.kind === "dropped")
+      this.#link.dropped(message.channel, message.unacknowledged ?? message.count);
     if (message.type === "notice" && message.kind === "sequence-changed") this.#askForAll();
     if (message.type !== "frame") return;
     const { product, axes, array, meta } = message;

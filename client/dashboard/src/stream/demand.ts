@@ -147,7 +147,8 @@ export class DemandControl {
     }
     this.#quiet = 0;
     const taken = this.#frames / (this.#frames + lost);
-    const good = this.excused || taken >= (all ? TAKEN : TAKEN_OF_FEWER) || this.#waited_s < WAITING * span_s || carried_bytes_s > WIDE_BYTES_S;
+    const good =
+      this.excused || taken >= (all ? TAKEN : TAKEN_OF_FEWER) || this.#waited_s < WAITING * span_s || carried_bytes_s > WIDE_BYTES_S;
     this.#bad = good ? 0 : this.#bad + 1;
     if (good || (all && this.#bad < BAD_WINDOWS)) return false;
     if (this.#raised) this.#patience = Math.min(MOST_PATIENCE, 2 * this.#patience);
@@ -173,7 +174,8 @@ export class DemandControl {
     this.#quiet += 1;
     if (carried_bytes_s > BETTER * this.#capacity_bytes_s) [this.#capacity_bytes_s, this.#patience] = [carried_bytes_s, 1];
     const more = this.#more(RAISE * (this.#demand.maxRate_hz ?? 0));
-    const expected_bytes_s = more.maxRate_hz === null ? Infinity : (more.maxRate_hz * gainOf(this.#demand) * this.#bytes) / this.#frames / gainOf(more);
+    const expected_bytes_s =
+      more.maxRate_hz === null ? Infinity : (more.maxRate_hz * gainOf(this.#demand) * this.#bytes) / this.#frames / gainOf(more);
     if (expected_bytes_s > this.#capacity_bytes_s && this.#quiet < this.#patience) return false;
     this.#quiet = 0;
     this.#raised = true;
@@ -185,7 +187,8 @@ export class DemandControl {
     const { coded, part } = this.#demand;
     const larger_hz = rate_hz / (part ? PART_GAIN : CODED_GAIN);
     // Larger frames, where there are enough of them or all that there are.
-    if ((part || coded) && (larger_hz >= this.#enough_hz || rate_hz >= this.#camera_hz)) return { coded: part && coded, part: false, maxRate_hz: larger_hz };
+    if ((part || coded) && (larger_hz >= this.#enough_hz || rate_hz >= this.#camera_hz))
+      return { coded: part && coded, part: false, maxRate_hz: larger_hz };
     return !coded && rate_hz > this.#camera_hz ? EVERYTHING : { coded, part, maxRate_hz: rate_hz };
   }
 }

@@ -43,7 +43,11 @@ export class Fluency {
     this.#pictures += 1;
     const span_s = now_s - this.#began_s;
     if (span_s < WINDOW_S) return null;
-    const report = { pictures_hz: this.#pictures / span_s, frames_hz: this.#frames / span_s, camera_hz: Math.max(this.#frames, this.#newest - this.#oldest) / span_s };
+    const report = {
+      pictures_hz: this.#pictures / span_s,
+      frames_hz: this.#frames / span_s,
+      camera_hz: Math.max(this.#frames, this.#newest - this.#oldest) / span_s,
+    };
     this.#begin(now_s);
     return report;
   }

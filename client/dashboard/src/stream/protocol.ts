@@ -161,7 +161,11 @@ export interface Subscription {
 }
 
 /** The first message of a client, and every later change of its subscription: frames from the next one on. */
-export function encodeSubscribe(subscriptions: readonly Subscription[], credits: number, token: string | null = null): Uint8Array<ArrayBuffer> {
+export function encodeSubscribe(
+  subscriptions: readonly Subscription[],
+  credits: number,
+  token: string | null = null,
+): Uint8Array<ArrayBuffer> {
   return encode({ type: "subscribe", v: 1, token, subscriptions, credits, start: null }) as Uint8Array<ArrayBuffer>;
 }
 

@@ -17,6 +17,7 @@ export type Command =
   | { readonly type: "look"; readonly sight: readonly number[] | null }
   | { readonly type: "acknowledge"; readonly frame: number }
   | ({ readonly type: "moved" } & FluencyReport)
+  | { readonly type: "rested" }
   | { readonly type: "retry" }
   | { readonly type: "bring"; readonly ticket: number; readonly path: string; readonly products: readonly string[] };
 
@@ -131,6 +132,9 @@ scope.onmessage = ({ data: command }) => {
       break;
     case "moved":
       connection?.moved(command);
+      break;
+    case "rested":
+      connection?.rested();
       break;
     case "bring":
       void bring(command.ticket, command.path, command.products);

@@ -44,7 +44,9 @@ export function onBar(scale: Scale, value: number): number {
 export function drawn(scale: Scale, end: keyof Span, place: number): Span {
   const share = place * LENGTH - MARGIN;
   const { low, high } = { low: valueAt(scale, 0), high: scale.high };
-  return end === "low" ? { low: valueAt(scale, Math.min(1 - NEAREST, share)), high } : { low, high: valueAt(scale, Math.max(NEAREST, share)) };
+  return end === "low"
+    ? { low: valueAt(scale, Math.min(1 - NEAREST, share)), high }
+    : { low, high: valueAt(scale, Math.max(NEAREST, share)) };
 }
 
 /** The colour scale of a picture: its numbers, how often each value occurs, and handles at both ends. */
@@ -78,7 +80,11 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
       aria-label={`Colour scale from ${write(scale.low)} to ${withUnit(write(scale.high), unit)}`}
     >
       <p class="colour-bar-unit">{unit === "1" ? "" : unit}</p>
-      <div class="colour-bar-body" title={onLimit === undefined ? undefined : "Drag the handles; double click lets the ends follow the data"} onDblClick={() => onLimit?.(null)}>
+      <div
+        class="colour-bar-body"
+        title={onLimit === undefined ? undefined : "Drag the handles; double click lets the ends follow the data"}
+        onDblClick={() => onLimit?.(null)}
+      >
         <canvas ref={canvas} width={COLOURS_PX + (values === undefined ? 0 : HISTOGRAM_PX)} height={ROWS} aria-hidden="true" />
         {numbers.map((value) => (
           <span key={value} class="colour-bar-tick" style={{ bottom: `${100 * onBar(base, value)}%` }}>
@@ -140,7 +146,13 @@ function Handle({ end, base, scale, text, unit, held, onLimit }: HandleProps) {
 }
 
 /** Colours at the left, those beyond the scale only where there are values that may lie there; at the right how often each value occurs; both from the foot upwards. */
-function paintBar(context: CanvasRenderingContext2D, base: Scale, scale: Scale, colours: ColourMapName, values: ArrayLike<number> | null): void {
+function paintBar(
+  context: CanvasRenderingContext2D,
+  base: Scale,
+  scale: Scale,
+  colours: ColourMapName,
+  values: ArrayLike<number> | null,
+): void {
   const table = colourTable(colours);
   const { under, over } = beyond(colours);
   const { width, height } = context.canvas;
@@ -148,7 +160,12 @@ function paintBar(context: CanvasRenderingContext2D, base: Scale, scale: Scale, 
   for (let row = 0; row < height; row++) {
     const place = fraction(scale, valueAt(base, (1 - (row + 0.5) / height) * LENGTH - MARGIN));
     const level = 4 * Math.min(LEVELS - 1, levelOf(place));
-    context.fillStyle = values !== null && place < 0 ? css(under) : values !== null && place > 1 ? css(over) : `rgb(${table[level]} ${table[level + 1]} ${table[level + 2]})`;
+    context.fillStyle =
+      values !== null && place < 0
+        ? css(under)
+        : values !== null && place > 1
+          ? css(over)
+          : `rgb(${table[level]} ${table[level + 1]} ${table[level + 2]})`;
     context.fillRect(0, row, COLOURS_PX, 1);
   }
   if (values === null) return;

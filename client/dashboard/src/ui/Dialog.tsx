@@ -1,6 +1,7 @@
 import type { Signal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
+import { LightOffButton } from "./LightOffButton";
 import "./Dialog.css";
 
 interface DialogProps {
@@ -38,10 +39,13 @@ export function Dialog({ open, title, onClose, children }: DialogProps) {
       }}
     >
       {open && (
-        <div class="dialog-inside">
-          <h2>{title}</h2>
-          {children}
-        </div>
+        <>
+          <div class="dialog-inside">
+            <h2>{title}</h2>
+            {children}
+          </div>
+          <LightOffButton />
+        </>
       )}
     </dialog>
   );

@@ -55,11 +55,18 @@ function RegionMark({ width, height }: SizeProps) {
   const region = measures.region.value;
   if (region === null) return null;
   const view = viewport.view.value;
-  if (region.corners !== undefined) return <PolygonMark corners={region.corners.map((corner) => seenAt(view, centreOf(corner, width, height)))} />;
-  const [from, to] = [seenAt(view, { x: region.x0 / width, y: region.y0 / height }), seenAt(view, { x: (region.x1 + 1) / width, y: (region.y1 + 1) / height })];
+  if (region.corners !== undefined)
+    return <PolygonMark corners={region.corners.map((corner) => seenAt(view, centreOf(corner, width, height)))} />;
+  const [from, to] = [
+    seenAt(view, { x: region.x0 / width, y: region.y0 / height }),
+    seenAt(view, { x: (region.x1 + 1) / width, y: (region.y1 + 1) / height }),
+  ];
   return (
     <div class="mark" aria-hidden="true">
-      <i class="mark-region" style={{ left: percent(from.x), top: percent(from.y), width: percent(to.x - from.x), height: percent(to.y - from.y) }} />
+      <i
+        class="mark-region"
+        style={{ left: percent(from.x), top: percent(from.y), width: percent(to.x - from.x), height: percent(to.y - from.y) }}
+      />
     </div>
   );
 }

@@ -20,7 +20,15 @@ export function PopoverButton({ face, label, title, kind, children }: PopoverBut
   const button = useRef<HTMLButtonElement>(null);
   return (
     <>
-      <button ref={button} type="button" class={`${kind}-button`} aria-label={label} title={title} aria-haspopup="dialog" popovertarget={id}>
+      <button
+        ref={button}
+        type="button"
+        class={`${kind}-button`}
+        aria-label={label}
+        title={title}
+        aria-haspopup="dialog"
+        popovertarget={id}
+      >
         {face}
       </button>
       <div

@@ -69,7 +69,12 @@ export function Stage({ width, height, label, children }: StageProps) {
 
   const onPointerDown = (event: PointerEvent): void => {
     if (event.button !== 0) return;
-    drag.current = { kind: event.shiftKey ? "region" : event.ctrlKey || event.metaKey ? "corner" : "pan", from: pixelAt(event), last: event, moved: false };
+    drag.current = {
+      kind: event.shiftKey ? "region" : event.ctrlKey || event.metaKey ? "corner" : "pan",
+      from: pixelAt(event),
+      last: event,
+      moved: false,
+    };
     picture.current?.setPointerCapture(event.pointerId);
   };
   const onPointerMove = (event: PointerEvent): void => {

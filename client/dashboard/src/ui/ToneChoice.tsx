@@ -7,5 +7,12 @@ const NAMES: Readonly<Record<ToneKind, string>> = { linear: "linear", root: "squ
 
 /** How the brightness of a picture grows with the density. */
 export function ToneChoice({ tone }: { tone: Signal<ToneKind> }) {
-  return <Choice label="Tone" value={tone.value} options={TONES.map((kind) => ({ value: kind, text: NAMES[kind] }))} onChange={(kind) => (tone.value = kind)} />;
+  return (
+    <Choice
+      label="Tone"
+      value={tone.value}
+      options={TONES.map((kind) => ({ value: kind, text: NAMES[kind] }))}
+      onChange={(kind) => (tone.value = kind)}
+    />
+  );
 }

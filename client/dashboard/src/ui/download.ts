@@ -1,5 +1,7 @@
 /** Files made in the page: what is on screen, as it is on screen. */
+import { type Api, LIVE, liveFrame, RequestError } from "../store/api";
 import type { Frame } from "../store/frames";
+import { frameUrl } from "../stream/frameUrl";
 
 /** Hands a file to the browser's downloads. */
 export function save(name: string, content: Blob): void {
@@ -18,10 +20,23 @@ export function savePicture(name: string, canvas: HTMLCanvasElement | null): voi
   }, "image/png");
 }
 
-/** The numbers of a frame as NPY. */
-export function saveNumbers(frame: Frame | null): void {
+/**
+ * The numbers of a frame as NPY, as the service has them: all pixels, not in codes.
+ *
+ * Of a map that the page measures itself, and of a frame that the service has no more, those of the page: NaN where a
+ * pixel was not sent.
+ */
+export async function saveNumbers(api: Api, frame: Frame | null): Promise<void> {
   if (frame === null) return;
-  save(`${frame.product}-${frame.meta.frame}.npy`, new Blob([npy(frame.values, frame.shape)]));
+  const { product, meta, origin, values, shape } = frame;
+  const name = `${product}-${meta.frame}.npy`;
+  const path = origin === LIVE ? liveFrame(meta.frame) : origin;
+  try {
+    save(name, await api.file(frameUrl(path, `${product}.npy`)));
+  } catch (error) {
+    if (!(error instanceof RequestError)) throw error;
+    save(name, new Blob([npy(values, shape)]));
+  }
 }
 
 const DESCRIPTIONS: readonly (readonly [new (length: number) => Frame["values"], string])[] = [

@@ -25,7 +25,13 @@ export async function saveFigure(name: string, canvas: HTMLCanvasElement | null,
   context.drawImage(await imageOf(svg), 0, 0, drawn.width, drawn.height);
   // The picture again, pixel by pixel: a browser may smooth what is within an SVG.
   context.imageSmoothingEnabled = false;
-  context.drawImage(canvas, PNG_SCALE * layout.left, PNG_SCALE * layout.top, PNG_SCALE * layout.pictureWidth, PNG_SCALE * layout.pictureHeight);
+  context.drawImage(
+    canvas,
+    PNG_SCALE * layout.left,
+    PNG_SCALE * layout.top,
+    PNG_SCALE * layout.pictureWidth,
+    PNG_SCALE * layout.pictureHeight,
+  );
   const content = await new Promise<Blob | null>((done) => drawn.toBlob(done, "image/png"));
   if (content !== null) save(`${name}.png`, content);
 }

@@ -12,9 +12,9 @@ export interface Flag {
 
 /** The gravest first: a pixel with several is shown by the first. */
 export const FLAGS: readonly Flag[] = [
-  { bit: 8, name: "non_finite", title: "Not finite", words: "a moment is not a number, or too large", colour: "#cc79a7" },
-  { bit: 2, name: "no_signal", title: "No signal", words: "no light came back", colour: "#1b2a6b" },
   { bit: 4, name: "saturated", title: "Saturated", words: "an image was at the end of its scale", colour: "#e69f00" },
+  { bit: 8, name: "non_finite", title: "Not finite", words: "a moment is not a number, or too large", colour: "#cc79a7" },
+  { bit: 2, name: "no_signal", title: "No signal", words: "no light above the noise came back", colour: "#1b2a6b" },
   {
     bit: 64,
     name: "contradictory",
@@ -22,9 +22,21 @@ export const FLAGS: readonly Flag[] = [
     words: "something is wrong: the moments contradict each other by more than noise explains, as after drift or where something moved",
     colour: "#d55e00",
   },
-  { bit: 128, name: "unexplained", title: "Unexplained", words: "the returns found do not explain the moments: the range may be biased", colour: "#56b4e9" },
+  {
+    bit: 128,
+    name: "unexplained",
+    title: "Unexplained",
+    words: "the returns found do not explain the moments: the range may be biased",
+    colour: "#56b4e9",
+  },
   { bit: 32, name: "replaced", title: "Replaced", words: "a bad pixel that shows the mean of its neighbours", colour: "#f0e442" },
-  { bit: 16, name: "degenerate", title: "Degenerate", words: "the moments do not determine a density, or another range fits nearly as well", colour: "#009e73" },
+  {
+    bit: 16,
+    name: "degenerate",
+    title: "Degenerate",
+    words: "the moments do not determine a density, or another range fits nearly as well",
+    colour: "#009e73",
+  },
   {
     bit: 1,
     name: "biased",

@@ -38,8 +38,18 @@ function panelNow(): string | null {
 /** All keys of the page, in the order they are listed. */
 export const SHORTCUTS: readonly Shortcut[] = [
   { keys: [" "], shown: "Space", words: "play or pause the light", run: ({ player }) => player.toggle() },
-  { keys: ["ArrowLeft"], shown: "←", words: "back by 0.1 ns, with Shift by 1 ns", run: (store, { shiftKey }) => scrub(store, shiftKey ? -LONG_STEP_S : -STEP_S) },
-  { keys: ["ArrowRight"], shown: "→", words: "on by 0.1 ns, with Shift by 1 ns", run: (store, { shiftKey }) => scrub(store, shiftKey ? LONG_STEP_S : STEP_S) },
+  {
+    keys: ["ArrowLeft"],
+    shown: "←",
+    words: "back by 0.1 ns, with Shift by 1 ns",
+    run: (store, { shiftKey }) => scrub(store, shiftKey ? -LONG_STEP_S : -STEP_S),
+  },
+  {
+    keys: ["ArrowRight"],
+    shown: "→",
+    words: "on by 0.1 ns, with Shift by 1 ns",
+    run: (store, { shiftKey }) => scrub(store, shiftKey ? LONG_STEP_S : STEP_S),
+  },
   { keys: ["Home"], shown: "Home", words: "to the start of the flight", run: ({ player }) => player.seek(0) },
   { keys: ["n"], shown: "N", words: "to the next arrival of light", run: ({ player }) => player.jump(true) },
   { keys: ["b"], shown: "B", words: "to the arrival before", run: ({ player }) => player.jump(false) },
@@ -55,7 +65,13 @@ export const SHORTCUTS: readonly Shortcut[] = [
   { keys: ["p"], shown: "P", words: "play or pause the recording that is shown", run: ({ replay }) => replay.toggle() },
   { keys: ["["], shown: "[", words: "one frame back in the recording", run: ({ replay }) => replay.step(-1) },
   { keys: ["]"], shown: "]", words: "one frame on in the recording", run: ({ replay }) => replay.step(1) },
-  { keys: ["f"], shown: "F", words: "show the panel under the pointer alone, or all again", run: ({ alone }) => (alone.value = alone.peek() === null ? panelNow() : null) },
+  { keys: ["x"], shown: "X", words: "switch the light off, whoever controls the camera", run: ({ lightOff }) => lightOff.press() },
+  {
+    keys: ["f"],
+    shown: "F",
+    words: "show the panel under the pointer alone, or all again",
+    run: ({ alone }) => (alone.value = alone.peek() === null ? panelNow() : null),
+  },
   { keys: ["l"], shown: "L", words: "the next layout", run: (store) => nextLayout(store) },
   { keys: ["z"], shown: "Z", words: "undo the last change of the layout", withControl: true, run: ({ layouts }) => layouts.undo() },
   { keys: ["k"], shown: "K", words: "all commands, to be searched", withControl: true, run: ({ palette }) => (palette.value = true) },

@@ -21,7 +21,13 @@ export function Arrangement() {
     <main class="views" data-alone={alone !== null} style={{ "--aspect": aspect }}>
       {rows.map((row, at) => (
         <Fragment key={at}>
-          {at > 0 && <Splitter kind="rows" place={rows[at - 1].share / (rows[at - 1].share + row.share)} onMove={(place) => change(split(rows, at - 1, place))} />}
+          {at > 0 && (
+            <Splitter
+              kind="rows"
+              place={rows[at - 1].share / (rows[at - 1].share + row.share)}
+              onMove={(place) => change(split(rows, at - 1, place))}
+            />
+          )}
           <RowOfViews row={row} onChange={(made) => change(rows.map((each, n) => (n === at ? made : each)))} />
         </Fragment>
       ))}
@@ -48,7 +54,10 @@ function RowOfViews({ row, onChange }: { row: Row; onChange: (row: Row) => void 
             />
           )}
           {isStack(place) ? (
-            <StackOfViews stack={place} onChange={(made) => onChange({ ...row, slots: row.slots.map((each, n) => (n === at ? made : each)) })} />
+            <StackOfViews
+              stack={place}
+              onChange={(made) => onChange({ ...row, slots: row.slots.map((each, n) => (n === at ? made : each)) })}
+            />
           ) : (
             <Place {...place} />
           )}
@@ -65,7 +74,11 @@ function StackOfViews({ stack, onChange }: { stack: Stack; onChange: (stack: Sta
       {slots.map((slot, at) => (
         <Fragment key={slot.view}>
           {at > 0 && (
-            <Splitter kind="rows" place={slots[at - 1].share / (slots[at - 1].share + slot.share)} onMove={(share) => onChange({ ...stack, slots: split(slots, at - 1, share) })} />
+            <Splitter
+              kind="rows"
+              place={slots[at - 1].share / (slots[at - 1].share + slot.share)}
+              onMove={(share) => onChange({ ...stack, slots: split(slots, at - 1, share) })}
+            />
           )}
           <Place {...slot} />
         </Fragment>
@@ -96,12 +109,27 @@ function Place({ view, share }: Slot) {
         run: store.alone.value === null ? set(replaced(layout, view, name)) : () => (store.alone.value = name),
       })),
     },
-    { title: "Add to the right", actions: room((name) => beside(layout, view, name)).map(({ name, title }) => ({ text: `${title} →`, run: set(beside(layout, view, name)) })) },
-    { title: "Add below", actions: room((name) => below(layout, view, name)).map(({ name, title }) => ({ text: `${title} ↓`, run: set(below(layout, view, name)) })) },
+    {
+      title: "Add to the right",
+      actions: room((name) => beside(layout, view, name)).map(({ name, title }) => ({
+        text: `${title} →`,
+        run: set(beside(layout, view, name)),
+      })),
+    },
+    {
+      title: "Add below",
+      actions: room((name) => below(layout, view, name)).map(({ name, title }) => ({
+        text: `${title} ↓`,
+        run: set(below(layout, view, name)),
+      })),
+    },
     {
       title: "Panel",
       actions: [
-        { text: store.alone.value === view ? "Show all panels" : "Show alone", run: () => (store.alone.value = store.alone.peek() === view ? null : view) },
+        {
+          text: store.alone.value === view ? "Show all panels" : "Show alone",
+          run: () => (store.alone.value = store.alone.peek() === view ? null : view),
+        },
         ...(viewsOf(layout).length > 1 ? [{ text: "Close", run: set(closed(layout, view)) }] : []),
       ],
     },
@@ -121,7 +149,9 @@ function Place({ view, share }: Slot) {
         set(replaced(layout, view, dragged))();
       }}
     >
-      <SlotContext.Provider value={groups}>{obstacle === undefined ? <View /> : <AbsentView name={view} title={shown.title} reason={obstacle} />}</SlotContext.Provider>
+      <SlotContext.Provider value={groups}>
+        {obstacle === undefined ? <View /> : <AbsentView name={view} title={shown.title} reason={obstacle} />}
+      </SlotContext.Provider>
     </div>
   );
 }
@@ -144,11 +174,17 @@ function Splitter({ kind, place, onMove }: { kind: "rows" | "columns"; place: nu
   const bar = useRef<HTMLDivElement>(null);
   const across = kind === "columns";
   const placeOf = (event: PointerEvent): number => {
-    const [before, after] = [bar.current?.previousElementSibling, bar.current?.nextElementSibling].map((each) => each?.getBoundingClientRect());
+    const [before, after] = [bar.current?.previousElementSibling, bar.current?.nextElementSibling].map((each) =>
+      each?.getBoundingClientRect(),
+    );
     if (before === undefined || after === undefined) return place;
-    return across ? (event.clientX - before.left) / (after.right - before.left) : (event.clientY - before.top) / (after.bottom - before.top);
+    return across
+      ? (event.clientX - before.left) / (after.right - before.left)
+      : (event.clientY - before.top) / (after.bottom - before.top);
   };
-  const keys: Readonly<Record<string, number | undefined>> = across ? { ArrowLeft: -KEY_STEP, ArrowRight: KEY_STEP } : { ArrowUp: -KEY_STEP, ArrowDown: KEY_STEP };
+  const keys: Readonly<Record<string, number | undefined>> = across
+    ? { ArrowLeft: -KEY_STEP, ArrowRight: KEY_STEP }
+    : { ArrowUp: -KEY_STEP, ArrowDown: KEY_STEP };
   return (
     <div
       ref={bar}

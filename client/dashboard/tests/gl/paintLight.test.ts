@@ -32,7 +32,9 @@ describe("painted light", () => {
       painter.paint(LIGHT, { phase_rad: PHASE_RAD, tone: { kind, white }, colours: "inferno", backdrop }, new Uint32Array(rgba.buffer));
       for (let pixel = 0; pixel < PIXELS; pixel++) {
         expect(rgba[4 * pixel + 3]).toBe(255);
-        expected(pixel, white, kind, backdrop).forEach((value, channel) => expect(Math.abs(rgba[4 * pixel + channel] - value)).toBeLessThan(0.51));
+        expected(pixel, white, kind, backdrop).forEach((value, channel) =>
+          expect(Math.abs(rgba[4 * pixel + channel] - value)).toBeLessThan(0.51),
+        );
       }
     }
   });

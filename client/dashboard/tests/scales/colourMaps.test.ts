@@ -54,4 +54,5 @@ test("viridis has the colours it is known by", () => {
   expect([...table.slice(4 * 255, 4 * 255 + 3)]).toEqual([253, 231, 37]);
 });
 
-test("a place on the scale finds its colour, and one beyond the ends the last", () => expect([-1, 0, 0.5, 0.999, 1, 7].map(levelOf)).toEqual([0, 0, 128, 255, 255, 255]));
+test("a place on the scale finds its colour, and one beyond the ends the last", () =>
+  expect([-1, 0, 0.5, 0.999, 1, 7].map(levelOf)).toEqual([0, 0, 128, 255, 255, 255]));

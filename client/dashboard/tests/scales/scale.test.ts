@@ -6,7 +6,8 @@ const linear: Scale = { low: 2, high: 6, kind: "linear" };
 const logarithmic: Scale = { low: 1, high: 1000, kind: "logarithmic" };
 
 describe("a place on a scale", () => {
-  test("goes evenly between the ends of a linear scale", () => expect([2, 3, 6, 8].map((value) => fraction(linear, value))).toEqual([0, 0.25, 1, 1.5]));
+  test("goes evenly between the ends of a linear scale", () =>
+    expect([2, 3, 6, 8].map((value) => fraction(linear, value))).toEqual([0, 0.25, 1, 1.5]));
 
   test("goes by factors on a logarithmic one", () => {
     expect(fraction(logarithmic, 10)).toBeCloseTo(1 / 3);
@@ -19,9 +20,12 @@ describe("a place on a scale", () => {
     expect(fraction(logarithmic, NaN)).toBeNaN();
   });
 
-  test.each([linear, logarithmic, { low: 1, high: 9, kind: "root" } as const, { low: 0, high: 50, kind: "logarithmic" } as const])("leads back to its value on %o", (scale) => {
-    for (const place of [0, 0.2, 0.7, 1]) expect(fraction(scale, valueAt(scale, place))).toBeCloseTo(place, 9);
-  });
+  test.each([linear, logarithmic, { low: 1, high: 9, kind: "root" } as const, { low: 0, high: 50, kind: "logarithmic" } as const])(
+    "leads back to its value on %o",
+    (scale) => {
+      for (const place of [0, 0.2, 0.7, 1]) expect(fraction(scale, valueAt(scale, place))).toBeCloseTo(place, 9);
+    },
+  );
 });
 
 describe("ticks", () => {
@@ -37,7 +41,8 @@ describe("ticks", () => {
     expect(ticks({ low: 1, high: 50, kind: "logarithmic" }, 6)).toEqual([1, 2, 5, 10, 20, 50]);
   });
 
-  test("of a logarithmic scale within one decade are still some", () => expect(ticks({ low: 1.4, high: 3, kind: "logarithmic" }, 6)).toEqual([1.5, 2, 2.5, 3]));
+  test("of a logarithmic scale within one decade are still some", () =>
+    expect(ticks({ low: 1.4, high: 3, kind: "logarithmic" }, 6)).toEqual([1.5, 2, 2.5, 3]));
 
   test("of an empty scale are none", () => expect(ticks({ low: 1, high: 1, kind: "linear" }, 6)).toEqual([]));
 });

@@ -18,7 +18,8 @@ test("the logarithmic tone shows three decades", () => {
 
 test("the shader knows the tones by their order", () => expect(TONES.map(toneIndex)).toEqual([0, 1, 2]));
 
-test("light adds nothing to the scene where there is none, and its full colour where it is bright", () => expect([strength(0), strength(1)]).toEqual([0, 1]));
+test("light adds nothing to the scene where there is none, and its full colour where it is bright", () =>
+  expect([strength(0), strength(1)]).toEqual([0, 1]));
 
 test("a scene that was not measured is black", () => {
   expect([NaN, -1, 0].map(backdropGrey)).toEqual([0, 0, 0]);

@@ -59,7 +59,11 @@ test.each([
   ["scene", true, "Measured on a scene, not a diffuser: It is used, as it was forced."],
 ])("a measurement on what is no diffuser is no success (%s, activated: %s)", async (verdict, activated, words) => {
   await calibrations.measure({ name: "", frames: 40, activate: true });
-  answers.push(job("done", { result: { bad_pixels: 0, rejected_images: 0, activated, verdict: { verdict, reason: "…", block_px: 8, blocks: ["#"] } } }));
+  answers.push(
+    job("done", {
+      result: { bad_pixels: 0, rejected_images: 0, activated, verdict: { verdict, reason: "…", block_px: 8, blocks: ["#"] } },
+    }),
+  );
   await vi.advanceTimersByTimeAsync(500);
   expect(calibrations.outcome.value).toEqual({ good: false, words });
 });

@@ -20,7 +20,9 @@ test.each([
 
 test("a caller that is refused from now on is forgotten", async () => {
   let refused = false;
-  const caller = answering(() => (refused ? Response.json({ type: "/problems/token-refused", status: 401 }, { status: 401 }) : known("viewer")));
+  const caller = answering(() =>
+    refused ? Response.json({ type: "/problems/token-refused", status: 401 }, { status: 401 }) : known("viewer"),
+  );
   await caller.look();
   refused = true;
   await caller.look();

@@ -31,7 +31,12 @@ class Page {
     shelf: null,
     api: new Api(() => Promise.resolve(new Response(JSON.stringify({ ...CAMERA, absent_products: this.absent })))),
   });
-  readonly client = new StreamClient(this.store, this.worker, new AnimationLoop((callback) => this.#requested.push(callback)), () => this.now_s);
+  readonly client = new StreamClient(
+    this.store,
+    this.worker,
+    new AnimationLoop((callback) => this.#requested.push(callback)),
+    () => this.now_s,
+  );
   now_s = 1000;
 
   receives(...reports: Report[]): void {
@@ -107,6 +112,32 @@ describe("between worker and store", () => {
     expect(page.acknowledged).toEqual([4]);
   });
 
+  test("a frame of which a part was sent is fetched whole when it is held", () => {
+    const report = frame("range", 4) as FrameReport;
+    const part = { width: 2, height: 1, region: [0, 0, 2, 1], decimation: 2 };
+    const thinned = { ...report.message, meta: { ...report.message.meta, ...part } } as unknown as FrameMessage;
+    page.receives(summarised(thinned));
+    page.refreshes();
+    page.store.held.value = true;
+    const asked = page.sent.filter((command) => command.type === "bring");
+    expect(asked).toEqual([{ type: "bring", ticket: 1, path: "/api/v1/frames/4", products: ["range"] }]);
+  });
+
+  test.each(["a pause", "a pin"])("%s ends the limits of a slow browser, and is told once", (what) => {
+    page.store.frames.claim(["coefficients"]);
+    page.store.player.playing.value = true;
+    page.receives({ ...frame("coefficients", 1), light: null } as Report);
+    page.refreshes();
+    page.sent.length = 0;
+    if (what === "a pause") page.store.player.playing.value = false;
+    else page.store.measures.pins.value = [{ name: "A", pixel: { x: 0, y: 0 } }] as never;
+    for (let n = 2; n < 5; n++) {
+      page.receives({ ...frame("coefficients", n), light: null } as Report);
+      page.refreshes();
+    }
+    expect(page.sent.filter(({ type }) => type === "rested")).toEqual([{ type: "rested" }]);
+  });
+
   describe("how fluently light moves", () => {
     const light = (number: number): Report => ({ ...frame("coefficients", number), light: null }) as Report;
     /** 3 s of 10 refreshes a second, a new frame at each second one. */
@@ -125,7 +156,12 @@ describe("between worker and store", () => {
     test("is counted while it plays, and while it is scrubbed", () => {
       page.store.player.playing.value = true;
       expect(watches()).toEqual([
-        { type: "moved", pictures_hz: expect.closeTo(10, 6) as number, frames_hz: expect.closeTo(5, 6) as number, camera_hz: expect.closeTo(10, 6) as number },
+        {
+          type: "moved",
+          pictures_hz: expect.closeTo(10, 6) as number,
+          frames_hz: expect.closeTo(5, 6) as number,
+          camera_hz: expect.closeTo(10, 6) as number,
+        },
       ]);
       page.store.player.playing.value = false;
       page.store.player.scrubbed.value = true;
@@ -239,13 +275,24 @@ describe("between worker and store", () => {
   test("notices become what happened", () => {
     page.receives({ type: "message", message: { type: "notice", kind: "lease-changed", change: "granted", holder: "bench 2" } });
     page.receives({ type: "message", message: { type: "notice", kind: "lost-images", count: 2, frame: 9 } });
-    expect(page.store.events.all.value.map(({ words }) => words)).toEqual(["bench 2 has taken control.", expect.stringMatching(/^2 images did not arrive intact/)]);
+    expect(page.store.events.all.value.map(({ words }) => words)).toEqual([
+      "bench 2 has taken control.",
+      expect.stringMatching(/^2 images did not arrive intact/),
+    ]);
   });
 
   test("a sequence that was set anew and is what it was is no news", () => {
     const sequence = { sequence_id: 1, harmonics: 4, base_frequency_hz: 23e6, exposure_s: 1e-3, images: 20 };
     const changed = (change: object): void =>
-      page.receives({ type: "message", message: { type: "notice", kind: "sequence-changed", channels: [], sequence: { ...sequence, ...change } as unknown as AppliedDocument } });
+      page.receives({
+        type: "message",
+        message: {
+          type: "notice",
+          kind: "sequence-changed",
+          channels: [],
+          sequence: { ...sequence, ...change } as unknown as AppliedDocument,
+        },
+      });
     changed({});
     changed({ sequence_id: 2 });
     expect(page.store.events.all.value).toHaveLength(1);

@@ -38,12 +38,16 @@ describe("what happened", () => {
   });
 
   test("to the calibration is said with its reason", () => {
-    expect(words({ kind: "calibration-changed", calibration_id: "nominal", reason: "It has 3 harmonics." })).toBe("Nominal gains are used from now on. It has 3 harmonics.");
+    expect(words({ kind: "calibration-changed", calibration_id: "nominal", reason: "It has 3 harmonics." })).toBe(
+      "Nominal gains are used from now on. It has 3 harmonics.",
+    );
     expect(words({ kind: "calibration-changed", calibration_id: "c1", reason: null })).toContain("c1");
   });
 
   test("to a recording is said with why it ended", () =>
-    expect(words({ kind: "recording-stopped", recording: "r", reason: "disk-space", problem: null })).toBe("The recording ended because the disk is nearly full."));
+    expect(words({ kind: "recording-stopped", recording: "r", reason: "disk-space", problem: null })).toBe(
+      "The recording ended because the disk is nearly full.",
+    ));
 
   test("is not said of drops, which have their figure, nor of kinds this page does not know", () => {
     expect(words({ kind: "dropped", channel: 0, count: 1, total: 1 })).toBeUndefined();

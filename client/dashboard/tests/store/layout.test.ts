@@ -23,7 +23,8 @@ describe("a layout", () => {
     }
   });
 
-  test("changes two views' places where one takes the other's", () => expect(viewsOf(replaced(OVERVIEW, "map", "sequence"))).toEqual(["transient", "sequence", "response", "map"]));
+  test("changes two views' places where one takes the other's", () =>
+    expect(viewsOf(replaced(OVERVIEW, "map", "sequence"))).toEqual(["transient", "sequence", "response", "map"]));
 
   test("shows another view where one stood", () => {
     const two = closed(closed(OVERVIEW, "sequence"), "response");

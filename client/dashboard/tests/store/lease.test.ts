@@ -43,7 +43,12 @@ class Desk {
     return Response.json(
       held === null
         ? { held: false, holder: null, expires_in_s: null }
-        : { held: true, holder: held.holder, expires_in_s: held.expires_s - this.now_s, ...(method === "GET" ? {} : { lease_id: held.id }) },
+        : {
+            held: true,
+            holder: held.holder,
+            expires_in_s: held.expires_s - this.now_s,
+            ...(method === "GET" ? {} : { lease_id: held.id }),
+          },
     );
   }
 

@@ -23,7 +23,8 @@ describe("pins", () => {
 });
 
 describe("a region", () => {
-  test("lies between its corners, whichever was first", () => expect(regionOf({ x: 5, y: 1 }, { x: 2, y: 8 })).toEqual({ x0: 2, y0: 1, x1: 5, y1: 8 }));
+  test("lies between its corners, whichever was first", () =>
+    expect(regionOf({ x: 5, y: 1 }, { x: 2, y: 8 })).toEqual({ x0: 2, y0: 1, x1: 5, y1: 8 }));
 
   test("has mean, deviation and count of the pixels that have a value", () => {
     // 4 x 3; the region is the 2 x 2 in its middle, one pixel without a value
@@ -49,7 +50,11 @@ describe("a region", () => {
       if (region === null) throw new Error("there are corners");
       expect(region).toMatchObject({ x0: 0, y0: 0, x1: 8, y1: 7 });
       expect(drawn.map((row, y) => [...row].map((_, x) => (holds(region, x, y) ? "#" : ".")).join(""))).toEqual(drawn);
-      expect(figuresOf(new Float32Array(9 * 8).fill(5), 9, 8, region)).toMatchObject({ mean: 5, std: 0, count: drawn.join("").split("#").length - 1 });
+      expect(figuresOf(new Float32Array(9 * 8).fill(5), 9, 8, region)).toMatchObject({
+        mean: 5,
+        std: 0,
+        count: drawn.join("").split("#").length - 1,
+      });
     }
   });
 

@@ -4,7 +4,12 @@ import { type Frame, Frames } from "../../src/store/frames";
 import { FEWEST, Noise, Noises, WINDOW } from "../../src/store/noise";
 
 const frame = (values: readonly number[], sequence_id = 1, origin = "/frames/latest"): Frame =>
-  ({ values: Float32Array.from(values), shape: [1, values.length], meta: { sequence_id, calibration_id: "nominal" }, origin }) as unknown as Frame;
+  ({
+    values: Float32Array.from(values),
+    shape: [1, values.length],
+    meta: { sequence_id, calibration_id: "nominal" },
+    origin,
+  }) as unknown as Frame;
 
 /** Numbers of a generator, so that every run has the same (Park and Miller). */
 function* numbers(seed: number): Generator<number, never> {

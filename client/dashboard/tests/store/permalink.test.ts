@@ -141,10 +141,31 @@ describe("a copied link", () => {
 });
 
 test.each([
-  ...["#side=secret", "#light=gate,neon,root,0,scene", "#light=gate,grey,root,x,scene", "#pins=D1,2/A1", "#region=1,2", "#sight=0.5,0,0", "#sight=4,x,0"],
+  ...[
+    "#side=secret",
+    "#light=gate,neon,root,0,scene",
+    "#light=gate,grey,root,x,scene",
+    "#pins=D1,2/A1",
+    "#region=1,2",
+    "#sight=0.5,0,0",
+    "#sight=4,x,0",
+  ],
   ...["#layout=1:secret.1", "#layout=:,/", "#layout=1:map.-1", "#layout=1:map.1,1_map.1", "#layout=1:1_"],
   ...["#look=range,neon,linear", "#look=range,viridis,linear,3,1", "#look=secret,viridis,linear", "#look=,"],
-  ...["#map=gone", "#pixel=1", "#pixel=-1,2", "#pixel=1,2,3", "#time_ns=1e999", "#time_ns=x", "#time_ns=-3", "#view=secret", "#recording=../../etc", "#frame=3", "#%%%", ""],
+  ...[
+    "#map=gone",
+    "#pixel=1",
+    "#pixel=-1,2",
+    "#pixel=1,2,3",
+    "#time_ns=1e999",
+    "#time_ns=x",
+    "#time_ns=-3",
+    "#view=secret",
+    "#recording=../../etc",
+    "#frame=3",
+    "#%%%",
+    "",
+  ],
 ])("an address that makes no sense says nothing: %s", async (hash) => {
   const { copied, opened } = page(hash);
   const { copied: plain } = page();

@@ -12,7 +12,12 @@ beforeEach(() => vi.useFakeTimers());
 afterEach(() => vi.useRealTimers());
 
 const meta = (sequence_id: number, range_error_m: number | null = null): FrameMeta =>
-  ({ sequence_id, frame: sequence_id, predicted_range_std_m: { median: 1e-3, p90: 2e-3 }, accuracy: range_error_m === null ? null : { range_error_m } }) as FrameMeta;
+  ({
+    sequence_id,
+    frame: sequence_id,
+    predicted_range_std_m: { median: 1e-3, p90: 2e-3 },
+    accuracy: range_error_m === null ? null : { range_error_m },
+  }) as FrameMeta;
 
 function bench(answer: () => FrameMeta) {
   const [status, replaying, requests] = [new Status(), signal(false), [] as string[]];

@@ -11,7 +11,15 @@ const TIMES = [0, 0.1, 0.2, 0.3, 1.4, 1.5]; // the camera was lost for a second
 
 function report(product: string, number: number): FrameReport {
   const array = { dtype: "<f4", shape: [1, 2], data: Float32Array.from([number, 2]) } as const;
-  return summarised({ type: "frame", product, unit: "m", axes: ["y", "x"], meta: { frame: number, base_frequency_hz: 23e6 }, encode_s: 0.001, array } as unknown as FrameMessage);
+  return summarised({
+    type: "frame",
+    product,
+    unit: "m",
+    axes: ["y", "x"],
+    meta: { frame: number, base_frequency_hz: 23e6 },
+    encode_s: 0.001,
+    array,
+  } as unknown as FrameMessage);
 }
 
 class Screen {
@@ -141,7 +149,9 @@ describe("a recording on the page", () => {
 
   test("of very many frames tells the time of some, and the others lie between", () => {
     screen.replay.timeline.value = { first: 1, last: 7, count: 7, started_s: 0, times_s: [0, 0.3, 0.9], step: 3 };
-    expect([1, 2, 4, 5, 6, 7].map((frame) => screen.replay.timeOf(frame))).toEqual([0, 0.1, 0.3, 0.5, 0.7, 0.9].map((time) => expect.closeTo(time, 9)));
+    expect([1, 2, 4, 5, 6, 7].map((frame) => screen.replay.timeOf(frame))).toEqual(
+      [0, 0.1, 0.3, 0.5, 0.7, 0.9].map((time) => expect.closeTo(time, 9)),
+    );
   });
 
   test("is left at once: a frame that is on its way does not come any more", async () => {

@@ -8,7 +8,8 @@ import type { AppliedDocument, ChoiceDocument } from "../../src/stream/documents
 
 const sequence = (harmonics: number, sequence_id: number): AppliedDocument =>
   ({ base_frequency_hz: 23e6, harmonics, exposure_s: 1e-3, images: 4 * harmonics, sequence_id }) as AppliedDocument;
-const choice = (harmonics: number, estimator: string): ChoiceDocument => ({ sequence: sequence(harmonics, 0), estimator }) as unknown as ChoiceDocument;
+const choice = (harmonics: number, estimator: string): ChoiceDocument =>
+  ({ sequence: sequence(harmonics, 0), estimator }) as unknown as ChoiceDocument;
 
 /** A service that sets what it is sent, unless it refuses. */
 function service() {
@@ -20,7 +21,8 @@ function service() {
       state.sets += 1;
       return Promise.resolve(sequence(harmonics, 1 + state.sets));
     },
-    reconstruction: () => Promise.resolve({ document: { reconstruction_id: 1, estimator: state.estimator, smoothing_px: state.smoothing_px }, tag: "t" }),
+    reconstruction: () =>
+      Promise.resolve({ document: { reconstruction_id: 1, estimator: state.estimator, smoothing_px: state.smoothing_px }, tag: "t" }),
     setReconstruction: (settings: { estimator: string; smoothing_px: number }, tag: string) => {
       expect(tag).toBe("t");
       expect(settings).not.toHaveProperty("reconstruction_id");

@@ -219,7 +219,13 @@ describe("settings", () => {
   test("stand in a copied link, and in the page's own address where that follows them", () => {
     const settings = new Settings(null);
     settings.of(TONE);
-    settings.of<number | null>({ link: "row", followed: true, initial: null, text: (row) => (row === null ? "" : String(row)), parse: Number }).value = 7;
+    settings.of<number | null>({
+      link: "row",
+      followed: true,
+      initial: null,
+      text: (row) => (row === null ? "" : String(row)),
+      parse: Number,
+    }).value = 7;
     expect([settings.hash(true), settings.hash(false)]).toEqual(["#tone=linear&row=7", "#row=7"]);
     expect(new Settings(null).hash(true)).toBe("");
   });
@@ -231,13 +237,15 @@ describe("settings", () => {
     settings.together("look", [TONE, GAIN, LIT]);
     settings.follow("#look=root,2.5,lit");
     expect([TONE, GAIN, LIT].map((each) => settings.of<unknown>(each).value)).toEqual(["root", 2.5, true]);
-    for (const wrong of ["linear,3", "linear,11,dark", "linear,,dark", "cubic,3,dark", "linear,3,dark,more"]) settings.follow(`#look=${wrong}`);
+    for (const wrong of ["linear,3", "linear,11,dark", "linear,,dark", "cubic,3,dark", "linear,3,dark,more"])
+      settings.follow(`#look=${wrong}`);
     expect(settings.hash(true)).toBe("#tone=root&look=root,2.5,lit");
   });
 });
 
 describe("requests", () => {
-  const answering = (body: string, status: number, type: string): Api => new Api(() => Promise.resolve(new Response(body, { status, headers: { "Content-Type": type } })));
+  const answering = (body: string, status: number, type: string): Api =>
+    new Api(() => Promise.resolve(new Response(body, { status, headers: { "Content-Type": type } })));
 
   test("a problem becomes its own words, and keeps the field it names", async () => {
     const problem = { title: "Invalid sequence", detail: "harmonics is 99, but must be from 1 to 32.", field: "harmonics" };
@@ -248,7 +256,8 @@ describe("requests", () => {
     expect((refusal as RequestError).problem).toMatchObject({ status: 422, field: "harmonics" });
   });
 
-  test("a proxy's page says at least its status", async () => await expect(answering("<html>", 502, "text/html").camera()).rejects.toThrow(/502/));
+  test("a proxy's page says at least its status", async () =>
+    await expect(answering("<html>", 502, "text/html").camera()).rejects.toThrow(/502/));
 
   test("a service that cannot be reached says that", async () => {
     const api = new Api(() => Promise.reject(new TypeError("Failed to fetch")));

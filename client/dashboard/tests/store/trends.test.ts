@@ -6,7 +6,8 @@ import { Status } from "../../src/store/status";
 import { KEPT_S, linesOf, type Sample, Trends } from "../../src/store/trends";
 import type { FrameMeta } from "../../src/stream/documents";
 
-const meta = (frame: number, host_time_s: number): FrameMeta => ({ frame, host_time_s, sequence_id: 1, accuracy: { range_error_m: 0.004 } }) as FrameMeta;
+const meta = (frame: number, host_time_s: number): FrameMeta =>
+  ({ frame, host_time_s, sequence_id: 1, accuracy: { range_error_m: 0.004 } }) as FrameMeta;
 
 function followed(): { status: Status; trends: Trends } {
   const status = new Status();

@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 
 import { pixelOf } from "../../src/physics/reflection";
-import { codesFor, decodeReflection16, whole } from "../../src/stream/compact";
+import { codesFor, decodeReflection16, has, spread, whole } from "../../src/stream/compact";
 
 /** Codes of u = (2 / pi) arcsin|g| g / |g|, as docs/stream.md has them. */
 function codesOf(reflection: readonly (readonly [number, number])[], at: number, area: number, codes: Uint16Array): void {
@@ -58,15 +58,21 @@ describe("coefficients in codes", () => {
 });
 
 describe("part of a picture", () => {
-  test("has each of its pixels in the place of those that were left out, also at the ends", () => {
+  test("gives planes that are drawn the pixel of those that were left out, also at the ends", () => {
     const codes = Float32Array.from([1, 2, 3, 4, 5, 6, 7, 8]); // two planes of 2 x 2
     const [one, other] = [
       [1, 1, 2, 1, 1, 2, 3, 3, 4],
       [5, 5, 6, 5, 5, 6, 7, 7, 8],
     ];
     expect([...whole(codes, [2, 2, 2], { region: [0, 0, 3, 3], decimation: 2 }, 3, 3)]).toEqual([...one, ...other]);
-    const within = [...whole(codes.slice(0, 4), [2, 2], { region: [1, 0, 3, 3], decimation: 2 }, 4, 4)];
-    expect(within.map((value) => (Number.isNaN(value) ? 0 : value))).toEqual([0, 1, 1, 2, 0, 1, 1, 2, 0, 3, 3, 4, 0, 0, 0, 0]);
+  });
+
+  test("gives a map no value where none was sent, and is drawn without gaps", () => {
+    const cut = { region: [1, 0, 3, 3], decimation: 2 } as const;
+    const map = whole(Float32Array.from([1, 2, 3, 4]), [2, 2], cut, 4, 4);
+    expect([...map]).toEqual([NaN, 1, NaN, 2, NaN, NaN, NaN, NaN, NaN, 3, NaN, 4, NaN, NaN, NaN, NaN]);
+    map.forEach((value, at) => expect(has(cut, at % 4, Math.floor(at / 4))).toBe(!Number.isNaN(value)));
+    expect([...spread(map, cut, 4)]).toEqual([NaN, 1, 1, 2, NaN, 1, 1, 2, NaN, 3, 3, 4, NaN, NaN, NaN, NaN]);
   });
 
   test("fills each plane; flags outside of it are none", () => {

@@ -144,7 +144,10 @@ describe("over a thin link", () => {
     world.socket.opens();
     await starves();
     expect(asked()).toMatchObject([{ product: "range", encoding: "u16", decimation: 2 }]);
-    expect(world.events.filter(({ type }) => type === "demand")).toMatchObject([{ demand: { coded: true, part: false } }, { demand: { coded: true, part: true } }]);
+    expect(world.events.filter(({ type }) => type === "demand")).toMatchObject([
+      { demand: { coded: true, part: false } },
+      { demand: { coded: true, part: true } },
+    ]);
     world.connection.look([3, 4, 50, 60]);
     expect(asked()).toMatchObject([{ encoding: "u16", region: [3, 4, 50, 60] }]);
     world.connection.adapt(false);
@@ -174,12 +177,26 @@ describe("with a slow browser", () => {
     world.socket.opens();
     stutters();
     expect(asked()).toEqual([{ product: "range", max_rate_hz: 8 }]);
-    expect(world.events.at(-1)).toEqual({ type: "demand", demand: { maxRate_hz: 8, coded: false, part: false }, carried_bytes_s: null, pictures_hz: 14.5 });
+    expect(world.events.at(-1)).toEqual({
+      type: "demand",
+      demand: { maxRate_hz: 8, coded: false, part: false },
+      carried_bytes_s: null,
+      pictures_hz: 14.5,
+    });
     world.connection.adapt(false);
     expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
     expect(world.events.at(-1)).toMatchObject({ type: "demand", demand: { maxRate_hz: null }, pictures_hz: null });
     stutters();
     expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+  });
+
+  test("asks for everything as soon as nothing moves", () => {
+    world.socket.opens();
+    for (let window = 0; window < 5; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: 1, camera_hz: 16 });
+    expect(asked()).toEqual([expect.objectContaining({ decimation: 2 })]);
+    world.connection.rested();
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+    expect(world.events.at(-1)).toMatchObject({ type: "demand", demand: { maxRate_hz: null, part: false } });
   });
 
   test("asks for more again where there is room, and for all of another sequence", () => {
@@ -210,7 +227,13 @@ describe("with a slow browser", () => {
     world.socket.opens();
     const late = async (frame: number, report: boolean): Promise<void> => {
       world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: 9, total: 9 });
-      world.socket.receives({ type: "frame", product: "range", axes: ["y", "x"], meta: { frame }, array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) } });
+      world.socket.receives({
+        type: "frame",
+        product: "range",
+        axes: ["y", "x"],
+        meta: { frame },
+        array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) },
+      });
       world.connection.acknowledge(frame);
       // slow, but from window to window not twice in a row
       if (report) world.connection.moved({ pictures_hz: 40, frames_hz: 1, camera_hz: 16 });
@@ -227,7 +250,13 @@ describe("with a slow browser", () => {
     world.socket.opens();
     for (let frame = 1; frame <= 5; frame++) {
       world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: 3, total: 3 });
-      world.socket.receives({ type: "frame", product: "range", axes: ["y", "x"], meta: { frame: 4 * frame }, array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) } });
+      world.socket.receives({
+        type: "frame",
+        product: "range",
+        axes: ["y", "x"],
+        meta: { frame: 4 * frame },
+        array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) },
+      });
       world.connection.acknowledge(4 * frame);
       await world.passes(1);
     }
@@ -235,7 +264,11 @@ describe("with a slow browser", () => {
     expect(linked_hz).toBeLessThan(2);
     for (let window = 0; window < 2; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: linked_hz, camera_hz: 16 });
     const event = world.events.at(-1);
-    expect(event).toMatchObject({ type: "demand", pictures_hz: 14.5, demand: { maxRate_hz: expect.closeTo(0.7 * linked_hz, 6) as number } });
+    expect(event).toMatchObject({
+      type: "demand",
+      pictures_hz: 14.5,
+      demand: { maxRate_hz: expect.closeTo(0.7 * linked_hz, 6) as number },
+    });
     expect(event).not.toMatchObject({ carried_bytes_s: null });
   });
 });
@@ -254,7 +287,8 @@ describe("of large frames", () => {
       array: { dtype: "|u1", shape: [1, 1], data: new Uint8Array(1) },
     });
   };
-  const frames = (): unknown[] => world.events.flatMap((event) => (event.type === "message" && event.message.type === "frame" ? [event.message.meta.frame] : []));
+  const frames = (): unknown[] =>
+    world.events.flatMap((event) => (event.type === "message" && event.message.type === "frame" ? [event.message.meta.frame] : []));
   const passed = (): Promise<void> => world.passes(0.01).then(() => new Promise((done) => setTimeout(done)));
 
   beforeEach(() => {

@@ -63,7 +63,8 @@ const TICK_S = 0.002;
 const CAMERA = { camera_hz: 10, frame_bytes: 1e6 };
 
 describe("what is asked for", () => {
-  test("is everything over a link that carries it", () => expect(new Stream().runs(60, { ...CAMERA, link_bytes_s: 20e6 })).toEqual(EVERYTHING));
+  test("is everything over a link that carries it", () =>
+    expect(new Stream().runs(60, { ...CAMERA, link_bytes_s: 20e6 })).toEqual(EVERYTHING));
 
   test("is fewer frames where enough of them remain, and not more than arrive", () => {
     const { coded, part, maxRate_hz } = new Stream().runs(20, { ...CAMERA, link_bytes_s: 7e6 });

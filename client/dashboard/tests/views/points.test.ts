@@ -85,7 +85,8 @@ describe("the distance of two pins", () => {
   test("has the deviation that small changes of the ranges give it", () => {
     const a = { x: 10, y: 70, range_m: 2.5, std_m: 0.01 };
     const b = { x: 90, y: 20, range_m: 4.1, std_m: 0.02 };
-    const apart = (da: number, db: number): number => distanceOf(lens, { ...a, range_m: a.range_m + da }, { ...b, range_m: b.range_m + db }).distance_m;
+    const apart = (da: number, db: number): number =>
+      distanceOf(lens, { ...a, range_m: a.range_m + da }, { ...b, range_m: b.range_m + db }).distance_m;
     const step = 1e-2;
     const byA = (apart(step, 0) - apart(-step, 0)) / (2 * step);
     const byB = (apart(0, step) - apart(0, -step)) / (2 * step);
@@ -97,7 +98,8 @@ describe("the room around a cloud", () => {
   /** A box of points: 3 m wide, floor 1.2 m below the camera, 2 to 5 m ahead. */
   const box = (noise = 0): Float32Array => {
     const points: number[] = [];
-    for (let n = 0; n < 1000; n++) points.push(-1.4 + (2.8 * (n % 10)) / 9, -1.2 + noise + (2 * (Math.floor(n / 10) % 10)) / 9, -2 - (2.9 * Math.floor(n / 100)) / 9);
+    for (let n = 0; n < 1000; n++)
+      points.push(-1.4 + (2.8 * (n % 10)) / 9, -1.2 + noise + (2 * (Math.floor(n / 10) % 10)) / 9, -2 - (2.9 * Math.floor(n / 100)) / 9);
     return Float32Array.from(points);
   };
 

@@ -27,19 +27,25 @@ const PARAMETERS = [
 
 describe("a form made of parameters", () => {
   test("untouched stands for what is set", () => {
-    expect(readingOf(PARAMETERS, draftOf(PARAMETERS))).toEqual({ settings: { smoothing_px: 0.6, estimator: "pisarenko", rounds: 3, careful: true } });
+    expect(readingOf(PARAMETERS, draftOf(PARAMETERS))).toEqual({
+      settings: { smoothing_px: 0.6, estimator: "pisarenko", rounds: 3, careful: true },
+    });
   });
 
   test("takes numbers and choices as they are typed", () => {
     const draft = { smoothing_px: " 1.5 ", estimator: "maximum-entropy", rounds: "4", careful: "false" };
-    expect(readingOf(PARAMETERS, draft)).toEqual({ settings: { smoothing_px: 1.5, estimator: "maximum-entropy", rounds: 4, careful: false } });
+    expect(readingOf(PARAMETERS, draft)).toEqual({
+      settings: { smoothing_px: 1.5, estimator: "maximum-entropy", rounds: 4, careful: false },
+    });
   });
 
   test.each([
     ["smoothing_px", "11", "Smoothing must be a number from 0 to 10\u202fpx."],
     ["smoothing_px", "", "Smoothing must be a number from 0 to 10\u202fpx."],
     ["rounds", "1.5", "Rounds must be an integer at least 1."],
-  ])("says what is wrong: %s = %s", (name, text, words) => expect(readingOf(PARAMETERS, { ...draftOf(PARAMETERS), [name]: text })).toEqual({ wrong: name, words }));
+  ])("says what is wrong: %s = %s", (name, text, words) =>
+    expect(readingOf(PARAMETERS, { ...draftOf(PARAMETERS), [name]: text })).toEqual({ wrong: name, words }),
+  );
 
   test("names and measures what it does not know, too", () => {
     expect(labelOf("inner_radius_px")).toBe("Inner radius");

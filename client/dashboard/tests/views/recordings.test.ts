@@ -43,6 +43,13 @@ describe("annotations as lines", () => {
 });
 
 test("durations and sizes are written as people do", () => {
-  expect([0, 4.24, 59.94, 59.96, 65, 3723].map(duration)).toEqual(["0.0\u202fs", "4.2\u202fs", "59.9\u202fs", "1:00\u202fmin", "1:05\u202fmin", "1:02:03\u202fh"]);
+  expect([0, 4.24, 59.94, 59.96, 65, 3723].map(duration)).toEqual([
+    "0.0\u202fs",
+    "4.2\u202fs",
+    "59.9\u202fs",
+    "1:00\u202fmin",
+    "1:05\u202fmin",
+    "1:02:03\u202fh",
+  ]);
   expect(bytes(114_873_344)).toBe("115\u202fMB");
 });

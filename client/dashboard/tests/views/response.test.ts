@@ -7,7 +7,8 @@ import { linesOf, ReturnHistory, sifted } from "../../src/views/response/returns
 import { stemsOf } from "../../src/views/response/stems";
 import { momentsOf, picture } from "../oracle";
 
-const look = (frame: number, flags: readonly string[], x = 4): PixelDocument => ({ x, y: 5, flags, meta: { frame, sequence_id: 1 } }) as unknown as PixelDocument;
+const look = (frame: number, flags: readonly string[], x = 4): PixelDocument =>
+  ({ x, y: 5, flags, meta: { frame, sequence_id: 1 } }) as unknown as PixelDocument;
 
 describe("flags of a pixel", () => {
   test("that come and go are shown by their share, and do not flicker", () => {
@@ -66,7 +67,8 @@ describe("returns beside the true ones", () => {
 
   test("scatter as they did in the looks before, of the same pixel", () => {
     const history = new ReturnHistory();
-    const taken = (frame: number, time_ns: number, x = 4): void => history.take({ ...look(frame, [], x), returns: [at(time_ns, 100 + frame), at(30)] });
+    const taken = (frame: number, time_ns: number, x = 4): void =>
+      history.take({ ...look(frame, [], x), returns: [at(time_ns, 100 + frame), at(30)] });
     for (const [frame, time_ns] of [9.9, 10.1, 9.9, 10.1].entries()) taken(frame, time_ns);
     expect(history.of(at(10)).time_s).toBeNaN();
     taken(4, 10);
@@ -117,12 +119,17 @@ describe("stems of returns", () => {
     for (let frame = 0; frame < 10; frame++) {
       history.take({ x: 1, y: 2, returns: [at(frame % 2 === 0 ? 10 : 11, 300), at(30, 100)], meta: { frame } } as unknown as PixelDocument);
     }
-    const { found, truth } = stemsOf({ returns: [at(10.5, 300), at(30, 100)] }, { kind: "paths", range_m: 1.5, direct: 100, brightness: 400, returns: [at(10, 100)] }, history);
+    const { found, truth } = stemsOf(
+      { returns: [at(10.5, 300), at(30, 100)] },
+      { kind: "paths", range_m: 1.5, direct: 100, brightness: 400, returns: [at(10, 100)] },
+      history,
+    );
     expect(found.map(({ share }) => share)).toEqual([0.75, 0.25]);
     expect(found[0].std_s).toBeCloseTo(Math.sqrt(10 / 9) * 0.5e-9, 15);
     expect(found[1].std_s).toBeCloseTo(0, 15);
     expect(truth).toEqual([{ time_s: 10e-9, std_s: NaN, share: 0.25 }]);
   });
 
-  test("of weak returns are left out, as in the table", () => expect(stemsOf({ returns: [at(10, 990), at(20, 10)] }, null, new ReturnHistory()).found).toHaveLength(1));
+  test("of weak returns are left out, as in the table", () =>
+    expect(stemsOf({ returns: [at(10, 990), at(20, 10)] }, null, new ReturnHistory()).found).toHaveLength(1));
 });

@@ -13,19 +13,29 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 _JPEG_QUALITY = 85
+_MOST_STEPS = 65535
 
 
 def png(frame: Frame) -> bytes:
-    """Return 16 bits a pixel: the steps of its product; 0 where there is no value."""
-    from PIL import Image  # 60 ms that the first frame need not wait for
+    """Return 16 bits a pixel: the steps of its product.
+
+    0 where there is no value, or one that has no steps from 1 to 65535. The unit of a step is also
+    in the file, as the header's is lost when it is saved.
+    """
+    from PIL import Image, PngImagePlugin  # 60 ms that the first frame need not wait for
 
     steps_of = PRODUCTS[frame.product].png_steps
     assert steps_of is not None  # noqa: S101 - `Encoding.fits` excludes it
     values = np.asarray(frame.array, dtype=np.float64)
-    steps = np.nan_to_num(values * steps_of.per_unit, posinf=65535.0)
-    image = Image.fromarray(np.clip(np.rint(steps), 0, 65535).astype(np.uint16))
+    steps = np.rint(values * steps_of.per_unit)
+    there = (steps >= 0) & (steps <= _MOST_STEPS)
+    image = Image.fromarray(np.where(there, steps, 0).astype(np.uint16))
+    text = PngImagePlugin.PngInfo()
+    text.add_text("Title", f"{frame.product} of frame {frame.meta['frame']}")
+    text.add_text("Unit", steps_of.unit)
+    text.add_text("Comment", f"0 is no value; so are those beyond {_MOST_STEPS} steps")
     file = io.BytesIO()
-    image.save(file, format="PNG", compress_level=1)
+    image.save(file, format="PNG", compress_level=1, pnginfo=text)
     return file.getvalue()
 
 

@@ -22,8 +22,6 @@ EXPLAINED_DEVIATIONS: Final = 4.0
 """Standard deviations of a negative eigenvalue that noise explains."""
 _UNLIT: Final = np.uint8(tm.Flags.NO_SIGNAL | tm.Flags.NON_FINITE | tm.Flags.SATURATED)
 _BLOCK_PIXELS: Final = 1 << 16
-_FEW: Final = 1 / 16
-"""Share of the pixels up to which their neighbourhoods are quicker to average one by one."""
 
 
 def moment_noise(recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoise:
@@ -163,13 +161,9 @@ def beyond_noise(
     brightness = np.asarray(found.smoothed[0].real)
     eigenvalue = np.asarray(found.validity).flat[doubtful] * brightness.flat[doubtful]
     ambient = found.ambient
-    if doubtful.size > _FEW * beyond.size:
-        noise = tm.noise.smoothed_of(noise_of, brightness, smoothing_px, ambient=ambient).variance
-        noise = noise.reshape((len(noise), -1))[:, doubtful]
-    else:
-        noise = tm.noise.smoothed_at(
-            noise_of, brightness, doubtful, smoothing_px, ambient=ambient
-        ).variance
+    noise = tm.noise.smoothed_at(
+        noise_of, brightness, doubtful, smoothing_px, ambient=ambient
+    ).variance
     std = np.sqrt(noise.sum(axis=0))
     beyond.flat[doubtful] = eigenvalue < -EXPLAINED_DEVIATIONS * std
     return beyond

@@ -96,7 +96,7 @@ def describe_pixel(
             for phase, weight in zip(
                 found.returns.phase_rad[at], found.returns.weight[at], strict=True
             )
-            if weight > 0.0 and math.isfinite(phase)
+            if weight > 0.0 and math.isfinite(phase) and not flags & tm.INVALID
         ],
         **density,
         "bounds": {

@@ -55,14 +55,21 @@ def test_a_png_of_range_counts_millimetres_and_0_is_no_value() -> None:
     image = image_of(encoded(PNG, "range", range_m))
 
     assert image.dtype == np.uint16
-    # 70 m is beyond 16 bits of millimetres and stays at the end of the scale
-    np.testing.assert_array_equal(image, [[1234, 0], [0, 65535]])
+    # 70 m is beyond 16 bits of millimetres: no value, rather than one that is wrong
+    np.testing.assert_array_equal(image, [[1234, 0], [0, 0]])
 
 
 def test_a_png_of_light_is_rounded_to_digital_numbers() -> None:
     image = image_of(encoded(PNG, "direct", np.array([[0.4, 0.6], [-3.0, np.inf]])))
 
-    np.testing.assert_array_equal(image, [[0, 1], [0, 65535]])
+    np.testing.assert_array_equal(image, [[0, 1], [0, 0]])
+
+
+def test_a_png_says_itself_what_its_steps_are() -> None:
+    file = Image.open(io.BytesIO(encoded(PNG, "range", np.ones((2, 2)))))
+
+    assert file.info["Unit"] == "mm"
+    assert "65535" in file.info["Comment"]
 
 
 def test_a_coloured_png_distinguishes_values_and_no_value_from_all() -> None:

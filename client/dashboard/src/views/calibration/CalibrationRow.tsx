@@ -86,7 +86,11 @@ export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
         )}
       </div>
       {!active && (
-        <Steer title={fits ? "Calibrate frames with it from the next one on" : (reason ?? "It does not fit")} disabled={!fits || task.busy.value !== null} onClick={use}>
+        <Steer
+          title={fits ? "Calibrate frames with it from the next one on" : (reason ?? "It does not fit")}
+          disabled={!fits || task.busy.value !== null}
+          onClick={use}
+        >
           {forcing && warned.value ? "Use anyway" : "Use"}
         </Steer>
       )}

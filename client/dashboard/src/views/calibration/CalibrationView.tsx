@@ -35,7 +35,9 @@ export function CalibrationView() {
             {outcome.words}
           </p>
         )}
-        {known !== null && known.former !== null && job === null && <Undo former={known.former} calibrations={known.calibrations} task={task} />}
+        {known !== null && known.former !== null && job === null && (
+          <Undo former={known.former} calibrations={known.calibrations} task={task} />
+        )}
         {calibrations.trouble.value !== null && <p class="refusal">{calibrations.trouble.value}</p>}
         {known !== null && (
           <ul class="recording-list" aria-label="Calibrations">
@@ -70,7 +72,8 @@ function MeasureForm({ task }: { task: Task }) {
   const activate = useSignal(true);
   const count = Number(frames.value);
   const sensible = frames.value.trim() !== "" && Number.isInteger(count) && count >= 2;
-  const measure = (): Promise<boolean> => task.run("Starting…", () => calibrations.measure({ name: name.peek().trim(), frames: count, activate: activate.peek() }));
+  const measure = (): Promise<boolean> =>
+    task.run("Starting…", () => calibrations.measure({ name: name.peek().trim(), frames: count, activate: activate.peek() }));
   return (
     <form
       class="record-form measure-form"
@@ -104,14 +107,20 @@ function MeasureForm({ task }: { task: Task }) {
         />
       </label>
       <div class="record-actions">
-        <Steer submit primary title="Measure with the present sequence; no frames come meanwhile" disabled={!sensible || task.busy.value !== null}>
+        <Steer
+          submit
+          primary
+          title="Measure with the present sequence; no frames come meanwhile"
+          disabled={!sensible || task.busy.value !== null}
+        >
           Measure
         </Steer>
       </div>
       <p class="quiet form-wide">
         Put filter and diffuser before the lens first, so that the light shines at the sensor. <Diffuser task={task} />{" "}
         <label class="check">
-          <input type="checkbox" checked={activate.value} onChange={(event) => (activate.value = event.currentTarget.checked)} /> Use it at once
+          <input type="checkbox" checked={activate.value} onChange={(event) => (activate.value = event.currentTarget.checked)} /> Use it at
+          once
         </label>
       </p>
     </form>
@@ -126,7 +135,11 @@ function Diffuser({ task }: { task: Task }) {
   if (world === null) return null;
   const words = world.diffusor ? "Take the diffuser away" : "Put the diffuser before the lens";
   return (
-    <Steer title={`${words} of the simulated camera`} disabled={task.busy.value !== null} onClick={() => void task.run(`${words}…`, () => simulation.putDiffuser(!world.diffusor))}>
+    <Steer
+      title={`${words} of the simulated camera`}
+      disabled={task.busy.value !== null}
+      onClick={() => void task.run(`${words}…`, () => simulation.putDiffuser(!world.diffusor))}
+    >
       {words}
     </Steer>
   );
@@ -138,7 +151,11 @@ function Undo({ former, calibrations: all, task }: { former: string; calibration
   const called = former === "nominal" ? "the nominal gains" : all.find(({ id }) => id === former)?.name || former;
   return (
     <p class="calibration-undo">
-      <Steer title="Calibrate frames by what was active before" disabled={task.busy.value !== null} onClick={() => void task.run("Switching…", () => calibrations.restore())}>
+      <Steer
+        title="Calibrate frames by what was active before"
+        disabled={task.busy.value !== null}
+        onClick={() => void task.run("Switching…", () => calibrations.restore())}
+      >
         Return to {called}
       </Steer>
     </p>
@@ -181,7 +198,12 @@ function Import({ task }: { task: Task }) {
           if (file !== undefined) void task.run(`Taking in ${file.name}…`, () => calibrations.take(file));
         }}
       />
-      <button type="button" title="Take in a calibration that was exported elsewhere" disabled={task.busy.value !== null} onClick={() => input.current?.click()}>
+      <button
+        type="button"
+        title="Take in a calibration that was exported elsewhere"
+        disabled={task.busy.value !== null}
+        onClick={() => input.current?.click()}
+      >
         Import…
       </button>
     </>

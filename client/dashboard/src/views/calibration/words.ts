@@ -22,7 +22,10 @@ const GROWN_BY = 0.02;
 const GROWN_TIMES = 2;
 
 /** How a calibration does, and whether it has grown worse. */
-export function driftOf({ invalid_share, invalid_share_at_capture }: NonNullable<CalibrationDocument["drift"]>): { words: string; grown: boolean } {
+export function driftOf({ invalid_share, invalid_share_at_capture }: NonNullable<CalibrationDocument["drift"]>): {
+  words: string;
+  grown: boolean;
+} {
   const now = fixed(100 * invalid_share, 1, "%");
   const before = invalid_share_at_capture;
   if (before === null) return { words: `${now} of the pixels contradict themselves.`, grown: false };

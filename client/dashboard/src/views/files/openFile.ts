@@ -15,7 +15,10 @@ export interface OpenedFile extends Blob {
 export async function openFile(store: Store, file: OpenedFile): Promise<void> {
   const opener = OPENERS[file.name.slice(file.name.lastIndexOf(".")).toLowerCase()];
   try {
-    if (opener === undefined) throw new RequestError({ detail: `${file.name} is none of what this page opens: a scene (.toml), a recording (.h5) or a calibration (.npz).` });
+    if (opener === undefined)
+      throw new RequestError({
+        detail: `${file.name} is none of what this page opens: a scene (.toml), a recording (.h5) or a calibration (.npz).`,
+      });
     store.events.tell(await opener(store, file), "good");
   } catch (error) {
     if (!(error instanceof RequestError)) throw error;
@@ -26,10 +29,12 @@ export async function openFile(store: Store, file: OpenedFile): Promise<void> {
 /** Each does it and answers what was done, or raises RequestError. */
 const OPENERS: Readonly<Record<string, (store: Store, file: OpenedFile) => Promise<string>>> = {
   ".toml": async (store, file) => {
-    if (store.camera.peek()?.simulated !== true) throw new RequestError({ detail: "A scene is for a simulated camera, and this is a real one." });
+    if (store.camera.peek()?.simulated !== true)
+      throw new RequestError({ detail: "A scene is for a simulated camera, and this is a real one." });
     if (store.obstacle.peek() !== null) throw new RequestError({ detail: `The scene was not changed: ${store.obstacle.peek()}` });
     const text = file.size > 4 * LONGEST_SCENE ? null : await file.text();
-    if (text === null || text.length > LONGEST_SCENE) throw new RequestError({ detail: `${file.name} is longer than ${LONGEST_SCENE} characters, the most of a scene.` });
+    if (text === null || text.length > LONGEST_SCENE)
+      throw new RequestError({ detail: `${file.name} is longer than ${LONGEST_SCENE} characters, the most of a scene.` });
     await store.simulation.stageOwn(text);
     return `The camera stands before the scene of ${file.name}.`;
   },
@@ -51,7 +56,10 @@ const OPENERS: Readonly<Record<string, (store: Store, file: OpenedFile) => Promi
 };
 
 /** The recording that a file is of: by the name it was downloaded under, else by its size, where no other is as large. */
-export function recordingIn(recordings: readonly RecordingDocument[], { name, size }: Pick<OpenedFile, "name" | "size">): RecordingDocument | null {
+export function recordingIn(
+  recordings: readonly RecordingDocument[],
+  { name, size }: Pick<OpenedFile, "name" | "size">,
+): RecordingDocument | null {
   const named = recordings.find(({ id }) => name.includes(id));
   if (named !== undefined) return named;
   const alike = recordings.filter(({ size_bytes }) => size_bytes === size);

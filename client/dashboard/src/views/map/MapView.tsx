@@ -1,7 +1,7 @@
 import { computed, type ReadonlySignal, type Signal } from "@preact/signals";
 import type { RefObject } from "preact";
 import { useMemo, useRef } from "preact/hooks";
-
+import { drawnOf } from "../../store/frames";
 import type { Look } from "../../store/looks";
 import { MAP_PRODUCTS, type MapProduct } from "../../store/mapCatalogue";
 import { useStore } from "../../store/store";
@@ -47,7 +47,14 @@ function MapPanel({ name, choice }: MapPanelProps) {
   const figure = (kind: "png" | "svg"): void => {
     const meta = look.frame.peek()?.meta;
     if (meta === undefined) return;
-    const parts = { title: shown.name, caption: captionOf(meta), scale: look.scale.peek(), colours: look.colours.peek(), unit: shown.unit, ground: "white" } as const;
+    const parts = {
+      title: shown.name,
+      caption: captionOf(meta),
+      scale: look.scale.peek(),
+      colours: look.colours.peek(),
+      unit: shown.unit,
+      ground: "white",
+    } as const;
     void saveFigure(`${shown.product}-${meta.frame}`, canvas.current, parts, kind);
   };
   return (
@@ -57,7 +64,7 @@ function MapPanel({ name, choice }: MapPanelProps) {
         { text: "Picture (PNG)", run: () => savePicture(`${shown.product}-${look.frame.peek()?.meta.frame ?? 0}`, canvas.current) },
         { text: "Figure (PNG)", run: () => figure("png") },
         { text: "Figure (SVG)", run: () => figure("svg") },
-        { text: `${shown.name} in ${shown.unit} (NPY)`, run: () => saveNumbers(look.frame.peek()) },
+        { text: `${shown.name} in ${shown.unit} (NPY)`, run: () => saveNumbers(store.api, look.frame.peek()) },
       ]}
       title={
         <Tabs
@@ -80,7 +87,10 @@ function MapLookMenu({ look, name }: { look: Look; name: ViewName }) {
   return (
     <PopoverButton face="Look" label={`Look of the ${name}`} title="Limits, scale and colours" kind="look">
       <LimitFields look={look} looks={looks} />
-      <Check checked={look.kind.value === "logarithmic"} onChange={(logarithmic) => (look.kind.value = logarithmic ? "logarithmic" : "linear")}>
+      <Check
+        checked={look.kind.value === "logarithmic"}
+        onChange={(logarithmic) => (look.kind.value = logarithmic ? "logarithmic" : "linear")}
+      >
         Logarithmic
       </Check>
       <ColourChoice colours={look.colours} />
@@ -125,7 +135,7 @@ function MapPicture({ look, canvas }: MapProps) {
     const [rows, columns] = newest.shape;
     if (target.width !== columns || target.height !== rows) [target.width, target.height] = [columns, rows];
     const image = context.createImageData(columns, rows);
-    paint(newest.values, scale, colours, image.data);
+    paint(drawnOf(newest), scale, colours, image.data);
     context.putImageData(image, 0, 0);
     // What the picture shows, for tests and for scripts that read the page.
     Object.assign(target.dataset, { product: shown.product, frame: newest.meta.frame, low: scale.low, high: scale.high, colours });
@@ -141,7 +151,14 @@ function MapPicture({ look, canvas }: MapProps) {
         {waiting.value ? (
           <div class="colour-bar" />
         ) : (
-          <ColourBar scale={look.scale.value} colours={look.colours.value} unit={shown.unit} values={frame} marked={marked} onLimit={(limits) => store.looks.limit(look, limits)} />
+          <ColourBar
+            scale={look.scale.value}
+            colours={look.colours.value}
+            unit={shown.unit}
+            values={frame}
+            marked={marked}
+            onLimit={(limits) => store.looks.limit(look, limits)}
+          />
         )}
       </div>
       <footer class="panel-foot">

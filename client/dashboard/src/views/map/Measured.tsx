@@ -66,8 +66,8 @@ function RegionRow({ look }: { look: Look }) {
       </span>
       {plane !== null && (
         <span title="The plane that the points of the region are nearest to: standard deviation of their distances from it, and the angle between its normal and the camera's axis">
-          <span class="quiet">plane σ</span> <span data-field="plane-residual">{engineering(plane.residual, "m", 2)}</span> <span class="quiet">tilt</span>{" "}
-          <span data-field="plane-tilt">{fixed(tiltOf(plane) / DEGREE, 1, "°")}</span>
+          <span class="quiet">plane σ</span> <span data-field="plane-residual">{engineering(plane.residual, "m", 2)}</span>{" "}
+          <span class="quiet">tilt</span> <span data-field="plane-tilt">{fixed(tiltOf(plane) / DEGREE, 1, "°")}</span>
         </span>
       )}
       <RegionHistogram look={look} figures={figures} />
@@ -91,5 +91,14 @@ function RegionHistogram({ look, figures }: { look: Look; figures: ReadonlySigna
     context.fillStyle = getComputedStyle(context.canvas).color;
     counts.forEach((count, bin) => context.fillRect(bin, HEIGHT_PX * (1 - count / most), 1, (HEIGHT_PX * count) / most));
   }, [look, figures]);
-  return <canvas ref={canvas} class="measured-histogram" width={BINS} height={HEIGHT_PX} role="img" aria-label="Histogram of the region over the colour scale" />;
+  return (
+    <canvas
+      ref={canvas}
+      class="measured-histogram"
+      width={BINS}
+      height={HEIGHT_PX}
+      role="img"
+      aria-label="Histogram of the region over the colour scale"
+    />
+  );
 }

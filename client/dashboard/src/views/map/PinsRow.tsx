@@ -35,7 +35,11 @@ export function PinsRow({ look }: { look: Look }) {
           const [from, to] = [ranged(a), ranged(b)];
           const apart = from === null || to === null ? null : distanceOf(lensOf(store, range.shape[1], range.shape[0]), from, to);
           return (
-            <span key={`${a.name}${b.name}`} data-distance={`${a.name}${b.name}`} title="Distance of the two points in space, with 1 σ from the scatter of both ranges">
+            <span
+              key={`${a.name}${b.name}`}
+              data-distance={`${a.name}${b.name}`}
+              title="Distance of the two points in space, with 1 σ from the scatter of both ranges"
+            >
               <span class="quiet">
                 {a.name} to {b.name}
               </span>{" "}

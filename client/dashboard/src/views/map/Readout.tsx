@@ -22,12 +22,15 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
   const amplitude = store.frames.of(ofLight);
   const [noise, lightNoise] = useMemo(() => [store.noises.of(shown.product), store.noises.of(ofLight)], [store, shown, ofLight]);
   const looked = useComputed(() => store.pointed.value ?? store.selected.value);
-  const at = (width: number | undefined): number => (looked.value === null || width === undefined ? -1 : looked.value.y * width + looked.value.x);
+  const at = (width: number | undefined): number =>
+    looked.value === null || width === undefined ? -1 : looked.value.y * width + looked.value.x;
   const place = useComputed(() => (looked.value === null ? "" : `${looked.value.x}, ${looked.value.y}`));
   const value = useComputed(() => fixed(valueAtPixel(frame.value, looked.value), shown.decimals, shown.unit));
   const scatter = useComputed(() => (noise.frames.value === 0 ? "" : deviation(noise.std(at(frame.value?.shape[1])), shown.unit)));
   const light = useComputed(() => fixed(valueAtPixel(amplitude.value, looked.value), 0, amplitude.value?.unit ?? ""));
-  const lightScatter = useComputed(() => (lightNoise.frames.value === 0 ? "" : deviation(lightNoise.std(at(amplitude.value?.shape[1])), amplitude.value?.unit ?? "")));
+  const lightScatter = useComputed(() =>
+    lightNoise.frames.value === 0 ? "" : deviation(lightNoise.std(at(amplitude.value?.shape[1])), amplitude.value?.unit ?? ""),
+  );
   const number = useComputed(() => frame.value?.meta.frame ?? "");
   if (place.value === "") return <p class="readout quiet">Point at the picture to read it.</p>;
   return (
@@ -36,7 +39,11 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
         <output class="readout-value" data-field="value">
           {value}
         </output>{" "}
-        <span class="quiet readout-scatter" data-field="scatter" title={`Standard deviation (1 σ) over the last ${WINDOW} frames, as measured at this pixel`}>
+        <span
+          class="quiet readout-scatter"
+          data-field="scatter"
+          title={`Standard deviation (1 σ) over the last ${WINDOW} frames, as measured at this pixel`}
+        >
           {value.value === NOTHING ? "no value" : scatter}
         </span>
       </span>

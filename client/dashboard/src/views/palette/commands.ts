@@ -25,15 +25,35 @@ export function commandsOf(store: Store): Command[] {
   const scenes = steering ? (store.simulation.world.value?.scenes ?? []) : [];
   const applied = store.sequence.value;
   return [
-    ...MAP_PRODUCTS.map(({ product, name }, at) => ({ words: `Map: ${name}`, key: String(at + 1), run: () => void (store.mapProduct.value = product) })),
+    ...MAP_PRODUCTS.map(({ product, name }, at) => ({
+      words: `Map: ${name}`,
+      key: String(at + 1),
+      run: () => void (store.mapProduct.value = product),
+    })),
     ...VIEWS.map(({ name, title }) => ({ words: `Show alone: ${title}`, key: "", run: () => void (store.alone.value = name) })),
-    ...Object.entries({ ...LAYOUTS, ...store.layouts.named.value }).map(([name, layout]) => ({ words: `Layout: ${name}`, key: "", run: () => store.showLayout(layout) })),
+    ...Object.entries({ ...LAYOUTS, ...store.layouts.named.value }).map(([name, layout]) => ({
+      words: `Layout: ${name}`,
+      key: "",
+      run: () => store.showLayout(layout),
+    })),
     { words: "Layout: save or remove…", key: "", run: () => void (store.asksForLayout.value = true) },
     ...(steering && applied !== null
-      ? PRESETS.map(({ name, sequence }) => ({ words: `Sequence: ${name}`, key: "", run: () => void reported(store, () => store.sequencing.set({ ...applied, ...sequence })) }))
+      ? PRESETS.map(({ name, sequence }) => ({
+          words: `Sequence: ${name}`,
+          key: "",
+          run: () => void reported(store, () => store.sequencing.set({ ...applied, ...sequence })),
+        }))
       : []),
-    ...scenes.map(({ name }) => ({ words: `Scene: ${name}`, key: "", run: () => void reported(store, () => store.simulation.stage(name)) })),
-    ...THEMES.map((theme) => ({ words: `Colours: ${theme === "auto" ? "as the system" : theme}`, key: "", run: () => void (store.theme.choice.value = theme) })),
+    ...scenes.map(({ name }) => ({
+      words: `Scene: ${name}`,
+      key: "",
+      run: () => void reported(store, () => store.simulation.stage(name)),
+    })),
+    ...THEMES.map((theme) => ({
+      words: `Colours: ${theme === "auto" ? "as the system" : theme}`,
+      key: "",
+      run: () => void (store.theme.choice.value = theme),
+    })),
     ...recordingCommands(store),
     { words: "Open a file: scene, recording or calibration…", key: "", run: () => chooseFile(store) },
     { words: "Copy a link to what is shown", key: "", run: () => void copyLink(window, store) },
@@ -49,7 +69,11 @@ export function commandsOf(store: Store): Command[] {
 function recordingCommands(store: Store): Command[] {
   const { recordings } = store;
   const active = recordings.active.value;
-  const does = (what: string, work: () => Promise<unknown>): Command => ({ words: `Recording: ${what}`, key: "", run: () => void reported(store, work) });
+  const does = (what: string, work: () => Promise<unknown>): Command => ({
+    words: `Recording: ${what}`,
+    key: "",
+    run: () => void reported(store, work),
+  });
   if (active !== null) return [does("stop", () => recordings.stop(active.id))];
   return [does("start", () => recordings.start({})), does(`save the last ${PAST_S} s`, () => recordings.savePast())];
 }

@@ -51,11 +51,20 @@ export function LineChart({ label, lines, along, across, ends, data }: LineChart
   return <div class="line-chart" ref={box} role="img" aria-label={label} />;
 }
 
-function makePlot(box: HTMLElement, { lines, along, across, ends }: Pick<LineChartProps, "lines" | "along" | "across"> & { ends: LineChartProps["ends"] | undefined }): uPlot {
+function makePlot(
+  box: HTMLElement,
+  { lines, along, across, ends }: Pick<LineChartProps, "lines" | "along" | "across"> & { ends: LineChartProps["ends"] | undefined },
+): uPlot {
   const style = getComputedStyle(box);
   const ink = (colour: string): string => (colour.startsWith("--") ? style.getPropertyValue(colour) : colour);
   const font = `${style.getPropertyValue("--small")} ${style.fontFamily}`;
-  const axis = { stroke: ink("--quiet"), font, labelFont: font, grid: { stroke: ink("--hairline"), width: 1 }, ticks: { stroke: ink("--hairline"), width: 1, size: 4 } };
+  const axis = {
+    stroke: ink("--quiet"),
+    font,
+    labelFont: font,
+    grid: { stroke: ink("--hairline"), width: 1 },
+    ticks: { stroke: ink("--hairline"), width: 1, size: 4 },
+  };
   return new uPlot(
     {
       width: Math.max(1, box.clientWidth),

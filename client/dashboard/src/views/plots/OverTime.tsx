@@ -65,7 +65,16 @@ function placesOf({ selected, measures }: Store): Place[] {
   const pixel = selected.value;
   const region = measures.region.value;
   return [
-    ...(pixel === null ? [] : [{ key: `pixel ${pixel.x},${pixel.y}`, name: `${pixel.x}, ${pixel.y}`, colour: "--curve", valueIn: (frame: Frame) => valueAtPixel(frame, pixel) }]),
+    ...(pixel === null
+      ? []
+      : [
+          {
+            key: `pixel ${pixel.x},${pixel.y}`,
+            name: `${pixel.x}, ${pixel.y}`,
+            colour: "--curve",
+            valueIn: (frame: Frame) => valueAtPixel(frame, pixel),
+          },
+        ]),
     ...measures.pins.value.map((pin) => ({
       key: `${pin.name} ${pin.x},${pin.y}`,
       name: pin.name,
@@ -75,7 +84,12 @@ function placesOf({ selected, measures }: Store): Place[] {
     ...(region === null
       ? []
       : [
-          { key: `region ${JSON.stringify(region)}`, name: "region", colour: "--light", valueIn: ({ values, shape }: Frame) => figuresOf(values, shape[1], shape[0], region).mean },
+          {
+            key: `region ${JSON.stringify(region)}`,
+            name: "region",
+            colour: "--light",
+            valueIn: ({ values, shape }: Frame) => figuresOf(values, shape[1], shape[0], region).mean,
+          },
         ]),
   ];
 }

@@ -47,7 +47,9 @@ export function PlotsView() {
       tools={<Tabs label="What of the values" value={side.value} options={SIDES} onChange={(value) => (side.value = value)} />}
       downloads={[{ text: "Values (CSV)", run: csv }]}
     >
-      <div class="plots">{side.value === "time" ? <OverTime key={key} look={look} data={data} /> : <AlongLine key={key} look={look} data={data} />}</div>
+      <div class="plots">
+        {side.value === "time" ? <OverTime key={key} look={look} data={data} /> : <AlongLine key={key} look={look} data={data} />}
+      </div>
     </Panel>
   );
 }

@@ -45,7 +45,11 @@ export class History {
     const values = this.#samples.map((sample) => finite(sample.values.get(name))).filter((value) => value !== null);
     const mean = values.reduce((sum, value) => sum + value, 0) / values.length;
     const squares = values.reduce((sum, value) => sum + (value - mean) ** 2, 0);
-    return { last: this.#samples.at(-1)?.values.get(name) ?? NaN, mean, std: values.length > 1 ? Math.sqrt(squares / (values.length - 1)) : NaN };
+    return {
+      last: this.#samples.at(-1)?.values.get(name) ?? NaN,
+      mean,
+      std: values.length > 1 ? Math.sqrt(squares / (values.length - 1)) : NaN,
+    };
   }
 }
 

@@ -5,7 +5,7 @@ import { LightPainter } from "../../gl/paintLight";
 import type { Backdrop } from "../../gl/renderer";
 import { grouped } from "../../scales/format";
 import { LIVE, RequestError } from "../../store/api";
-import type { Frame } from "../../store/frames";
+import { drawnOf, type Frame } from "../../store/frames";
 import type { TransientLook } from "../../store/lightLook";
 import { aBoolean, aNumber, oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
@@ -119,7 +119,12 @@ export function PointsView() {
       if (lit.pixels.length !== frame.values.length) lit.pixels = new Uint32Array(frame.values.length);
       lit.painter.paint(
         coefficients,
-        { phase_rad: store.player.phase_rad.value, tone: light.toneNow, colours: light.colours.value, backdrop: backdropOf(amplitude, light) },
+        {
+          phase_rad: store.player.phase_rad.value,
+          tone: light.toneNow,
+          colours: light.colours.value,
+          backdrop: backdropOf(amplitude, light),
+        },
         lit.pixels,
       );
       return byPicture(lit.pixels);
@@ -132,7 +137,13 @@ export function PointsView() {
     if (frame === null || drawn === null || made === 0) return;
     colourCloud(drawn.cloudFor(frame.values.length), count.peek(), painter(frame, chosen));
     drawn.recolour();
-    if (canvas.current !== null) Object.assign(canvas.current.dataset, { frame: frame.meta.frame, points: count.peek(), colouring: chosen, ...rangeLook.scale.peek() });
+    if (canvas.current !== null)
+      Object.assign(canvas.current.dataset, {
+        frame: frame.meta.frame,
+        points: count.peek(),
+        colouring: chosen,
+        ...rangeLook.scale.peek(),
+      });
   }, [scene, range]);
 
   const saveShown = (): void => {
@@ -193,7 +204,13 @@ export function PointsView() {
       <div class="picture">
         <div class="points" ref={box}>
           <SceneStage canvas={canvas} scene={scene} range={range} />
-          {trouble.value !== null ? <p class="stage-empty">{trouble.value}</p> : frameless.value ? <FirstFrame /> : loading.value && <p class="stage-empty">Loading</p>}
+          {trouble.value !== null ? (
+            <p class="stage-empty">{trouble.value}</p>
+          ) : frameless.value ? (
+            <FirstFrame />
+          ) : (
+            loading.value && <p class="stage-empty">Loading</p>
+          )}
         </div>
         {colouring.value === "flight" ? (
           <LightBar look={light} play="density" />
@@ -249,5 +266,7 @@ export function PointsView() {
 /** The still scene behind the light, where it is wanted. */
 function backdropOf(amplitude: Frame | null, light: TransientLook): Backdrop | null {
   const white = amplitude?.map?.high ?? NaN;
-  return light.backdrop.value && white > 0 && amplitude?.values instanceof Float32Array ? { values: amplitude.values, white } : null;
+  return light.backdrop.value && white > 0 && amplitude?.values instanceof Float32Array
+    ? { values: drawnOf(amplitude) as Float32Array, white }
+    : null;
 }

@@ -129,7 +129,11 @@ export function SceneStage({ canvas, scene, range }: SceneStageProps) {
       />
       <div class="scene-marks" aria-hidden="true">
         {marks.value.map(({ kind, x, y, text, colour }, n) => (
-          <span key={n} class={`scene-mark scene-mark-${kind}`} style={{ left: `${x}px`, top: `${y}px`, ...(colour === undefined ? {} : { "--pin": colour }) }}>
+          <span
+            key={n}
+            class={`scene-mark scene-mark-${kind}`}
+            style={{ left: `${x}px`, top: `${y}px`, ...(colour === undefined ? {} : { "--pin": colour }) }}
+          >
             {text}
           </span>
         ))}

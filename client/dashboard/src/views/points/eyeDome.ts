@@ -50,14 +50,24 @@ void main() {
 }`;
 
 export class EyeDome {
-  readonly #target = new WebGLRenderTarget(1, 1, { minFilter: NearestFilter, magFilter: NearestFilter, depthTexture: new DepthTexture(1, 1) });
+  readonly #target = new WebGLRenderTarget(1, 1, {
+    minFilter: NearestFilter,
+    magFilter: NearestFilter,
+    depthTexture: new DepthTexture(1, 1),
+  });
   readonly #material = new ShaderMaterial({
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
     blending: NoBlending,
     depthTest: false,
     depthWrite: false,
-    uniforms: { colours: { value: this.#target.texture }, depths: { value: this.#target.depthTexture }, near: { value: 1 }, far: { value: 2 }, reach: { value: 1 } },
+    uniforms: {
+      colours: { value: this.#target.texture },
+      depths: { value: this.#target.depthTexture },
+      near: { value: 1 },
+      far: { value: 2 },
+      reach: { value: 1 },
+    },
   });
   readonly #screen = new Scene();
   readonly #flat = new OrthographicCamera();

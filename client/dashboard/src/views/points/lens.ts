@@ -20,7 +20,9 @@ export const FIELD_DEG: Setting<number> = { key: "points.field_deg", initial: 45
 /** The lens for pictures of a size. */
 export function lensOf(store: Store, width: number, height: number): Pinhole {
   const lens = knownLens(store);
-  return lens !== null && lens.width === width && lens.height === height ? lens : pinholeOf(width, height, store.settings.of(FIELD_DEG).value * DEGREE);
+  return lens !== null && lens.width === width && lens.height === height
+    ? lens
+    : pinholeOf(width, height, store.settings.of(FIELD_DEG).value * DEGREE);
 }
 
 /** A pixel with its range and the deviation of that, both in m. */
@@ -35,7 +37,8 @@ export function distanceOf(lens: Pinhole, a: Ranged, b: Ranged): { readonly dist
   const between = from.map((value, axis) => value - to[axis]);
   const distance_m = Math.hypot(...between);
   // A range moves its point along its ray: only what of that lies along the distance changes it.
-  const share = (point: readonly number[], { range_m }: Ranged): number => point.reduce((sum, value, axis) => sum + (value / range_m) * (between[axis] / distance_m), 0);
+  const share = (point: readonly number[], { range_m }: Ranged): number =>
+    point.reduce((sum, value, axis) => sum + (value / range_m) * (between[axis] / distance_m), 0);
   return { distance_m, std_m: Math.hypot(share(from, a) * a.std_m, share(to, b) * b.std_m) };
 }
 

@@ -27,7 +27,14 @@ export function floorOf(positions: Float32Array, count: number, before: Floor | 
   const down = (value: number): number => step * Math.floor(value / step);
   const up = (value: number): number => step * Math.ceil(value / step);
   // From the camera on, so that distances to it are read off.
-  const made = { y: y.low, step, left: down(x.low), right: Math.max(up(x.high), down(x.low) + step), far: Math.min(down(z.low), -step), near: 0 };
+  const made = {
+    y: y.low,
+    step,
+    left: down(x.low),
+    right: Math.max(up(x.high), down(x.low) + step),
+    far: Math.min(down(z.low), -step),
+    near: 0,
+  };
   return before !== null && alike(before, made) ? before : made;
 }
 
@@ -45,7 +52,8 @@ function spanOf(positions: Float32Array, count: number, axis: number): { low: nu
   return { low: values[beyond], high: values[values.length - 1 - beyond] };
 }
 
-const range = (from: number, to: number, step: number): number[] => Array.from({ length: Math.round((to - from) / step) + 1 }, (_, n) => from + n * step);
+const range = (from: number, to: number, step: number): number[] =>
+  Array.from({ length: Math.round((to - from) / step) + 1 }, (_, n) => from + n * step);
 
 /** Lines of the grid. */
 export function gridLines({ y, step, left, right, far, near }: Floor): Float32Array {

@@ -33,7 +33,13 @@ export function Annotations({ recording, onClose }: { recording: RecordingDocume
         <div class="lines">
           {lines.value.map(({ name, text }, at) => (
             <div key={at} class="line">
-              <input type="text" aria-label={`Name of line ${at + 1}`} placeholder="sample" value={name} onInput={(event) => set(at, { name: event.currentTarget.value })} />
+              <input
+                type="text"
+                aria-label={`Name of line ${at + 1}`}
+                placeholder="sample"
+                value={name}
+                onInput={(event) => set(at, { name: event.currentTarget.value })}
+              />
               <input
                 type="text"
                 aria-label={`Text of line ${at + 1}`}
@@ -41,7 +47,11 @@ export function Annotations({ recording, onClose }: { recording: RecordingDocume
                 value={text}
                 onInput={(event) => set(at, { text: event.currentTarget.value })}
               />
-              <button type="button" aria-label={`Remove line ${at + 1}`} onClick={() => (lines.value = lines.peek().filter((_, n) => n !== at))}>
+              <button
+                type="button"
+                aria-label={`Remove line ${at + 1}`}
+                onClick={() => (lines.value = lines.peek().filter((_, n) => n !== at))}
+              >
                 ×
               </button>
             </div>

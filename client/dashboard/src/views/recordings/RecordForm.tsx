@@ -68,10 +68,20 @@ export function RecordForm({ task }: { task: Task }) {
         {number("Frames", "", frames, "frames")}
       </fieldset>
       <div class="record-actions">
-        <button type="submit" class="record" disabled={busy || limits === null} title={limits === null ? "A limit must be a number above 0" : "Record every frame, raw"}>
+        <button
+          type="submit"
+          class="record"
+          disabled={busy || limits === null}
+          title={limits === null ? "A limit must be a number above 0" : "Record every frame, raw"}
+        >
           <i aria-hidden="true" /> Record
         </button>
-        <button type="button" disabled={busy} title="Keep what the service still holds of the time that has just passed" onClick={() => void savePast()}>
+        <button
+          type="button"
+          disabled={busy}
+          title="Keep what the service still holds of the time that has just passed"
+          onClick={() => void savePast()}
+        >
           Save the last {PAST_S} s
         </button>
       </div>

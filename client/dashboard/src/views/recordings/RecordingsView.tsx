@@ -48,7 +48,13 @@ export function RecordingsView() {
           {known?.recordings
             .filter(({ id }) => id !== known.active)
             .map((recording) => (
-              <RecordingRow key={recording.id} recording={recording} task={task} onAnnotate={() => (annotating.value = recording)} onDelete={() => (deleting.value = recording)} />
+              <RecordingRow
+                key={recording.id}
+                recording={recording}
+                task={task}
+                onAnnotate={() => (annotating.value = recording)}
+                onDelete={() => (deleting.value = recording)}
+              />
             ))}
         </ul>
       </div>
@@ -65,7 +71,8 @@ export function RecordingsView() {
         }}
       >
         <p>
-          <strong>{doomed?.name}</strong>, {grouped(doomed?.frames ?? 0)} frames of {duration(doomed?.duration_s ?? 0)}. What it shows cannot be captured again.
+          <strong>{doomed?.name}</strong>, {grouped(doomed?.frames ?? 0)} frames of {duration(doomed?.duration_s ?? 0)}. What it shows
+          cannot be captured again.
         </p>
       </Confirm>
     </Panel>
@@ -92,11 +99,20 @@ function Running({ recording, task }: { recording: RecordingDocument; task: Task
       {recording.dropped_frames > 0 && <span class="refusal">{grouped(recording.dropped_frames)} left out</span>}
       <span class="spring" />
       {replay.recording.value?.id !== recording.id && (
-        <button type="button" disabled={recording.frames === 0 || task.busy.value !== null} onClick={() => void task.run("Opening…", () => replay.open(recording.id))}>
+        <button
+          type="button"
+          disabled={recording.frames === 0 || task.busy.value !== null}
+          onClick={() => void task.run("Opening…", () => replay.open(recording.id))}
+        >
           Watch from its start
         </button>
       )}
-      <button type="button" class="danger" disabled={task.busy.value !== null} onClick={() => void task.run("Writing the rest to the disk…", () => recordings.stop(recording.id))}>
+      <button
+        type="button"
+        class="danger"
+        disabled={task.busy.value !== null}
+        onClick={() => void task.run("Writing the rest to the disk…", () => recordings.stop(recording.id))}
+      >
         Stop recording
       </button>
       {limit_s !== null && <progress max={limit_s} value={recording.duration_s} aria-label="Share of the recording that is done" />}

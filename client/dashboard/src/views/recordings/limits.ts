@@ -8,7 +8,11 @@ export interface TypedLimits {
 }
 
 /** What is typed, as the service takes it; null where it is no limit. */
-export function limitsOf({ duration_s, size_mb, frames }: TypedLimits): Pick<RecordingRequest, "duration_s" | "max_bytes" | "frames"> | null {
+export function limitsOf({
+  duration_s,
+  size_mb,
+  frames,
+}: TypedLimits): Pick<RecordingRequest, "duration_s" | "max_bytes" | "frames"> | null {
   const [duration, size, count] = [duration_s, size_mb, frames].map((text) => (text.trim() === "" ? null : Number(text)));
   const sensible = (value: number | null): boolean => value === null || (Number.isFinite(value) && value > 0);
   if (![duration, size, count].every(sensible) || (count !== null && !Number.isInteger(count))) return null;

@@ -6,7 +6,10 @@ export interface Line {
 }
 
 export function linesOf(annotations: Readonly<Record<string, unknown>>): Line[] {
-  return Object.entries(annotations).map(([name, value]) => ({ name, text: typeof value === "string" && !isJson(value) ? value : JSON.stringify(value) }));
+  return Object.entries(annotations).map(([name, value]) => ({
+    name,
+    text: typeof value === "string" && !isJson(value) ? value : JSON.stringify(value),
+  }));
 }
 
 /** What the lines say, without those that say nothing; null where a name is missing or stands twice. */

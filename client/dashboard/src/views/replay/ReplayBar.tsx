@@ -92,7 +92,8 @@ function Scrubber({ replay, timeline }: { replay: Replay; timeline: Timeline }) 
       <p class="scrubber-words">
         <span data-field="replay-time">{fixed(time_s, 2, "s")}</span> <span class="quiet">of {fixed(replay.timeOf(last), 2, "s")}</span>
         <span class="scrubber-frame">
-          <span class="quiet">frame</span> <span data-field="replay-frame">{grouped(frame - first + 1)}</span> <span class="quiet">of {grouped(count)}</span>
+          <span class="quiet">frame</span> <span data-field="replay-frame">{grouped(frame - first + 1)}</span>{" "}
+          <span class="quiet">of {grouped(count)}</span>
         </span>
       </p>
     </div>

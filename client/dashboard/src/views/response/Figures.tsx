@@ -15,7 +15,14 @@ export function PixelFigures({ pixel }: { pixel: Pixel }) {
     void [noises.of("range").frames.value, noises.of(ofLight).frames.value];
     if (range === null || light === null) return null;
     const at = pixel.y * range.shape[1] + pixel.x;
-    return { range_m: range.values[at], range_std_m: noises.of("range").std(at), light: light.values[at], light_std: noises.of(ofLight).std(at), ofLight, unit: light.unit };
+    return {
+      range_m: range.values[at],
+      range_std_m: noises.of("range").std(at),
+      light: light.values[at],
+      light_std: noises.of(ofLight).std(at),
+      ofLight,
+      unit: light.unit,
+    };
   });
   if (figures.value === null) return null;
   const { range_m, range_std_m, light, light_std, ofLight, unit } = figures.value;

@@ -8,7 +8,17 @@ import { linesOf, type ReturnHistory, type ReturnLine, sifted } from "./returns"
 import "./Listings.css";
 
 /** What the service found at the pixel: returns, the truth where it is known, and flags. `held` is the number of the frame that is held. */
-export function Found({ details, held, flags, returns }: { details: PixelDocument | null; held: number | null; flags: FlagHistory; returns: ReturnHistory }) {
+export function Found({
+  details,
+  held,
+  flags,
+  returns,
+}: {
+  details: PixelDocument | null;
+  held: number | null;
+  flags: FlagHistory;
+  returns: ReturnHistory;
+}) {
   const { frames } = useStore();
   if (details === null) return null;
   const scene = frames.sceneOf(details.meta);
@@ -54,8 +64,15 @@ function ReturnTable({ details, history }: { details: PixelDocument; history: Re
   const { strong, weak, weakShare } = sifted(details.returns);
   const lines = linesOf(strong, sifted(details.truth?.returns ?? []).strong);
   const beyond = Math.max(0, lines.length - LINES);
-  const [found, truth, difference] = [lines.slice(0, LINES).map((line) => line.found), lines.map((line) => line.truth), lines.map(differenceOf)];
-  const notes = [beyond > 0 ? `${beyond} more` : "", weak > 0 ? `${weak} weak, together ${fixed(100 * weakShare, 1, "%")} of the light` : ""];
+  const [found, truth, difference] = [
+    lines.slice(0, LINES).map((line) => line.found),
+    lines.map((line) => line.truth),
+    lines.map(differenceOf),
+  ];
+  const notes = [
+    beyond > 0 ? `${beyond} more` : "",
+    weak > 0 ? `${weak} weak, together ${fixed(100 * weakShare, 1, "%")} of the light` : "",
+  ];
   return (
     <div>
       <table class="listing returns" data-field="returns">

@@ -17,7 +17,12 @@ export function MomentsPlane({ pixel }: { pixel: ReadonlySignal<Pixel | null> })
   });
   return (
     <div class="moments">
-      <svg class="moments-plane" viewBox={`${-REACH} ${-REACH} ${2 * REACH} ${2 * REACH}`} role="img" aria-label="Moments over b₀ on the complex plane">
+      <svg
+        class="moments-plane"
+        viewBox={`${-REACH} ${-REACH} ${2 * REACH} ${2 * REACH}`}
+        role="img"
+        aria-label="Moments over b₀ on the complex plane"
+      >
         <circle class="moments-circle" r="1" />
         <circle class="moments-ring" r="0.5" />
         <path class="moments-ring" d={`M${-REACH} 0H${REACH}M0 ${-REACH}V${REACH}`} />

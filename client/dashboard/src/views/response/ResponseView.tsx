@@ -6,7 +6,7 @@ import { rangeOfTime_m } from "../../physics/constants";
 import { pixelOf } from "../../physics/reflection";
 import { fixed, significant } from "../../scales/format";
 import { autoLimits, type Span } from "../../scales/scale";
-import type { Frame } from "../../store/frames";
+import { type Frame, wasSent } from "../../store/frames";
 import { PIN_COLOURS } from "../../store/measures";
 import type { Pixel } from "../../store/pixel";
 import type { Lit } from "../../store/player";
@@ -57,6 +57,7 @@ export function ResponseView() {
         const pixel = store.selected.value;
         if (!coefficients || pixel === null) return null;
         if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return null;
+        if (frame.value !== null && !wasSent(frame.value, pixel)) return null;
         const index = pixel.y * coefficients.width + pixel.x;
         return { pixel, coefficients, index };
       }),
@@ -104,7 +105,12 @@ export function ResponseView() {
         )}
         {place.value !== null && (
           <aside class="response-side fades" aria-label="What was found at the pixel" tabIndex={0}>
-            <Found flags={flags} returns={returns} details={store.details.document.value} held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null} />
+            <Found
+              flags={flags}
+              returns={returns}
+              details={store.details.document.value}
+              held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null}
+            />
             {pixel.value !== null && <PixelFigures key={place.value} pixel={pixel.value} />}
             <FlagWords flags={flags} looked={store.details.document.value !== null} />
           </aside>
@@ -121,7 +127,8 @@ function selectFirst(store: Store, frame: ReadonlySignal<Frame | null>): () => v
     if (store.selected.value !== null || newest === null) return;
     const [height, width] = newest.shape;
     const pixel = newest.coefficients ? richestPixel(newest.coefficients) : { x: width >> 1, y: height >> 1 };
-    untracked(() => (store.selected.value = pixel));
+    // a slow browser has every second pixel while light plays: one of these keeps its curve
+    untracked(() => (store.selected.value = pixel && { x: pixel.x & ~1, y: pixel.y & ~1 }));
   });
   return end;
 }
@@ -232,9 +239,13 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
             truth
           </span>
         )}
-        {aspect === "bounds" && <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">smoothed</em>}
+        {aspect === "bounds" && (
+          <em title="Bounds hold for densities smoothed with the Poisson kernel; so is all that is drawn here">smoothed</em>
+        )}
         {aspect !== "cumulative" && !logarithmic && (
-          <em title="Height: linear near zero, logarithmic where it is high, so that what is dim stays in sight beside narrow and high peaks">asinh</em>
+          <em title="Height: linear near zero, logarithmic where it is high, so that what is dim stays in sight beside narrow and high peaks">
+            asinh
+          </em>
         )}
         <Toggle
           pressed={lit.value}

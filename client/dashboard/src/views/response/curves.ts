@@ -87,7 +87,9 @@ function curvesOf(aspect: Aspect, c: Coefficients, pixel: number, phases_rad: Fl
         [made[0][n], made[1][n], made[2][n]] = [perNs * lower, perNs * upper, perNs * smoothed];
       }
       if (whole === null) return;
-      made[3][n] = perNs * whole.returns.reduce((sum, { time_s, weight }) => sum + weight * poissonKernel(phase - TURN * c.baseFrequency_hz * time_s), 0);
+      made[3][n] =
+        perNs *
+        whole.returns.reduce((sum, { time_s, weight }) => sum + weight * poissonKernel(phase - TURN * c.baseFrequency_hz * time_s), 0);
     });
   } else {
     const poles = new Poles(c.harmonics, 1);

@@ -76,7 +76,12 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, ends_
             : { range: () => [0, top()] },
       },
       axes: [
-        { ...axis, size: 20, gap: 2, values: (_plot, splits) => splits.map((time_ns, at) => withUnit(String(time_ns), at === splits.length - 1 ? "ns" : "")) },
+        {
+          ...axis,
+          size: 20,
+          gap: 2,
+          values: (_plot, splits) => splits.map((time_ns, at) => withUnit(String(time_ns), at === splits.length - 1 ? "ns" : "")),
+        },
         {
           ...axis,
           size: 52,
@@ -86,7 +91,11 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, ends_
           labelGap: 0,
           space: 28,
           values: (_plot, splits) => splits.map(tickText),
-          ...(logarithmic ? { splits: powersOfTen, filter: all } : aspect !== "cumulative" ? { splits: bentSplits(ASINH_SHARES[aspect]), filter: all } : {}),
+          ...(logarithmic
+            ? { splits: powersOfTen, filter: all }
+            : aspect !== "cumulative"
+              ? { splits: bentSplits(ASINH_SHARES[aspect]), filter: all }
+              : {}),
         },
         {
           ...axis,

@@ -10,7 +10,11 @@ const LOOKS = 30;
 const FEWEST = 5;
 
 /** The returns that are worth a line, by time, and the light of the others together. */
-export function sifted(returns: readonly ReturnDocument[]): { readonly strong: readonly ReturnDocument[]; readonly weak: number; readonly weakShare: number } {
+export function sifted(returns: readonly ReturnDocument[]): {
+  readonly strong: readonly ReturnDocument[];
+  readonly weak: number;
+  readonly weakShare: number;
+} {
   const light = returns.reduce((sum, { weight }) => sum + Math.max(0, weight), 0);
   const strong = returns.filter(({ weight }) => weight >= WEAK_SHARE * light).sort((a, b) => a.time_s - b.time_s);
   const rest = returns.filter((each) => !strong.includes(each));

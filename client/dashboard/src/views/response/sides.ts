@@ -16,6 +16,9 @@ export const ASPECTS: readonly Words<Aspect>[] = [
   { value: "cumulative", text: "Cumulative", hint: "Light up to each time of flight" },
 ];
 
-export const SIDES: readonly Words<Side>[] = [...ASPECTS, { value: "moments", text: "Moments", hint: "The trigonometric moments on the complex plane" }];
+export const SIDES: readonly Words<Side>[] = [
+  ...ASPECTS,
+  { value: "moments", text: "Moments", hint: "The trigonometric moments on the complex plane" },
+];
 
 export const SIDE: Setting<Side> = { key: "response.side", link: "side", initial: "bounds", ...oneOf(SIDES.map(({ value }) => value)) };

@@ -25,7 +25,11 @@ export const NO_STEMS: Stems = { found: [], truth: [] };
 export function stemsOf(details: Pick<PixelDocument, "returns">, truth: Truth | null, history: ReturnHistory): Stems {
   const light = details.returns.reduce((sum, { weight }) => sum + Math.max(0, weight), 0);
   return {
-    found: sifted(details.returns).strong.map((each) => ({ time_s: each.time_s, std_s: history.of(each).time_s, share: each.weight / light })),
+    found: sifted(details.returns).strong.map((each) => ({
+      time_s: each.time_s,
+      std_s: history.of(each).time_s,
+      share: each.weight / light,
+    })),
     truth: (truth?.returns ?? []).map(({ time_s, weight }) => ({ time_s, std_s: NaN, share: weight / (truth?.brightness ?? NaN) })),
   };
 }

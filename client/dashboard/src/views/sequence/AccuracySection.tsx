@@ -42,7 +42,9 @@ export function AccuracySection({ applied }: { applied: AppliedDocument }) {
     <div class="accuracy fades" data-predicted={tradeoff !== null}>
       {tradeoff !== null && <FrontPlot tradeoff={tradeoff} now={now} chosen={looked} onChoose={look} />}
       <div class="accuracy-control">
-        <p class="accuracy-figures">{looked === null ? <NowFigures applied={applied} truth_m={truth_m} /> : <LookedFigures choice={looked} />}</p>
+        <p class="accuracy-figures">
+          {looked === null ? <NowFigures applied={applied} truth_m={truth_m} /> : <LookedFigures choice={looked} />}
+        </p>
         <FrontSlider front={tradeoff?.front ?? []} now_s={applied.capture_s} looked={looked} onLook={look} onRelease={() => void apply()} />
         <Finding task={task} />
         {tradeoff !== null && <Obstacle />}
@@ -87,7 +89,8 @@ function NowFigures({ applied, truth_m }: { applied: AppliedDocument; truth_m: n
       <strong data-field="now_range_error_m" title={`Of the range in the median pixel: ${errorWords(error)}`}>
         ± {engineering(error?.error_m, "m", 2)}
       </strong>{" "}
-      {error?.of === "noise" && <span class="quiet">noise</span>} <span>{engineering(applied.capture_s, "s")}</span> <span>{fixed(applied.frame_rate_hz, 1, "Hz")}</span>{" "}
+      {error?.of === "noise" && <span class="quiet">noise</span>} <span>{engineering(applied.capture_s, "s")}</span>{" "}
+      <span>{fixed(applied.frame_rate_hz, 1, "Hz")}</span>{" "}
       <span class="quiet">
         now
         {truth_m !== null && `, ${engineering(truth_m, "m", 2)} off the truth`}

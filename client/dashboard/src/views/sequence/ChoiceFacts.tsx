@@ -17,7 +17,11 @@ export function ChoiceFacts({ choice }: { choice: ChoiceDocument }) {
       <Fact name="Base frequency" value={engineering(sequence.base_frequency_hz, "Hz", 4)} field="choice_base_frequency_hz" />
       <Fact name="Zeroth moment" value={ZEROTH_NAMES[sequence.zeroth]} field="choice_zeroth" />
       <Fact name="Range by" value={choice.estimator.replaceAll("-", " ")} field="choice_estimator" />
-      <Fact name="Error, 90 % within" value={`${engineering(low, "m", 2)} to ${engineering(high, "m", 2)}`} field="choice_range_error_interval_m" />
+      <Fact
+        name="Error, 90 % within"
+        value={`${engineering(low, "m", 2)} to ${engineering(high, "m", 2)}`}
+        field="choice_range_error_interval_m"
+      />
       <Fact name="of that noise" value={engineering(predicted.range_std_m.median, "m")} field="choice_range_std_m" />
       <Fact name="of that bias" value={bias + doubt} field="choice_range_bias_m" />
       <Fact name="Outliers" value={fixed(100 * predicted.outlier_share, 1, "%")} field="choice_outlier_share" />

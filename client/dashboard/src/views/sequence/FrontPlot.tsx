@@ -41,7 +41,10 @@ export function FrontPlot({ tradeoff, now, chosen, onChoose }: FrontPlotProps) {
   const points = tradeoff.front.map((choice) => ({ choice, ...at(choice.capture_s, choice.predicted.range_error_m.median) }));
   // One point is reached by Tab, the others from there by arrow keys.
   const reached = tradeoff.front.find((choice) => sameSequence(choice, chosen)) ?? tradeoff.front[0];
-  const planned = chosen !== null && !tradeoff.front.some((choice) => sameSequence(choice, chosen)) ? at(chosen.capture_s, chosen.predicted.range_error_m.median) : null;
+  const planned =
+    chosen !== null && !tradeoff.front.some((choice) => sameSequence(choice, chosen))
+      ? at(chosen.capture_s, chosen.predicted.range_error_m.median)
+      : null;
   const here = now === null ? null : within(at(now.capture_s, now.range_error_m));
   return (
     <div class="front" ref={box}>
@@ -105,7 +108,8 @@ export function FrontPlot({ tradeoff, now, chosen, onChoose }: FrontPlotProps) {
                   event.preventDefault();
                   event.stopPropagation();
                   onChoose(next);
-                  const other = step === 1 ? event.currentTarget.nextElementSibling : step === -1 ? event.currentTarget.previousElementSibling : null;
+                  const other =
+                    step === 1 ? event.currentTarget.nextElementSibling : step === -1 ? event.currentTarget.previousElementSibling : null;
                   if (other instanceof SVGElement) other.focus();
                 }}
               >

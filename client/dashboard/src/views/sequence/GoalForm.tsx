@@ -19,7 +19,14 @@ export function GoalForm({ disabled, onGoal }: GoalFormProps) {
     <label class="field">
       <span>{label}</span>
       <span class="field-input">
-        <input type="text" inputMode="decimal" name={name} autocomplete="off" value={text.value} onInput={(event) => (text.value = event.currentTarget.value)} />
+        <input
+          type="text"
+          inputMode="decimal"
+          name={name}
+          autocomplete="off"
+          value={text.value}
+          onInput={(event) => (text.value = event.currentTarget.value)}
+        />
         <span class="quiet">{unit}</span>
       </span>
     </label>

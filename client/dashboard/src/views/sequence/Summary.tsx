@@ -9,7 +9,12 @@ export function Summary({ applied }: { applied: AppliedDocument }) {
     <dl class="facts">
       <Fact name="Harmonics m" value={String(applied.harmonics)} field="harmonics" strong />
       <Fact name="Exposure" value={engineering(applied.exposure_s, "s")} field="exposure_s" strong />
-      <Fact name="Takes" value={applied.takes > 1 ? `${applied.takes}, ${TAKE_ORDER_NAMES[applied.take_order]}` : String(applied.takes)} field="takes" strong />
+      <Fact
+        name="Takes"
+        value={applied.takes > 1 ? `${applied.takes}, ${TAKE_ORDER_NAMES[applied.take_order]}` : String(applied.takes)}
+        field="takes"
+        strong
+      />
       <Fact name="Base frequency" value={engineering(applied.base_frequency_hz, "Hz", 4)} field="base_frequency_hz" />
       <Fact name="Zeroth moment" value={ZEROTH_NAMES[applied.zeroth]} field="zeroth" />
       <Fact name="Unambiguous range" value={fixed(applied.unambiguous_range_m, 2, "m")} field="unambiguous_range_m" />

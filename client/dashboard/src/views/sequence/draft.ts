@@ -34,8 +34,8 @@ export function draftOf(sequence: SequenceDocument): Draft {
 
 /** The document a draft stands for, with what is not edited from `base`; null where a field is no number. */
 export function documentOf(draft: Draft, base: SequenceDocument): SequenceRequest | null {
-  const [frequency_mhz, harmonics, exposure_ms, takes] = [draft.base_frequency_mhz, draft.harmonics, draft.exposure_ms, draft.takes].map((text) =>
-    text.trim() === "" ? NaN : Number(text),
+  const [frequency_mhz, harmonics, exposure_ms, takes] = [draft.base_frequency_mhz, draft.harmonics, draft.exposure_ms, draft.takes].map(
+    (text) => (text.trim() === "" ? NaN : Number(text)),
   );
   if (![frequency_mhz, harmonics, exposure_ms, takes].every(Number.isFinite)) return null;
   return {

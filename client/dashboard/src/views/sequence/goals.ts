@@ -23,5 +23,8 @@ export function goalWords(problem: Problem): string {
 
 /** What takes give where the camera leaves nothing else to choose. */
 function takesWords({ takes = [] }: Problem): string[] {
-  return takes.map((each) => `${each.takes} ${each.takes === 1 ? "take" : "takes"}: ${engineering(each.capture_s, "s")}, range to ${engineering(each.range_std_m, "m")}.`);
+  return takes.map(
+    (each) =>
+      `${each.takes} ${each.takes === 1 ? "take" : "takes"}: ${engineering(each.capture_s, "s")}, range to ${engineering(each.range_std_m, "m")}.`,
+  );
 }

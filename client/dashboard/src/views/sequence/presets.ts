@@ -16,7 +16,11 @@ export const PRESETS: readonly Preset[] = [
     words: "two and three returns in a tenth of a second",
     sequence: { base_frequency_hz: 23e6, harmonics: 4, zeroth: "estimated", exposure_s: 1.92e-3, takes: 1 },
   },
-  { name: "Video", words: "the paper's, 18.6 Hz", sequence: { base_frequency_hz: 23e6, harmonics: 3, zeroth: "estimated", exposure_s: 0.5e-3, takes: 1 } },
+  {
+    name: "Video",
+    words: "the paper's, 18.6 Hz",
+    sequence: { base_frequency_hz: 23e6, harmonics: 3, zeroth: "estimated", exposure_s: 0.5e-3, takes: 1 },
+  },
   {
     name: "One frequency",
     words: "the phase of an ordinary lidar: fast, and biased by all indirect light",

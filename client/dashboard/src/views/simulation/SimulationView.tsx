@@ -36,7 +36,8 @@ export function SimulationView() {
         <Obstacle />
         {world !== null && (
           <p class="quiet scene-words">
-            {world.scenes.find(({ name }) => name === world.scene)?.description ?? "A scene from a file"}. A scene of your own is opened here, or dropped on the page.
+            {world.scenes.find(({ name }) => name === world.scene)?.description ?? "A scene from a file"}. A scene of your own is opened
+            here, or dropped on the page.
           </p>
         )}
         {world !== null && (
@@ -98,9 +99,13 @@ function Effects({ task }: { task: Task }) {
           <span data-field="effects-built">
             {built} of {explanation.effects.length}
           </span>{" "}
-          effects are computed: those above {explanation.called_above} of the noise floor, which is {engineering(explanation.noise_floor_dn, "DN")}.{" "}
+          effects are computed: those above {explanation.called_above} of the noise floor, which is{" "}
+          {engineering(explanation.noise_floor_dn, "DN")}.{" "}
           {chosen && (
-            <Steer disabled={task.busy.value !== null} onClick={() => void task.run("Leaving all effects to the scene…", () => simulation.chooseNothing())}>
+            <Steer
+              disabled={task.busy.value !== null}
+              onClick={() => void task.run("Leaving all effects to the scene…", () => simulation.chooseNothing())}
+            >
               Leave all to the scene
             </Steer>
           )}
@@ -131,7 +136,8 @@ function EffectRow({ effect, calledAbove, task }: { effect: EffectDocument; call
     <tr data-effect={effect.effect} data-built={effect.built}>
       <th scope="row">{name}</th>
       <td class="effect-size">
-        <meter min={0} max={1} value={sizeShare(effect, calledAbove)} aria-label={`Size of ${name} over the noise floor`} /> {sizeWords(effect)}
+        <meter min={0} max={1} value={sizeShare(effect, calledAbove)} aria-label={`Size of ${name} over the noise floor`} />{" "}
+        {sizeWords(effect)}
       </td>
       <td>
         {effect.choice === "always" ? (
@@ -164,7 +170,11 @@ function FaultButton({ fault, task }: { fault: Fault; task: Task }) {
   const { word, title } = FAULTS[fault];
   const plugged = simulation.world.value?.plugged ?? true;
   return (
-    <Steer title={title} disabled={task.busy.value !== null || !possible(fault, plugged)} onClick={() => void task.run(`${title}…`, () => simulation.cause(fault))}>
+    <Steer
+      title={title}
+      disabled={task.busy.value !== null || !possible(fault, plugged)}
+      onClick={() => void task.run(`${title}…`, () => simulation.cause(fault))}
+    >
       {word}
     </Steer>
   );

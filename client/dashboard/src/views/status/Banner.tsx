@@ -7,8 +7,22 @@ import "./Banner.css";
 
 /** Says at once what is wrong, and what is being done about it; goes away with it. */
 export function Banner({ onRetry }: { onRetry: () => void }) {
-  const { status, lease, asksForToken } = useStore();
+  const { status, lease, lightOff, asksForToken } = useStore();
   const connection = status.connection.value;
+  const off = lightOff.state.value;
+  if (off !== null && off.kind !== "sent") {
+    return (
+      <div class="banner" role="alert" data-banner="light">
+        <p>
+          <strong>The light may be on.</strong> {sentence(off.reason)}{" "}
+          {off.kind === "unconfirmed" && "This page asks again until it is confirmed off."}
+        </p>
+        <button type="button" onClick={() => (off.kind === "refused" ? lightOff.withdraw() : lightOff.press())}>
+          {off.kind === "refused" ? "Dismiss" : "Try now"}
+        </button>
+      </div>
+    );
+  }
   if (connection.kind === "refused") {
     return (
       <div class="banner" role="alert" data-banner="token">
@@ -38,8 +52,8 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
     return (
       <div class="banner" role="alert" data-banner="camera">
         <p>
-          <strong>Camera lost</strong> at {timeOfDay(loss.at_s)}. The service looks for it and goes on by itself; what you see is the last frame.{" "}
-          {loss.reason !== null && <span class="quiet">Reason: {lossReason(loss.reason)}</span>}
+          <strong>Camera lost</strong> at {timeOfDay(loss.at_s)}. The service looks for it and goes on by itself; what you see is the last
+          frame. {loss.reason !== null && <span class="quiet">Reason: {lossReason(loss.reason)}</span>}
         </p>
       </div>
     );

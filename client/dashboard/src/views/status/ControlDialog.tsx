@@ -42,10 +42,13 @@ function Control({ onDone }: { onDone: () => void }) {
       <p data-field="control-words">
         {control.kind === "unknown" && "Who controls the camera is not known yet."}
         {barred !== null && `${barred}: this page can look, but not take control. `}
-        {control.kind === "free" && barred === null && "Control is free, so every client may change things. Take it, and only you may; others go on watching."}
+        {control.kind === "free" &&
+          barred === null &&
+          "Control is free, so every client may change things. Take it, and only you may; others go on watching."}
         {control.kind === "us" && (
           <>
-            You have control, as <strong>{control.holder}</strong>. This page renews it; if it stops doing so, the camera stops and its light goes off after {left}.
+            You have control, as <strong>{control.holder}</strong>. This page renews it; if it stops doing so, the camera stops and its
+            light goes off after {left}.
           </>
         )}
         {control.kind === "other" && (
@@ -57,21 +60,31 @@ function Control({ onDone }: { onDone: () => void }) {
       {control.kind !== "us" && (
         <label class="field">
           <span>What others should call you</span>
-          <input type="text" name="holder" autocomplete="nickname" maxLength={LONGEST_NAME} value={name.value} onInput={(event) => (name.value = event.currentTarget.value)} />
+          <input
+            type="text"
+            name="holder"
+            autocomplete="nickname"
+            maxLength={LONGEST_NAME}
+            value={name.value}
+            onInput={(event) => (name.value = event.currentTarget.value)}
+          />
         </label>
       )}
       <TaskLine task={task} field="control-status" />
-      {control.kind === "other" && task.refusal.value !== null && <p class="quiet">Control can be taken over from tokens of the same role or a lower one.</p>}
+      {control.kind === "other" && task.refusal.value !== null && (
+        <p class="quiet">Control can be taken over from tokens of the same role or a lower one.</p>
+      )}
       <div class="dialog-actions">
-        <button type="button" class="danger" onClick={() => void act("Switching the light off…", () => lightOff())}>
-          Light off
-        </button>
-        <span class="spring" />
         <button type="button" onClick={onDone}>
           Close
         </button>
         {control.kind === "us" ? (
-          <button type="button" class="primary" disabled={task.busy.value !== null} onClick={() => void act("Giving control back…", () => lease.release())}>
+          <button
+            type="button"
+            class="primary"
+            disabled={task.busy.value !== null}
+            onClick={() => void act("Giving control back…", () => lease.release())}
+          >
             Give back
           </button>
         ) : (
@@ -87,11 +100,6 @@ function Control({ onDone }: { onDone: () => void }) {
       </div>
     </form>
   );
-
-  async function lightOff(): Promise<void> {
-    const { state } = await store.api.safeOff();
-    store.status.cameraIs(state, Date.now() / 1000);
-  }
 }
 
 const HOLDER: Setting<string> = {

@@ -42,7 +42,9 @@ function Saved({ onDone }: { onDone: () => void }) {
         />
       </label>
       <p class={taken ? "refusal" : "quiet"} role="status">
-        {taken ? `${name} is a layout of the page's own: choose another name.` : "It is kept in this browser; a copied link shows it to others."}
+        {taken
+          ? `${name} is a layout of the page's own: choose another name.`
+          : "It is kept in this browser; a copied link shows it to others."}
       </p>
       {names.length > 0 && (
         <ul class="saved-layouts" aria-label="Saved layouts">

@@ -17,16 +17,30 @@ export function PageMenu() {
         {
           title: "Layout",
           actions: [
-            ...Object.entries({ ...LAYOUTS, ...store.layouts.named.value }).map(([text, layout]) => ({ text, run: () => store.showLayout(layout) })),
+            ...Object.entries({ ...LAYOUTS, ...store.layouts.named.value }).map(([text, layout]) => ({
+              text,
+              run: () => store.showLayout(layout),
+            })),
             { text: "Save or remove a layout…", run: () => (store.asksForLayout.value = true) },
             ...(store.layouts.undoable.value ? [{ text: "Undo the last change (Z)", run: () => store.layouts.undo() }] : []),
           ],
         },
-        { title: "Colours", actions: THEMES.map((theme) => ({ text: THEME_NAMES[theme] + (theme === choice.value ? " ✓" : ""), run: () => (choice.value = theme) })) },
+        {
+          title: "Colours",
+          actions: THEMES.map((theme) => ({
+            text: THEME_NAMES[theme] + (theme === choice.value ? " ✓" : ""),
+            run: () => (choice.value = theme),
+          })),
+        },
         { title: "Files", actions: [{ text: "Open a scene, recording or calibration…", run: () => chooseFile(store) }] },
         {
           title: "Stream",
-          actions: [{ text: `Ask for less where link or browser is too slow${store.adapts.value ? " ✓" : ""}`, run: () => (store.adapts.value = !store.adapts.peek()) }],
+          actions: [
+            {
+              text: `Ask for less where link or browser is too slow${store.adapts.value ? " ✓" : ""}`,
+              run: () => (store.adapts.value = !store.adapts.peek()),
+            },
+          ],
         },
         {
           title: "Help",

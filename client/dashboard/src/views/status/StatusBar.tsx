@@ -3,6 +3,7 @@ import { deviation, fixed } from "../../scales/format";
 import { flowTrouble } from "../../store/status";
 import { useStore } from "../../store/store";
 import { useNow } from "../../ui/hooks";
+import { LightOffButton } from "../../ui/LightOffButton";
 import { errorWords } from "../sequence/words";
 import { Figures } from "./Figures";
 import { Steering } from "./Steering";
@@ -25,6 +26,7 @@ export function StatusBar() {
       <Figures />
       <Toasts />
       <Steering />
+      <LightOffButton />
     </header>
   );
 }

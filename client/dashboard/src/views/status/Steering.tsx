@@ -17,7 +17,11 @@ export function Steering() {
       <RecordingSign />
       <ControlButton />
       {!store.replay.active.value && (
-        <Toggle pressed={store.held.value} title="Hold this frame while the camera goes on (H)" onToggle={() => (store.held.value = !store.held.peek())}>
+        <Toggle
+          pressed={store.held.value}
+          title="Hold this frame while the camera goes on (H)"
+          onToggle={() => (store.held.value = !store.held.peek())}
+        >
           <HoldIcon /> <span class="wide">Hold</span>
         </Toggle>
       )}
@@ -37,11 +41,13 @@ function Capture() {
   };
   const toggle = (): Promise<void> =>
     run("Switching", async () => {
+      store.lightOff.withdraw();
       const { state } = await store.api.setAcquisition(running !== true);
       store.status.cameraIs(state, Date.now() / 1000);
     });
   const single = (): Promise<void> =>
     run("Capturing", async () => {
+      store.lightOff.withdraw();
       store.held.value = false;
       store.replay.leave();
       await captureOne(store.api, store.sequence.peek()?.capture_s ?? 0);
@@ -55,7 +61,11 @@ function Capture() {
       <Steer title={occupied ?? "Stop the camera, capture one frame and look at it"} disabled={busy} onClick={() => void single()}>
         <SingleIcon /> <span class="wide">Single</span>
       </Steer>
-      <Steer title={occupied ?? (running ? "Stop the camera; its light goes off" : "Start the camera")} disabled={busy} onClick={() => void toggle()}>
+      <Steer
+        title={occupied ?? (running ? "Stop the camera; its light goes off" : "Start the camera")}
+        disabled={busy}
+        onClick={() => void toggle()}
+      >
         {running ? <PauseIcon /> : <PlayIcon />} <span class="wide">{running ? "Stop" : "Start"}</span>
       </Steer>
     </>
@@ -83,9 +93,19 @@ function ControlButton() {
   }
   const words = { unknown: "Take control", free: "Take control", us: "You have control", other: "" }[control.kind];
   return (
-    <button type="button" class={`control-button control-${control.kind}`} title="Who controls the camera" data-field="control" onClick={() => (asksForControl.value = true)}>
+    <button
+      type="button"
+      class={`control-button control-${control.kind}`}
+      title="Who controls the camera"
+      data-field="control"
+      onClick={() => (asksForControl.value = true)}
+    >
       <ControlIcon />
-      {control.kind === "other" ? <Other holder={control.holder} expires_s={control.expires_s} /> : <span class={control.kind === "free" ? "wide" : ""}>{words}</span>}
+      {control.kind === "other" ? (
+        <Other holder={control.holder} expires_s={control.expires_s} />
+      ) : (
+        <span class={control.kind === "free" ? "wide" : ""}>{words}</span>
+      )}
     </button>
   );
 }

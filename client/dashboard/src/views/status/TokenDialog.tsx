@@ -36,7 +36,14 @@ function TokenForm({ onDone }: { onDone: () => void }) {
       </p>
       <label class="field">
         <span>Token</span>
-        <input type="password" name="token" autocomplete="off" spellcheck={false} value={text.value} onInput={(event) => (text.value = event.currentTarget.value)} />
+        <input
+          type="password"
+          name="token"
+          autocomplete="off"
+          spellcheck={false}
+          value={text.value}
+          onInput={(event) => (text.value = event.currentTarget.value)}
+        />
       </label>
       {known && recognised !== null && (
         <p data-field="caller">

@@ -31,7 +31,10 @@ export function StreakView() {
   const canvas = useRef<HTMLCanvasElement>(null);
   const bright = useSignal(NaN);
   const pointed = useSignal<{ x: number; bin: number } | null>(null);
-  const size = useMemo(() => computed(() => `${frame.value?.coefficients?.width ?? 163}x${frame.value?.coefficients?.height ?? 120}`), [frame]);
+  const size = useMemo(
+    () => computed(() => `${frame.value?.coefficients?.width ?? 163}x${frame.value?.coefficients?.height ?? 120}`),
+    [frame],
+  );
   const [width, height] = size.value.split("x").map(Number);
   const row = useComputed(() => Math.min(height - 1, store.selected.value?.y ?? height >> 1));
 
@@ -43,7 +46,8 @@ export function StreakView() {
     streak.compute(coefficients, y);
     const white = whiteOf(streak.values);
     if (!(Math.abs(Math.log(white / bright.peek())) < 0.2)) bright.value = white; // not with every frame's noise
-    if (canvas.current.width !== streak.width || canvas.current.height !== BINS) [canvas.current.width, canvas.current.height] = [streak.width, BINS];
+    if (canvas.current.width !== streak.width || canvas.current.height !== BINS)
+      [canvas.current.width, canvas.current.height] = [streak.width, BINS];
     const image = context.createImageData(streak.width, BINS);
     paintStreak(streak.values, bright.peek(), toneNow, coloursNow, image.data);
     context.putImageData(image, 0, 0);
@@ -106,7 +110,9 @@ export function StreakView() {
           <canvas ref={canvas} data-product="streak" />
           <Marks width={width} />
         </div>
-        {bright.value > 0 && <ColourBar scale={scaleOf(tone.value, Number((bright.value * 1e-9).toPrecision(3)))} colours={colours.value} unit="DN/ns" />}
+        {bright.value > 0 && (
+          <ColourBar scale={scaleOf(tone.value, Number((bright.value * 1e-9).toPrecision(3)))} colours={colours.value} unit="DN/ns" />
+        )}
       </div>
       <footer class="panel-foot">
         <div class="panel-row">
@@ -118,7 +124,9 @@ export function StreakView() {
               max={height - 1}
               value={row.value}
               aria-label="Scanline"
-              onInput={(event) => (store.selected.value = { x: store.selected.peek()?.x ?? width >> 1, y: event.currentTarget.valueAsNumber })}
+              onInput={(event) =>
+                (store.selected.value = { x: store.selected.peek()?.x ?? width >> 1, y: event.currentTarget.valueAsNumber })
+              }
             />
           </label>
           <Readout frame={frame} streak={streak} pointed={pointed} width={width} period_ns={period_ns} />

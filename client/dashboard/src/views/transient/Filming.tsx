@@ -20,7 +20,10 @@ export class Filming {
   /** Films to choose from. */
   actions(subject: Subject, store: Store): Action[] {
     const run = (make: typeof filmPass, name: string, kind: FilmKind) => (): void => {
-      void this.#make(() => make(subject, store, kind, this.#progress()), `${name}-${store.frames.of("coefficients").peek()?.meta.frame ?? 0}.${kind}`);
+      void this.#make(
+        () => make(subject, store, kind, this.#progress()),
+        `${name}-${store.frames.of("coefficients").peek()?.meta.frame ?? 0}.${kind}`,
+      );
     };
     const kinds: readonly (readonly [FilmKind, string])[] = [
       ["webm", "WebM"],

@@ -18,5 +18,9 @@ export function LightBar({ look, play }: { look: TransientLook; play: Play }) {
   const store = useStore();
   const dark = useComputed(() => store.frames.of("coefficients").value === null).value;
   const { scale, unit } = lightScale(look, store, play);
-  return !dark && scale.high > 0 ? <ColourBar scale={scale} colours={look.colours.value} unit={unit} /> : <div class="colour-bar colour-bar-bare" />;
+  return !dark && scale.high > 0 ? (
+    <ColourBar scale={scale} colours={look.colours.value} unit={unit} />
+  ) : (
+    <div class="colour-bar colour-bar-bare" />
+  );
 }

@@ -34,7 +34,8 @@ export function LightSoFar({ look }: { look: TransientLook }) {
     if (!coefficients || canvas.current === null || !context || !(white > 0)) return;
     light.take(coefficients);
     const values = light.between(look.play.value === "gate" ? gateStart_rad(phase_rad, store.period_s.value) : 0, phase_rad);
-    if (canvas.current.width !== light.width || canvas.current.height !== light.height) [canvas.current.width, canvas.current.height] = [light.width, light.height];
+    if (canvas.current.width !== light.width || canvas.current.height !== light.height)
+      [canvas.current.width, canvas.current.height] = [light.width, light.height];
     const image = context.createImageData(light.width, light.height);
     const table = new Uint32Array(colourTable(colours).buffer);
     const pixels = new Uint32Array(image.data.buffer);

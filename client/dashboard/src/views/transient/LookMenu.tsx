@@ -19,7 +19,11 @@ export function LookMenu({ look }: { look: TransientLook }) {
       />
       <ColourChoice colours={look.colours} />
       {look.play.value === "density" && (
-        <Check title="Show the still scene behind the light" checked={look.backdrop.value} onChange={(shown) => (look.backdrop.value = shown)}>
+        <Check
+          title="Show the still scene behind the light"
+          checked={look.backdrop.value}
+          onChange={(shown) => (look.backdrop.value = shown)}
+        >
           Scene behind the light
         </Check>
       )}

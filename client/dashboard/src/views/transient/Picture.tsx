@@ -3,6 +3,7 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 
 import { createRenderer, hasGraphics } from "../../gl/createRenderer";
 import type { DensityRenderer } from "../../gl/renderer";
+import { drawnOf } from "../../store/frames";
 import type { TransientLook } from "../../store/lightLook";
 import { AMPLITUDE } from "../../store/mapCatalogue";
 import { useStore } from "../../store/store";
@@ -57,7 +58,10 @@ export function Picture({ look }: { look: TransientLook }) {
     if (renderer.value === null || coefficients === null) return;
     const fits = brightness?.values.length === coefficients.width * coefficients.height;
     const white = brightness?.map?.high ?? NaN;
-    const backdrop = wanted && fits && white > 0 && brightness?.values instanceof Float32Array ? { values: brightness.values, white } : null;
+    const backdrop =
+      wanted && fits && white > 0 && brightness?.values instanceof Float32Array
+        ? { values: drawnOf(brightness) as Float32Array, white }
+        : null;
     renderer.value.draw(coefficients, { phase_rad, tone, colours, backdrop });
     if (canvas.current !== null) canvas.current.dataset.frame = String(frame.peek()?.meta.frame);
     look.snapshot = () => {

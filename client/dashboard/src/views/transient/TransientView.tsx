@@ -28,7 +28,11 @@ import "./TransientView.css";
 
 const PLAY_TABS: readonly { readonly value: Play; readonly text: string; readonly hint: string }[] = [
   { value: "density", text: "In flight", hint: "The light that arrives at one time" },
-  { value: "gate", text: "Last 1 ns", hint: "The light that came within the nanosecond before: a front that is too thin to be seen leaves a trail" },
+  {
+    value: "gate",
+    text: "Last 1 ns",
+    hint: "The light that came within the nanosecond before: a front that is too thin to be seen leaves a trail",
+  },
   { value: "cumulative", text: "So far", hint: "All light that has come up to that time" },
 ];
 
@@ -164,7 +168,9 @@ function DensityReadout({ play }: { play: Play }) {
       }),
     [store, play],
   );
-  const text = useComputed(() => (Number.isNaN(density.value) ? "" : play === "density" ? significant(density.value * 1e-9, 3, "DN/ns") : fixed(density.value, 0, "DN")));
+  const text = useComputed(() =>
+    Number.isNaN(density.value) ? "" : play === "density" ? significant(density.value * 1e-9, 3, "DN/ns") : fixed(density.value, 0, "DN"),
+  );
   return (
     <span class="readout-density" data-field="density">
       {text}

@@ -24,7 +24,10 @@ export function litOf(arrivals: ArrayLike<number>): Lit | null {
   const worth = all.map((value) => value > least && value > 0);
   if (!worth.includes(true)) return null;
   const room = 0.02;
-  return { first: Math.max(0, worth.indexOf(true) / all.length - room), last: Math.min(1, (worth.lastIndexOf(true) + 1) / all.length + room) };
+  return {
+    first: Math.max(0, worth.indexOf(true) / all.length - room),
+    last: Math.min(1, (worth.lastIndexOf(true) + 1) / all.length + room),
+  };
 }
 
 /** Ends that noise alone moves stay where they are. */

@@ -5,7 +5,11 @@ const COLUMNS = 4;
 export const PICTURES = 8;
 const LABEL_PX = 12;
 /** Draws what `pictureAt` shows at each turn, with its time below. */
-export function stripOf(turns: readonly number[], period_s: number, pictureAt: (turn: number) => HTMLCanvasElement | null): HTMLCanvasElement {
+export function stripOf(
+  turns: readonly number[],
+  period_s: number,
+  pictureAt: (turn: number) => HTMLCanvasElement | null,
+): HTMLCanvasElement {
   const strip = document.createElement("canvas");
   turns.forEach((turn, n) => {
     const picture = pictureAt(turn);

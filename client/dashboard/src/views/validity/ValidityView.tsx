@@ -1,7 +1,7 @@
 import { type ReadonlySignal, useComputed } from "@preact/signals";
 import { useRef } from "preact/hooks";
 import { fixed, grouped } from "../../scales/format";
-import type { Frame } from "../../store/frames";
+import { drawnOf, type Frame, sentOf } from "../../store/frames";
 import { useStore } from "../../store/store";
 import { saveNumbers, savePicture } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
@@ -31,7 +31,7 @@ export function ValidityView() {
     if (canvas.current.width !== columns || canvas.current.height !== rows) [canvas.current.width, canvas.current.height] = [columns, rows];
     const image = context.createImageData(columns, rows);
     const fits = brightness?.values.length === newest.values.length;
-    paintFlags(newest.values, fits ? brightness.values : null, brightness?.map?.high ?? 1, image.data);
+    paintFlags(newest.values, fits ? drawnOf(brightness) : null, brightness?.map?.high ?? 1, image.data);
     context.putImageData(image, 0, 0);
     canvas.current.dataset.frame = String(newest.meta.frame);
   }, [frame, scene]);
@@ -42,7 +42,7 @@ export function ValidityView() {
       title={<h2>Validity</h2>}
       downloads={[
         { text: "Picture (PNG)", run: () => savePicture(`validity-${frame.peek()?.meta.frame ?? 0}`, canvas.current) },
-        { text: "Flags (NPY)", run: () => saveNumbers(frame.peek()) },
+        { text: "Flags (NPY)", run: () => saveNumbers(store.api, frame.peek()) },
       ]}
     >
       <Stage width={width} height={height} label="Validity map">
@@ -55,7 +55,7 @@ export function ValidityView() {
 }
 
 function Legend({ frame }: { frame: ReadonlySignal<Frame | null> }) {
-  const counts = useComputed(() => countFlags(frame.value?.values ?? []));
+  const counts = useComputed(() => countFlags(frame.value === null ? [] : sentOf(frame.value)));
   const { total, valid, byFlag } = counts.value;
   const share = (count: number): string => fixed(total === 0 ? NaN : (100 * count) / total, count === 0 || count === total ? 0 : 1, "%");
   return (

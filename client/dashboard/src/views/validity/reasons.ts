@@ -37,6 +37,8 @@ export interface FlagCounts {
 export function countFlags(flags: ArrayLike<number>): FlagCounts {
   const seen = new Uint32Array(256);
   for (let pixel = 0; pixel < flags.length; pixel++) seen[flags[pixel]]++;
-  const byFlag = Object.fromEntries(FLAGS.map(({ bit, name }) => [name, seen.reduce((sum, count, bits) => sum + ((bits & bit) !== 0 ? count : 0), 0)]));
+  const byFlag = Object.fromEntries(
+    FLAGS.map(({ bit, name }) => [name, seen.reduce((sum, count, bits) => sum + ((bits & bit) !== 0 ? count : 0), 0)]),
+  );
   return { total: flags.length, valid: seen[0], byFlag };
 }
