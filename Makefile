@@ -17,7 +17,7 @@ DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 
 DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test test-fast mutants check bench paper docs docs-site dist clean dashboard debian-packages \
+.PHONY: help serve test test-fast mutants check bench paper docs docs-site dist lock release clean dashboard debian-packages \
 	check-pyright check-mypy check-style check-documents check-dashboard check-newest
 
 help:  ## Say what each target does
@@ -62,6 +62,29 @@ dist: .venv/test.stamp dashboard  ## Build the sdist and, from it, the wheel (di
 		$(BIN)/python -m build --no-isolation --outdir dist && \
 	for each in packages/*; do $(BIN)/python -m build --no-isolation --wheel --outdir dist $$each; done
 
+# Every version and every hash of what is installed, for all platforms. uv's own lock names where packages
+# come from, and is not kept: what is exported from it is.
+EXPORT = build/lock/bin/uv --quiet export --frozen --no-dev --no-header --no-annotate --no-emit-workspace --format requirements-txt
+lock:  ## Resolve pyproject.toml anew, to the newest of all, into requirements/
+	$(PYTHON) -m venv build/lock && build/lock/bin/python -m pip install --quiet 'uv>=0.9'
+	build/lock/bin/uv --quiet lock --upgrade
+	$(EXPORT) --extra test --group build --output-file requirements/test.txt >/dev/null
+	$(EXPORT) --extra server --extra conformance --extra opt8241 --extra cluster --extra plot \
+		--output-file requirements/service.txt >/dev/null
+	for each in build release; do $(EXPORT) --only-group $$each --output-file requirements/$$each.txt >/dev/null; done
+	rm uv.lock
+
+# What is released says what is in it, and of that nothing has a known weakness; both of the locked versions.
+release: dist build/release.stamp  ## dist, with a bill of materials (CycloneDX) and a look for known weaknesses
+	build/release/bin/python -m cyclonedx_py requirements --output-reproducible --of JSON \
+		--output-file dist/transientcam.cdx.json requirements/service.txt
+	build/release/bin/python -m pip_audit --disable-pip --require-hashes --requirement requirements/service.txt
+
+build/release.stamp: requirements/release.txt
+	$(PYTHON) -m venv build/release
+	build/release/bin/python -m pip install --quiet --require-hashes --no-deps --requirement requirements/release.txt
+	@touch $@
+
 clean:  ## Remove everything that was built or installed here
 	rm -rf .venv build dist client/dashboard/node_modules $(dir $(BUILT_PAGE))
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
@@ -73,15 +96,22 @@ clean:  ## Remove everything that was built or installed here
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade pip
 
-.venv/serve.stamp: pyproject.toml $(wildcard packages/*/pyproject.toml) | .venv/bin/python
-	$(BIN)/python -m pip install --quiet --editable '.[server,plot,conformance,opt8241]' $(PACKAGES)
+# The locks have all that is needed, and what builds: nothing is resolved or fetched beside them.
+LOCKED := -m pip install --quiet --require-hashes --no-deps
+OURS := -m pip install --quiet --no-deps --no-build-isolation --editable .
+
+.venv/serve.stamp: pyproject.toml requirements/service.txt requirements/build.txt $(wildcard packages/*/pyproject.toml) | .venv/bin/python
+	$(BIN)/python $(LOCKED) --requirement requirements/build.txt
+	$(BIN)/python $(LOCKED) --requirement requirements/service.txt
+	$(BIN)/python $(OURS) $(PACKAGES)
 	@touch $@
 
 # The client of the TOFcam660's vendor, which drives our emulation of it. What the tests use of it needs NumPy
 # alone; its own requirements (OpenCV, Bluetooth, serial ports) are for its other cameras.
-.venv/test.stamp: pyproject.toml $(wildcard packages/*/pyproject.toml) | .venv/bin/python
-	$(BIN)/python -m pip install --quiet --editable '.[test]' $(PACKAGES)
-	$(BIN)/python -m pip install --quiet --no-deps 'epc-tofcam-toolkit==0.13.0'
+.venv/test.stamp: pyproject.toml requirements/test.txt requirements/vendor.txt $(wildcard packages/*/pyproject.toml) | .venv/bin/python
+	$(BIN)/python $(LOCKED) --requirement requirements/test.txt
+	$(BIN)/python $(LOCKED) --requirement requirements/vendor.txt
+	$(BIN)/python $(OURS) $(PACKAGES)
 	@touch $@ .venv/serve.stamp
 
 # For nothing else, and with much that nothing else needs.
@@ -91,7 +121,7 @@ clean:  ## Remove everything that was built or installed here
 
 # What is installed here states the commit that it is of.
 .venv/version.stamp: $(wildcard .git/logs/HEAD) | .venv/serve.stamp
-	$(BIN)/python -m pip install --quiet --no-deps --editable .
+	$(BIN)/python $(OURS)
 	@touch $@
 
 client/dashboard/node_modules/.package-lock.json: client/dashboard/package-lock.json

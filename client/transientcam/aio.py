@@ -16,6 +16,7 @@ from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamErr
 from transientcam.frame import Frame
 from transientcam.lease import AsyncLease, OnLapse
 from transientcam.requests import (
+    MOST_DOCUMENT_BYTES,
     PROGRESS_EVERY_S,
     WAIT_S,
     OnProgress,
@@ -40,9 +41,11 @@ from transientcam.transport import (
     Deadline,
     DownloadProgress,
     Progress,
-    answer_of,
+    exchange_async,
     http_options,
-    request_options,
+    read_async,
+    require_direct,
+    require_plain,
     set_lease,
     stream_options,
     translated,
@@ -169,8 +172,8 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
         with translated(self.url):
             async with self._http.stream("GET", url) as response:
                 if response.status_code != httpx.codes.OK:
-                    await response.aread()
-                    raise problem(answer_of(response))
+                    raise problem(await read_async(response, most_bytes=MOST_DOCUMENT_BYTES))
+                require_plain(response)
                 received = DownloadProgress(response, progress)
                 with part.open("wb") as file:
                     async for piece in response.aiter_bytes():
@@ -212,12 +215,9 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
 
     async def _ask(self, request: Request[_T]) -> _T:
         with translated(self.url):
-            response = await self._http.request(
-                request.method,
-                f"{self._address.api}/{request.path}",
-                **request_options(request, timeout_s=self._timeout_s),
-            )
-        return request.result(answer_of(response))
+            url = f"{self._address.api}/{request.path}"
+            answer = await exchange_async(self._http, url, request, timeout_s=self._timeout_s)
+        return request.result(answer)
 
 
 class AsyncStream(BaseStream):
@@ -293,6 +293,7 @@ class AsyncStream(BaseStream):
             connection: ClientConnection = await self._stack.enter_async_context(
                 connect(self._url, **stream_options(self._url, timeout_s=self._timeout_s))
             )
+            require_direct(connection, self._url)
             await connection.send(self._state.opening(connection.subprotocol))
         if self.closed:  # meanwhile, by another task
             raise StreamClosed(CloseCode.NORMAL, "it was closed here")

@@ -51,8 +51,13 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
 
     @property
     def url(self) -> str:
-        """Address of the daemon."""
-        return self._address.url
+        """Address of the daemon, without a user's name and password."""
+        return self._address.shown
+
+    @property
+    def has_token(self) -> bool:
+        """Whether requests carry a token."""
+        return self._token is not None
 
     def validate(self, settings: Mapping[str, Any]) -> _Document:
         """Return what a sequence would really be set to, without setting it."""

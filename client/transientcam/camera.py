@@ -13,6 +13,7 @@ from transientcam.frame import Frame
 from transientcam.lease import Lease, OnLapse
 from transientcam.notebook import table_html
 from transientcam.requests import (
+    MOST_DOCUMENT_BYTES,
     PROGRESS_EVERY_S,
     WAIT_S,
     OnProgress,
@@ -36,9 +37,11 @@ from transientcam.stream_state import (
 from transientcam.transport import (
     DownloadProgress,
     Progress,
-    answer_of,
+    bounded,
+    exchange,
     http_options,
-    request_options,
+    read,
+    require_plain,
     set_lease,
     translated,
 )
@@ -67,7 +70,7 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
     token
         Bearer token, where the daemon requires one.
     timeout_s
-        How long to wait for a connection and for each answer.
+        How long to wait for each answer, all of it.
     transport
         How httpx sends requests, for tests and unusual networks; streams do not take it.
     """
@@ -81,8 +84,8 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
         transport: httpx.BaseTransport | None = None,
     ) -> None:
         super().__init__(url, token=token, timeout_s=timeout_s)
-        self._http = httpx.Client(
-            **http_options(token=token, timeout_s=timeout_s), transport=transport
+        self._http = bounded(
+            httpx.Client(**http_options(token=token, timeout_s=timeout_s), transport=transport)
         )
         self._streams: list[Stream] = []
 
@@ -215,8 +218,8 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
         url = f"{self._address.api}/{recording_file(recording_id)}"
         with translated(self.url), self._http.stream("GET", url) as response:
             if response.status_code != httpx.codes.OK:
-                response.read()
-                raise problem(answer_of(response))
+                raise problem(read(response, most_bytes=MOST_DOCUMENT_BYTES))
+            require_plain(response)
             received = DownloadProgress(response, progress)
             with part.open("wb") as file:
                 for piece in response.iter_bytes():
@@ -291,9 +294,6 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
 
     def _ask(self, request: Request[_T]) -> _T:
         with translated(self.url):
-            response = self._http.request(
-                request.method,
-                f"{self._address.api}/{request.path}",
-                **request_options(request, timeout_s=self._timeout_s),
-            )
-        return request.result(answer_of(response))
+            url = f"{self._address.api}/{request.path}"
+            answer = exchange(self._http, url, request, timeout_s=self._timeout_s)
+        return request.result(answer)

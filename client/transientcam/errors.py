@@ -15,7 +15,8 @@
     ├── PromiseBroken         a camera does not do what is documented (transientcam conformance)
     └── CheckSkipped          a promise that cannot be tried on this camera (the same)
 
-Each is a dataclass: its fields are its data, and its sentence is built from them.
+Each is a dataclass: its fields are its data, and its sentence is built from them; in it stands no
+sign of a server's that a terminal would obey.
 """
 
 import dataclasses
@@ -23,6 +24,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
+
+from transientcam.text import plain
 
 _SHOWN_CHARACTERS = 80
 
@@ -68,7 +71,7 @@ class ServerUnreachable(_DataError):  # noqa: N818 - a state has no "Error" in i
     reason: str
 
     def __str__(self) -> str:
-        return f"No camera answers at {self.url}: {self.reason}"
+        return f"No camera answers at {plain(self.url)}: {plain(self.reason)}"
 
 
 @dataclass(eq=False, repr=False, kw_only=True)
@@ -100,7 +103,7 @@ class ProblemError(_DataError):
     document: Mapping[str, object] = dataclasses.field(default_factory=dict, repr=False)
 
     def __str__(self) -> str:
-        what = self.detail or self.title or self.type
+        what = plain(self.detail or self.title or self.type, lines=True)
         return f"{what} ({self.status})" if self.status else what
 
 
@@ -112,7 +115,7 @@ class StreamClosed(_DataError):  # noqa: N818 - the same
     reason: str = ""
 
     def __str__(self) -> str:
-        return f"The stream closed ({self.code}): {self.reason or 'no reason was given'}"
+        return f"The stream closed ({self.code}): {plain(self.reason) or 'no reason was given'}"
 
 
 @dataclass(eq=False, repr=False)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from transientcam.errors import MissingExtra, ParameterError
 from transientcam.frame import Frame
 from transientcam.remote_file import RemoteFile
-from transientcam.transport import parse_address
+from transientcam.transport import parse_address, without_secrets
 
 GROUP: Final = "transientcam.recordings"
 _PATH: Final = "/api/v1/recordings/"
@@ -190,5 +190,5 @@ def _file_url(url: str) -> str:
     before, found, name = address.rpartition(_PATH)
     recording_id = name.removesuffix("/file")
     if not found or not recording_id or "/" in recording_id:
-        raise ParameterError("path_or_url", url, _LIMIT)
+        raise ParameterError("path_or_url", without_secrets(url), _LIMIT)
     return f"{before}{_PATH}{recording_id}/file"

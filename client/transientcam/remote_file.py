@@ -7,8 +7,8 @@ from typing import Final
 import httpx
 
 from transientcam.errors import ProtocolError
-from transientcam.requests import problem
-from transientcam.transport import answer_of, http_options, translated
+from transientcam.requests import MOST_DOCUMENT_BYTES, problem
+from transientcam.transport import bounded, http_options, read, translated, within, without_secrets
 
 _BLOCK_BYTES: Final = 16 * 1024
 """What reads less than that gets a whole block; what reads more gets no byte beside."""
@@ -25,7 +25,7 @@ class RemoteFile(io.RawIOBase):
     token
         Bearer token, where the server requires one.
     timeout_s
-        How long to wait for a connection and for each answer.
+        How long to wait for each answer, all of it.
     transport
         How httpx sends requests, for tests and unusual networks.
 
@@ -46,11 +46,13 @@ class RemoteFile(io.RawIOBase):
         transport: httpx.BaseTransport | None = None,
     ) -> None:
         super().__init__()
-        self.url = url
-        options = http_options(token=token, timeout_s=timeout_s)
-        # bytes of a range count as they are stored
-        options["headers"]["accept-encoding"] = "identity"
-        self._http = httpx.Client(**options, transport=transport)
+        self._url = url
+        self.url = without_secrets(url)
+        """Of the file, as it may be shown."""
+        self._timeout_s = timeout_s
+        self._http = bounded(
+            httpx.Client(**http_options(token=token, timeout_s=timeout_s), transport=transport)
+        )
         self._blocks: OrderedDict[int, bytes] = OrderedDict()
         self._place = 0
         self._tag: str | None = None
@@ -127,17 +129,22 @@ class RemoteFile(io.RawIOBase):
         headers = {"range": f"bytes={first}-{first + size - 1}"}
         if self._tag is not None:
             headers["if-range"] = self._tag
-        with translated(self.url), self._http.stream("GET", self.url, headers=headers) as response:
+        with (
+            translated(self.url),
+            within(self._timeout_s),
+            self._http.stream("GET", self._url, headers=headers) as response,
+        ):
             if response.status_code == httpx.codes.OK:  # the whole file, which is not read
                 limit = "the part requested" if self._tag is None else "the file that was opened"
                 raise ProtocolError("answer", "the whole of a file", limit)
-            response.read()
-        if response.status_code != httpx.codes.PARTIAL_CONTENT:
-            raise problem(answer_of(response))
+            partial = response.status_code == httpx.codes.PARTIAL_CONTENT
+            answer = read(response, most_bytes=size if partial else MOST_DOCUMENT_BYTES)
+        if not partial:
+            raise problem(answer)
         _, _, total = response.headers.get("content-range", "").partition("/")
         if not total.isdecimal():
             raise ProtocolError("content-range", total, "bytes first-last/size")
         self.size, self._tag = int(total), response.headers.get("etag")
-        if len(response.content) != min(size, self.size - first):
-            raise ProtocolError("answer", f"{len(response.content)} bytes", "those requested")
-        return response.content
+        if len(answer.body) != min(size, self.size - first):
+            raise ProtocolError("answer", f"{len(answer.body)} bytes", "those requested")
+        return answer.body

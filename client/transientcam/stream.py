@@ -11,7 +11,7 @@ from websockets.typing import Data
 from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
 from transientcam.frame import Frame
 from transientcam.stream_state import DEFAULT_CREDITS, StreamState, subscribe_message
-from transientcam.transport import Deadline, stream_options, translated
+from transientcam.transport import Deadline, require_direct, stream_options, translated
 from transientcam.wire import Channel, CloseCode, Hello, Notice, Subscription
 
 
@@ -152,6 +152,7 @@ class Stream(BaseStream):
                     **stream_options(self._url, timeout_s=self._timeout_s, threaded=True),
                 )
             )
+            require_direct(connection, self._url)
             connection.send(self._state.opening(connection.subprotocol))
         if self.closed:  # meanwhile, by another thread
             raise StreamClosed(CloseCode.NORMAL, "it was closed here")

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.progress import Progress, TaskID
 
+from transientcam.cli.terminal import Terminal, echo
 from transientcam_server.cli.cluster import DaskOption, WorkersOption, cluster_client
 from transientcam_server.cli.progress import progress_bars
 
@@ -61,7 +61,7 @@ def paper(
             known = ", ".join(map(str, FIGURES))
             raise typer.BadParameter(f"{number} is none of {known}", param_hint="FIGURES")
     page = Page(output)
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     documents = {}
     with ExitStack() as stack:
         if workers is not None or dask is not None:
@@ -79,7 +79,7 @@ def paper(
             progress.advance(task)
     ordered = [documents[number] for number in chosen]
     if as_json:
-        typer.echo(json.dumps(ordered, ensure_ascii=False))
+        echo(json.dumps(ordered, ensure_ascii=False))
     else:
         for document in ordered:
             _print_statements(console, document)
@@ -101,7 +101,7 @@ def _made_on(
             yield task[0], result
 
 
-def _print_statements(console: Console, document: dict[str, Any]) -> None:
+def _print_statements(console: Terminal, document: dict[str, Any]) -> None:
     statements = document["statements"]
     hold = sum(each["passes"] for each in statements)
     heading = f"Figure {document['figure']}, {document['title']}"
@@ -163,7 +163,7 @@ def tradeoff(
         for name in scenes
     }
     records = experiment.Records(output)
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     interrupted = False
     try:
         if workers is not None or dask is not None:
@@ -175,7 +175,7 @@ def tradeoff(
     written = experiment.report(output, records) if len(records) else []
     if as_json:
         document = {"points": len(records), "written": [str(path) for path in written]}
-        typer.echo(json.dumps(document))
+        echo(json.dumps(document))
     else:
         console.print(f"{len(records)} points; see {output / 'index.html'}")
     if interrupted:
@@ -186,7 +186,7 @@ def tradeoff(
 def _capture_on(
     workers: int | None,
     dask: str | None,
-    console: Console,
+    console: Terminal,
     grid: "Grid",
     scenes: list[str],
     records: "Records",
@@ -215,7 +215,7 @@ def _capture_on(
 
 
 def _measure_here(
-    console: Console, points: Mapping[str, "list[Point]"], records: "Records", *, seed: int
+    console: Terminal, points: Mapping[str, "list[Point]"], records: "Records", *, seed: int
 ) -> None:
     """Measure in this process what is left of all scenes."""
     import transientcam_moments as tm

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import logging
 import secrets
+import threading
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, replace
@@ -111,6 +112,10 @@ class Service:
         The sequence that frames are captured with from now on.
     mjpeg_clients
         How many clients are sent a preview as MJPEG.
+    closing
+        Set once the service ends: what takes long asks for it.
+    simulating
+        Held while another simulated scene is prepared.
     observers
         Notified of every event of the acquisition, and of every frame that was the newest.
     """
@@ -124,6 +129,8 @@ class Service:
         self.history = History(settings.history)
         self.mjpeg_clients = 0
         self.observers: list[Observer] = []
+        self.closing = threading.Event()
+        self.simulating = asyncio.Lock()
         self._superseded: list[Frame] = []
         self._executor = ThreadPoolExecutor(
             settings.workers, WORKER_THREADS, initializer=tm.kernels.use_one_thread
@@ -134,7 +141,7 @@ class Service:
             suited(settings.reconstruction, camera.capabilities.sampling)
         )
         self.planner = Planner(camera.capabilities, sensor, reconstruction)
-        self.planning = PlanningQueue(PlanningProcess())
+        self.planning = PlanningQueue(PlanningProcess(settings.limits.plan_s))
         kept = CalibrationStore(settings.calibrations, given=settings.calibration)
         self.pipeline = Pipeline(
             camera,
@@ -231,6 +238,7 @@ class Service:
             yield
         finally:
             turning.cancel()
+            self.closing.set()
             await self.planning.close()
             self.lease.close()
             self.hub.close()
@@ -248,6 +256,7 @@ class Service:
 
     async def close_streams(self) -> None:
         """Close every stream, and give clients that still read the time to receive the reason."""
+        self.closing.set()
         await self.planning.close()
         self.hub.close()
         self.jobs.cancel_all()

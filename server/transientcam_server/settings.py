@@ -247,6 +247,8 @@ class LimitSettings(_Group):
     """Time without any client being served, after which the light is switched off until they are:
     no client could switch it off meanwhile. After the same time without the camera's thread the
     supervisor, a process of its own, switches it off until somebody starts."""
+    plan_s: _Finite = Field(default=300.0, gt=0.0, le=86400.0)
+    """Time for a plan, or a look at the scene, to be computed; then it is given up."""
     head_s: _Finite = Field(default=10.0, gt=0.0, le=3600.0)
     """Time for the head of a request to arrive, and for a handshake of TLS."""
     body_s: _Finite = Field(default=30.0, gt=0.0, le=3600.0)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from websockets.http11 import Request, Response
 from websockets.sync.server import ServerConnection
 
 from tests.client.conftest import Recording, ReplayServer
@@ -18,6 +19,7 @@ from transientcam.errors import (
     ProtocolError,
     ServerUnreachable,
     StreamClosed,
+    TransientcamError,
 )
 
 _Start = Callable[..., ReplayServer]
@@ -249,6 +251,27 @@ def test_a_server_without_the_subprotocol_is_refused(connect: _Connect, replay: 
 
     with pytest.raises(ProtocolError, match="subprotocol is None"):
         client.receive(timeout_s=5.0)
+
+
+def test_a_redirect_is_not_followed_and_no_token_goes_there(
+    connect: _Connect, replay: _Start
+) -> None:
+    received: list[object] = []
+
+    def thief(connection: ServerConnection) -> None:
+        received.extend(connection)
+
+    elsewhere = replay(thief)
+
+    def send_there(connection: ServerConnection, request: Request) -> Response:
+        response = connection.respond(302, "")
+        response.headers["Location"] = f"ws://127.0.0.1:{elsewhere.port}/api/v1/stream"
+        return response
+
+    server = replay(lambda _: None, process_request=send_there)
+    with pytest.raises(TransientcamError):
+        connect(server.url, "range").receive()
+    assert received == []
 
 
 @pytest.mark.parametrize("code", [1001, 1011, 1013, 4003])

@@ -107,7 +107,8 @@ def test_a_cluster_s_image_has_dask_and_its_store_the_same_secret() -> None:
     found = services()
     store, worker = found["s3"]["environment"], found["worker"]["environment"]
 
-    assert ",cluster]'" in (_DOCKER / "Dockerfile").read_text()
+    assert "-r requirements/service.txt" in (_DOCKER / "Dockerfile").read_text()
+    assert "\ndistributed==" in (ROOT / "requirements" / "service.txt").read_text()
     assert found["s3"]["ports"] == ["127.0.0.1:9000:9000"]
     assert worker["AWS_ACCESS_KEY_ID"] == store["MINIO_ROOT_USER"]
     assert worker["AWS_SECRET_ACCESS_KEY"] == store["MINIO_ROOT_PASSWORD"]

@@ -12,6 +12,7 @@ from typing import Annotated, Final
 
 import typer
 
+from transientcam.cli.terminal import echo
 from transientcam.cli.verbs import extra_of, load_verbs, words_to_complete
 from transientcam.errors import CommandUnavailable
 
@@ -51,14 +52,14 @@ def run(arguments: Sequence[str]) -> int:
         sentence = _sentence(error, arguments)
         if sentence is None:
             raise
-        typer.echo(f"transientcam: {sentence}", err=True)
+        echo(f"transientcam: {' '.join(sentence.splitlines())}", err=True)
         return FAILED
     return 0
 
 
 def _print_version(given: bool) -> None:
     if given:
-        typer.echo(f"transientcam {version('transientcam')}")
+        echo(f"transientcam {version('transientcam')}")
         raise typer.Exit
 
 

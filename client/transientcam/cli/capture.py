@@ -10,6 +10,7 @@ import typer
 from transientcam.camera import Camera
 from transientcam.cli.formats import MADE_BY_DAEMON, Format, frame_bytes
 from transientcam.cli.options import JsonOption, ProductArgument, TokenOption, UrlArgument
+from transientcam.cli.terminal import echo
 from transientcam.frame import Frame
 
 
@@ -77,7 +78,7 @@ def capture(
         return
     output.write_bytes(data)
     report |= {"file": str(output), "bytes": len(data)}
-    typer.echo(json.dumps(report) if as_json else f"{product}: {len(data)} bytes in {output}")
+    echo(json.dumps(report) if as_json else f"{product}: {len(data)} bytes in {output}")
 
 
 def _format_of(output: Path) -> Format:

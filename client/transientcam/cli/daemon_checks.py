@@ -1,5 +1,6 @@
 """The checks of ``transientcam doctor URL``: a daemon, as a client sees it."""
 
+import json
 import ssl
 import time
 from collections.abc import Iterator, Mapping
@@ -14,7 +15,8 @@ import httpx
 from transientcam.camera import Camera
 from transientcam.cli.findings import Finding, absent_in_words
 from transientcam.errors import FrameTimeout, ProblemError, TransientcamError
-from transientcam.transport import http_options, parse_address, translated
+from transientcam.requests import MOST_DOCUMENT_BYTES
+from transientcam.transport import bounded, http_options, parse_address, read, translated, within
 
 CLOCKS_WITHIN_S: Final = 1.5
 """The daemon's ``Date`` has whole seconds, so that nothing finer can be measured."""
@@ -31,17 +33,17 @@ def of_daemon(
 ) -> Iterator[Finding]:
     """Check a daemon, and watch its stream for some seconds."""
     base = parse_address(url).url
-    with httpx.Client(**http_options(token=token, timeout_s=timeout_s)) as http:
+    with bounded(httpx.Client(**http_options(token=token, timeout_s=timeout_s))) as http:
         try:
-            with translated(base):
+            with translated(base), within(timeout_s):
                 sent_s = time.time()
                 with http.stream("GET", f"{base}/api/versions") as response:
-                    response.read()
+                    body = read(response, most_bytes=MOST_DOCUMENT_BYTES).body
                     # the connection is to be had only while the answer is open
                     ends = _certificate_ends(response)
                 answered_s = time.time()
-            found = response.json() if response.status_code == httpx.codes.OK else None
-        except (TransientcamError, ValueError) as error:
+            found = json.loads(body) if response.status_code == httpx.codes.OK else None
+        except (TransientcamError, ValueError, RecursionError) as error:
             remedy = "is `transientcam serve` running there, and does a firewall let you through?"
             yield Finding("fault", "reachable", str(error), remedy)
             return
@@ -54,7 +56,7 @@ def of_daemon(
         if ends is not None:
             yield _certificate(ends, now=datetime.now(UTC))
         yield _versions(found)
-        yield _ready(http, base)
+        yield _ready(http, base, timeout_s=timeout_s)
         yield _clock(response.headers.get("date"), sent_s, answered_s)
     try:
         with Camera(base, token=token, timeout_s=timeout_s) as camera:
@@ -95,17 +97,21 @@ def _versions(found: dict[str, Any]) -> Finding:
     return Finding("ok", "versions", f"both are {here}")
 
 
-def _ready(http: httpx.Client, base: str) -> Finding:
+def _ready(http: httpx.Client, base: str, *, timeout_s: float) -> Finding:
     try:
-        with translated(base):
-            response = http.get(f"{base}/readyz")
+        with (
+            translated(base),
+            within(timeout_s),
+            http.stream("GET", f"{base}/readyz") as response,
+        ):
+            body = read(response, most_bytes=MOST_DOCUMENT_BYTES).body
     except TransientcamError as error:
         return Finding("fault", "ready", str(error), "look into the daemon's log")
     if response.status_code == httpx.codes.OK:
         return Finding("ok", "ready", "frames can be had")
     try:
-        why = str(response.json()["detail"])
-    except (ValueError, KeyError, TypeError):
+        why = str(json.loads(body)["detail"])
+    except (ValueError, KeyError, TypeError, RecursionError):
         why = f"status {response.status_code}"
     return Finding("fault", "ready", why, "is the camera plugged in? Its daemon's log says more")
 

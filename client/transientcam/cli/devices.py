@@ -11,12 +11,11 @@ from itertools import chain
 from typing import Annotated, Any, Final
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from transientcam.cli import presence
 from transientcam.cli.options import JsonOption
+from transientcam.cli.terminal import Terminal, echo
 from transientcam.cli.verbs import extra_of
 from transientcam.discovery import FoundCamera, discover
 from transientcam.errors import CommandUnavailable, ServerUnreachable
@@ -53,13 +52,13 @@ def devices(
     if watch:
         presence.watch(lambda: _searched(timeout_s, interface), now=datetime.now, as_json=as_json)
     document = {**_found(network=network), "network": [], "network_problem": None}
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     if network:
         with console.status("listening on the network"):
             found, problem = _announced(timeout_s, interface)
         document |= {"network": [asdict(each) for each in found], "network_problem": problem}
     if as_json:
-        typer.echo(json.dumps(document, indent=2))
+        echo(json.dumps(document, indent=2))
     else:
         _print(document, network=network)
 
@@ -105,7 +104,7 @@ def _searched(timeout_s: float, interfaces: list[str] | None) -> tuple[FoundCame
     """Return what announces itself; without a network there is nothing to watch."""
     found, problem = _announced(timeout_s, interfaces)
     if problem is not None:
-        typer.echo(problem, err=True)
+        echo(problem, err=True)
         raise typer.Exit(code=1)
     return found
 
@@ -122,7 +121,7 @@ def _announced(
 
 
 def _print(document: dict[str, Any], *, network: bool) -> None:
-    console = Console()
+    console = Terminal()
     cameras, announced = document["cameras"], document["network"]
     if document["kinds"]:
         console.print(_kinds_table(document["kinds"]))
@@ -134,14 +133,14 @@ def _print(document: dict[str, Any], *, network: bool) -> None:
     for camera in cameras:
         if camera["problem"] is not None:
             where = camera["node"] or camera["spec"]
-            console.print(escape(f"{where}: {camera['problem']}"), soft_wrap=True)
+            console.print(f"{where}: {camera['problem']}", soft_wrap=True)
     for kind, problem in document["problems"].items():
-        console.print(escape(f"{kind}: {problem}"), soft_wrap=True)
+        console.print(f"{kind}: {problem}", soft_wrap=True)
     if announced:
         console.print(_network_table(announced))
     elif network:
         message = document["network_problem"] or "No camera announces itself on the network."
-        console.print(escape(message), soft_wrap=True)
+        console.print(message, soft_wrap=True)
     if cameras or announced:
         console.print(_PRODUCTS, soft_wrap=True)
     if document["simulated"]:
@@ -152,7 +151,7 @@ def _print(document: dict[str, Any], *, network: bool) -> None:
 def _kinds_table(kinds: list[dict[str, Any]]) -> Table:
     table = Table("name of a camera", "what it opens", box=None)
     for kind in kinds:
-        table.add_row(escape(kind["usage"]), escape(kind["summary"]))
+        table.add_row(kind["usage"], kind["summary"])
     return table
 
 
@@ -160,7 +159,7 @@ def _camera_table(cameras: list[dict[str, Any]]) -> Table:
     table = Table("camera", "serial number", "product", "at", box=None)
     for camera in cameras:
         fields = (camera[name] or "?" for name in ("spec", "serial", "product", "node"))
-        table.add_row(*map(escape, fields))
+        table.add_row(*fields)
     return table
 
 
@@ -168,5 +167,5 @@ def _network_table(cameras: list[dict[str, Any]]) -> Table:
     table = Table("address", "serial number", "firmware", "state", "name", box=None)
     for camera in cameras:
         fields = (camera[name] or "?" for name in ("url", "serial", "firmware", "state", "name"))
-        table.add_row(*map(escape, fields))
+        table.add_row(*fields)
     return table

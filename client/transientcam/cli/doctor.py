@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Annotated, Final
 
 import typer
-from rich.console import Console
 from rich.text import Text
 
 from transientcam.cli import daemon_checks, findings
 from transientcam.cli.findings import Finding, Level
 from transientcam.cli.options import JsonOption, TokenOption
+from transientcam.cli.terminal import Terminal, echo
 
 _STYLES: Final[dict[Level, str]] = {"ok": "green", "warning": "yellow", "fault": "bold red"}
 _WIDTH = 12
@@ -74,13 +74,13 @@ def _tell_as_json(found: Iterable[Finding]) -> list[Finding]:
     levels = [each.level for each in seen]
     worst = next(level for level in ("fault", "warning", "ok") if level in levels)
     document = {"verdict": worst, "findings": [each.to_document() for each in seen]}
-    typer.echo(json.dumps(document, indent=2))
+    echo(json.dumps(document, indent=2))
     return seen
 
 
 def _tell(found: Iterable[Finding]) -> list[Finding]:
     """Print findings as they come: some take a while."""
-    console = Console(highlight=False)
+    console = Terminal(highlight=False)
     seen = []
     for each in found:
         seen.append(each)

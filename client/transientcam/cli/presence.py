@@ -6,8 +6,7 @@ from dataclasses import asdict
 from datetime import datetime
 from typing import Final, Literal
 
-import typer
-
+from transientcam.cli.terminal import echo
 from transientcam.discovery import FoundCamera
 
 Change = Literal["here", "gone"]
@@ -42,6 +41,6 @@ def watch(
         for change, camera in presence.update(search()):
             time = now().isoformat(sep=" ", timespec="seconds")
             if as_json:
-                typer.echo(json.dumps({"time": time, "change": change, **asdict(camera)}))
+                echo(json.dumps({"time": time, "change": change, **asdict(camera)}))
             else:
-                typer.echo(f"{time}  {change}  {camera.url}  {camera.serial or '?'}  {camera.name}")
+                echo(f"{time}  {change}  {camera.url}  {camera.serial or '?'}  {camera.name}")

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from transientcam.camera import Camera
 from transientcam.cli.options import JsonOption, TokenOption, UrlArgument, require_suffix
+from transientcam.cli.terminal import Terminal, echo
 
 _LOOK_S = 0.5
 
@@ -62,18 +62,18 @@ def record(
                 progress=lambda done, total: bars.update(bar, completed=done, total=total),
             )
     if as_json:
-        typer.echo(json.dumps(running))
+        echo(json.dumps(running))
     else:
         place = "" if output is None else f", downloaded into {output}"
-        typer.echo(f"{running['id']}: {_line(running)}{place}")
+        echo(f"{running['id']}: {_line(running)}{place}")
     if running["problem"] is not None:
-        typer.echo(f"transientcam: {running['problem']}", err=True)
+        echo(f"transientcam: {running['problem']}", err=True)
         raise typer.Exit(code=1)
 
 
 def _bars() -> Progress:
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
-    return Progress(*columns, console=Console(stderr=True), transient=True)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
+    return Progress(*columns, console=Terminal(stderr=True), transient=True)
 
 
 def _line(recording: dict[str, Any]) -> str:

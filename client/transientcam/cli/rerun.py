@@ -1,16 +1,18 @@
 """``transientcam rerun``: a camera's frames, live or as a file, in Rerun."""
 
+import subprocess
+import sys
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Final
 
 import rerun as rr
 import typer
-from rich.console import Console
 
 from transientcam.camera import Camera
 from transientcam.cli.options import JsonOption, TokenOption, UrlArgument, require_suffix
 from transientcam.cli.showing import shown_on
+from transientcam.cli.terminal import Terminal
 from transientcam.robotics import BINS, LOGGED, RerunBridge, blueprint
 
 _HERE: Final = "rerun+http://127.0.0.1:9876/proxy"
@@ -24,7 +26,11 @@ def rerun(
     ] = None,
     spawn: Annotated[
         bool,
-        typer.Option("--spawn", help="Start a viewer on this machine (the default)."),
+        typer.Option(
+            "--spawn",
+            help="Start a viewer on this machine (the default, but with a token to be said: every "
+            "user of the machine can read what a viewer shows).",
+        ),
     ] = False,
     connect: Annotated[
         str | None, typer.Option(metavar="URL", help=f"A viewer that runs, such as {_HERE}.")
@@ -50,7 +56,11 @@ def rerun(
     It only subscribes.
     """
     require_suffix(save, ".rrd", hint="--save")
-    console = Console(stderr=True)
+    somewhere = spawn or connect is not None or save is not None
+    if token is not None and not somewhere:
+        message = "a viewer asks nobody for a token: say --spawn, --connect or --save"
+        raise typer.BadParameter(message, param_hint="--token")
+    console = Terminal(stderr=True)
     with Camera(url, token=token) as camera, rr.RecordingStream("transientcam") as recording:
         bridge = RerunBridge(
             camera,
@@ -61,7 +71,7 @@ def rerun(
             bins=bins,
             on_report=shown_on(console, as_json=as_json),
         )
-        _open(recording, spawn=spawn or (connect is None and save is None), to=connect, file=save)
+        _open(recording, spawn=spawn or not somewhere, to=connect, file=save)
         with bridge, suppress(KeyboardInterrupt):  # the way to end it, not a failure
             bridge.run(count)
         recording.disconnect()
@@ -78,7 +88,7 @@ def _open(recording: rr.RecordingStream, *, spawn: bool, to: str | None, file: P
     sinks: list[rr.GrpcSink | rr.FileSink] = []
     try:
         if spawn:
-            rr.spawn(connect=False, hide_welcome_screen=True)
+            _start_viewer()
             sinks.append(rr.GrpcSink(_HERE))
         if to not in (None, _HERE if spawn else None):
             sinks.append(rr.GrpcSink(to))
@@ -87,3 +97,11 @@ def _open(recording: rr.RecordingStream, *, spawn: bool, to: str | None, file: P
         recording.set_sinks(*sinks, default_blueprint=blueprint())
     except RuntimeError as error:
         raise OSError(None, f"cannot send to Rerun ({error})") from error
+
+
+def _start_viewer() -> None:
+    """Start a viewer that outlives this program; the SDK's `spawn` serves the whole network."""
+    address = ["--bind", "127.0.0.1", "--port", "9876"]
+    shown = ["--hide-welcome-screen", "--expect-data-soon"]
+    command = [sys.executable, "-m", "rerun_cli", *address, *shown]
+    subprocess.Popen(command, start_new_session=True)  # noqa: S603 - no word of it is from elsewhere

@@ -3,21 +3,19 @@
 import json
 from collections.abc import Callable
 
-import typer
-from rich.console import Console
-
+from transientcam.cli.terminal import Terminal, echo
 from transientcam.robotics import Report
 
 _STYLES = {"info": "green", "warning": "yellow", "error": "red"}
 
 
-def shown_on(console: Console, *, as_json: bool) -> Callable[[Report], None]:
+def shown_on(console: Terminal, *, as_json: bool) -> Callable[[Report], None]:
     """Return what prints reports: in colours on ``console``, or as JSON on standard output."""
 
     def show(report: Report) -> None:
         if as_json:
-            typer.echo(json.dumps(report.to_document()))
+            echo(json.dumps(report.to_document()))
         else:
-            console.print(report.text, style=_STYLES[report.level], soft_wrap=True, markup=False)
+            console.print(report.text, style=_STYLES[report.level], soft_wrap=True)
 
     return show

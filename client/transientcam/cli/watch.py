@@ -7,13 +7,13 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
 from transientcam.camera import Camera
 from transientcam.cli.options import JsonOption, ProductsArgument, TokenOption, UrlArgument
 from transientcam.cli.statistics import Sample, Statistics
+from transientcam.cli.terminal import Terminal, echo
 from transientcam.wire import Notice
 
 
@@ -31,7 +31,7 @@ def watch(
     """Show rate, latency, losses and the median of what a camera streams, until interrupted."""
     names = products or ["range"]
     statistics = Statistics()
-    display = Lines() if as_json else Screen(Console())
+    display = Lines() if as_json else Screen(Terminal())
 
     def on_notice(notice: Notice) -> None:
         statistics.notice(notice)
@@ -55,7 +55,7 @@ def watch(
 class Lines:
     """One JSON document a line."""
 
-    def __init__(self, write: Callable[[str], Any] = typer.echo) -> None:
+    def __init__(self, write: Callable[[str], Any] = echo) -> None:
         self._write = write
 
     def shown(self) -> AbstractContextManager[object]:
@@ -74,7 +74,7 @@ class Lines:
 class Screen:
     """One line a product that changes in place; a line a frame where that cannot be."""
 
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Terminal) -> None:
         self._console = console
         self._rows: dict[str, Sample] = {}
         self._live = Live(console=console, refresh_per_second=8) if console.is_terminal else None

@@ -15,9 +15,17 @@ from transientcam.requests._frames import Part, Which
 from transientcam.requests._jobs import PROGRESS_EVERY_S, WAIT_S, Jobs, OnProgress, ended
 from transientcam.requests._lease import give_lease_back, lease_id, renew_lease, take_lease
 from transientcam.requests._recordings import recording_file
-from transientcam.requests._request import Answer, Request, document, problem, problem_error
+from transientcam.requests._request import (
+    MOST_DOCUMENT_BYTES,
+    Answer,
+    Request,
+    document,
+    problem,
+    problem_error,
+)
 
 __all__ = [
+    "MOST_DOCUMENT_BYTES",
     "PROGRESS_EVERY_S",
     "WAIT_S",
     "Answer",

@@ -11,7 +11,7 @@ from transientcam.errors import ParameterError
 from transientcam.frame import Frame
 from transientcam.requests._recordings import recording_path
 from transientcam.requests._request import Request, body_of, document, query, segment
-from transientcam.wire import MEDIA_TYPE, parse_frame
+from transientcam.wire import MAX_SERVER_MESSAGE_BYTES, MEDIA_TYPE, parse_frame
 
 _MEDIA_TYPES: Final = {
     "png": "image/png",
@@ -128,6 +128,7 @@ def frame(product: str, which: Which, part: Part = WHOLE) -> Request[Frame]:
         lambda answer: parse_frame(body_of(answer, MEDIA_TYPE)),
         query((*part.params, *which.params)),
         accept=MEDIA_TYPE,
+        most_bytes=MAX_SERVER_MESSAGE_BYTES,
         extra_timeout_s=which.extra_timeout_s,
     )
 
@@ -151,6 +152,7 @@ def file(
         lambda answer: body_of(answer, media_type),
         query((("view", "colour" if colour else None), *part.params, *which.params)),
         accept=media_type,
+        most_bytes=MAX_SERVER_MESSAGE_BYTES,
         extra_timeout_s=which.extra_timeout_s,
     )
 

@@ -8,10 +8,12 @@ from typing import Any, Final, Generic, TypeVar
 import numpy as np
 
 from transientcam.errors import ParameterError, ProblemError, ProtocolError
-from transientcam.wire import PROBLEM_MEDIA_TYPE
+from transientcam.wire import MAX_SERVER_MESSAGE_BYTES, PROBLEM_MEDIA_TYPE
 
 _T = TypeVar("_T")
 _JSON: Final = "application/json"
+MOST_DOCUMENT_BYTES: Final = 16 * 1024 * 1024
+"""The client reads no document longer than this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +40,8 @@ class Request(Generic[_T]):
     """How much longer than usual the server may take, because the request lets it wait."""
     content_type: str = _JSON
     """Of the body, where there is one."""
+    most_bytes: int = MOST_DOCUMENT_BYTES
+    """The longest answer that is read."""
 
     @property
     def headers(self) -> dict[str, str]:
@@ -81,7 +85,13 @@ def document(
 
 def file(path: str, media_type: str) -> Request[bytes]:
     """Build a request that is answered with a file."""
-    return Request("GET", path, lambda answer: body_of(answer, media_type), accept=media_type)
+    return Request(
+        "GET",
+        path,
+        lambda answer: body_of(answer, media_type),
+        accept=media_type,
+        most_bytes=MAX_SERVER_MESSAGE_BYTES,
+    )
 
 
 def upload(

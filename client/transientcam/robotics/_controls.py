@@ -13,6 +13,7 @@ _WAIT_S: Final = 10.0
 _NO_FRAME: Final = "/problems/no-frame-yet"
 _SETTABLE: Final = ("sequence", "reconstruction", "acquisition")
 """The documents of parameters that can be set."""
+_NO_LIGHT: Final = "--control-light was not given"
 
 
 class Controls:
@@ -29,12 +30,15 @@ class Controls:
         Name of the lease.
     writable
         Whether anything may be changed.
+    light
+        Whether the camera may be started, which switches the light on.
     """
 
-    def __init__(self, camera: Camera, *, holder: str, writable: bool) -> None:
+    def __init__(self, camera: Camera, *, holder: str, writable: bool, light: bool) -> None:
         self._camera = camera
         self._holder = holder
         self._writable = writable
+        self._light = light
         self._one_at_a_time = threading.Lock()
 
     def read(self, names: Iterable[str] = ()) -> dict[str, Any]:
@@ -83,7 +87,7 @@ class Controls:
         Raises
         ------
         ParameterError
-            If it is stopped and nothing may be changed.
+            If it is stopped and may not be started.
         ServerUnreachable, ProblemError
             If the daemon does not answer, no frame comes, or another client has the lease.
         """
@@ -91,8 +95,8 @@ class Controls:
             newest: int | None = self._camera.frames["last"]
             if self._camera.acquisition["running"]:
                 return self._next_frame(newest)
-            if not self._writable:
-                raise ParameterError("acquisition.running", False, "true: --control was not given")
+            if not self._light:
+                raise ParameterError("acquisition.running", False, f"true: {_NO_LIGHT}")
             with self._camera.lease(self._holder, on_lapse="stop"):
                 self._camera.start()
                 try:
@@ -111,6 +115,9 @@ class Controls:
         each = known[name]
         if each["access"] != "read-write" or _document_of(each) not in _SETTABLE:
             raise ParameterError(name, value, f"left at {each['value']}: it is read-only")
+        # all of this document but "stop": what is no bool may yet be taken for one
+        if _document_of(each) == "acquisition" and value is not False and not self._light:
+            raise ParameterError(name, value, f"false, or left as it is: {_NO_LIGHT}")
 
     def _set(self, document: str, by_pointer: Mapping[str, Any]) -> None:
         if document == "acquisition":

@@ -1,25 +1,23 @@
 """A camera's frames, live, for viewers that speak Foxglove's WebSocket protocol.
 
 What no viewer has subscribed to is neither asked of the camera nor encoded. Viewers see the
-parameters; they set them only where the bridge was given control.
+parameters; they set them only where the bridge was given control, and start the light only where
+it was given that, too.
 """
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from functools import partial
 from typing import Any, Final
 
-import foxglove
-from foxglove import StatusLevel
-from foxglove.websocket import Capability
 from numpy.typing import NDArray
 
+from transientcam.admission import Admission
 from transientcam.camera import Camera
-from transientcam.errors import ParameterError, TransientcamError
+from transientcam.errors import ParameterError
 from transientcam.frame import Frame
 from transientcam.robotics._controls import Controls
-from transientcam.robotics._foxglove_messages import PROTOBUF, encode, schema_of
+from transientcam.robotics._foxglove_messages import encode, schema_of
 from transientcam.robotics._messages import (
     Calibration,
     Message,
@@ -31,19 +29,13 @@ from transientcam.robotics._messages import (
 )
 from transientcam.robotics._reports import Report
 from transientcam.robotics._source import Source
-from transientcam.robotics._watching import Watching, capture_service, parameters_of
+from transientcam.robotics._viewer_server import ViewerServer
+from transientcam.robotics._watching import SERVICES, Watching
 from transientcam.wire import PRODUCTS, Notice
 
 SHOWN: Final = ("range", "direct", "indirect", "brightness", "pointcloud")
 """Products that viewers can choose from, if nothing else is said."""
-_BACKLOG: Final = 32
-"""Messages kept for a viewer that is too slow; the oldest are dropped."""
 _FIXED: Final = frozenset((Transform.topic, Calibration.topic))
-_LEVELS: Final = {
-    "info": StatusLevel.Info,
-    "warning": StatusLevel.Warning,
-    "error": StatusLevel.Error,
-}
 _PARAMETERS_CHANGE: Final = ("reconnected", "sequence-changed", "reconstruction-changed")
 
 
@@ -63,7 +55,11 @@ class FoxgloveBridge:
     max_rate_hz
         No more frames a second than this; None for all.
     control
-        Whether viewers may set parameters, and start a camera that is stopped for one capture.
+        Whether viewers may set parameters, and stop the camera.
+    control_light
+        Whether they may also start it, for good or for one capture: that switches the light on.
+    origins
+        Pages whose connections are accepted, such as https://app.foxglove.dev; programs need none.
     on_report
         Called with what viewers are shown, too: losses and lost connections.
     now_ns
@@ -72,7 +68,7 @@ class FoxgloveBridge:
     Raises
     ------
     ParameterError
-        If a product cannot be shown.
+        If a product cannot be shown, or an origin is none.
     ServerUnreachable, ProblemError
         If the camera does not say its lens.
     OSError
@@ -88,6 +84,8 @@ class FoxgloveBridge:
         port: int = 8765,
         max_rate_hz: float | None = 10.0,
         control: bool = False,
+        control_light: bool = False,
+        origins: Sequence[str] = (),
         on_report: Callable[[Report], object] = lambda report: None,
         now_ns: Callable[[], int] = time.time_ns,
     ) -> None:
@@ -97,7 +95,15 @@ class FoxgloveBridge:
                 raise ParameterError("products", name, f"some of {', '.join(can_be_shown)}")
         self._max_rate_hz = max_rate_hz
         self._now_ns = now_ns
-        self._controls = Controls(camera, holder="transientcam foxglove", writable=control)
+        controls = Controls(
+            camera,
+            holder="transientcam foxglove",
+            writable=control or control_light,
+            light=control_light,
+        )
+        # what it shows and changes it does by the right of its token
+        lends = control or control_light or camera.has_token
+        self._admission = Admission.to(host, lends_right=lends, origins=origins)
         self._source = Source(
             camera,
             on_report=on_report,
@@ -105,42 +111,30 @@ class FoxgloveBridge:
             on_notice=self._noticed,
             now_ns=now_ns,
         )
-        self._watching = Watching(self._controls)
+        self._watching = Watching(controls)
         self._newest = 0
         self._direct: Frame | None = None
-        self._context = foxglove.Context()
         kinds: dict[str, type[Message]] = {
             Transform.topic: Transform,
             Calibration.topic: Calibration,
         }
         for name in products:
             kinds |= topics_of(name)
-        self._channels = {
-            topic: foxglove.Channel(
-                topic, schema=schema_of(kind), message_encoding=PROTOBUF, context=self._context
-            )
-            for topic, kind in kinds.items()
-        }
-        try:
-            self._server = foxglove.start_server(
-                name=f"transientcam {camera.url}",
-                host=host,
-                port=port,
-                capabilities=[Capability.Parameters, Capability.Services],
-                supported_encodings=["json"],
-                services=[capture_service(self._controls)],
-                server_listener=self._watching,
-                context=self._context,
-                message_backlog_size=_BACKLOG,
-            )
-        except RuntimeError as error:
-            raise OSError(None, f"cannot serve viewers ({error})", f"{host}:{port}") from error
+        self._server = ViewerServer(
+            name=f"transientcam {camera.url}",
+            host=host,
+            port=port,
+            admission=self._admission,
+            channels={topic: schema_of(kind) for topic, kind in kinds.items()},
+            services=SERVICES,
+            listener=self._watching,
+        )
         self._watching.on_report = self._source.report
 
     @property
-    def port(self) -> int:
-        """Where viewers connect to."""
-        return self._server.port
+    def url(self) -> str:
+        """Where viewers connect to, with the secret where one is required."""
+        return f"ws://{self._admission.host}:{self._server.port}{self._admission.path}"
 
     def run(self) -> None:
         """Send frames to the viewers that are subscribed, until it is closed."""
@@ -156,9 +150,7 @@ class FoxgloveBridge:
         """Disconnect viewers and camera; ``run`` returns."""
         self._source.close()
         self._watching.close()
-        self._server.stop()
-        for channel in self._channels.values():
-            channel.close()
+        self._server.close()
 
     def __enter__(self) -> "FoxgloveBridge":
         return self
@@ -199,23 +191,11 @@ class FoxgloveBridge:
         of_frame = self._direct if self._direct and self._direct.frame == self._newest else None
         intensity = None if of_frame is None else of_frame.array
         for message in messages_of(arrays, self._source.lens, intensity=intensity, topics=topics):
-            encoded = encode(message, time_ns)
-            self._channels[message.topic].log(encoded.data, log_time=time_ns)
+            self._server.publish(message.topic, time_ns, encode(message, time_ns).data)
 
     def _noticed(self, notice: Notice) -> None:
         if notice.kind in _PARAMETERS_CHANGE:
-            with suppress(TransientcamError):  # the stream reports what is wrong with the camera
-                parameters = parameters_of(self._controls)
-                self._while_it_serves(partial(self._server.publish_parameter_values, parameters))
+            self._server.publish_parameters(self._watching.parameters())
 
     def _publish(self, report: Report) -> None:
-        status = report.text, _LEVELS[report.level], report.about
-        self._while_it_serves(partial(self._server.publish_status, *status))
-
-    def _while_it_serves(self, publish: Callable[[], None]) -> None:
-        """Publish something, unless `close` stops the server, which cannot be called meanwhile."""
-        try:
-            publish()
-        except RuntimeError:  # "Already mutably borrowed"
-            if not self._source.closed:
-                raise
+        self._server.publish_status(report.text, report.level, report.about)

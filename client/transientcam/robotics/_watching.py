@@ -3,20 +3,10 @@
 import json
 import threading
 from collections import Counter
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Final
 
-from foxglove import MessageSchema, Schema
-from foxglove.websocket import (
-    ChannelView,
-    Client,
-    Parameter,
-    ParameterType,
-    ServerListener,
-    Service,
-    ServiceRequest,
-    ServiceSchema,
-)
+from foxglove import Schema
 
 from transientcam.errors import TransientcamError
 from transientcam.robotics._controls import Controls
@@ -24,10 +14,9 @@ from transientcam.robotics._reports import Report
 
 CAPTURE: Final = "/capture"
 """The service that waits for the next frame and answers with its metadata."""
-_JSON: Final = "json"
 
 
-class Watching(ServerListener):
+class Watching:
     """Counts the viewers of each topic, and answers them about parameters.
 
     The server calls it from threads of its own.
@@ -50,37 +39,42 @@ class Watching(ServerListener):
         self._viewers: Counter[str] = Counter()
         self._closed = False
 
-    def on_subscribe(self, client: Client, channel: ChannelView) -> None:
+    def subscribed(self, topic: str) -> None:
         """Count a viewer of a topic."""
         with self._changed:
-            self._viewers[channel.topic] += 1
+            self._viewers[topic] += 1
             self._changed.notify_all()
 
-    def on_unsubscribe(self, client: Client, channel: ChannelView) -> None:
+    def unsubscribed(self, topic: str) -> None:
         """Discount a viewer, also one whose connection broke."""
         with self._changed:
-            self._viewers[channel.topic] -= 1
+            self._viewers[topic] -= 1
             self._changed.notify_all()
 
-    def on_get_parameters(
-        self, client: Client, param_names: list[str], request_id: str | None = None
-    ) -> list[Parameter]:
-        """Answer with the present values; with none where the daemon does not answer."""
+    def parameters(self, names: Iterable[str] = ()) -> list[dict[str, Any]]:
+        """Return the present values; none where the daemon does not answer."""
         try:
-            return parameters_of(self._controls, *param_names)
+            found = self._controls.read(names)
         except TransientcamError as error:
             self.on_report(Report("error", "parameter", str(error)))
             return []
+        return [
+            # a float without a fraction would look like an integer
+            {"name": name, "value": value}
+            | ({"type": "float64"} if isinstance(value, float) else {})
+            for name, value in found.items()
+        ]
 
-    def on_set_parameters(
-        self, client: Client, parameters: list[Parameter], request_id: str | None = None
-    ) -> list[Parameter]:
-        """Set what may be set, and answer with the values as they are then."""
+    def set_parameters(self, values: Mapping[str, Any]) -> None:
+        """Set what may be set."""
         try:
-            self._controls.write({each.name: each.get_value() for each in parameters})
+            self._controls.write(values)
         except TransientcamError as error:
             self.on_report(Report("error", "parameter", str(error)))
-        return self.on_get_parameters(client, [], request_id)
+
+    def call(self, service: str) -> dict[str, Any]:
+        """Wait for the next frame, and return its metadata: `CAPTURE` is the only service."""
+        return self._controls.capture()
 
     @property
     def topics(self) -> frozenset[str]:
@@ -104,40 +98,12 @@ class Watching(ServerListener):
         return frozenset() if self._closed else frozenset(+self._viewers)
 
 
-def parameters_of(controls: Controls, *names: str) -> list[Parameter]:
-    """Return parameters as Foxglove has them; all, if none is named.
-
-    Raises
-    ------
-    ServerUnreachable, ProblemError
-        If the daemon does not answer.
-    """
-    return [
-        # a float without a fraction would look like an integer
-        Parameter(name, value=value, type=ParameterType.Float64)
-        if isinstance(value, float)
-        else Parameter(name, value=value)
-        for name, value in controls.read(names).items()
-    ]
-
-
-def capture_service(controls: Controls) -> Service:
-    """Return the service `CAPTURE`: its request is empty, its response a frame's metadata."""
-
-    def capture(request: ServiceRequest) -> bytes:
-        return json.dumps(controls.capture()).encode()
-
-    return Service(
-        CAPTURE,
-        schema=ServiceSchema(
-            "transientcam/Capture",
-            request=_object("transientcam/CaptureRequest"),
-            response=_object("transientcam/FrameMeta"),
-        ),
-        handler=capture,
-    )
-
-
-def _object(name: str) -> MessageSchema:
+def _object(name: str) -> Schema:
     data = json.dumps({"title": name, "type": "object"}).encode()
-    return MessageSchema(encoding=_JSON, schema=Schema(name=name, encoding="jsonschema", data=data))
+    return Schema(name=name, encoding="jsonschema", data=data)
+
+
+SERVICES: Final = {
+    CAPTURE: (_object("transientcam/CaptureRequest"), _object("transientcam/FrameMeta"))
+}
+"""Its request is empty, its response a frame's metadata."""

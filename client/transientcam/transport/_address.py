@@ -1,5 +1,6 @@
 """The address of a camera's daemon, for requests and for streams."""
 
+import re
 from dataclasses import dataclass
 from urllib.parse import urlsplit, urlunsplit
 
@@ -18,6 +19,11 @@ class Address:
     url: str
 
     @property
+    def shown(self) -> str:
+        """What may stand in a sentence: without a user's name and password."""
+        return without_secrets(self.url)
+
+    @property
     def api(self) -> str:
         """Start of the address of every resource."""
         return f"{self.url}/api/v1"
@@ -27,6 +33,15 @@ class Address:
         """Address of the stream."""
         parts = urlsplit(self.api)
         return urlunsplit(parts._replace(scheme=_STREAM_SCHEMES[parts.scheme])) + "/stream"
+
+
+def without_secrets(url: str) -> str:
+    """Return an address without what may be secret in it: user, password, query and fragment."""
+    head, mark, rest = url.partition("://")
+    host = re.split(r"[/?#]", rest if mark else head, maxsplit=1)[0]
+    path = (rest if mark else head)[len(host) :]
+    plain = re.split(r"[?#]", path, maxsplit=1)[0]
+    return f"{head if mark else ''}{mark}{host.rpartition('@')[2]}{plain}"
 
 
 def parse_address(url: str) -> Address:
@@ -42,7 +57,7 @@ def parse_address(url: str) -> Address:
         parts = urlsplit(url if "://" in url else f"http://{url}")
         _ = parts.port  # checked only when it is read
     except ValueError as error:
-        raise ParameterError("url", url, limit) from error
+        raise ParameterError("url", without_secrets(url), limit) from error
     if parts.scheme not in _STREAM_SCHEMES or not parts.hostname or parts.query or parts.fragment:
-        raise ParameterError("url", url, limit)
+        raise ParameterError("url", without_secrets(url), limit)
     return Address(urlunsplit(parts).rstrip("/"))

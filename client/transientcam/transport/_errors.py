@@ -17,6 +17,7 @@ from transientcam.errors import (
     TransientcamError,
 )
 from transientcam.requests import Answer, problem
+from transientcam.transport._address import without_secrets
 from transientcam.wire import CloseCode
 
 FOREIGN = (
@@ -41,6 +42,7 @@ def translated(url: str) -> Iterator[None]:
 
 def translate(error: Exception, url: str) -> TransientcamError:
     """Return our error for a foreign one; the most specific match wins."""
+    url = without_secrets(url)
     match error:
         case ws.ConnectionClosed():
             close = error.rcvd or error.sent  # the latter if this end found the fault
@@ -60,12 +62,14 @@ def translate(error: Exception, url: str) -> TransientcamError:
         case ws.PayloadTooBig():
             return StreamClosed(CloseCode.TOO_BIG, str(error))
         case httpx.InvalidURL() | httpx.UnsupportedProtocol() | ws.InvalidURI():
-            return ParameterError("url", url, f"an address of a camera ({error})")
+            return ParameterError("url", url, f"an address of a camera ({type(error).__name__})")
         case httpx.RemoteProtocolError() | ws.InvalidMessage():
             return ServerUnreachable(url, f"what answers there does not speak HTTP ({error})")
         case httpx.TimeoutException() | TimeoutError():
             return ServerUnreachable(url, "no answer in time")
-        case ws.ProxyError() | ws.InvalidProxy():
+        case ws.InvalidProxy():  # its sentence has the proxy's address, maybe with a password
+            return ServerUnreachable(url, f"the proxy failed ({error.msg})")
+        case ws.ProxyError():
             return ServerUnreachable(url, f"the proxy failed ({error})")
         case httpx.TransportError() | OSError():
             return ServerUnreachable(url, _reason(error))

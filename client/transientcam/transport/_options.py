@@ -1,26 +1,41 @@
 """The options of httpx and websockets, for the synchronous and the asynchronous client."""
 
+import logging
 from collections.abc import Callable
 from importlib.metadata import version
 from typing import Any, Final
 
 import httpx
 from websockets.typing import Subprotocol
+from websockets.uri import parse_uri
 
-from transientcam.requests import Answer, Request
-from transientcam.transport._errors import media_type
+from transientcam.errors import ParameterError, ProtocolError
+from transientcam.requests import Request
 from transientcam.transport._tls import shared_context
 from transientcam.wire import LEASE_HEADER, MAX_SERVER_MESSAGE_BYTES, SUBPROTOCOL
 
 USER_AGENT: Final = f"transientcam/{version('transientcam')}"
+QUIET: Final = logging.getLogger("transientcam.websockets")
+"""Of websockets, which would log every head and message: tokens and addresses with secrets."""
+QUIET.setLevel(logging.CRITICAL)
 _CLOSE_WITHIN_S = 1.0
 _QUEUED_MESSAGES = 256
 
 
 def http_options(*, token: str | None, timeout_s: float) -> dict[str, Any]:
-    """Return the options of an httpx client."""
-    headers = {"user-agent": USER_AGENT}
+    """Return the options of an httpx client.
+
+    Raises
+    ------
+    ParameterError
+        If the token is none; it is not shown.
+    """
+    # what is unpacked here has no bound: the bytes of an answer count as they travel
+    headers = {"user-agent": USER_AGENT, "accept-encoding": "identity"}
     if token is not None:
+        # what is no header is quoted in the error of the library
+        if not token or not token.isascii() or not token.isprintable() or " " in token:
+            raise ParameterError("token", "…", "printable ASCII without spaces")
         headers["authorization"] = f"Bearer {token}"
     return {"headers": headers, "timeout": timeout_s}
 
@@ -33,16 +48,6 @@ def request_options(request: Request[Any], *, timeout_s: float) -> dict[str, Any
         "headers": request.headers,
         "timeout": timeout_s + request.extra_timeout_s,
     }
-
-
-def answer_of(response: httpx.Response) -> Answer:
-    """Return the answer in a response that was read to its end."""
-    return Answer(
-        response.status_code,
-        media_type(response.headers.get("content-type", "")),
-        response.content,
-        response.reason_phrase,
-    )
 
 
 def set_lease(headers: httpx.Headers, lease_id: str | None) -> None:
@@ -62,9 +67,7 @@ class DownloadProgress:
 
     def __init__(self, response: httpx.Response, progress: Progress | None) -> None:
         length = response.headers.get("content-length", "")
-        # a compressed body has another length once it is decoded
-        plain = length.isdecimal() and "content-encoding" not in response.headers
-        self._total = int(length) if plain else None
+        self._total = int(length) if length.isdecimal() else None
         self._progress = progress
         self._done = 0
 
@@ -75,11 +78,26 @@ class DownloadProgress:
             self._progress(self._done, self._total)
 
 
+def require_direct(connection: Any, url: str) -> None:
+    """Refuse a connection that was redirected, before a token is sent over it.
+
+    Raises
+    ------
+    ProtocolError
+        If ``connection``, of websockets, is not one to ``url``.
+    """
+    found = connection.protocol.uri
+    if found != parse_uri(url):
+        place = f"{found.host}:{found.port}"
+        raise ProtocolError("location", place, "absent: redirects are not followed")
+
+
 def stream_options(url: str, *, timeout_s: float, threaded: bool = False) -> dict[str, Any]:
     """Return the options of a websockets client; ``threaded`` for one that reads on a thread."""
     options: dict[str, Any] = {
         "subprotocols": [Subprotocol(SUBPROTOCOL)],
         "user_agent_header": USER_AGENT,
+        "logger": QUIET,
         "open_timeout": timeout_s,
         "close_timeout": _CLOSE_WITHIN_S,
         "max_size": MAX_SERVER_MESSAGE_BYTES,  # the default of 1 MiB is less than many a frame

@@ -164,6 +164,7 @@ class Simulation(Protocol):
         definition: str | None = None,
         effects: Mapping[str, str] | None = None,
         diffuser: bool | None = None,
+        ask: Callable[[], object] = lambda: None,
     ) -> None:
         """Put the camera in front of another scene, or choose other effects; images go on.
 
@@ -185,6 +186,8 @@ class Simulation(Protocol):
         diffuser
             Puts filter and diffuser before the lens, so that the light shines at the sensor as in
             a calibration (Sec. 4.2), or takes them away; by default they stay.
+        ask
+            Called between the steps, from this thread; what it raises gives the change up.
 
         Raises
         ------

@@ -1,5 +1,6 @@
 """Values of the whole simulation: impulse responses, imperfections, normal numbers."""
 
+from transientcam_simulation.base._giving_up import ask, giving_up_by
 from transientcam_simulation.base._imperfections import (
     IDEAL,
     PINHOLE,
@@ -45,8 +46,10 @@ __all__ = [
     "Scatter",
     "SparseResponses",
     "Waveform",
+    "ask",
     "drawn_bins",
     "drawn_tails",
+    "giving_up_by",
     "quantiles",
     "standard_normal",
 ]

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from transientcam.cli.terminal import echo
 from transientcam_driver.camera import CameraName
 from transientcam_driver.cameras.tofcam660 import CONTROL_PORT, DATA_PORT
 from transientcam_driver.cli.options import JsonOption
@@ -46,7 +47,7 @@ def emulate(
         print(json.dumps(where), flush=True)  # noqa: T201 - the caller reads it from a pipe
     else:
         ports = f"commands on port {device.control_port}, images on {device.data_port}"
-        typer.echo(f"an emulated TOFcam660 at {host}: {ports} (Ctrl-C ends it)")
+        echo(f"an emulated TOFcam660 at {host}: {ports} (Ctrl-C ends it)")
     try:
         threading.Event().wait()
     finally:

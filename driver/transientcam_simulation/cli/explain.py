@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
+from transientcam.cli.terminal import echo
 from transientcam_driver.camera import CameraName, ExplainedEffect, Explanation
 from transientcam_driver.cli.options import JsonOption
 from transientcam_driver.errors import DriverError, SpecError
@@ -57,7 +58,7 @@ def explain(
         "takes": takes,
     }
     if bool(scene) == all_scenes:
-        typer.echo("transientcam explain: name a scene, or give --all-scenes", err=True)
+        echo("transientcam explain: name a scene, or give --all-scenes", err=True)
         raise typer.Exit(_BAD_USAGE)
     names = (
         [info.name for info in list_scenes() if info.name != MEASURED] if all_scenes else [scene]
@@ -66,15 +67,15 @@ def explain(
         wanted = _sequence(sequence, options)
         explanations = [_explained(name, wanted) for name in names]
     except DriverError as error:
-        typer.echo(f"transientcam explain: {error}", err=True)
+        echo(f"transientcam explain: {error}", err=True)
         raise typer.Exit(_BAD_USAGE) from error
     if as_json:
         documents = [each.to_document() for each in explanations]
-        typer.echo(json.dumps(documents if all_scenes else documents[0], indent=2))
+        echo(json.dumps(documents if all_scenes else documents[0], indent=2))
     elif all_scenes:
-        typer.echo(scenes_table(explanations))
+        echo(scenes_table(explanations))
     else:
-        typer.echo(described(explanations[0]))
+        echo(described(explanations[0]))
 
 
 def _sequence(path: Path | None, options: dict[str, Any]) -> Sequence:

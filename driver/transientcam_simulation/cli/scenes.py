@@ -2,11 +2,9 @@
 
 import json
 
-import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
+from transientcam.cli.terminal import Terminal, echo
 from transientcam_driver.cli.options import JsonOption
 from transientcam_simulation import list_scenes
 
@@ -19,9 +17,9 @@ def scenes(as_json: JsonOption = False) -> None:
             {"name": info.name, "description": info.description, "path": str(info.path)}
             for info in infos
         ]
-        typer.echo(json.dumps(fields, indent=2))
+        echo(json.dumps(fields, indent=2))
         return
     table = Table("scene", "what it shows", box=None)
     for info in infos:
-        table.add_row(f"sim:{info.name}", escape(info.description))
-    Console().print(table)
+        table.add_row(f"sim:{info.name}", info.description)
+    Terminal().print(table)

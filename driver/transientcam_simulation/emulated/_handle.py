@@ -7,6 +7,7 @@ from typing import Protocol
 from transientcam_driver.camera import Explanation, Sensor, Truth
 from transientcam_driver.errors import CameraError
 from transientcam_driver.sequence import Sequence
+from transientcam_simulation.base import giving_up_by
 from transientcam_simulation.emulated._open_usb import Fault
 from transientcam_simulation.imaging import SwitchableWorld, World
 from transientcam_simulation.scene import Scene, parse_scene
@@ -104,9 +105,10 @@ class SimulationHandle:
         definition: str | None = None,
         effects: Mapping[str, str] | None = None,
         diffuser: bool | None = None,
+        ask: Callable[[], object] = lambda: None,
     ) -> None:
         """Prepare another scene, other effects or the diffuser, and switch to it."""
-        with self._changing:
+        with self._changing, giving_up_by(ask):
             wanted: Scene | str = self._chosen
             if definition is not None:
                 wanted = parse_scene(definition)

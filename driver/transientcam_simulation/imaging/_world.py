@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.camera import ExplainedEffect, Explanation, Sensor, Truth
 from transientcam_driver.sequence import ImageLabel, Sequence
-from transientcam_simulation.base import IDEAL, PINHOLE, DeviceProfile
+from transientcam_simulation.base import IDEAL, PINHOLE, DeviceProfile, ask
 from transientcam_simulation.effects import (
     CALLED_ABOVE,
     EFFECTS,
@@ -261,6 +261,7 @@ class World:
 
     def _quadratures(self, plan: _Plan, harmonic: int, time_s: float) -> Quadratures:
         """Planes of the images of a harmonic; computed again only where the scene moves."""
+        ask()
         view = plan.views.at(time_s)
         plan.time_s = time_s
         frequency_hz = plan.frequencies_hz[harmonic]

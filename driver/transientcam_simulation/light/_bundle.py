@@ -93,7 +93,8 @@ def plane_of(values: NDArray[np.floating] | np.floating | float, shape: tuple[in
 
 def _frame(middle: Points) -> NDArray[np.float64]:
     """Return unit vectors along a direction and across it, the first of these level."""
-    middle = middle / max(float(np.linalg.norm(middle)), 1e-12)
+    length = float(np.linalg.norm(middle))  # none of rays that go all ways: then any will do
+    middle = middle / length if length > 1e-12 else np.array([0.0, 1.0, 0.0])
     level = np.cross(middle, [0.0, 0.0, 1.0] if abs(middle[2]) < 0.9 else [0.0, 1.0, 0.0])
     level /= np.linalg.norm(level)
     return np.array([middle, level, np.cross(level, middle)])

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
-from transientcam_simulation.base import BIN_S, Scatter
+from transientcam_simulation.base import BIN_S, Scatter, ask
 from transientcam_simulation.light._patches import Patches, form_factors
 from transientcam_simulation.light._paths import image_lights, light_on, normals_at, scatter_of
 from transientcam_simulation.scene import Points, Scene
@@ -71,6 +71,7 @@ class Exchange:
         light = self.radiosity.sum(axis=(0, 2))
         highest = [float(light.max(initial=0.0))]
         for bounce in range(_MOST_BOUNCES):
+            ask()
             light = self.patches.albedo * (self.factors @ light)
             highest.append(float(light.max(initial=0.0)))
             share = min(highest[-1] / highest[-2], 0.999) if highest[-2] else 0.0
@@ -84,10 +85,12 @@ class Exchange:
         scatter = scatter_of(self.scene, self.patches.surface)
         transfer = 1.0 if scatter is None else scatter.transfer(frequency_hz)
         light = np.einsum("kns,kns->n", self.radiosity, np.exp(1j * omega * self.delay_s))
+        ask()
         phase = np.float32(omega / SPEED_OF_LIGHT_M_S) * self.distance_m
         in_phase, quadrature = self.factors * np.cos(phase), self.factors * np.sin(phase)
         total = np.zeros(len(self.patches), dtype=np.complex128)
         for _bounce in range(bounces):
+            ask()
             given = (light * transfer).astype(np.complex64)
             of_real, of_imag = given.real.copy(), given.imag.copy()
             got = (in_phase @ of_real - quadrature @ of_imag) + 1j * (
@@ -166,6 +169,7 @@ def _direct(scene: Scene, patches: Patches) -> tuple[NDArray[np.float64], NDArra
     shape = (len(lights), len(patches), _SAMPLES**2)
     delay_s, radiosity = np.zeros(shape), np.zeros(shape)
     for k, light in enumerate(lights):
+        ask()
         length_m, irradiance = light_on(scene, light, points, normal)
         delay_s[k] = length_m.reshape(shape[1:]) / SPEED_OF_LIGHT_M_S
         radiosity[k] = irradiance.reshape(shape[1:]) * patches.albedo[:, None] / _SAMPLES**2

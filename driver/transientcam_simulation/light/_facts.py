@@ -97,9 +97,8 @@ class SceneFacts:
 
     def further_bounces(self, tolerance: float) -> int:
         """Return how often light goes from surface to surface until less than this is left."""
-        return Exchange.of(self._rough(self._scene.at(self._times_s[0])), _ROUGH_PATCHES).bounces(
-            tolerance
-        )
+        rough = self._rough(self._scene.at(self._times_s[0]))
+        return Exchange.of(rough, rough.transport.patches).bounces(tolerance)
 
     def _changes(
         self, effect: str, frequencies_hz: tuple[float, ...], during_s: float

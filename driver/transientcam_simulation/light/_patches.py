@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_simulation.base import ask
 from transientcam_simulation.light._paths import blocked
-from transientcam_simulation.scene import Cells, Points, Scene
+from transientcam_simulation.scene import Cells, Points, Scene, patch_edges_m
 
-_LEAST = 4  # patches along the longest side of a surface
 _BLOCK = 1 << 18  # segments at a time
 
 
@@ -39,18 +39,11 @@ class Patches:
 
     @classmethod
     def of(cls, scene: Scene, per_side: int) -> "Patches":
-        """Cut the longest side of all surfaces into so many patches, the others as finely.
-
-        The longest side of a small one is cut into a few all the same.
-        """
+        """Cut the longest side of all surfaces into so many patches, the others as finely."""
         scattering = {k: each for k, each in enumerate(scene.surfaces) if each.scatters}
-        longest_m = max(np.ptp(s.shape.extent(), axis=0).max() for s in scattering.values())
-        edge_m = float(longest_m) / per_side
         cells = {
-            index: each.shape.cells(
-                min(edge_m, float(np.ptp(each.shape.extent(), axis=0).max()) / _LEAST)
-            )
-            for index, each in scattering.items()
+            index: scattering[index].shape.cells(edge_m)
+            for index, edge_m in patch_edges_m(scene, per_side).items()
         }
         counts = {index: len(grid.area) for index, grid in cells.items()}
         first = dict(zip(counts, np.cumsum([0, *counts.values()]).tolist(), strict=False))
@@ -77,6 +70,7 @@ def form_factors(scene: Scene, patches: Patches, at: Points, normal: Points) -> 
     rows = max(1, _BLOCK // max(1, len(patches)))
     hides = len(scene.surfaces) > 0
     for first in range(0, len(at), rows):
+        ask()
         block = slice(first, first + rows)
         way = patches.centre[None, :, :] - at[block, None, :]
         towards = np.einsum("pnc,pc->pn", way, normal[block]) > 1e-9

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from transientcam_compiled import cores
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
-from transientcam_simulation.base import Scatter, SparseResponses
+from transientcam_simulation.base import Scatter, SparseResponses, ask
 from transientcam_simulation.scene import (
     Light,
     Points,
@@ -28,6 +28,7 @@ from transientcam_simulation.scene import (
 )
 
 _BLOCK = 16384  # rays at a time, so that what is computed for them stays in the cache
+_NOWHERE_M = 1e-12
 FAR_M = 1e3  # longer than any path in a scene
 _BESIDE = 1.5  # sizes of a mirror, up to which pixels at its edge may see beside it
 
@@ -142,6 +143,7 @@ def sparse_image(
 
 def light_rays(scene: Scene, directions: Points) -> Lit:
     """Follow rays from the camera to their ends, and light to there, on all cores."""
+    ask()
     lights = tuple(image_lights(scene))
 
     def follow(rays: Points) -> Lit:
@@ -321,7 +323,8 @@ def light_on(
         near = np.flatnonzero(light.mirrors[0].shape.hit(point, image_m) < 1)
         point, normal = point[near], normal[near]
     way = light.positions_m[0] - point
-    distance_m = np.sqrt(np.einsum("pc,pc->p", way, way))
+    # of a point in the light itself there is no direction: nothing comes from it
+    distance_m = np.maximum(np.sqrt(np.einsum("pc,pc->p", way, way)), _NOWHERE_M)
     towards = way / distance_m[:, None]
     cosine = np.einsum("pc,pc->p", towards, normal)
     received = np.maximum(cosine, 0) / distance_m**2

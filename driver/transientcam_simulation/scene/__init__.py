@@ -16,6 +16,7 @@ from transientcam_simulation.scene._geometry import (
     Shape,
     blocked_by_mask,
 )
+from transientcam_simulation.scene._limits import patch_edges_m
 from transientcam_simulation.scene._motion import Motion
 from transientcam_simulation.scene._scene import (
     Background,
@@ -50,4 +51,5 @@ __all__ = [
     "list_scenes",
     "load_scene",
     "parse_scene",
+    "patch_edges_m",
 ]

@@ -43,6 +43,10 @@ from transientcam_simulation.scene._table import Table
 
 BUILT_IN = Path(__file__).parents[1] / "scenes"
 MOST_BOUNCES = 8
+LEAST_E, MOST_E = 1e-9, 1e15
+"""Electrons a second: with them and what the light falls on, no number is out of bounds."""
+MOST_S = 1e-3
+"""Of a delay."""
 _FORMER_DIFFUSER = "diffusor"
 """How the table [diffuser] was spelt."""
 _SHAPES = ("rectangle", "sphere", "ellipsoid")
@@ -139,7 +143,7 @@ def _open(path: Path) -> Table:
 
 
 def _light(table: Table, *, somewhere: bool) -> Light:
-    electrons_per_s = table.number("electrons_per_s", above=0)
+    electrons_per_s = table.number("electrons_per_s", least=LEAST_E, most=MOST_E)
     if not somewhere:
         table.done()
         return Light(electrons_per_s, np.zeros(3), np.zeros(3), 0.0)
@@ -147,7 +151,7 @@ def _light(table: Table, *, somewhere: bool) -> Light:
         electrons_per_s=electrons_per_s,
         position_m=table.vector("position_m"),
         aim_at_m=table.vector("aim_at_m"),
-        beam_exponent=table.number("beam_exponent", 0.0, least=0),
+        beam_exponent=table.number("beam_exponent", 0.0, least=0, most=1e4),
     )
     if np.array_equal(light.aim_at_m, light.position_m):
         raise table.error("aim_at_m", light.aim_at_m.tolist(), "away from position_m")
@@ -183,9 +187,9 @@ def _lens(table: Table) -> Lens:
 def _sensor(table: Table) -> Sensor:
     default = Sensor()
     sensor = Sensor(
-        full_well_e=table.number("full_well_e", default.full_well_e, above=0),
-        gain_e_per_dn=table.number("gain_e_per_dn", default.gain_e_per_dn, above=0),
-        read_noise_e=table.number("read_noise_e", default.read_noise_e, least=0),
+        full_well_e=table.number("full_well_e", default.full_well_e, least=1, most=1e12),
+        gain_e_per_dn=table.number("gain_e_per_dn", default.gain_e_per_dn, least=1e-6, most=1e9),
+        read_noise_e=table.number("read_noise_e", default.read_noise_e, least=0, most=1e9),
         bits=table.integer("bits", default.bits, least=1, most=16),
         dark_dn=table.number("dark_dn", default.dark_dn, least=0),
     )
@@ -208,7 +212,7 @@ def _device(table: Table, folder: Path | None) -> DeviceProfile:
     if "lens_scatter" in table:
         profile = replace(profile, lens_scatter=_lens_scatter(table.table("lens_scatter")))
     if "dark_current_e_per_s" in table:
-        current = DarkCurrent(table.number("dark_current_e_per_s", least=0))
+        current = DarkCurrent(table.number("dark_current_e_per_s", least=0, most=MOST_E))
         profile = replace(profile, dark_current=current)
     if "outlier_share" in table:
         share = table.number("outlier_share", least=0, most=1)
@@ -219,10 +223,10 @@ def _device(table: Table, folder: Path | None) -> DeviceProfile:
 
 def _pattern(table: Table, folder: Path | None) -> Pattern:
     pattern = Pattern(
-        delay_s=table.number("delay_s", 0.0, least=0),
+        delay_s=table.number("delay_s", 0.0, least=0, most=MOST_S),
         gain=table.number("gain", 0.0, least=0, most=0.3),
         file=_file(table, "file", folder) if "file" in table else None,
-        file_frequency_hz=table.number("file_frequency_hz", 23e6, above=0),
+        file_frequency_hz=table.number("file_frequency_hz", 23e6, least=1, most=1e12),
     )
     if pattern.file is not None and pattern.delay_s:
         raise table.error("delay_s", pattern.delay_s, "absent beside file, which has the delays")
@@ -240,9 +244,9 @@ def _file(table: Table, key: str, folder: Path | None) -> Path:
 
 def _drift(table: Table) -> Drift:
     drift = Drift(
-        rise_c=table.number("rise_c"),
-        time_constant_s=table.number("time_constant_s", above=0),
-        delay_s_per_c=table.number("delay_s_per_c"),
+        rise_c=table.number("rise_c", least=-1e4, most=1e4),
+        time_constant_s=table.number("time_constant_s", least=1e-6, most=1e9),
+        delay_s_per_c=table.number("delay_s_per_c", least=-MOST_S, most=MOST_S),
     )
     table.done()
     return drift
@@ -250,7 +254,8 @@ def _drift(table: Table) -> Drift:
 
 def _lens_scatter(table: Table) -> LensScatter:
     scatter = LensScatter(
-        share=table.number("share", least=0, most=0.5), width=table.number("width", 0.15, above=0)
+        share=table.number("share", least=0, most=0.5),
+        width=table.number("width", 0.15, least=1e-6, most=1e6),
     )
     table.done()
     return scatter
@@ -274,7 +279,7 @@ def _transport(table: Table) -> Transport:
 
 
 def _ambient(table: Table) -> float:
-    electrons_per_s = table.number("electrons_per_s", 0.0, least=0)
+    electrons_per_s = table.number("electrons_per_s", 0.0, least=0, most=MOST_E)
     table.done()
     return electrons_per_s
 
@@ -286,8 +291,8 @@ def _diffuser(top: Table) -> Diffuser | None:
         raise top.error(_FORMER_DIFFUSER, "a table", "absent beside [diffuser]")
     table = top.table("diffuser" if "diffuser" in top else _FORMER_DIFFUSER)
     diffuser = Diffuser(
-        brightness=table.number("brightness", 1.0, above=0),
-        delay_s=table.number("delay_s", 0.0, least=0),
+        brightness=table.number("brightness", 1.0, least=1e-9, most=1e9),
+        delay_s=table.number("delay_s", 0.0, least=0, most=MOST_S),
         fall_off=table.number("fall_off", 0.0, least=0, most=0.9),
     )
     table.done()
@@ -312,7 +317,7 @@ def _motions(tables: list[Table]) -> dict[str, Motion]:
             raise table.error("name", name, "a name that no other motion has")
         motions[name] = Motion(
             path_m=table.vectors("path_m", least=2),
-            period_s=table.number("period_s", above=0),
+            period_s=table.number("period_s", least=1e-6, most=1e9),
             repeat=table.choice("repeat", get_args(Repeat), "restart"),
         )
         table.done()
@@ -348,16 +353,14 @@ def _shape(table: Table, kind: Kind) -> Shape:
     shape = table.choice("shape", allowed, "rectangle")
     centre_m = table.vector("centre_m")
     if shape == "sphere":
-        return Ellipsoid(centre_m, np.full(3, table.number("radius_m", above=0)))
+        return Ellipsoid(centre_m, np.full(3, table.length("radius_m")))
     if shape == "ellipsoid":
-        radii_m = table.vector("radii_m")
-        if radii_m.min() <= 0:
-            raise table.error("radii_m", radii_m.tolist(), "three numbers above 0")
-        return Ellipsoid(centre_m, radii_m)
+        return Ellipsoid(centre_m, np.array(table.lengths("radii_m", 3)))
     normal = table.vector("normal")
     if not np.any(normal):
         raise table.error("normal", normal.tolist(), "other than zero")
-    return Rectangle.facing(centre_m, normal, size=table.size("size_m"))
+    width_m, height_m = table.lengths("size_m", 2)
+    return Rectangle.facing(centre_m, normal, size=(width_m, height_m))
 
 
 def _gloss(table: Table) -> tuple[float, float]:
@@ -370,7 +373,7 @@ def _gloss(table: Table) -> tuple[float, float]:
 def _scatter(table: Table) -> Scatter:
     return Scatter(
         width_s=table.number("scatter_width_s", 0.0, least=0, most=1e-6),
-        decay_s=table.number("scatter_decay_s", above=0, most=1e-6),
+        decay_s=table.number("scatter_decay_s", least=1e-15, most=1e-6),
     )
 
 
@@ -395,21 +398,23 @@ def _mask(table: Table) -> NDArray[np.bool_]:
 
 
 def _response(table: Table, folder: Path | None) -> ResponseFile:
-    time_zero_s = table.number("time_zero_s") if "time_zero_s" in table else None
+    time_zero_s = (
+        table.number("time_zero_s", least=-MOST_S, most=MOST_S) if "time_zero_s" in table else None
+    )
     has_zero_file = "time_zero_file" in table
     zero_file = _file(table, "time_zero_file", folder) if has_zero_file else None
     if time_zero_s is not None and zero_file is not None:
         raise table.error("time_zero_s", time_zero_s, "absent beside time_zero_file")
     response = ResponseFile(
         path=_file(table, "file", folder),
-        weight=table.number("weight", 1.0, above=0),
-        delay_s=table.number("delay_s", 0.0),
+        weight=table.number("weight", 1.0, least=1e-9, most=1e9),
+        delay_s=table.number("delay_s", 0.0, least=-MOST_S, most=MOST_S),
         normalise=table.switch("normalise", True),
         background=table.choice("background", get_args(Background), "none"),
         time_zero=table.choice("time_zero", get_args(TimeZero), "start"),
         time_zero_s=time_zero_s,
         time_zero_file=zero_file,
-        bin_s=table.number("bin_s", above=0) if "bin_s" in table else None,
+        bin_s=table.number("bin_s", least=1e-15, most=MOST_S) if "bin_s" in table else None,
     )
     table.done()
     return response

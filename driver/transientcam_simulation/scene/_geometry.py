@@ -100,9 +100,13 @@ class Rectangle:
         tangents = away @ across / along
         return float(tangents.min()), float(tangents.max())
 
+    def grid(self, edge_m: float) -> tuple[int, int]:
+        """Return how many rows and columns `cells` cuts it into."""
+        return _counts(self.height, edge_m), _counts(self.width, edge_m)
+
     def cells(self, edge_m: float) -> Cells:
         """Cut it into equal cells of about the edge given."""
-        rows, columns = _counts(self.height, edge_m), _counts(self.width, edge_m)
+        rows, columns = self.grid(edge_m)
         y, x = np.meshgrid(_middles(rows), _middles(columns), indexing="ij")
         across, along = self.right * self.width / 2, self.up * self.height / 2
         centre = self.centre + x.reshape(-1, 1) * across + y.reshape(-1, 1) * along
@@ -222,10 +226,14 @@ class Ellipsoid:
             at[met] = np.where(ahead > _CLEAR_OF_CURVED, ahead, np.inf)
         return at
 
+    def grid(self, edge_m: float) -> tuple[int, int]:
+        """Return how many rows and columns `cells` cuts it into."""
+        rows = max(2, _counts(np.pi * float(self.radii[2]), edge_m))
+        return rows, max(4, _counts(2 * np.pi * float(self.radii[:2].max()), edge_m))
+
     def cells(self, edge_m: float) -> Cells:
         """Cut it along equal steps of height and of longitude."""
-        rows = max(2, _counts(np.pi * self.radii[2], edge_m))
-        columns = max(4, _counts(2 * np.pi * float(self.radii[:2].max()), edge_m))
+        rows, columns = self.grid(edge_m)
         z, angle = np.meshgrid(_middles(rows), np.pi * _middles(columns), indexing="ij")
         on_unit = _on_unit_sphere(z.ravel(), angle.ravel())
         centre = self.centre + on_unit * self.radii

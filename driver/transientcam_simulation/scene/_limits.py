@@ -1,6 +1,12 @@
-"""What a scene from elsewhere may cost: memory and time of its preparation stay bounded."""
+"""What a scene will need before its light is known, and how much of it one from elsewhere may.
 
+It is counted as the light is built, by the same functions (`patch_edges_m`, `Shape.grid`).
+"""
+
+from dataclasses import dataclass
 from typing import Final
+
+import numpy as np
 
 from transientcam_driver.errors import SceneError
 from transientcam_simulation.scene._scene import Scene
@@ -9,7 +15,61 @@ MOST_SURFACES: Final = 32
 MOST_MIRROR_PATHS: Final = 64
 """Chains of mirrors that light may take, each of which is followed."""
 MOST_PATCHES: Final = 4096
-"""Between scattering surfaces; the memory grows with the square of their number."""
+"""Between scattering surfaces: their matrices take 128 MiB, and 0.5 GiB while they are made."""
+_LEAST_PER_SIDE: Final = 4
+"""Patches along the longest side of a surface, however small it is beside others."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What the light of a scene needs.
+
+    Attributes
+    ----------
+    mirror_paths
+        Chains of mirrors that are followed at most.
+    patches
+        Of scattering surfaces, between which light is followed; 0 where none is.
+    """
+
+    mirror_paths: int
+    patches: int
+
+
+def patch_edges_m(scene: Scene, per_side: int) -> dict[int, float]:
+    """Return how long the edges of the patches of each scattering surface are, by its index.
+
+    The longest side of all surfaces is cut into ``per_side`` patches, the others as finely.
+    """
+    sides_m = {
+        index: float(np.ptp(each.shape.extent(), axis=0).max())
+        for index, each in enumerate(scene.surfaces)
+        if each.scatters
+    }
+    edge_m = max(sides_m.values(), default=0.0) / per_side
+    return {index: min(edge_m, side_m / _LEAST_PER_SIDE) for index, side_m in sides_m.items()}
+
+
+def patches_of(scene: Scene, per_side: int) -> int:
+    """Return how many patches the scattering surfaces of a scene are cut into."""
+    grids = (
+        scene.surfaces[index].shape.grid(edge_m)
+        for index, edge_m in patch_edges_m(scene, per_side).items()
+    )
+    return sum(rows * columns for rows, columns in grids)
+
+
+def cost_of(scene: Scene) -> Cost:
+    """Return what the light of a scene needs, without computing any of it."""
+    transport = scene.transport
+    mirrors = sum(each.kind == "mirror" for each in scene.surfaces)
+    # no light goes from a plane mirror to itself
+    paths = sum(
+        mirrors * (mirrors - 1) ** (bounces - 1)
+        for bounces in range(1, transport.mirror_bounces + 1)
+    )
+    followed = transport.diffuse_bounces != 0
+    return Cost(paths, patches_of(scene, transport.patches) if followed else 0)
 
 
 def require_modest(scene: Scene) -> None:
@@ -23,17 +83,14 @@ def require_modest(scene: Scene) -> None:
     surfaces, transport = scene.surfaces, scene.transport
     if len(surfaces) > MOST_SURFACES:
         raise SceneError("the scene", "surface", len(surfaces), f"at most {MOST_SURFACES} tables")
-    mirrors = sum(each.kind == "mirror" for each in surfaces)
-    # no light goes from a plane mirror to itself
-    paths = sum(
-        mirrors * (mirrors - 1) ** (bounces - 1)
-        for bounces in range(1, transport.mirror_bounces + 1)
-    )
-    if paths > MOST_MIRROR_PATHS:
-        limit = f"fewer: {paths} chains of {mirrors} mirrors are more than {MOST_MIRROR_PATHS}"
+    cost = cost_of(scene)
+    if cost.mirror_paths > MOST_MIRROR_PATHS:
+        limit = f"fewer: {cost.mirror_paths} chains of mirrors are more than {MOST_MIRROR_PATHS}"
         raise SceneError("the scene", "transport.mirror_bounces", transport.mirror_bounces, limit)
-    scattering = sum(each.scatters for each in surfaces)
-    if transport.diffuse_bounces != 0 and scattering * transport.patches**2 > MOST_PATCHES:
-        most = int((MOST_PATCHES / scattering) ** 0.5)
-        limit = f"at most {most} with {scattering} scattering surfaces, or diffuse_bounces = 0"
+    if cost.patches > MOST_PATCHES:
+        most = max(n for n in range(2, transport.patches) if patches_of(scene, n) <= MOST_PATCHES)
+        limit = (
+            f"at most {most} with these surfaces, or diffuse_bounces = 0: {cost.patches} patches "
+            f"are more than {MOST_PATCHES}"
+        )
         raise SceneError("the scene", "transport.patches", transport.patches, limit)

@@ -3,12 +3,19 @@
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.errors import SceneError
+
+MOST_M: Final = 1e6
+"""Of a coordinate or a size: squares and products of what is allowed stay finite."""
+LEAST_M: Final = 1e-6
+"""Of a size."""
+_NOTHING: Final = 1e-12
+"""What is nearer to 0 counts as 0: a picometre; what is divided by it would overflow."""
 
 
 class Table:
@@ -83,20 +90,28 @@ class Table:
         return value
 
     def vector(self, key: str, default: tuple[float, ...] | None = None) -> NDArray[np.float64]:
-        """Read three finite numbers."""
-        value = self._numbers(key, default, 3)
-        return np.array(value, dtype=np.float64)
+        """Read a place or a direction: three numbers in m, of at most `MOST_M`."""
+        return self._place(key, self._take(key, default), f"a list of 3 numbers{_WITHIN}")
 
     def vectors(self, key: str, *, least: int) -> NDArray[np.float64]:
-        """Read a list of at least so many vectors."""
+        """Read a list of at least so many places."""
         value = self._take(key, None)
-        allowed = f"a list of at least {least} lists of 3 numbers"
+        allowed = f"a list of at least {least} lists of 3 numbers{_WITHIN}"
         if not isinstance(value, list) or len(value) < least:
             raise self.error(key, value, allowed)
-        for item in value:
-            if not _are_numbers(item, 3):
-                raise self.error(key, item, allowed)
-        return np.array(value, dtype=np.float64)
+        return np.array([self._place(key, item, allowed) for item in value])
+
+    def length(self, key: str) -> float:
+        """Read a size in m."""
+        return self.number(key, least=LEAST_M, most=MOST_M)
+
+    def lengths(self, key: str, count: int) -> list[float]:
+        """Read so many sizes in m."""
+        value = self._take(key, None)
+        if not _are_numbers(value, count) or not all(LEAST_M <= each <= MOST_M for each in value):
+            limits = _limits(LEAST_M, MOST_M, -math.inf)
+            raise self.error(key, value, f"a list of {count} numbers{limits}")
+        return [float(item) for item in value]
 
     def words(self, key: str) -> list[str]:
         """Read a word or a list of words."""
@@ -106,18 +121,12 @@ class Table:
             raise self.error(key, value, "a text or a list of texts")
         return words
 
-    def size(self, key: str) -> tuple[float, float]:
-        """Read two positive numbers, width and height."""
-        width, height = self._numbers(key, None, 2)
-        if width <= 0 or height <= 0:
-            raise self.error(key, [width, height], "two numbers above 0: width and height")
-        return width, height
-
-    def _numbers(self, key: str, default: tuple[float, ...] | None, count: int) -> list[float]:
-        value = self._take(key, default)
-        if not _are_numbers(value, count):
-            raise self.error(key, value, f"a list of {count} numbers")
-        return [float(item) for item in value]
+    def _place(self, key: str, value: Any, allowed: str) -> NDArray[np.float64]:
+        if not _are_numbers(value, 3) or not all(abs(each) <= MOST_M for each in value):
+            raise self.error(key, value, allowed)
+        place = np.array(value, dtype=np.float64)
+        place[np.abs(place) < _NOTHING] = 0.0
+        return place
 
     def table(self, key: str) -> "Table":
         """Enter a table inside this one; empty when absent."""
@@ -153,6 +162,9 @@ def _is_finite(value: object) -> bool:
         return math.isfinite(value)
     except OverflowError:  # an integer that no float can hold
         return False
+
+
+_WITHIN: Final = f" from {-MOST_M:g} to {MOST_M:g}"
 
 
 def _limits(least: float, most: float, above: float) -> str:

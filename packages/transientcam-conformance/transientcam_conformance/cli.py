@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 
 from transientcam.cli.options import TokenOption, UrlArgument
+from transientcam.cli.terminal import Terminal, echo
 from transientcam_conformance import CHECKS, SLOW, Check, Device, Report, Result, chosen, run
 
 _MARKS = {
@@ -48,7 +48,7 @@ def conformance(
     """
     checks = chosen(only or (), quick=quick)
     to_standard_output = report is not None and str(report) == "-"
-    console = Console(stderr=to_standard_output, highlight=False)
+    console = Terminal(stderr=to_standard_output, highlight=False, markup=True)
     width = max(len(each.name) for each in CHECKS)
 
     with Device(url, token=token, timeout_s=timeout_s) as device, console.status("") as status:
@@ -70,7 +70,7 @@ def conformance(
     if report is not None:
         text = json.dumps(outcome.to_document(), indent=2)
         if to_standard_output:
-            typer.echo(text)
+            echo(text)
         else:
             report.write_text(text + "\n", encoding="utf-8")
     if outcome.failed:

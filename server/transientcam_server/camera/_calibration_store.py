@@ -18,7 +18,7 @@ from typing import Any, Final
 from numpy.typing import NDArray
 
 from transientcam_driver import CalibrationCapture, CalibrationFileError, CalibrationSubject
-from transientcam_server.errors import Problem, kinds
+from transientcam_server.errors import Problem, fenced, kinds
 from transientcam_server.imaging import (
     NOMINAL_ID,
     Calibration,
@@ -220,7 +220,7 @@ class CalibrationStore:
             return {"id": str(document["id"]), "former": None if former is None else str(former)}
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+        except Exception as error:  # of a file that anybody may have written
             _log.warning("which calibration was active cannot be read: %s", error)
             return {}
 
@@ -319,11 +319,14 @@ class CalibrationStore:
 
 
 def _read(path: Path, size_bytes: int) -> StoredCalibration | None:
-    try:
-        capture = CalibrationCapture.load(path)
-    except CalibrationFileError as error:
-        _log.warning("%s", error)
-        return None
+    def unreadable(reason: str) -> None:
+        _log.warning("%s is not readable: %s", path, reason)
+
+    return fenced(lambda path: _loaded(path, size_bytes), path, unreadable)
+
+
+def _loaded(path: Path, size_bytes: int) -> StoredCalibration | None:
+    capture = CalibrationCapture.load(path)
     return StoredCalibration(
         id=capture.id,
         path=path,

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from transientcam.cli.options import TokenOption, require_suffix
+from transientcam.cli.terminal import Terminal, echo
 from transientcam_driver.texts import read_text
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def calibrate(
         options["harmonics"] = harmonics
         result = _measured_by_daemon(url, options, output, token, diffuser=diffuser)
     if as_json:
-        typer.echo(json.dumps(result, indent=2))
+        echo(json.dumps(result, indent=2))
     elif url is None:
         _print_capture(result)
     else:
@@ -136,7 +136,7 @@ def _undo(url: str | None, token: str | None, *, as_json: bool) -> None:
     with Camera(url, token=token) as camera:
         active = camera.calibrations.undo()
     used, former = active["id"], active["former"]
-    typer.echo(json.dumps(active, indent=2) if as_json else f"{used} is in use again, not {former}")
+    echo(json.dumps(active, indent=2) if as_json else f"{used} is in use again, not {former}")
 
 
 def _refuse(options: dict[str, Any], reason: str) -> None:
@@ -153,7 +153,7 @@ def _measured_by_daemon(
 
     from transientcam import Camera
 
-    with Camera(url, token=token) as camera, Progress(console=Console(stderr=True)) as shown:
+    with Camera(url, token=token) as camera, Progress(console=Terminal(stderr=True)) as shown:
         task = shown.add_task("waiting", total=1.0)
 
         def show(job: Mapping[str, Any]) -> None:
@@ -230,7 +230,7 @@ def _measure(camera: "Camera", order: _Order) -> "tuple[Calibration, str | None]
     from transientcam_server.imaging import SweepEvaluation, evaluate
 
     sweep = SweepEvaluation(camera.capabilities, takes=order.takes)
-    with Progress(console=Console(stderr=True)) as shown:
+    with Progress(console=Terminal(stderr=True)) as shown:
         task = shown.add_task("capturing", total=None)
         capture = capture_calibration(
             camera,
@@ -283,7 +283,7 @@ def _print_capture(result: dict[str, Any]) -> None:
         *_verdict_lines(result["verdict"]),
     )
     for line in lines:
-        typer.echo(line)
+        echo(line)
 
 
 def _harmonics_lines(result: Mapping[str, Any]) -> list[str]:
@@ -325,4 +325,4 @@ def _print_measured(result: dict[str, Any]) -> None:
     if result["file"] is not None:
         lines.append(f"  downloaded into {result['file']}")
     for line in lines:
-        typer.echo(line)
+        echo(line)

@@ -5,8 +5,8 @@ from contextlib import contextmanager
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 
+from transientcam.cli.terminal import Terminal
 from transientcam_server.errors import ClusterError, MissingExtra
 
 WorkersOption = Annotated[
@@ -24,7 +24,7 @@ _CONNECT_WITHIN_S = 10
 
 
 @contextmanager
-def cluster_client(workers: int | None, address: str | None, console: Console) -> Iterator[Any]:
+def cluster_client(workers: int | None, address: str | None, console: Terminal) -> Iterator[Any]:
     """Connect to a cluster, or start one on this machine that ends with the block.
 
     Raises
@@ -62,6 +62,6 @@ def cluster_client(workers: int | None, address: str | None, console: Console) -
         yield client
 
 
-def _say(console: Console, client: Any) -> None:
+def _say(console: Terminal, client: Any) -> None:
     workers = len(client.scheduler_info(n_workers=-1)["workers"])
     console.print(f"{workers} workers, dashboard: {client.dashboard_link}", soft_wrap=True)

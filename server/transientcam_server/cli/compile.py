@@ -7,9 +7,9 @@ import json
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from transientcam.cli.options import JsonOption
+from transientcam.cli.terminal import Terminal, echo
 from transientcam_server.cli.progress import progress_bars
 
 
@@ -24,11 +24,11 @@ def compile_kernels(
 
     if not tm.kernels.state()["enabled"]:
         if as_json:
-            typer.echo(json.dumps(tm.kernels.state()))
+            echo(json.dumps(tm.kernels.state()))
         else:
-            typer.echo("Kernels are off (TRANSIENTCAM_KERNELS); everything is left to NumPy.")
+            echo("Kernels are off (TRANSIENTCAM_KERNELS); everything is left to NumPy.")
         return
-    console = Console(stderr=as_json)
+    console = Terminal(stderr=as_json)
     with progress_bars(console=console) as progress:
         task = progress.add_task("compiling", total=None)
 
@@ -38,7 +38,7 @@ def compile_kernels(
         tm.kernels.compile(harmonics=harmonics, progress=advance)
     state = tm.kernels.state()
     if as_json:
-        typer.echo(json.dumps(state))
+        echo(json.dumps(state))
     else:
         for failure in state["failed"]:
             console.print(f"failed: {failure}", soft_wrap=True)

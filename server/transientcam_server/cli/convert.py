@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich.console import Console
 
 from transientcam.cli.options import JsonOption
+from transientcam.cli.terminal import Terminal, echo
 from transientcam_server.cli.options import RecordingArgument
 from transientcam_server.cli.progress import progress_bar
 
@@ -55,9 +55,9 @@ def convert(
         )
         frames, lens = opened.frames, lens_of(opened)
     if as_json:
-        typer.echo(json.dumps({"file": str(output), "frames": frames}))
+        echo(json.dumps({"file": str(output), "frames": frames}))
         return
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     console.print(f"{output}: {frames} frames", soft_wrap=True)
     if "pointcloud" in products and lens.source == "assumed":
         console.print(

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich.console import Console
 
 from transientcam.cli.options import JsonOption, require_suffix
+from transientcam.cli.terminal import Terminal, echo
 from transientcam_server.cli.progress import progress_bar
 
 
@@ -44,6 +44,6 @@ def import_kinect2(
     with progress_bar("importing") as advance:
         frames = imported(file, output, lens=known, progress=advance)
     if as_json:
-        typer.echo(json.dumps({"file": str(output), "frames": frames}))
+        echo(json.dumps({"file": str(output), "frames": frames}))
     else:
-        Console(stderr=True).print(f"{output}: {frames} frames", soft_wrap=True)
+        Terminal(stderr=True).print(f"{output}: {frames} frames", soft_wrap=True)

@@ -7,9 +7,9 @@ import json
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from transientcam.cli.options import JsonOption, TokenOption
+from transientcam.cli.terminal import Terminal, echo
 from transientcam_server.cli.plan_text import print_front, print_plan, print_takes
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def plan(
             goal_of_one | _options(target) | _options(budget),
             "is for one sequence, and --front shows all that no other beats",
         )
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     if daemon is not None:
         here: dict[str, Any] = {"camera": camera, "real_time": real_time or None}
         here |= {"return": returns or None}
@@ -140,7 +140,7 @@ def plan(
             view, None if front else _goal(asked, stays), console, as_json=as_json
         )
     if as_json:
-        typer.echo(json.dumps(document))
+        echo(json.dumps(document))
     elif front:
         print_front(document)
     else:
@@ -159,7 +159,7 @@ def _goal(asked: dict[str, Any], fixed: dict[str, Any]) -> "Goal":
 
 
 def _by_camera(
-    view: "View", goal: "Goal | None", console: Console, *, as_json: bool
+    view: "View", goal: "Goal | None", console: Terminal, *, as_json: bool
 ) -> dict[str, Any]:
     """Plan here; where that is refused print what limits, and end with exit code 1."""
     from transientcam_server.cli.plan_here import by_camera
@@ -169,7 +169,7 @@ def _by_camera(
         return by_camera(view, goal, console)
     except Problem as problem:
         if as_json:
-            typer.echo(json.dumps({"detail": problem.detail, **problem.extensions}))
+            echo(json.dumps({"detail": problem.detail, **problem.extensions}))
         else:
             console.print(problem.detail, style="red", soft_wrap=True)
             takes: Any = problem.extensions.get("takes", [])
@@ -178,7 +178,7 @@ def _by_camera(
 
 
 def _by_daemon(
-    url: str, token: str | None, parts: dict[str, Any] | None, console: Console, *, as_json: bool
+    url: str, token: str | None, parts: dict[str, Any] | None, console: Terminal, *, as_json: bool
 ) -> dict[str, Any]:
     """Let a daemon plan; where it refuses that do the same."""
     from transientcam.errors import ProblemError
@@ -188,7 +188,7 @@ def _by_daemon(
         return by_daemon(url, token, parts, console)
     except ProblemError as problem:
         if as_json:
-            typer.echo(json.dumps(problem.document))
+            echo(json.dumps(problem.document))
         else:
             console.print(problem.detail, style="red", soft_wrap=True)
             takes: Any = problem.document.get("takes", [])

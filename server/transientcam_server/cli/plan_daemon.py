@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import typer
-from rich.console import Console
 
 from transientcam import Camera
+from transientcam.cli.terminal import Terminal
 
 
 def by_daemon(
-    url: str, token: str | None, parts: Mapping[str, Any] | None, console: Console
+    url: str, token: str | None, parts: Mapping[str, Any] | None, console: Terminal
 ) -> dict[str, Any]:
     """Let a daemon plan for the scene before its camera; Ctrl-C cancels the job there, too.
 

@@ -3,10 +3,10 @@
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
-from rich.console import Console
 from rich.status import Status
 
 import transientcam_moments as tm
+from transientcam.cli.terminal import Terminal
 from transientcam_driver import Camera, open_camera
 from transientcam_driver.clock import RealClock, VirtualClock
 from transientcam_server.camera import sensor_of
@@ -52,7 +52,7 @@ class View:
     ambient_dn_per_s: float | None
 
 
-def by_camera(view: View, goal: Goal | None, console: Console) -> dict[str, Any]:
+def by_camera(view: View, goal: Goal | None, console: Terminal) -> dict[str, Any]:
     """Plan for a goal, or, without one, find all that no other beats; return it as JSON.
 
     Raises
@@ -87,7 +87,7 @@ def by_camera(view: View, goal: Goal | None, console: Console) -> dict[str, Any]
 
 
 def _scene(
-    planner: Planner, camera: Camera, view: View, goal: Goal, console: Console
+    planner: Planner, camera: Camera, view: View, goal: Goal, console: Terminal
 ) -> SceneStatistics:
     """Look at the scene, and show how far that has come; or take it as it is given."""
     if view.brightness_dn_per_s is not None:

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
-import typer
+from transientcam.cli.terminal import echo
 
 MOVING: Final = 0.02
 """Share of moving pixels from which on it is said."""
@@ -15,29 +15,29 @@ def print_plan(document: Mapping[str, Any], *, computing: bool) -> None:
     """Print a recommended sequence, what it gives, and its neighbours."""
     predicted = document["predicted"]
     error, std = predicted["range_error_m"], predicted["range_std_m"]
-    typer.echo(json.dumps(document["sequence"]))
-    typer.echo(f"estimator {document['estimator']}")
+    echo(json.dumps(document["sequence"]))
+    echo(f"estimator {document['estimator']}")
     time_ms, rate_hz = document["capture_s"] * 1e3, document["frame_rate_hz"]
-    typer.echo(f"captures in {time_ms:.1f} ms ({rate_hz:.1f} Hz back to back)")
+    echo(f"captures in {time_ms:.1f} ms ({rate_hz:.1f} Hz back to back)")
     if computing:
-        typer.echo(
+        echo(
             f"reconstructs in {document['reconstruct_s'] * 1e3:.1f} ms, "
             f"{document['computing_share']:.1%} of the time"
         )
-    typer.echo(
+    echo(
         f"range to {error['median'] * 1e3:.2f} mm ({error['low'] * 1e3:.2f} to "
         f"{error['high'] * 1e3:.2f}): noise {std['median'] * 1e3:.2f} mm, "
         f"bias {_bias_mm(predicted, '.2f')} mm; "
         f"{predicted['outlier_share']:.1%} of the ranges are outliers"
     )
-    typer.echo(document["summary"])
+    echo(document["summary"])
     _print_scene(document["scene"])
     if predicted["beyond_scene"]:
-        typer.echo("at best: this resolves more of the scene than the capture it is predicted from")
+        echo("at best: this resolves more of the scene than the capture it is predicted from")
     if predicted["separation_share"] is not None:
-        typer.echo(f"finds both returns in {predicted['separation_share']:.0%} of captures")
+        echo(f"finds both returns in {predicted['separation_share']:.0%} of captures")
     if predicted["bound_width"] is not None:
-        typer.echo(f"bounds {predicted['bound_width']:.3g} times the mean density apart")
+        echo(f"bounds {predicted['bound_width']:.3g} times the mean density apart")
     for name, what in (("half_time", "half the time"), ("twice_accuracy", "twice the accuracy")):
         _print_neighbour(what, document[name])
 
@@ -48,15 +48,15 @@ def print_front(document: Mapping[str, Any]) -> None:
     widths = [max(len(row[k]) for row in rows) for k in range(len(_COLUMNS) - 1)]
     for *figures, words in rows:
         cells = [cell.rjust(width) for cell, width in zip(figures, widths, strict=True)]
-        typer.echo("  ".join([*cells, words]))
-    typer.echo(document["summary"])
+        echo("  ".join([*cells, words]))
+    echo(document["summary"])
 
 
 def print_takes(predicted: Iterable[Mapping[str, Any]]) -> None:
     """Print what more takes give, where nothing else can be chosen."""
     for each in predicted:
         cost = f"{each['capture_s'] * 1e3:.1f} ms ({each['frame_rate_hz']:.1f} Hz)"
-        typer.echo(f"takes {each['takes']:>2}: {cost}, range to {each['range_std_m'] * 1e3:.2f} mm")
+        echo(f"takes {each['takes']:>2}: {cost}, range to {each['range_std_m'] * 1e3:.2f} mm")
 
 
 def _row(choice: Mapping[str, Any]) -> tuple[str, ...]:
@@ -82,22 +82,22 @@ def _bias_mm(predicted: Mapping[str, Any], digits: str) -> str:
 
 
 def _print_scene(scene: Mapping[str, Any]) -> None:
-    typer.echo(
+    echo(
         f"seen: {scene['lit_share']:.0%} of the pixels lit, at {scene['range_m']:.2f} m; "
         f"{scene['ambient_dn_per_s']:.3g} DN/s of ambient light"
     )
     if scene["moving_share"] > MOVING:
-        typer.echo(f"{scene['moving_share']:.0%} of them move: what that costs is not predicted")
+        echo(f"{scene['moving_share']:.0%} of them move: what that costs is not predicted")
     if not scene["ambiguity_checked"]:
-        typer.echo("whether ranges are short by a period was not checked")
+        echo("whether ranges are short by a period was not checked")
 
 
 def _print_neighbour(what: str, other: Mapping[str, Any] | None) -> None:
     if other is None:
-        typer.echo(f"{what}: no sequence does")
+        echo(f"{what}: no sequence does")
         return
     errors = "" if other["error_factor"] is None else f"{other['error_factor']:.2g} x the error, "
-    typer.echo(
+    echo(
         f"{what}: {errors}{other['time_factor']:.2g} x the time, estimator {other['estimator']}: "
         f"{json.dumps(other['sequence'])}"
     )

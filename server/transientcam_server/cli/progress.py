@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -14,16 +13,18 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from transientcam.cli.terminal import Terminal
 
-def progress_bars(*, console: Console | None = None, counted: bool = False) -> Progress:
+
+def progress_bars(*, console: Terminal | None = None, counted: bool = False) -> Progress:
     """Return bars for several tasks; ``counted`` shows "3/12" in place of a percentage."""
     return Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn() if counted else TaskProgressColumn(),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
-        console=console or Console(stderr=True),
+        console=console or Terminal(stderr=True),
     )
 
 

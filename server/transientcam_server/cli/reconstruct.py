@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from rich.console import Console
 
 from transientcam.cli.options import JsonOption, TokenOption, require_suffix
+from transientcam.cli.terminal import Terminal, echo
 from transientcam_server.cli.cluster import DaskOption, WorkersOption
 from transientcam_server.cli.progress import progress_bars
 from transientcam_server.cli.reconstruct_recordings import (
@@ -118,7 +118,7 @@ def reconstruct(
     measurement = offline.load_measurement(
         Path(input), frequency_hz=frequency_hz, harmonics=harmonics, background=background
     )
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     with progress_bars(console=console) as progress:
         task = progress.add_task("reconstructing", total=None)
 
@@ -134,7 +134,7 @@ def reconstruct(
             progress.update(task, description="drawing")
             pictures.save_picture(plot, cube)
     if as_json:
-        typer.echo(json.dumps(_document(measurement, cube, output)))
+        echo(json.dumps(_document(measurement, cube, output)))
     else:
         _print_cube(console, _document(measurement, cube, output))
 
@@ -160,7 +160,7 @@ def _document(measurement: "Measurement", cube: "TransientCube", output: str) ->
     }
 
 
-def _print_cube(console: Console, document: dict[str, Any]) -> None:
+def _print_cube(console: Terminal, document: dict[str, Any]) -> None:
     console.print(
         "{file}: {width} x {height} pixels, m = {harmonics} at ".format(**document)
         + f"{document['base_frequency_hz'] / 1e6:g} MHz, {document['times']} times of flight",

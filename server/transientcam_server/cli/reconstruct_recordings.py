@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
-from rich.console import Console
 
+from transientcam.cli.terminal import Terminal, echo
 from transientcam_server.cli.cluster import cluster_client
 from transientcam_server.cli.progress import progress_bar
 
@@ -81,7 +81,7 @@ def reconstruct_on_cluster(
     as_json: bool,
 ) -> None:
     """Reconstruct one recording, or all of a directory, on a cluster."""
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     outputs = _outputs(place, output)
     with cluster_client(workers, dask, console) as client:
         from transientcam_server.offline import reconstruct_on, recording_at
@@ -121,9 +121,9 @@ def _report(
 ) -> None:
     if as_json:
         document = {"file": output, "products": products, "frames": frames, "before": before}
-        typer.echo(json.dumps(document))
+        echo(json.dumps(document))
         return
     resumed = f", {before} of them before" if before else ""
-    Console(stderr=True).print(
+    Terminal(stderr=True).print(
         f"{output}: {', '.join(products)} of {frames} frames{resumed}", soft_wrap=True
     )

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from transientcam.cli.options import JsonOption
+from transientcam.cli.terminal import Terminal, echo
 
 
 def recover(
@@ -23,7 +23,7 @@ def recover(
     """Recover the unfinished recordings of a killed service; its next start does the same."""
     from transientcam_server.recording import recovery
 
-    with Console(stderr=True).status("recovering"):
+    with Terminal(stderr=True).status("recovering"):
         if path.is_dir():
             parts = recovery.unfinished(path)
             recovered = recovery.recover_all(parts)
@@ -31,10 +31,10 @@ def recover(
             parts, recovered = [path], [recovery.recover(path)]
     if as_json:
         left = [str(part) for part in parts if part.exists()]
-        typer.echo(json.dumps({"recovered": [str(each) for each in recovered], "left": left}))
+        echo(json.dumps({"recovered": [str(each) for each in recovered], "left": left}))
     else:
         for each in recovered:
-            typer.echo(f"recovered {each}")
-        typer.echo(f"{len(recovered)} of {len(parts)} recovered")
+            echo(f"recovered {each}")
+        echo(f"{len(recovered)} of {len(parts)} recovered")
     if len(recovered) < len(parts):
         raise typer.Exit(code=1)

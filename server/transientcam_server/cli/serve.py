@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
+from rich.text import Text
 
 from transientcam.cli.options import JsonOption
+from transientcam.cli.terminal import Terminal, echo
 
 
 def serve(
@@ -139,14 +140,14 @@ def _check(command_line: dict[str, Any], config: Path | None, *, as_json: bool) 
         if not as_json:
             raise
         mistakes = mistakes_document(error)
-        typer.echo(json.dumps({"valid": False, "mistakes": mistakes}, default=str))
+        echo(json.dumps({"valid": False, "mistakes": mistakes}, default=str))
         raise typer.Exit(code=1) from error
     document = to_document(configuration)
     if as_json:
-        typer.echo(json.dumps({"valid": True, "settings": document}))
+        echo(json.dumps({"valid": True, "settings": document}))
         return
     for line in to_toml(document):
-        typer.echo(line)
+        echo(line)
 
 
 def _announce(url: str, camera: str, *, as_json: bool) -> None:
@@ -154,8 +155,7 @@ def _announce(url: str, camera: str, *, as_json: bool) -> None:
         # flushed, since the caller reads the line from a pipe
         print(json.dumps({"url": url, "camera": camera, "pid": os.getpid()}), flush=True)  # noqa: T201
         return
-    console = Console()
-    console.print(
-        f"transientcam serves {camera} at [bold link={url}]{url}[/] (Ctrl-C ends it)",
-        soft_wrap=True,
-    )
+    console = Terminal()
+    link = url, f"bold link {url}"
+    line = Text.assemble(f"transientcam serves {camera} at ", link, " (Ctrl-C ends it)")
+    console.print(line, soft_wrap=True)

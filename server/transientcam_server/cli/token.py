@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from transientcam.cli.options import JsonOption
+from transientcam.cli.terminal import Terminal, echo
 
 app = typer.Typer(
     no_args_is_help=True, help="Create and revoke the tokens that give access to this camera."
@@ -64,14 +63,13 @@ def create(
         name, Role.named(role), now=now, expires=expires, may_light=may_light is not False
     )
     if as_json:
-        typer.echo(json.dumps({**_document(token.model_dump(mode="json")), "token": text}))
+        echo(json.dumps({**_document(token.model_dump(mode="json")), "token": text}))
         return
-    typer.echo(text)
-    Console(stderr=True).print(
+    echo(text)
+    Terminal(stderr=True).print(
         f"Token {token.id}, {role}, for {name}. It is shown only once; a running service accepts "
         "it at once.",
         soft_wrap=True,
-        markup=False,
         highlight=False,
     )
 
@@ -86,10 +84,10 @@ def list_tokens(
     file = TokenFile(_path(config, tokens_file))
     tokens = file.tokens()
     if as_json:
-        typer.echo(json.dumps([_document(token.model_dump(mode="json")) for token in tokens]))
+        echo(json.dumps([_document(token.model_dump(mode="json")) for token in tokens]))
         return
     if not tokens:
-        typer.echo(f"There are no tokens in {file.path}.")
+        echo(f"There are no tokens in {file.path}.")
         return
     table = Table("id", "name", "role", "light", "made", "expires", box=None)
     for token in tokens:
@@ -98,8 +96,8 @@ def list_tokens(
             expires += " (over)"
         made = f"{token.created:%Y-%m-%d}"
         light = "yes" if token.lights else "no"
-        table.add_row(token.id, escape(token.name), token.role, light, made, expires)
-    Console().print(table)
+        table.add_row(token.id, token.name, token.role, light, made, expires)
+    Terminal().print(table)
 
 
 @app.command()
@@ -114,9 +112,9 @@ def revoke(
 
     token = TokenFile(_path(config, tokens_file)).revoke(token_id)
     if as_json:
-        typer.echo(json.dumps(_document(token.model_dump(mode="json"))))
+        echo(json.dumps(_document(token.model_dump(mode="json"))))
     else:
-        typer.echo(f"Token {token.id} of {token.name} is not valid any more.")
+        echo(f"Token {token.id} of {token.name} is not valid any more.")
 
 
 def _path(config: Path | None, tokens_file: Path | None) -> Path:

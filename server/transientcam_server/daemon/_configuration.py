@@ -20,11 +20,13 @@ from pydantic import BaseModel, ValidationError
 from transientcam_driver.texts import read_text
 from transientcam_server.api import TokenFile
 from transientcam_server.errors import SettingsError, SettingsMistake, TokenFileError
+from transientcam_server.relay import uses_token
 from transientcam_server.settings import NO_HOME, Settings
 
 ENVIRONMENT_PREFIX: Final = "TRANSIENTCAM_"
 OTHER_VARIABLES: Final = frozenset(
-    f"{ENVIRONMENT_PREFIX}{name}" for name in ("TOKEN", "URL", "KERNELS", "TEST_DATA")
+    f"{ENVIRONMENT_PREFIX}{name}"
+    for name in ("TOKEN", "RELAY_TOKEN", "URL", "KERNELS", "TEST_DATA")
 )
 """Those that begin so, too, but are not for the daemon's settings."""
 DEFAULT_FILES: Final = (Path("transientcam.toml"), Path("/etc/transientcam/transientcam.toml"))
@@ -79,6 +81,7 @@ def load(
     mistakes = [
         *_homeless(loaded.settings),
         *_unsafe(loaded.settings, loaded.places),
+        *_lent(loaded.settings, loaded.places, environment),
         *_bad_certificate(loaded.settings, loaded.places),
     ]
     if mistakes:
@@ -261,6 +264,21 @@ def _unsafe(settings: Settings, places: Places) -> Iterator[SettingsMistake]:
             "`transientcam token create`; or listen on 127.0.0.1, or add --insecure to "
             "let every client that reaches the port control the camera",
         )
+
+
+def _lent(
+    settings: Settings, places: Places, environment: Mapping[str, str]
+) -> Iterator[SettingsMistake]:
+    """Find a relay that would show everybody what its own token shows it."""
+    if settings.needs_token or settings.insecure or not uses_token(settings.camera, environment):
+        return
+    yield SettingsMistake(
+        places.of(("camera",)),
+        settings.camera,
+        "the origin asks for a token, so ask clients for one, too: require_token (and "
+        "`transientcam token create`); or add --insecure to lend the relay's to every user of "
+        "this machine",
+    )
 
 
 def _bad_certificate(settings: Settings, places: Places) -> Iterator[SettingsMistake]:

@@ -27,6 +27,7 @@ from transientcam_server.errors._exceptions import (
     TokenFileError,
     UnknownToken,
 )
+from transientcam_server.errors._fence import fenced
 from transientcam_server.errors._kinds import ProblemKind
 from transientcam_server.errors._translation import (
     ProblemDocument,
@@ -59,6 +60,7 @@ __all__ = [
     "StorageError",
     "TokenFileError",
     "UnknownToken",
+    "fenced",
     "kinds",
     "plain",
     "problem_document",

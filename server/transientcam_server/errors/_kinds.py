@@ -302,6 +302,13 @@ PLANNING_ENDED: Final = ProblemKind(
     "The process that computes plans ended before it answered: it was killed, or had too little "
     "memory. Frames, recordings and other requests go on. Try again.",
 )
+PLAN_TOO_LONG: Final = ProblemKind(
+    "plan-too-long",
+    504,
+    "The plan takes too long",
+    "What is planned was given up after `limit` seconds, the setting `limits.plan_s`. Fewer takes, "
+    "a smaller budget or an estimator that is named take less.",
+)
 TOO_LARGE: Final = ProblemKind(
     "too-large",
     413,

@@ -56,7 +56,7 @@ def write_mcap(
         profile="ros2" if schemas == "ros2" else None
     )
     with (
-        _in_own_words(output),
+        _in_words(output),
         whole(output) as scratch,
         foxglove.open_mcap(scratch, context=log.context, writer_options=options) as writer,
     ):
@@ -75,11 +75,13 @@ def write_mcap(
 
 
 @contextmanager
-def _in_own_words(output: Path) -> Iterator[None]:
-    """Say of what a failure of the writer is: it has no type for one of the disk."""
+def _in_words(output: Path) -> Iterator[None]:
+    """Say of what a failure of the SDK is where a disk is full, or fails: it has no type for it."""
     try:
         yield
     except RuntimeError as error:
+        if type(error) is not RuntimeError:  # one of another kind, a `RecursionError` say
+            raise
         raise StorageError(str(output), str(error)) from error
 
 

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from transientcam_server.errors import NotARecording
+from transientcam_server.errors import NotARecording, fenced
 from transientcam_server.recording import _lock as lock
 from transientcam_server.recording._directory import id_of
 from transientcam_server.recording._layout import Header
@@ -130,22 +130,24 @@ def _of_header(header: Header) -> dict[str, Any]:
 
 
 def _read(path: Path) -> dict[str, Any]:
+    damaged = {"id": id_of(path), "state": "damaged"} | _UNREADABLE
+    return fenced(_of_recording, path, lambda reason: damaged | {"problem": reason})
+
+
+def _of_recording(path: Path) -> dict[str, Any]:
     unfinished = path.name.endswith(".part")
-    try:
-        with Recording(path) as recording:
-            end, host_time_s = recording.end, recording.series("host_time_s")
-            between_s = float(host_time_s[-1] - host_time_s[0]) if len(host_time_s) else 0.0
-            return _of_header(recording.header) | {
-                "id": id_of(path),
-                "state": "interrupted" if unfinished else "complete",
-                "frames": recording.frames,
-                # what its writer brought to the disk of an unfinished one, nobody else knows
-                "synced_frames": None if unfinished else recording.frames,
-                "dropped_frames": int(recording.series("dropped_frames").sum()),
-                "duration_s": float(end.get("duration_s", between_s)),
-                "reason": end.get("reason", "interrupted"),
-                "problem": end.get("problem"),
-                "annotations": recording.annotations,
-            }
-    except (NotARecording, OSError) as error:
-        return {"id": id_of(path), "state": "damaged", "problem": str(error)} | _UNREADABLE
+    with Recording(path) as recording:
+        end, host_time_s = recording.end, recording.series("host_time_s")
+        between_s = float(host_time_s[-1] - host_time_s[0]) if len(host_time_s) else 0.0
+        return _of_header(recording.header) | {
+            "id": id_of(path),
+            "state": "interrupted" if unfinished else "complete",
+            "frames": recording.frames,
+            # what its writer brought to the disk of an unfinished one, nobody else knows
+            "synced_frames": None if unfinished else recording.frames,
+            "dropped_frames": int(recording.series("dropped_frames").sum()),
+            "duration_s": float(end.get("duration_s", between_s)),
+            "reason": end.get("reason", "interrupted"),
+            "problem": end.get("problem"),
+            "annotations": recording.annotations,
+        }

@@ -9,8 +9,11 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any, Final, Literal
+
+from transientcam_server.errors import fenced
 
 FORMAT: Final = "transientcam products"
 """What the attribute ``format`` of every store and file of products is."""
@@ -24,6 +27,9 @@ _KEY: Final = re.compile(
 )
 _METADATA_BYTES: Final = 4 * 1024**2
 """Of a group with consolidated metadata, at most: those of 20 products take 30 KB."""
+_MOST_PRODUCTS: Final = 64
+_MOST_CHARACTERS: Final = 64 * 1024
+_DIGITS: Final = 18
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +55,8 @@ class ProductStore:
     has_every_chunk
         Whether also chunks of the fill value alone are written, so that one that is not there was
         deleted.
+    problem
+        Why it cannot be read; None where it can, else all that is above is empty.
     """
 
     id: str
@@ -60,12 +68,15 @@ class ProductStore:
     frames: int
     reconstruction: Mapping[str, Any]
     complete: bool
-    generation: str
-    has_every_chunk: bool
+    generation: str = ""
+    has_every_chunk: bool = False
+    problem: str | None = None
 
     @property
-    def state(self) -> Literal["complete", "unfinished"]:
+    def state(self) -> Literal["complete", "unfinished", "damaged"]:
         """Whether all frames are in it, in a word."""
+        if self.problem is not None:
+            return "damaged"
         return "complete" if self.complete else "unfinished"
 
     def file(self, key: str) -> Path | None:
@@ -112,7 +123,7 @@ class ProductStores:
         return [store for store in found if store is not None]
 
     def find(self, store_id: str) -> ProductStore | None:
-        """Return a store by its id, None if there is none.
+        """Return a store by its id, None if there is none that can be read.
 
         Behind the id ``~`` and the `generation` may stand, of which it then is.
         """
@@ -120,42 +131,94 @@ class ProductStores:
         if not _ID.fullmatch(name):
             return None
         found = _read(self._directory / (name + SUFFIX))
-        return None if found and generation not in ("", found.generation) else found
+        if found is None or found.problem is not None:
+            return None
+        return None if generation not in ("", found.generation) else found
 
 
 def _read(path: Path) -> ProductStore | None:
     """Return the store in a directory; None where there is none, or one of something else."""
-    store_id = path.name.removesuffix(SUFFIX)
-    if not _ID.fullmatch(store_id) or path.is_symlink():
+    if not _ID.fullmatch(_id_of(path)) or path.is_symlink():
         return None
+    return fenced(
+        _described,
+        path,
+        lambda reason: ProductStore(
+            _id_of(path), path, "", "", (), 0, 0, {}, False, problem=reason
+        ),
+    )
+
+
+def _described(path: Path) -> ProductStore | None:
     try:
         group = _document(path / METADATA)
-        attributes = group["attributes"]
-        if attributes["format"] != FORMAT:
-            return None
-        *products, bins = json.loads(attributes["products"])
-        consolidated = group.get("consolidated_metadata")
-        arrays = {} if consolidated is None else consolidated["metadata"]
-        counting = arrays.get("frame") or _document(path / "frame" / METADATA)
-        return ProductStore(
-            id=store_id,
-            path=path,
-            recording_id=str(attributes["recording_id"]),
-            title=str(attributes["title"]),
-            products=tuple(map(str, products)),
-            bins=int(bins),
-            frames=int(counting["shape"][0]),
-            reconstruction=dict(json.loads(attributes["reconstruction"])),
-            complete=consolidated is not None,
-            generation=hashlib.sha256(json.dumps(group).encode()).hexdigest()[:12],
-            has_every_chunk=attributes.get(EVERY_CHUNK) is True,
-        )
-    except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError):
-        return None  # it is being laid out, or is no store that `reconstruct` wrote
+    except FileNotFoundError:
+        return None  # it is being laid out
+    attributes = group.get("attributes", {})
+    if attributes.get("format") != FORMAT:
+        return None
+    *products, bins = _parsed(_text(attributes, "products"))
+    consolidated = group.get("consolidated_metadata")
+    arrays = {} if consolidated is None else consolidated["metadata"]
+    counting = arrays.get("frame") or _document(path / "frame" / METADATA)
+    if len(products) > _MOST_PRODUCTS or not all(isinstance(each, str) for each in products):
+        raise ValueError(f"products: must be at most {_MOST_PRODUCTS} names")
+    return ProductStore(
+        id=_id_of(path),
+        path=path,
+        recording_id=_text(attributes, "recording_id"),
+        title=_text(attributes, "title"),
+        products=tuple(products),
+        bins=_count("bins", bins),
+        frames=_count("frames", counting["shape"][0]),
+        reconstruction=dict(_parsed(_text(attributes, "reconstruction"))),
+        complete=consolidated is not None,
+        generation=hashlib.sha256(json.dumps(group).encode()).hexdigest()[:12],
+        has_every_chunk=attributes.get(EVERY_CHUNK) is True,
+    )
+
+
+def _id_of(path: Path) -> str:
+    return path.name.removesuffix(SUFFIX)
 
 
 def _document(path: Path) -> Any:
     if not path.is_file():  # opening a pipe would wait
         raise FileNotFoundError(path)
     with path.open("rb") as file:
-        return json.loads(file.read(_METADATA_BYTES))
+        document = _parsed(file.read(_METADATA_BYTES))
+    if not isinstance(document, dict):
+        raise ValueError(f"{path.name}: must be a JSON object")
+    return document
+
+
+def _parsed(text: str | bytes) -> Any:
+    """Return a JSON document that can be written as one again: of finite numbers alone."""
+    return json.loads(text, parse_constant=_no_number, parse_int=_integer, parse_float=_finite)
+
+
+def _no_number(text: str) -> float:
+    raise ValueError(f"{text} is no number of JSON")
+
+
+def _finite(text: str) -> float:
+    return value if isfinite(value := float(text)) else _no_number(text[:20])
+
+
+def _integer(text: str) -> int:
+    if len(text) > _DIGITS:
+        raise ValueError(f"a number of {len(text)} digits")
+    return int(text)
+
+
+def _text(attributes: Mapping[str, Any], name: str) -> str:
+    value = attributes[name]
+    if not isinstance(value, str) or len(value) > _MOST_CHARACTERS:
+        raise ValueError(f"{name}: must be a text of at most {_MOST_CHARACTERS} characters")
+    return value
+
+
+def _count(name: str, value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**31:
+        raise ValueError(f"{name}: must be a whole number from 0 to {2**31 - 1}")
+    return value

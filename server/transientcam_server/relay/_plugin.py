@@ -66,6 +66,15 @@ def _token(name: CameraName, environment: Mapping[str, str]) -> str | None:
     return token
 
 
+def uses_token(spec: str, environment: Mapping[str, str]) -> bool:
+    """Return whether a camera is a relay that shows its origin a token."""
+    try:
+        name = CameraName.parse(spec)
+        return name.kind == "relay" and _token(name, environment) is not None
+    except SpecError:  # it says so itself when it is opened
+        return False
+
+
 def _open(name: CameraName, clock: Clock) -> Camera:
     url, token = _address(name), _token(name, os.environ)
     origin = Origin(

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from rich.console import Console
 
 from tests.serving import Served, serving
 from transientcam import Camera, Notice, wire
 from transientcam.cli import run
 from transientcam.cli.statistics import Sample
+from transientcam.cli.terminal import Terminal
 from transientcam.cli.watch import Screen
 
 
@@ -176,7 +176,7 @@ def test_watch_without_a_daemon_is_one_sentence(capsys: pytest.CaptureFixture[st
 
 
 def test_a_terminal_shows_one_line_a_product_and_every_notice() -> None:
-    console = Console(force_terminal=True, width=100, record=True)
+    console = Terminal(force_terminal=True, width=100, record=True)
     screen = Screen(console)
     sample = Sample(
         frame=1,

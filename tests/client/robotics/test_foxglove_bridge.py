@@ -72,7 +72,7 @@ def pixels(message: Any) -> NDArray[Any]:
 
 def test_a_viewer_sees_the_values_of_the_camera(served: Served) -> None:
     topics = ("/range", "/depth", "/pointcloud", "/camera_info", "/tf_static")
-    with bridged(served.url) as (bridge, _), viewing(bridge.port) as viewer:
+    with bridged(served.url) as (bridge, _), viewing(bridge.url) as viewer:
         assert set(viewer.channels) == {*topics, "/direct", "/indirect", "/brightness"}
         viewer.subscribe(*topics)
         seen = viewer.frame(*topics)
@@ -102,7 +102,7 @@ def test_a_viewer_sees_the_values_of_the_camera(served: Served) -> None:
 
 
 def test_only_what_is_looked_at_is_asked_of_the_camera(served: Served) -> None:
-    with bridged(served.url) as (bridge, reports), viewing(bridge.port) as viewer:
+    with bridged(served.url) as (bridge, reports), viewing(bridge.url) as viewer:
         viewer.subscribe("/range")
         assert said(reports, "streaming").text == "streaming range"
         viewer.message("/range")
@@ -118,14 +118,14 @@ def test_only_what_is_looked_at_is_asked_of_the_camera(served: Served) -> None:
 
 def test_a_viewer_that_leaves_without_a_word_is_no_longer_served(served: Served) -> None:
     with bridged(served.url) as (bridge, reports):
-        with viewing(bridge.port) as viewer:
+        with viewing(bridge.url) as viewer:
             viewer.subscribe("/range")
             viewer.message("/range")
         said(reports, "no viewer is subscribed")
 
 
 def test_viewers_see_the_parameters_and_cannot_set_them(served: Served) -> None:
-    with bridged(served.url) as (bridge, _), viewing(bridge.port) as viewer:
+    with bridged(served.url) as (bridge, _), viewing(bridge.url) as viewer:
         values = viewer.parameters("sequence.harmonics", "sequence.exposure_s", "sequence.zeroth")
         assert values == {
             "sequence.harmonics": 3,
@@ -148,7 +148,7 @@ def test_viewers_that_were_given_control_set_parameters_and_see_those_of_others(
     with (
         Camera(served.url, timeout_s=60.0) as other,
         bridged(served.url, control=True) as (bridge, _),
-        viewing(bridge.port) as viewer,
+        viewing(bridge.url) as viewer,
     ):
         before = other.sequence, other.reconstruction
         answer = viewer.set_parameters(
@@ -184,9 +184,9 @@ def test_a_capture_answers_with_a_frame_that_was_not_there_before(served: Served
     with (
         Camera(served.url, timeout_s=60.0) as camera,
         bridged(served.url) as (bridge, _),
-        bridged(served.url, control=True) as (in_control, _),
-        viewing(bridge.port) as viewer,
-        viewing(in_control.port) as operator,
+        bridged(served.url, control_light=True) as (in_control, _),
+        viewing(bridge.url) as viewer,
+        viewing(in_control.url) as operator,
     ):
         newest = camera.frames["last"]
         found = viewer.call("/capture")
@@ -195,7 +195,7 @@ def test_a_capture_answers_with_a_frame_that_was_not_there_before(served: Served
 
         camera.stop()
         newest = camera.frames["last"]
-        assert "--control was not given" in viewer.call("/capture")["message"]
+        assert "--control-light was not given" in viewer.call("/capture")["message"]
         assert operator.call("/capture")["frame"] > newest
         assert camera.acquisition["running"] is False
         camera.start()
@@ -206,7 +206,7 @@ def test_lens_and_pose_can_be_looked_at_alone(silent: Camera) -> None:
     reports: list[Report] = []
     with (
         running(silent, on_report=reports.append, now_ns=lambda: 5 * 10**9) as bridge,
-        viewing(bridge.port) as viewer,
+        viewing(bridge.url) as viewer,
     ):
         viewer.subscribe("/tf_static", "/camera_info")
         pose, lens = viewer.message("/tf_static"), viewer.message("/camera_info")
@@ -220,7 +220,7 @@ def test_viewers_are_shown_that_the_camera_is_gone_and_see_it_again() -> None:
         with serving(SPEC) as first:
             port = int(first.url.rpartition(":")[2])
             bridge, _ = stays.enter_context(bridged(first.url))
-            viewer = stays.enter_context(viewing(bridge.port))
+            viewer = stays.enter_context(viewing(bridge.url))
             viewer.subscribe("/brightness")
             viewer.message("/brightness")
         assert viewer.status("connection to the camera lost")["level"] == 2
@@ -236,7 +236,7 @@ def test_dropped_frames_are_counted_for_viewers_every_few_seconds(silent: Camera
         FoxgloveBridge(
             silent, port=0, on_report=reports.append, now_ns=lambda: next(times_ns)
         ) as bridge,
-        viewing(bridge.port) as viewer,
+        viewing(bridge.url) as viewer,
     ):
         for total in (1, 2, 3):
             bridge._source.noticed(Notice("dropped", {"channel": 0, "count": 1, "total": total}))
@@ -286,7 +286,7 @@ def test_the_verb_says_where_to_connect(
     served: Served, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def run(bridge: FoxgloveBridge) -> None:
-        with viewing(bridge.port) as viewer:
+        with viewing(bridge.url) as viewer:
             assert set(viewer.channels) == {"/flags", "/camera_info", "/tf_static"}
 
     monkeypatch.setattr(FoxgloveBridge, "run", run)

@@ -1,6 +1,7 @@
 """A daemon, the bridge, and what it wrote, read back by Rerun's own reader."""
 
 import queue
+import subprocess
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -211,3 +212,26 @@ def test_a_file_that_cannot_be_written_and_an_address_of_none_are_named(
         verb.rerun(served.url, connect="nonsense")
     with pytest.raises(typer.BadParameter, match="rrd"):
         verb.rerun(served.url, save=tmp_path / "a.mcap")
+
+
+def test_a_viewer_that_is_started_is_reached_from_this_machine_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    started: list[list[str]] = []
+    monkeypatch.setattr(subprocess, "Popen", lambda command, **_: started.append(command))
+
+    verb._start_viewer()
+
+    (command,) = started
+    assert command[command.index("--bind") + 1] == "127.0.0.1"
+    monkeypatch.undo()
+    # the viewer knows the options: it would refuse others
+    known = subprocess.run([*command, "--version"], capture_output=True, check=False)
+    assert b"error" not in known.stderr + known.stdout
+    unknown = subprocess.run([*command, "--bound", "--version"], capture_output=True, check=False)
+    assert b"error" in unknown.stderr
+
+
+def test_with_a_token_a_viewer_is_started_only_where_that_is_said() -> None:
+    with pytest.raises(typer.BadParameter, match="--spawn"):
+        verb.rerun("http://127.0.0.1:9", token="t0ken")

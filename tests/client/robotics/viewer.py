@@ -17,10 +17,11 @@ from typing import Any
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 from websockets.sync.client import ClientConnection, connect
-from websockets.typing import Subprotocol
+from websockets.typing import Origin, Subprotocol
 
 from tests.client.robotics.reporting import WAIT_S
 
+SPOKEN = [Subprotocol("foxglove.sdk.v1")]
 _MESSAGE = struct.Struct("<BIQ")
 _CALL = struct.Struct("<BIII")
 _ENCODING = b"json"
@@ -166,8 +167,10 @@ class Viewer:
 
 
 @contextmanager
-def viewing(port: int) -> Iterator[Viewer]:
-    """Connect a viewer until the end of the block."""
-    spoken = [Subprotocol("foxglove.sdk.v1")]
-    with connect(f"ws://127.0.0.1:{port}", subprotocols=spoken, max_size=None) as connection:
+def viewing(url: str, *, origin: Origin | None = None, host: str | None = None) -> Iterator[Viewer]:
+    """Connect a viewer until the end of the block; ``host`` as the header of that name."""
+    headers = None if host is None else {"Host": host}
+    with connect(
+        url, subprotocols=SPOKEN, max_size=None, origin=origin, additional_headers=headers
+    ) as connection:
         yield Viewer(connection)

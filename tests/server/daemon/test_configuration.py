@@ -226,6 +226,25 @@ def test_asking_for_tokens_and_for_none_contradict_each_other() -> None:
         load(insecure=True, require_token=True)
 
 
+def test_a_relay_with_a_token_asks_for_tokens_or_is_told_not_to(tmp_path: Path) -> None:
+    path, mine = tmp_path / "tokens.json", tmp_path / "lab.token"
+    TokenFile(path).create("a", Role.VIEWER, now=utc_now())
+    mine.write_text("secret of the origin")
+    with_token = {"TRANSIENTCAM_RELAY_TOKEN": "secret of the origin"}
+    for camera, environment in (
+        ("relay:http://lab:8000", with_token),
+        (f"relay:http://lab:8000?token_file={mine}", {}),
+    ):
+        with pytest.raises(SettingsError, match=r"--camera.*require_token") as refused:
+            load(camera=camera, environment=environment)
+        assert "secret of the origin" not in str(refused.value)
+        load(camera=camera, environment=environment, insecure=True)
+        load(camera=camera, environment=environment, require_token=True, tokens_file=path)
+
+    load(camera="relay:http://lab:8000")
+    load(camera="sim:wall", environment=with_token)
+
+
 def test_a_file_of_tokens_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     path = tmp_path / "tokens.json"
     path.write_text("{")

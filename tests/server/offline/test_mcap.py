@@ -1,6 +1,8 @@
 """Recordings as .mcap: read back by other people's readers, and held against the recording."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -218,3 +220,26 @@ def test_what_no_message_can_hold_is_refused_with_what_can(
 def test_other_formats_hold_raw_images_only(source: Path, tmp_path: Path) -> None:
     with Recording(source) as recording, pytest.raises(InputError, match="reconstruct"):
         convert_recording(recording, tmp_path / "a.npz", products=["range"])
+
+
+def test_a_disk_that_takes_no_more_is_an_error_in_words(source: Path, tmp_path: Path) -> None:
+    program = f"""
+import resource
+from pathlib import Path
+from transientcam_server.offline import convert_recording
+from transientcam_server.recording import Recording
+with Recording(Path({str(source)!r})) as recording:
+    convert_recording(recording, Path({str(tmp_path / "whole.mcap")!r}))  # all is imported
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+    try:
+        convert_recording(recording, Path({str(tmp_path / "a.mcap")!r}))
+    except OSError as error:
+        print(error.strerror, error.filename)
+"""
+    # -B: no compiled module is cut off, too
+    command = [sys.executable, "-B", "-c", program]
+    ended = subprocess.run(command, capture_output=True, text=True, check=True)
+
+    assert ended.stdout.startswith("cannot be written (")
+    assert ended.stdout.endswith("a.mcap\n")
+    assert [each.name for each in tmp_path.iterdir()] == ["whole.mcap"]

@@ -37,6 +37,13 @@ def go_on_for_ever(progress: Progress) -> NoReturn:
         sum(k * k for k in range(10_000))
 
 
+def tell_for_ever(progress: Progress) -> NoReturn:
+    """Report one step after the other, so that there is always something to be heard."""
+    while True:
+        for k in range(1000):
+            progress.at(k / 1000, "on and on")
+
+
 def end_at_once(progress: Progress) -> NoReturn:
     os._exit(3)
 

@@ -65,8 +65,10 @@ ERRORS = [
     ("[0, -1, 0]", "[0, 0, 0]", "surface[0].normal", [0, 0, 0], "other than zero"),
     ("[0, -1, 0]", "[0, -1]", "surface[0].normal", [0, -1], "a list of 3 numbers"),
     ("[0, -1, 0]", "[0, nan, 0]", "surface[0].normal", None, "a list of 3 numbers"),
-    ("[3, 2]", "[3, -2]", "surface[0].size_m", [3, -2], "above 0"),
-    ("electrons_per_s = 1e7", "electrons_per_s = 0", "light.electrons_per_s", 0, "above 0"),
+    ("[3, 2]", "[3, -2]", "surface[0].size_m", [3, -2], "at least 1e-06 and of at most 1e+06"),
+    ("electrons_per_s = 1e7", "electrons_per_s = 0", "light.electrons_per_s", 0, "at least 1e-09"),
+    ("[0, -1, 0]", "[0, 1e-308, 0]", "surface[0].normal", [0, 0, 0], "other than zero"),
+    ("[0, 1, 0]", "[0, 1e308, 0]", "light.aim_at_m", [0, 1e308, 0], "from -1e+06 to 1e+06"),
     ("electrons_per_s = 1e7", "electrons_per_s = inf", "light.electrons_per_s", None, "a number"),
     ("aim_at_m = [0, 1, 0]", "aim_at_m = [0, 0, 0]", "light.aim_at_m", [0, 0, 0], "away from"),
     ("[light]", "[light]\ncolour = 1", "light.colour", 1, "absent"),
@@ -195,9 +197,9 @@ WALL = SCENE[SCENE.index("[[surface]]") :]
         (SCENE + 32 * WALL, "surface"),
         (SCENE + 9 * MIRROR, "transport.mirror_bounces"),
         (SCENE + 2 * MIRROR + "[transport]\nmirror_bounces = 8", None),
-        (SCENE + 7 * WALL, "transport.patches"),
-        (SCENE + 7 * WALL + "[transport]\ndiffuse_bounces = 0", None),
-        (SCENE + 7 * WALL + "[transport]\npatches = 22", None),
+        (SCENE + 10 * WALL, "transport.patches"),
+        (SCENE + 10 * WALL + "[transport]\ndiffuse_bounces = 0", None),
+        (SCENE + 9 * WALL, None),  # 10 of 24 x 16 are 3840
     ],
 )
 def test_a_scene_that_is_sent_names_no_files_and_costs_no_more_than_it_may(

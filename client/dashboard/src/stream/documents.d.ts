@@ -909,8 +909,11 @@ export interface ProductStoreDocument {
   readonly recording: string;
   /** What people call that. */
   readonly name: string;
-  /** `unfinished`: frames are still computed, or an interrupted run was not gone on with. */
-  readonly state: "complete" | "unfinished";
+  /** `unfinished`: frames are still computed, or an interrupted run was not gone on with.
+   * `damaged`: it cannot be read, and what is said of it is empty. */
+  readonly state: "complete" | "unfinished" | "damaged";
+  /** Why it cannot be read. */
+  readonly problem: string | null;
   readonly frames: number;
   readonly products: readonly string[];
   /** Times of flight of products over time. */

@@ -19,8 +19,11 @@ class ProductStoreDocument(Document):
     """Id of the recording whose products these are; it may have been deleted."""
     name: str = Field(validation_alias="title")
     """What people call that."""
-    state: Literal["complete", "unfinished"]
-    """`unfinished`: frames are still computed, or an interrupted run was not gone on with."""
+    state: Literal["complete", "unfinished", "damaged"]
+    """`unfinished`: frames are still computed, or an interrupted run was not gone on with.
+    `damaged`: it cannot be read, and what is said of it is empty."""
+    problem: str | None
+    """Why it cannot be read."""
     frames: int
     products: list[str]
     bins: int

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 
 from transientcam_driver import SceneInfo, Simulation, list_scenes
 from transientcam_server.api._dependencies import ServiceOf
@@ -14,8 +14,10 @@ from transientcam_server.api._documents.simulation import (
     SimulationDocument,
     SimulationRequest,
 )
+from transientcam_server.api._planned import for_request
 from transientcam_server.api._problems import documented
 from transientcam_server.errors import Problem, kinds
+from transientcam_server.planning import Progress
 from transientcam_server.service import Service
 
 router = APIRouter(tags=["simulation"])
@@ -37,15 +39,20 @@ async def read_simulation(service: ServiceOf) -> SimulationDocument:
 @router.put(
     "/simulation",
     summary="Put the camera before another scene",
-    responses=documented(kinds.NOT_SIMULATED, kinds.BAD_REQUEST, kinds.INVALID_REQUEST),
+    responses=documented(
+        kinds.NOT_SIMULATED, kinds.BAD_REQUEST, kinds.INVALID_REQUEST, kinds.SHUTTING_DOWN
+    ),
 )
-async def change_simulation(service: ServiceOf, wanted: SimulationRequest) -> SimulationDocument:
+async def change_simulation(
+    service: ServiceOf, wanted: SimulationRequest, http: Request
+) -> SimulationDocument:
     """Change the scene, force effects on or off, or put the diffuser before the lens.
 
     `definition` is a scene of one's own; a name it has must not be that of a built-in scene. One
     that would take much memory or time to prepare is refused.
 
-    Capturing goes on meanwhile. Answered once the scene is prepared, which may take seconds. The
+    Capturing goes on meanwhile. Answered once the scene is prepared, which may take seconds; a
+    client that leaves ends that. The
     frame that is captured at that moment may hold images of both. Streams are sent a
     `simulation-changed` notice.
     """
@@ -56,24 +63,30 @@ async def change_simulation(service: ServiceOf, wanted: SimulationRequest) -> Si
         raise Problem(kinds.INVALID_REQUEST, detail, field="scene", value=wanted.scene, limit=limit)
     if wanted.scene is not None:
         _require_known(wanted.scene, simulation)
-    await asyncio.to_thread(
-        simulation.change,
-        scene=wanted.scene,
-        definition=wanted.definition,
-        effects=wanted.effects,
-        diffuser=wanted.diffuser,
-    )
-    service.fronts.forget()
-    changed = _document(simulation)
-    service.hub.notify(
-        "simulation-changed",
-        {
-            "scene": changed.scene,
-            "effects": dict(changed.effects),
-            "diffusor": changed.diffusor,
-        },
-    )
-    return changed
+
+    async def prepare(progress: Progress) -> SimulationDocument:
+        def ask() -> None:
+            if service.closing.is_set():
+                raise Problem(kinds.SHUTTING_DOWN, "The service is shutting down.")
+            progress()
+
+        async with service.simulating:  # so that no thread waits for its turn
+            change = asyncio.ensure_future(
+                asyncio.to_thread(
+                    simulation.change,
+                    scene=wanted.scene,
+                    definition=wanted.definition,
+                    effects=wanted.effects,
+                    diffuser=wanted.diffuser,
+                    ask=ask,
+                )
+            )
+            # also where it was done just before the client was seen to have left
+            change.add_done_callback(lambda done: _announce(service, simulation, done))
+            await asyncio.shield(change)
+        return _document(simulation)
+
+    return await for_request(http, prepare)
 
 
 @router.get(
@@ -98,6 +111,21 @@ async def make_fault(service: ServiceOf, wanted: FaultRequest) -> SimulationDocu
     # the device's own lock may be held while it makes an image
     await asyncio.to_thread(_FAULTS[wanted.fault], simulation)
     return _document(simulation)
+
+
+def _announce(service: Service, simulation: Simulation, done: asyncio.Future[None]) -> None:
+    if done.cancelled() or done.exception() is not None:
+        return
+    service.fronts.forget()
+    changed = _document(simulation)
+    service.hub.notify(
+        "simulation-changed",
+        {
+            "scene": changed.scene,
+            "effects": dict(changed.effects),
+            "diffusor": changed.diffusor,
+        },
+    )
 
 
 def _simulation(service: Service) -> Simulation:

@@ -32,6 +32,7 @@ _REFUSALS: Final = (
     kinds.SHUTTING_DOWN,
     kinds.PLANNING_BUSY,
     kinds.PLANNING_ENDED,
+    kinds.PLAN_TOO_LONG,
 )
 
 

@@ -4,7 +4,9 @@ What plans is Python in large part: on a thread of the service it would hold the
 which every frame needs many times, and memory that the service would keep (decision 15).
 """
 
+import math
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
@@ -24,9 +26,20 @@ class PlanningProcess:
     It is started by the first call, or before it (`prepare`), stays for the next one, and is killed
     where a call is given up. Once it is idle it makes kernels ready: a plan is a look and, right
     after it, a search.
+
+    Parameters
+    ----------
+    most_s
+        How long one call may take.
+    clock
+        Time in s.
     """
 
-    def __init__(self) -> None:
+    def __init__(
+        self, most_s: float = math.inf, *, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._most_s = most_s
+        self._clock = clock
         self._calling = threading.Lock()
         self._child = ChildProcess(_planning, tm.kernels.make_ready)
         self._closing = threading.Event()
@@ -46,7 +59,8 @@ class PlanningProcess:
         Raises
         ------
         Problem
-            ``shutting-down`` from `close` on, ``planning-ended`` where the process is gone.
+            ``shutting-down`` from `close` on, ``plan-too-long`` after ``most_s``,
+            ``planning-ended`` where the process is gone.
         Exception
             What ``compute`` raises.
         """
@@ -54,15 +68,20 @@ class PlanningProcess:
         def ask() -> None:
             if self._closing.is_set():
                 raise Problem(kinds.SHUTTING_DOWN, "The service is shutting down.")
+            if self._clock() >= ends_s:
+                detail = f"It was not done after {self._most_s:g} s."
+                raise Problem(kinds.PLAN_TOO_LONG, detail, limit=self._most_s)
             progress()
 
         def told(said: Any) -> None:
+            ask()
             if isinstance(said, tuple):
                 progress.at(*said)
             else:
                 progress.show(said)
 
         with self._calling:
+            ends_s = self._clock() + self._most_s
             ask()
             try:
                 value: _T = self._child.call(_compute, compute, arguments, ask=ask, told=told)

@@ -1,3 +1,9 @@
+import socket
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from urllib.parse import urlsplit
+
 import httpx
 import numpy as np
 import pytest
@@ -7,6 +13,7 @@ from tests.serving import Served
 from transientcam import wire
 from transientcam_driver import open_camera
 from transientcam_server.camera import snapshot_of
+from transientcam_server.errors import Problem
 
 
 def test_the_simulated_scene_is_reported(http: httpx.Client) -> None:
@@ -178,3 +185,86 @@ def test_streams_are_notified_of_another_scene(served: Served) -> None:
         "effects": {"lens-scatter": "off"},
         "diffusor": False,
     }
+
+
+class Preparing:
+    """Prepares a scene until it is asked to give up, in the place of `Simulation.change`."""
+
+    def __init__(self) -> None:
+        self.begun, self.given_up = threading.Event(), threading.Event()
+
+    def __call__(self, *, ask: Callable[[], object], **_: object) -> None:
+        self.begun.set()
+        try:
+            while not self.given_up.wait(0.01):
+                ask()
+        except Problem:
+            self.given_up.set()
+            raise
+
+
+def test_a_scene_that_is_prepared_is_given_up_when_its_client_leaves(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    preparing = Preparing()
+    monkeypatch.setattr(served.camera.simulation, "change", preparing)
+    address = urlsplit(served.url)
+    body = b'{"scene": "wall"}'
+    head = (
+        f"PUT /api/v1/simulation HTTP/1.1\r\nHost: {address.netloc}\r\n"
+        f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
+    )
+    with socket.create_connection((address.hostname, address.port)) as client:
+        client.sendall(head.encode() + body)
+        assert preparing.begun.wait(60.0)
+        assert not preparing.given_up.is_set()
+    assert preparing.given_up.wait(60.0)
+
+
+def test_a_scene_that_is_prepared_is_given_up_when_the_service_ends(
+    served: Served, http: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    preparing = Preparing()
+    monkeypatch.setattr(served.camera.simulation, "change", preparing)
+    with ThreadPoolExecutor(1) as other:
+        answer = other.submit(http.put, "/api/v1/simulation", json={"scene": "wall"}, timeout=60.0)
+        assert preparing.begun.wait(60.0)
+        served.service.closing.set()
+        try:
+            assert answer.result(60.0).json()["type"] == "/problems/shutting-down"
+        finally:
+            served.service.closing.clear()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field"),
+    [
+        ("[0, 2, 0]", "[0, 1e308, 0]", "light.aim_at_m"),
+        ("patches = 2", "patches = 45", "transport.patches"),
+    ],
+)
+def test_a_scene_that_costs_too_much_or_has_no_numbers_names_key_and_limit(
+    http: httpx.Client, old: str, new: str, field: str
+) -> None:
+    sphere = """
+[[surface]]
+kind = "diffuse"
+shape = "sphere"
+centre_m = [{}, 3, 0]
+radius_m = 1
+albedo = 0.9
+"""
+    scene = """
+[light]
+electrons_per_s = 6e6
+position_m = [0.1, 0, 0]
+aim_at_m = [0, 2, 0]
+[camera]
+[transport]
+patches = 2
+""" + "".join(sphere.format(x) for x in (-1.2, 1.2))
+    refused = http.put("/api/v1/simulation", json={"definition": scene.replace(old, new)})
+
+    assert refused.status_code == 422
+    assert refused.json()["field"] == field
+    assert refused.json()["limit"]

@@ -3,8 +3,8 @@
 import os
 import subprocess
 import threading
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import Any, NoReturn
 
 import pytest
 
@@ -122,6 +122,19 @@ def test_the_end_gives_up_what_is_computed() -> None:
     assert raised[0].kind is kinds.SHUTTING_DOWN
     with pytest.raises(Problem, match="shutting down"):
         process.run(calls.pid, progress=Progress())
+
+
+@pytest.mark.parametrize("compute", [calls.go_on_for_ever, calls.tell_for_ever])
+def test_what_is_not_done_in_time_is_given_up(compute: Callable[[Progress], NoReturn]) -> None:
+    began = threading.Event()
+    process = PlanningProcess(60.0, clock=lambda: 61.0 if began.is_set() else 0.0)
+    try:
+        with pytest.raises(Problem) as raised:
+            process.run(compute, progress=Progress(lambda share, step: began.set()))
+    finally:
+        process.close()
+    assert raised.value.kind is kinds.PLAN_TOO_LONG
+    assert raised.value.extensions["limit"] == 60.0
 
 
 def test_it_leaves_when_it_has_nothing_to_do_and_comes_back(process: PlanningProcess) -> None:
