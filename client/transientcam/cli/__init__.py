@@ -14,7 +14,7 @@ import typer
 
 from transientcam.cli.terminal import echo
 from transientcam.cli.verbs import extra_of, load_verbs, words_to_complete
-from transientcam.errors import CommandUnavailable
+from transientcam.errors import CommandUnavailable, TransientcamError
 
 FAILED: Final = 1
 INTERRUPTED: Final = 130
@@ -52,7 +52,7 @@ def run(arguments: Sequence[str]) -> int:
         sentence = _sentence(error, arguments)
         if sentence is None:
             raise
-        echo(f"transientcam: {' '.join(sentence.splitlines())}", err=True)
+        echo(f"transientcam: {sentence}", err=True)
         return FAILED
     return 0
 
@@ -87,4 +87,7 @@ def _sentence(error: Exception, arguments: Sequence[str]) -> str | None:
         return f"{error.strerror or error}{place}"
     # the errors of each package of this distribution are sentences for users
     ours = (each.__module__.partition(".")[0] for each in type(error).__mro__)
-    return str(error) if any(root.startswith("transientcam") for root in ours) else None
+    if not any(root.startswith("transientcam") for root in ours):
+        return None
+    # what a service says stays in one line, in which it cannot pass for another message
+    return " ".join(str(error).splitlines()) if isinstance(error, TransientcamError) else str(error)

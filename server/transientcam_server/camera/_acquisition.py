@@ -20,7 +20,6 @@ from transientcam_driver import (
     Camera,
     CameraError,
     CameraFault,
-    CameraLost,
     FrameTimeout,
     NotStreaming,
     RawFrame,
@@ -321,10 +320,13 @@ class Acquisition:
 
     def _may_light(self) -> bool:
         """Announce the light; return whether it may begin, watched: the one gate of all light."""
+        self._announce()
+        return self._announcement.light_on_in_s is None and self._is_watched()
+
+    def _announce(self) -> None:
         if self._announcement.begin() and self._announcement.delay_s:
             _log.warning("the light goes on in %g s", self._announcement.delay_s)
             self._report(LightArmingEvent(self._announcement.delay_s))
-        return self._announcement.light_on_in_s is None and self._is_watched()
 
     def _is_watched(self) -> bool:
         """Have the supervisor watch the light; return whether it does."""
@@ -413,8 +415,12 @@ class Acquisition:
             if self._running or cause == "stop":  # a lapse ends nothing that has ended already
                 self._go_dark(Dark(cause))
         elif not self._running:
-            with suppress(CameraLost):  # it starts once it is found
+            try:
                 self._require_interlock()
+            except CameraFault:
+                raise
+            except CameraError as error:  # it starts once it is found, or answers
+                _log.info("whether the interlock is closed is not known: %s", error)
             self._light.used()
             self._arrivals_s.clear()
             self._moved_s = self._clock()
@@ -422,7 +428,7 @@ class Acquisition:
             if self._darkness is not None:
                 self._darkness.keep(None)
             if self._connected:
-                self._may_light()  # announced by the time it is answered
+                self._announce()  # by the time it is answered
 
     def _go_dark(self, dark: Dark) -> None:
         """End the capture, and keep that it ended, also where the camera fails."""
@@ -481,6 +487,10 @@ class Acquisition:
                 self._started = False
                 self._camera.stop()
             return work(self._camera, go_on)
+        except CameraError as error:
+            if self._offs == offs:
+                raise
+            raise JobCancelled(job_id) from error  # the off switch was faster than this thread
         finally:
             self._occupant = None
             if not self._running:

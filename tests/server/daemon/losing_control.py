@@ -99,8 +99,10 @@ class Control:
 
     def _lights(self) -> bool:
         assert self._client is not None
+        assert self.process is not None
         self._client.put("/api/v1/acquisition", json={"running": True}).raise_for_status()
-        return self.camera.lit
+        # some light for moments only: the camera is asked to wait for one
+        return self.camera.signal(self.process.pid, 0)
 
     def start(self) -> None:
         self.close()

@@ -142,7 +142,9 @@ def once_there_is_room(url: str, trusting: ssl.SSLContext) -> httpx.Response:
     end_s = monotonic() + PATIENCE_S
     while True:
         try:
-            return httpx.get(url, verify=trusting, timeout=PATIENCE_S)
+            answer = httpx.get(url, verify=trusting, timeout=PATIENCE_S)
+            if answer.status_code != httpx.codes.TOO_MANY_REQUESTS or monotonic() > end_s:
+                return answer
         except httpx.TransportError:
             if monotonic() > end_s:
                 raise

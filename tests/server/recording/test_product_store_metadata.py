@@ -95,10 +95,10 @@ def test_what_reconstruct_would_not_write_is_no_store(
 def test_metadata_of_at_most_four_mebibytes_are_read(
     tmp_path: Path, size_bytes: int, *, readable: bool
 ) -> None:
-    path = store(tmp_path, title="")
+    path = store(tmp_path, padding="")
     short = len((path / "zarr.json").read_bytes())
     group = json.loads((path / "zarr.json").read_bytes())
-    group["attributes"]["title"] = "x" * (size_bytes - short)
+    group["attributes"]["padding"] = "x" * (size_bytes - short)
     (path / "zarr.json").write_text(json.dumps(group), "utf-8")
     assert (path / "zarr.json").stat().st_size == size_bytes
 

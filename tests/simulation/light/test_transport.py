@@ -221,13 +221,13 @@ def test_a_composed_scene_is_seen_where_it_is_at_that_time(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("old", "new", "key", "allowed"),
     [
-        ("radius_m = 0.5", "radius_m = 0", "surface[0].radius_m", "above 0"),
+        ("radius_m = 0.5", "radius_m = 0", "surface[0].radius_m", "at least 1e-06"),
         ("radius_m = 0.5", "", "surface[0].radius_m", "present"),
         ('"sphere"', '"cube"', "surface[0].shape", "rectangle, sphere, ellipsoid"),
         ('motion = "swing"', 'motion = "walk"', "surface[0].motion", "swing"),
         ('motion = "swing"', "motion = 3", "surface[0].motion", "a text or a list of texts"),
         ('repeat = "back"', 'repeat = "on"', "motion[0].repeat", "restart, back, loop"),
-        ("period_s = 2", "period_s = 0", "motion[0].period_s", "above 0"),
+        ("period_s = 2", "period_s = 0", "motion[0].period_s", "at least"),
         ("[[-0.5, 0, 0], [0.5, 0, 0]]", "[[0, 0, 0]]", "motion[0].path_m", "at least 2"),
         ("[[-0.5, 0, 0], [0.5, 0, 0]]", "[[0, 0], [1, 1]]", "motion[0].path_m", "3 numbers"),
         ("scatter_decay_s = 1e-9", "", "surface[1].scatter_decay_s", "present"),

@@ -22,7 +22,7 @@ class ProductStoreDocument(Document):
     state: Literal["complete", "unfinished", "damaged"]
     """`unfinished`: frames are still computed, or an interrupted run was not gone on with.
     `damaged`: it cannot be read, and what is said of it is empty."""
-    problem: str | None
+    problem: str | None = None
     """Why it cannot be read."""
     frames: int
     products: list[str]

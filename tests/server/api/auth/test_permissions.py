@@ -163,7 +163,13 @@ def test_nothing_but_the_gate_lights() -> None:
     import transientcam_server
 
     (root,) = map(Path, transientcam_server.__path__)
-    calls = ("_camera.start(", "camera.start(", "capture_calibration(", ".reconnect(")
+    calls = (
+        "_camera.start(",
+        "start_unless(",
+        "camera.start(",
+        "capture_calibration(",
+        ".reconnect(",
+    )
     found = {
         f"{file.relative_to(root)}: {line.strip()}"
         for folder in ("camera", "api", "daemon", "broadcast", "imaging")
@@ -176,5 +182,5 @@ def test_nothing_but_the_gate_lights() -> None:
         "camera/_acquisition.py: self._camera.start()",
         "camera/_acquisition.py: self._camera.reconnect()",
         "camera/_calibrator.py: return capture_calibration(",  # within `Acquisition.occupy`
-        "camera/_shared.py: self._camera.start()",  # of a relay: at its origin
+        "camera/_shared.py: self._origin.start_unless(offs)",  # of a relay: at its origin
     }

@@ -126,7 +126,7 @@ def test_what_the_daemon_would_refuse_is_not_as_described(wrong: dict[str, Any])
 @pytest.mark.parametrize("kind", sorted(wire.NOTICES))
 def test_a_notice_of_each_kind_is_described_with_its_keys(kind: str) -> None:
     values: dict[str, Any] = {"integer": 1, "string": "x", "object": {}, "array": []}
-    values |= {"null": None, "boolean": True}
+    values |= {"null": None, "boolean": True, "number": 0.5}
     described = wire.NOTICES[kind]
     details = {
         key: values[types if isinstance(types, str) else types[0]]
