@@ -37,6 +37,10 @@ _REPORTS: Final[Mapping[str, Callable[[Mapping[str, Any]], Report]]] = {
         "error", "camera", f"the camera does not answer: {said['reason']}"
     ),
     "camera-back": lambda said: Report("info", "camera", "the camera answers again"),
+    "light-arming": lambda said: Report(
+        "warning", "camera", f"the light goes on in {said['in_s']:g} s"
+    ),
+    "light-off": lambda said: Report("warning", "camera", f"the light is off: {said['reason']}"),
     "light-held": lambda said: Report("warning", "camera", f"the light is off: {said['reason']}"),
     "light-released": lambda said: Report("info", "camera", "the light goes on again"),
     "light-unconfirmed": lambda said: Report("warning", "camera", said["reason"]),

@@ -210,6 +210,7 @@ def _homeless(settings: Settings) -> Iterator[SettingsMistake]:
         ("tokens_file", settings.tokens_file, "set it, XDG_CONFIG_HOME or HOME"),
         ("recordings.directory", settings.recordings.directory, variables),
         ("calibrations.directory", settings.calibrations.directory, variables),
+        ("light.directory", settings.light.directory, variables),
     ):
         if NO_HOME in path.parents:
             yield SettingsMistake(place, None, f"this user has no home directory: {remedy}")

@@ -11,6 +11,8 @@ from transientcam.wire import Notice
         (Notice("lost-images", {"count": 3, "frame": 7}), "warning", "lost-images", "3 images"),
         (Notice("camera-lost", {"reason": "unplugged"}), "error", "camera", "unplugged"),
         (Notice("camera-back", {}), "info", "camera", "again"),
+        (Notice("light-arming", {"in_s": 3.0}), "warning", "camera", "on in 3 s"),
+        (Notice("light-off", {"reason": "stopped"}), "warning", "camera", "off: stopped"),
         (Notice("light-held", {"reason": "no client"}), "warning", "camera", "no client"),
         (Notice("light-unconfirmed", {"reason": "may be on"}), "warning", "camera", "may be on"),
         (Notice("light-released", {}), "info", "camera", "goes on"),

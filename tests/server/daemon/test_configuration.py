@@ -291,7 +291,8 @@ def test_a_user_without_a_home_is_told_which_settings_are_missing() -> None:
         load()
 
     places = [each.place for each in caught.value.mistakes]
-    assert places == ["tokens_file", "recordings.directory", "calibrations.directory"]
+    stated = ["tokens_file", "recordings.directory", "calibrations.directory", "light.directory"]
+    assert places == stated
     assert "HOME" in str(caught.value)
 
 

@@ -224,6 +224,12 @@ export class StreamClient {
         status.cameraIs("lost", this.#now_s(), notice.reason);
         if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
         break;
+      case "light-arming":
+        status.cameraIs("arming", this.#now_s());
+        break;
+      case "light-off":
+        status.cameraIs("stopped", this.#now_s());
+        break;
       case "camera-back":
         status.cameraIs("streaming", this.#now_s());
         void this.#readCamera();

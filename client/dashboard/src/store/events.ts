@@ -1,6 +1,6 @@
 /** What happened, for people: notices of the service and what this page noticed, the newest last. */
 import { signal } from "@preact/signals";
-import { engineering, grouped } from "../scales/format";
+import { engineering, fixed, grouped } from "../scales/format";
 import type { AppliedDocument } from "../stream/documents";
 import type { Notice } from "../stream/protocol";
 
@@ -104,6 +104,10 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
       return { words: notice.reason ? `The camera was lost: ${lossReason(notice.reason)}` : "The camera was lost.", tone: "bad" };
     case "camera-back":
       return { words: "The camera is back.", tone: "good" };
+    case "light-arming":
+      return { words: `The camera's light goes on in ${fixed(notice.in_s, 1, "s")}.`, tone: "bad" };
+    case "light-off":
+      return { words: `The light is off: ${notice.reason}.`, tone: "plain" };
     case "light-held":
       return { words: `The light was switched off${notice.reason ? `: ${notice.reason}` : ""}.`, tone: "bad" };
     case "light-released":

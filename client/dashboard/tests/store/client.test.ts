@@ -198,6 +198,15 @@ describe("between worker and store", () => {
     expect(page.store.status.running.value).toBe(true);
   });
 
+  test("light that is announced, and what ended it, are shown in the status", () => {
+    page.receives({ type: "open" }, hello("stopped"));
+    page.receives({ type: "message", message: { type: "notice", kind: "light-arming", in_s: 3 } });
+    expect(page.store.status.cameraState.value).toBe("arming");
+    page.receives({ type: "message", message: { type: "notice", kind: "light-off", because: "stop", reason: "the capture was stopped" } });
+    expect(page.store.status.cameraState.value).toBe("stopped");
+    expect(page.store.status.running.value).toBe(false);
+  });
+
   test("a session that begins without a camera says so", () => {
     page.receives({ type: "open" }, hello("lost"));
     expect(page.store.status.cameraLoss.value).not.toBeNull();

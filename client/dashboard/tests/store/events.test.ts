@@ -32,6 +32,13 @@ describe("what happened", () => {
     expect(words({ kind: "sequence-changed", sequence })).toBe("The sequence changed: 23.0\u202fMHz, m = 4, 500\u202fµs, 20 images.");
   });
 
+  test("to the light is said before it goes on, and when it is off", () => {
+    expect(words({ kind: "light-arming", in_s: 3 })).toBe("The camera's light goes on in 3.0\u202fs.");
+    expect(words({ kind: "light-off", because: "stop", reason: "the capture was stopped" })).toBe(
+      "The light is off: the capture was stopped.",
+    );
+  });
+
   test("to control is said with the names", () => {
     expect(words({ kind: "lease-changed", change: "taken-over", holder: "B", from: "A" })).toBe("B has taken over control from A.");
     expect(words({ kind: "lease-changed", change: "lapsed", holder: "A" })).toContain("lapsed");

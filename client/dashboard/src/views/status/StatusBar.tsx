@@ -20,6 +20,7 @@ export function StatusBar() {
         <span class="wide">transientcam</span>
       </h1>
       <StateChip />
+      <NoWatchdog />
       <LessAsked />
       <Performance />
       <Subject />
@@ -49,6 +50,7 @@ function StateChip() {
     if (replay.active.value) return { tone: "still", word: "Replay" };
     if (status.cameraLoss.value !== null) return { tone: "bad", word: "Camera lost" };
     if (calibrating.value) return { tone: "waiting", word: "Calibrating" };
+    if (status.cameraState.value === "arming") return { tone: "waiting", word: "Light soon", why: "The camera's light is about to go on" };
     if (held.value) return { tone: "still", word: "Held" };
     if (status.running.value === false) return { tone: "still", word: "Stopped" };
     if (status.newest.value === null) return { tone: "waiting", word: "Waiting" };
@@ -66,6 +68,18 @@ function StateChip() {
 /** A live camera whose frames come too seldom or too late is not well. */
 function slowed(state: State, trouble: string | null): State {
   return state.word === "Live" && trouble !== null ? { tone: "waiting", word: "Live, slow", why: trouble } : state;
+}
+
+/** That nothing in the camera switches its light off where the service fails. */
+function NoWatchdog() {
+  const warning = useStore().camera.value?.light_warning ?? null;
+  if (warning === null) return null;
+  return (
+    <span class="chip chip-waiting no-watchdog" data-field="light-warning" title={warning}>
+      <i aria-hidden="true" />
+      No watchdog
+    </span>
+  );
 }
 
 /** That less is asked for than there is, and what. */
