@@ -114,7 +114,7 @@ def camera() -> str:
 class SlowClock(RealClock):
     """Time passes more slowly: daemon and page compute and draw so many times fewer frames."""
 
-    def __init__(self, slower: float = 3.0) -> None:
+    def __init__(self, slower: float = 8.0) -> None:
         self._slower = slower
 
     def now_s(self) -> float:
