@@ -1,6 +1,7 @@
 """Kernels that a call does not find: made ready in the background, which no call waits for."""
 
 import bisect
+import gc
 import logging
 import threading
 import time
@@ -273,8 +274,11 @@ class Kernels(Generic[Key]):
 
 def _fill_cache(load: Callable[[Key], Any], key: Key, _tell: Tell) -> None:
     """Compile a kernel into the cache, in the other process."""
+    # millions of objects, of which hardly any is garbage before the end: a quarter of the time
+    gc.disable()
     with suppress(Exception):  # the one that wants it finds the same by itself
         load(key)
+    gc.collect()
 
 
 def _go_on() -> None:

@@ -1,7 +1,8 @@
 """Kernels beside the planar algorithms: the same results, chosen when they are ready.
 
 A *kernel* is one algorithm compiled for one order m (that of the likelihood for all up to 8) and
-one precision, which takes as many pixels at a time as a vector register holds. A planar function names the kernel that may stand in for it::
+one precision, which takes as many pixels at a time as a vector register holds. A planar function
+names the kernel that may stand in for it::
 
     @accelerated("levinson")
     def _coefficients(b): ...
@@ -77,6 +78,7 @@ _SINGLE_ONLY: Final = (
 )
 _ANY_ORDER: Final = ("likelihood",)
 """Kernels that take m when they are called, up to `MOST_ROOTS`: compiled once."""
+_COMPILING_S: Final = {"likelihood": 10.0, "reconstruct": 8.0, "pisarenko": 8.0, "pairs": 4.0}
 _DOUBLE_ONLY: Final = ("covariance", "direct_noise")
 _FEW_ROOTS: Final = (
     "pisarenko",
@@ -125,9 +127,7 @@ class Key(NamedTuple):
     @property
     def compiling_s(self) -> float:
         """About how long it takes to compile on an idle processor."""
-        return {"likelihood": 14.0, "reconstruct": 6.0, "pairs": 6.0, "density": 3.0}.get(
-            self.name, 1.0
-        )
+        return _COMPILING_S.get(self.name, 1.0)
 
 
 CACHE: Final = Cache(

@@ -9,9 +9,9 @@ them.
 
 A process that ends meanwhile waits for no kernel, or at most for the one that is being compiled by
 its thread. The environment variable ``TRANSIENTCAM_KERNELS=off`` leaves everything to NumPy,
-``TRANSIENTCAM_KERNELS=manual`` compiles only what `compile` is called for. Compiled code is kept for the next process in ``NUMBA_CACHE_DIR``, else in
-``transientcam/kernels`` below ``XDG_CACHE_HOME`` or ``~/.cache``, else (nothing there can be
-written to) not at all.
+``TRANSIENTCAM_KERNELS=manual`` compiles only what `compile` is called for. Compiled code is kept
+for the next process in ``NUMBA_CACHE_DIR``, else in ``transientcam/kernels`` below
+``XDG_CACHE_HOME`` or ``~/.cache``, else (nothing there can be written to) not at all.
 
 `density`, `levinson`, `pisarenko` and `reconstruct` use all cores, or as many threads as their
 ``threads`` says. A program that makes such calls on threads of its own calls `use_one_thread` on

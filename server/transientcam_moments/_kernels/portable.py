@@ -286,14 +286,22 @@ def _multiply_rows(values: Any, length: Any, table: Any, out: Any) -> Callable[.
     return run
 
 
+# without the two entries of each function that Python and C would call it by
+_CALLED_BY_KERNELS: dict[str, Any] = {
+    "error_model": "numpy",
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
+
+
 def _compile_statements(module: ModuleType, *, inline: bool) -> None:
     """Let kernels call what a module states."""
     for function in vars(module).values():
         if inspect.isfunction(function) and function.__module__ == module.__name__:
-            extending.register_jitable(error_model="numpy", forceinline=inline)(function)
+            extending.register_jitable(**_CALLED_BY_KERNELS, forceinline=inline)(function)
 
 
-extending.register_jitable(error_model="numpy")(logarithm)
+extending.register_jitable(**_CALLED_BY_KERNELS)(logarithm)
 for _module in (choice, linear, pair_fit, sharp, tail):
     _compile_statements(_module, inline=False)
 for _module in (

@@ -36,6 +36,7 @@ from transientcam_server.service import Service
 from transientcam_server.settings import Settings
 
 PATIENCE_S = 60.0
+QUICK = {"TRANSIENTCAM_RECONSTRUCTION__ESTIMATOR": "pisarenko"}
 
 
 def environment(**variables: str) -> dict[str, str]:
@@ -54,7 +55,7 @@ def daemon(
     with subprocess.Popen(
         [*command, *arguments],
         cwd=directory,
-        env=environment(**variables),
+        env=environment(**QUICK | variables),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
