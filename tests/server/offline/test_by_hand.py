@@ -7,10 +7,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-import transientcam_moments as tm
-from benchmarks.recordings.by_hand import MODES, Mode, Ranges, differences, example, recorded
-from tests.moments.compiled_kernels import kernels
+from benchmarks.recordings.by_hand import MODES, Mode, by_worker, differences, example, recorded
+from tests.moments.compiled_kernels import kernels, without_kernels
 from tests.serving import serving
 from transientcam import Camera
 from transientcam_moments._dispatch import KERNELS
@@ -24,6 +24,7 @@ THRESHOLD_SHARE = 1e-2
 def camera(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Camera]:
     kept = {"directory": tmp_path_factory.mktemp("kept"), "min_free_bytes": 0}
     with (
+        kernels(3, precisions=("float32",), names=("likelihood",)),
         serving("sim:mirrors?seed=1", recordings=kept, reconstruction={}) as served,
         Camera(served.url, timeout_s=60.0) as opened,
     ):
@@ -43,25 +44,27 @@ def test_a_file_of_every_mode_is_enough_for_the_daemons_range(
         assert file["gain"].ndim == (3 if mode.calibrated else 1)
     assert np.isfinite(ranges.daemon).mean() > 0.9
     assert np.nanmax(ranges.daemon) - np.nanmin(ranges.daemon) > 0.1
-    assert_the_same(ranges)
-
-
-def test_a_worker_that_has_compiled_its_kernels_gives_the_same_range(
-    camera: Camera, tmp_path: Path
-) -> None:
-    with kernels():  # the cache of the tests
-        ranges = recorded(camera, MODES[0], tmp_path)
-        assert "likelihood m<=8 float32" in tm.kernels.state()["compiled"]
-
-    assert not np.array_equal(ranges.worker, ranges.daemon, equal_nan=True)
-    assert_the_same(ranges)
-
-
-def assert_the_same(ranges: Ranges) -> None:
     for way in (ranges.example, ranges.labelled, ranges.opened, ranges.worker):
-        median_m, _, apart = differences(ranges.daemon, way)
-        assert median_m < ROUNDING_M
-        assert apart <= THRESHOLD_SHARE
+        assert_the_same(ranges.daemon, way)
+
+
+def test_numpy_gives_the_range_of_the_compiled_kernel(
+    camera: Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(KERNELS, "enabled", False)
+    compiled_m = recorded(camera, MODES[0], tmp_path).daemon
+    (path,) = tmp_path.iterdir()
+    with without_kernels():
+        in_numpy_m = by_worker(path)
+
+    assert not np.array_equal(in_numpy_m, compiled_m, equal_nan=True)
+    assert_the_same(compiled_m, in_numpy_m)
+
+
+def assert_the_same(range_m: NDArray[np.floating], other_m: NDArray[np.floating]) -> None:
+    median_m, _, apart = differences(range_m, other_m)
+    assert median_m < ROUNDING_M
+    assert apart <= THRESHOLD_SHARE
 
 
 def test_the_documented_example_is_short_and_needs_nothing_but_the_file() -> None:
