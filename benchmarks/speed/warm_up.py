@@ -3,11 +3,12 @@
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 from benchmarks.common.daemon import COMPILED_WITHIN_S, Process, daemon
 from benchmarks.common.tables import Table
-from transientcam import Camera
+from transientcam import Camera, ProblemError
 
 _LOOK_EVERY_S = 0.1
 _FRAME_WITHIN_S = 10.0
@@ -33,8 +34,11 @@ class WarmUp:
 def warmed_up(process: Process, camera: Camera, sequence_id: int, begin_s: float) -> WarmUp:
     """Wait for a frame of a sequence, and then until nothing is being prepared."""
     end_s = begin_s + COMPILED_WITHIN_S
-    while camera.frame("range", wait_s=_FRAME_WITHIN_S).meta["sequence_id"] != sequence_id:
-        pass
+    there = False
+    while not there:
+        with suppress(ProblemError):  # none yet
+            frame = camera.frame("range", wait_s=_FRAME_WITHIN_S)
+            there = frame.meta["sequence_id"] == sequence_id
     first_frame_s = process.age_s() - begin_s
     estimator_s = all_s = first_frame_s
     while (kernels := camera.info["kernels"]) is not None:

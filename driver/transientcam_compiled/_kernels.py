@@ -274,7 +274,7 @@ class Kernels(Generic[Key]):
 
 def _fill_cache(load: Callable[[Key], Any], key: Key, _tell: Tell) -> None:
     """Compile a kernel into the cache, in the other process."""
-    # millions of objects, of which hardly any is garbage before the end: a quarter of the time
+    # millions of objects, of which hardly any is garbage before the end
     gc.disable()
     with suppress(Exception):  # the one that wants it finds the same by itself
         load(key)

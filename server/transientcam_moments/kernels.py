@@ -194,30 +194,23 @@ def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the buil
 
 
 def prepare(names: Sequence[str], harmonics: int) -> threading.Thread | None:
-    """Make kernels for single precision ready in the background, before all others.
+    """Make kernels ready in the background, in this order and before all others; as of `settled`.
 
-    What calls wanted before is dropped until they want it again.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Which of `LANES`, the most urgent first; those that are not offered for this order do not
-        count.
-    harmonics : int
-        The order m, 1 to 32.
-
-    Returns
-    -------
-    threading.Thread or None
-        Named "transientcam-compile"; it ends when nothing is left to do. None where
-        ``TRANSIENTCAM_KERNELS`` is "off" or "manual".
-
-    Raises
-    ------
-    ParameterError
-        For another order or kernel.
+    What calls wanted before is dropped until they want it again. Returns the thread, named
+    "transientcam-compile", which ends when nothing is left to do; None where
+    ``TRANSIENTCAM_KERNELS`` is "off" or "manual".
     """
     return KERNELS.prefer(_named(names, harmonics))
+
+
+def preparing(names: Sequence[str], harmonics: int) -> tuple[list[str], float]:
+    """Return which of these kernels are being made ready, the next one first; as of `settled`.
+
+    And about how long it takes until the last of them is, in s: as on an idle processor of 3 GHz,
+    or in proportion to what others have taken here.
+    """
+    found, left_s = KERNELS.left(_named(names, harmonics))
+    return [str(key) for key in found], left_s
 
 
 @contextmanager
@@ -267,28 +260,6 @@ def _named(names: Sequence[str], harmonics: int) -> list[Key]:
         chosen("names", name, LANES)
     _require_order(harmonics)
     return [key for name in names if (key := Key.of(name, harmonics, "f")).is_offered]
-
-
-def preparing(names: Sequence[str], harmonics: int) -> tuple[list[str], float]:
-    """Return which kernels for single precision are being made ready, the next one first.
-
-    And about how long it takes until the last of them is, in s: as long as on an idle processor of
-    3 GHz, or in proportion to what others have taken here.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Which of `LANES`.
-    harmonics : int
-        The order m, 1 to 32.
-
-    Raises
-    ------
-    ParameterError
-        For another order or kernel.
-    """
-    found, left_s = KERNELS.left(_named(names, harmonics))
-    return [str(key) for key in found], left_s
 
 
 def _require_order(harmonics: int) -> None:
