@@ -4,7 +4,6 @@ import bisect
 import gc
 import logging
 import threading
-import time
 from collections.abc import Callable, Container, Hashable, Iterable, Mapping
 from contextlib import suppress
 from typing import Any, Final, Generic, TypeVar
@@ -53,8 +52,6 @@ class Kernels(Generic[Key]):
     expected_s : callable, optional
         About how long it takes to compile a kernel on an idle processor; what takes less goes
         first.
-    clock : callable, optional
-        Returns the present time in s.
 
     Attributes
     ----------
@@ -78,7 +75,6 @@ class Kernels(Generic[Key]):
         *,
         added: Callable[[Key, Any], object] = lambda key, kernel: None,
         expected_s: Callable[[Key], float] = lambda key: 1.0,
-        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         setting = environ.get("TRANSIENTCAM_KERNELS", "on").strip().lower()
         self.enabled = setting not in ("off", "0", "no", "false")
@@ -91,8 +87,8 @@ class Kernels(Generic[Key]):
             self.load = load
         self._cache = cache
         self._added = added
-        self._expected_s, self._clock = expected_s, clock
-        self._begun_s, self._slowness = 0.0, 1.0
+        self._expected_s = expected_s
+        self._watched: tuple[Key | None, float] = (None, 0.0)
         self._making = threading.Lock()
         self._queueing = threading.Lock()
         self._seen: set[Key] = set()
@@ -175,16 +171,20 @@ class Kernels(Generic[Key]):
             self._seen.update(self._urgent)
             return self._work()
 
-    def left(self, keys: Container[Key]) -> tuple[list[Key], float]:
-        """Return which of these wait or are made ready now, and about how long that takes in s."""
+    def left(self, keys: Container[Key], now_s: float) -> tuple[list[Key], float]:
+        """Return which of these wait or are made ready now, and about how long that takes in s.
+
+        What is made ready has begun when it was first looked at, by the caller's clock.
+        """
         with self._queueing:
-            now = self.compiling
-            queue = [*self._urgent, *self._waiting]
-        taking_s = [self._expected_s(key) * self._slowness for key in queue]
+            now, queue = self.compiling, [*self._urgent, *self._waiting]
+            if now != self._watched[0]:
+                self._watched = now, now_s
+            begun_s = self._watched[1]
+        taking_s = [self._expected_s(key) for key in queue]
         if now is not None:
             queue.insert(0, now)
-            expected_s = self._expected_s(now) * self._slowness
-            taking_s.insert(0, max(1.0, expected_s - (self._clock() - self._begun_s)))
+            taking_s.insert(0, max(1.0, self._expected_s(now) - (now_s - begun_s)))
         found = [k for k, key in enumerate(queue) if key in keys]
         return [queue[k] for k in found], sum(taking_s[: found[-1] + 1]) if found else 0.0
 
@@ -215,7 +215,7 @@ class Kernels(Generic[Key]):
                         self._thread = None
                         return
                     urgent, key = queue is self._urgent, queue.pop(0)
-                    self.compiling, self._begun_s = key, self._clock()
+                    self.compiling = key
                 self.make_ready(key, elsewhere=True)
                 with self._queueing:
                     if urgent and not self._urgent:
@@ -259,7 +259,6 @@ class Kernels(Generic[Key]):
                 return self.load(key)
             try:
                 self._child.call(_fill_cache, self.load, key, ask=_go_on)
-                self._slowness = (self._clock() - self._begun_s) / self._expected_s(key)
             except _ProgramEnds:
                 raise
             except Exception as error:

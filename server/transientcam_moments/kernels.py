@@ -203,13 +203,13 @@ def prepare(names: Sequence[str], harmonics: int) -> threading.Thread | None:
     return KERNELS.prefer(_named(names, harmonics))
 
 
-def preparing(names: Sequence[str], harmonics: int) -> tuple[list[str], float]:
+def preparing(names: Sequence[str], harmonics: int, now_s: float) -> tuple[list[str], float]:
     """Return which of these kernels are being made ready, the next one first; as of `settled`.
 
-    And about how long it takes until the last of them is, in s: as on an idle processor of 3 GHz,
-    or in proportion to what others have taken here.
+    And about how long it takes on an idle processor until the last of them is, in s. ``now_s`` is
+    by any clock, the same one at each call: what is compiled began when it was first asked about.
     """
-    found, left_s = KERNELS.left(_named(names, harmonics))
+    found, left_s = KERNELS.left(_named(names, harmonics), now_s)
     return [str(key) for key in found], left_s
 
 

@@ -148,25 +148,22 @@ def test_what_is_preferred_goes_first_and_what_calls_wanted_before_is_dropped() 
 
 
 def test_how_long_it_takes_is_expected_from_what_is_known_and_has_passed() -> None:
-    slow, now_s = Slow(), [100.0]
+    slow = Slow()
     kernels = Kernels[str](
         {},
         Cache("transientcam_compiled._spread", environ={}),
         slow,
         expected_s=lambda key: 10.0 if key == "a" else 2.0,
-        clock=lambda: now_s[0],
     )
-    assert kernels.left("abc") == ([], 0.0)
+    assert kernels.left("abc", 0.0) == ([], 0.0)
     thread = kernels.prefer(["a", "b", "c"])
     assert slow.begun.wait(10)
-    now_s[0] = 104.0
 
-    assert kernels.left("abc") == (["a", "b", "c"], 10.0)
-    assert kernels.left(["b"]) == (["b"], 8.0)
-    now_s[0] = 150.0
-    assert kernels.left(["a"]) == (["a"], 1.0), "longer than expected: not yet"
+    assert kernels.left("abc", 100.0) == (["a", "b", "c"], 14.0)
+    assert kernels.left(["b"], 104.0) == (["b"], 8.0)
+    assert kernels.left(["a"], 150.0) == (["a"], 1.0), "longer than expected: not yet"
 
     slow.go_on.set()
     assert thread is not None
     thread.join()
-    assert kernels.left("abc") == ([], 0.0)
+    assert kernels.left("abc", 200.0) == ([], 0.0)

@@ -208,7 +208,7 @@ def test_orders_and_precisions_out_of_range_are_refused(
     assert caught.value.field == field
 
 
-@pytest.mark.parametrize("function", [tm.kernels.prepare, tm.kernels.preparing, tm.kernels.settled])
+@pytest.mark.parametrize("function", [tm.kernels.prepare, tm.kernels.settled])
 def test_what_there_is_no_kernel_of_is_refused(function: Callable[..., object]) -> None:
     with pytest.raises(tm.ParameterError, match="names"):
         function(["range"], 3)

@@ -1,5 +1,7 @@
 """What answers here, and which versions of the interface it serves."""
 
+import asyncio
+
 from fastapi import APIRouter
 
 import transientcam_moments as tm
@@ -58,7 +60,8 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
 
 
 def _kernels(recipe: Recipe) -> InfoDocument.KernelsDocument | None:
-    preparing, left_s = tm.kernels.preparing(recipe.kernels, recipe.applied.sequence.multiples[-1])
+    now_s, order = asyncio.get_running_loop().time(), recipe.applied.sequence.multiples[-1]
+    preparing, left_s = tm.kernels.preparing(recipe.kernels, order, now_s)
     return InfoDocument.KernelsDocument(preparing=preparing, left_s=left_s) if preparing else None
 
 
