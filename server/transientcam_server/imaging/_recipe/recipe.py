@@ -19,7 +19,7 @@ from transientcam_server.settings import ReconstructionSettings
 
 _log = logging.getLogger("transientcam_server.imaging.recipe")
 _ONE_RETURN: Final = "unwrapped-phase"
-_KERNELS_OF: Final = {
+_KERNELS_OF: Final[dict[str, tuple[str, ...]]] = {
     "likelihood": ("likelihood",),
     "two-returns": ("pairs",),
     "maximum-entropy": ("levinson", "peaks"),
