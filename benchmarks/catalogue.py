@@ -63,7 +63,7 @@ _ALL: Final = (
             "pisarenko",
             "cumulative",
             "scaling",
-            "compiling",
+            "warm_up",
             "automatic",
         )
     ),

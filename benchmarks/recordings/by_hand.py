@@ -20,6 +20,8 @@ from benchmarks.common.daemon import daemon
 from benchmarks.common.records import DOCS
 from benchmarks.common.tables import Table
 from transientcam import Camera
+from transientcam_server.offline import BatchOptions
+from transientcam_server.offline._job import Job, computed
 from transientcam_server.offline._opening import open_recording
 from transientcam_server.settings import ReconstructionSettings
 
@@ -54,12 +56,13 @@ MODES: Final = (
 
 @dataclass(frozen=True)
 class Ranges:
-    """Ranges (H, W) in m of one frame: the daemon's, and three computed from its file."""
+    """Ranges (H, W) in m of one frame: the daemon's, and four computed from its file."""
 
     daemon: _Array
     example: _Array
     labelled: _Array
     opened: _Array
+    worker: _Array
 
 
 def calibrate(camera: Camera, sequence: dict[str, Any]) -> None:
@@ -85,7 +88,7 @@ def recorded(camera: Camera, mode: Mode, directory: Path) -> Ranges:
     served = camera.frame("range", recording=recording_id, number=1).array
     with open_recording(str(path)) as opened:
         of_open = opened.frames[0].range_m
-    return Ranges(served, by_example(path), by_labels(path), of_open)
+    return Ranges(served, by_example(path), by_labels(path), of_open, by_worker(path))
 
 
 def _finished(camera: Camera, recording_id: str) -> str:
@@ -113,15 +116,27 @@ def example() -> str:
 def by_labels(path: Path) -> _Array:
     """Return the range of raw images with their labels and gains."""
     with h5py.File(path) as file:
-        settings = ReconstructionSettings(**json.loads(file.attrs["reconstruction"]))
+        sequence, camera = (json.loads(file.attrs[name]) for name in ("sequence", "camera"))
+        stated = {name: sequence[name] for name in ("zeroth", "takes")}
         found = tm.reconstruct(
             file["raw"][0],
-            settings.for_moments(),
+            _settings(file).for_moments(sensor=tm.noise.Sensor(**camera["sensor"]), **stated),
             **{name: file[name][()] for name in LABELS},
             calibration=file["gain"][()],
             bad_pixels=file["bad"][()] > 0 if "bad" in file else None,
         )
     return np.asarray(found.range_m)
+
+
+def by_worker(path: Path) -> _Array:
+    """Return the range that a worker of `transientcam reconstruct --workers` computes."""
+    with h5py.File(path) as file:
+        options = BatchOptions(("range",), _settings(file))
+    return computed(Job.of(str(path), options), 0, 1)["range"][0]
+
+
+def _settings(file: h5py.File) -> ReconstructionSettings:
+    return ReconstructionSettings(**json.loads(file.attrs["reconstruction"]))
 
 
 def differences(served: _Array, found: _Array) -> tuple[float, float, float]:
@@ -139,17 +154,18 @@ def table(camera: Camera, directory: Path) -> Table:
     """Return the differences of every mode."""
     result = Table(
         "Against the daemon",
-        ("mode", "example", "`tm.reconstruct`, labelled", "`transientcam.open`"),
+        ("mode", "example", "`tm.reconstruct`, labelled", "`transientcam.open`", "worker"),
         notes=[
             "Median and largest absolute difference in m from the daemon's own range of the same "
             f"frame (`{CAMERA}`, with noise, m = 3), and the share of the pixels that differ by "
             "more than 1 mm. The example divides by gains where the daemon multiplies with their "
-            "reciprocals, which rounds otherwise. So do the daemon's compiled kernels, off here.",
+            "reciprocals, which rounds otherwise. So do compiled kernels, which the worker of "
+            "`transientcam reconstruct --workers` has, and the others have not.",
         ],
     )
     for mode in MODES:
         ranges = recorded(camera, mode, directory)
-        ways = (ranges.example, ranges.labelled, ranges.opened)
+        ways = (ranges.example, ranges.labelled, ranges.opened, ranges.worker)
         result.rows.append((mode.name, *(_cell(ranges.daemon, way) for way in ways)))
     return result
 

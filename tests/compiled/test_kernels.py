@@ -4,6 +4,7 @@ import logging
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -24,7 +25,9 @@ def cache(tmp_path: Path) -> Cache:
 def made(cache: Cache, load: Callable[[str], object] = calls.load, **environ: str) -> Kernels[str]:
     """Return kernels after two were made ready in the background."""
     kernels = Kernels[str](environ, cache, load)
-    kernels.make_ready_in_background(["a", "b"]).join()
+    thread = kernels.prefer(["a", "b"])
+    if thread is not None:
+        thread.join()
     assert kernels.compiling is None
     return kernels
 
@@ -97,7 +100,7 @@ def test_a_program_that_ends_does_not_wait_for_what_another_process_compiles(
         "from transientcam_compiled import Cache, Kernels\n"
         "load = partial(calls.load_never, os.getpid())\n"
         "kernels = Kernels({}, Cache('transientcam_compiled._spread'), load)\n"
-        "kernels.make_ready_in_background(['a'])\n"
+        "kernels.prefer(['a'])\n"
         "print('the end')\n"
     )
     root = Path(__file__).resolve().parents[2]
@@ -107,3 +110,60 @@ def test_a_program_that_ends_does_not_wait_for_what_another_process_compiles(
     printed = subprocess.check_output(command, env=os.environ | environ, text=True, timeout=300)
 
     assert printed == "the end\n"
+
+
+class Slow:
+    """Loads nothing before it may, and notes what it was asked for."""
+
+    def __init__(self) -> None:
+        self.begun, self.go_on = threading.Event(), threading.Event()
+        self.keys: list[str] = []
+
+    def __call__(self, key: str) -> str:
+        self.begun.set()
+        assert self.go_on.wait(10)
+        self.keys.append(key)
+        return key
+
+
+def test_what_is_preferred_goes_first_and_what_calls_wanted_before_is_dropped() -> None:
+    slow = Slow()
+    kernels = Kernels[str]({}, Cache("transientcam_compiled._spread", environ={}), slow)
+    kernels.want("begun")
+    assert slow.begun.wait(10)
+    kernels.want("before")
+    kernels.prefer(["x", "y"])
+    kernels.want("meanwhile")
+    thread = kernels.prefer(["begun", "z", "y"])
+    assert thread is not None
+    slow.go_on.set()
+    thread.join()
+
+    assert slow.keys == ["begun", "z", "y"]
+    kernels.want("before")  # that calls still do without it is seen when they want it again
+    for thread in threading.enumerate():
+        if thread.name == THREAD:
+            thread.join()
+    assert slow.keys[3:] == ["before"]
+
+
+def test_how_long_it_takes_is_expected_from_what_is_known_and_has_passed() -> None:
+    slow = Slow()
+    kernels = Kernels[str](
+        {},
+        Cache("transientcam_compiled._spread", environ={}),
+        slow,
+        expected_s=lambda key: 10.0 if key == "a" else 2.0,
+    )
+    assert kernels.left("abc", 0.0) == ([], 0.0)
+    thread = kernels.prefer(["a", "b", "c"])
+    assert slow.begun.wait(10)
+
+    assert kernels.left("abc", 100.0) == (["a", "b", "c"], 14.0)
+    assert kernels.left(["b"], 104.0) == (["b"], 8.0)
+    assert kernels.left(["a"], 150.0) == (["a"], 1.0), "longer than expected: not yet"
+
+    slow.go_on.set()
+    assert thread is not None
+    thread.join()
+    assert kernels.left("abc", 200.0) == ([], 0.0)

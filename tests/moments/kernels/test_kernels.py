@@ -3,7 +3,8 @@
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +56,7 @@ def test_using_the_package_imports_no_compiler() -> None:
 def test_kernels_can_be_turned_off() -> None:
     code = (
         "import sys, transientcam_moments as tm\n"
-        "tm.kernels.compile(harmonics=[3]); tm.kernels.compile_in_background().join()\n"
+        "tm.kernels.compile(harmonics=[3]); tm.kernels.prepare(['levinson'], 3)\n"
         "state = tm.kernels.state()\n"
         "print(state['enabled'], state['compiled'], 'numba' in sys.modules)"
     )
@@ -116,28 +117,19 @@ def test_progress_names_every_kernel_and_ends_at_the_total() -> None:
         assert set(tm.kernels.state()["compiled"]) == set(names)
 
 
-def test_compiling_in_the_background_ends_with_the_kernels_in_use() -> None:
+def test_compiling_in_the_background_ends_with_the_kernels_in_use(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(KERNELS, "automatic", True)
     with kernels():  # the cache of the tests
-        thread = tm.kernels.compile_in_background(harmonics=[3], precisions=["float32"])
+        thread = tm.kernels.prepare(["levinson"], 3)
+        assert thread is not None
         assert thread.name == "transientcam-compile"
         thread.join()
 
         assert find("levinson", np.ones((4, 64), np.complex64)) is not None
         state = tm.kernels.state()
         assert (state["compiling"], state["failed"]) == (None, [])
-
-
-def test_the_pairs_that_a_camera_of_gapped_frequencies_waits_for_are_compiled_first(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    asked: list[Key] = []
-    monkeypatch.setattr(KERNELS, "make_ready", lambda key, **_: asked.append(key))
-
-    tm.kernels.compile_in_background([15, 3], also="pairs").join()
-
-    assert [str(key) for key in asked if key.name == "pairs"] == ["pairs m=15 float32"]
-    assert asked[0].name == "pairs"
-    assert "likelihood" not in {key.name for key in asked}
 
 
 def test_a_kernel_that_cannot_be_compiled_leaves_numpy_and_the_other_kernels(
@@ -166,10 +158,10 @@ def test_background_compiling_stops_when_the_program_ends() -> None:
         "import threading, time\n"
         "slow = lambda m, precision: print(m, flush=True) or time.sleep(0.2)\n"
         "compiler.COMPILERS.update(dict.fromkeys(compiler.COMPILERS, slow))\n"
-        "tm.kernels.compile_in_background(harmonics=range(1, 33))\n"
+        "tm.kernels.prepare(list(tm.kernels.LANES), 3)\n"
     )
 
-    lines = in_fresh_process(code).splitlines()
+    lines = in_fresh_process(code, TRANSIENTCAM_KERNELS="on").splitlines()
 
     assert len(lines) <= 2, "it went on after the main thread had ended"
 
@@ -186,13 +178,19 @@ def test_several_threads_compile_each_kernel_once(monkeypatch: pytest.MonkeyPatc
 
         monkeypatch.setitem(compiler.COMPILERS, name, make)
 
-    threads = [tm.kernels.compile_in_background(harmonics=[3, 5]) for _ in range(4)]
+    names = tuple(compiler.COMPILERS)
+    threads = [
+        threading.Thread(target=tm.kernels.compile, args=([3, 5],), kwargs={"names": names})
+        for _ in range(4)
+    ]
+    for thread in threads:
+        thread.start()
     for thread in threads:
         thread.join()
 
     assert len(made) == len(set(made))
-    in_background = set(compiler.COMPILERS) - set(tm.kernels.WHEN_NEEDED)
-    expected = {(name, m) for name in in_background for m in (3, 5)} | {("likelihood", 3)}
+    expected = {(name, m) for name in names for m in (3, 5)}
+    expected = expected - {("likelihood", 3), ("likelihood", 5)} | {("likelihood", 8)}
     assert {(name, m) for name, m, _ in made} == expected
 
 
@@ -208,10 +206,14 @@ def test_orders_and_precisions_out_of_range_are_refused(
         tm.kernels.compile(**arguments)  # type: ignore[arg-type]  # what is refused
 
     assert caught.value.field == field
-    with pytest.raises(tm.ParameterError):
-        tm.kernels.compile_in_background(**arguments)  # type: ignore[arg-type]  # likewise
-    with pytest.raises(tm.ParameterError, match="also"):
-        tm.kernels.compile_in_background(also="levinson")
+
+
+@pytest.mark.parametrize("function", [tm.kernels.prepare, tm.kernels.settled])
+def test_what_there_is_no_kernel_of_is_refused(function: Callable[..., object]) -> None:
+    with pytest.raises(tm.ParameterError, match="names"):
+        function(["range"], 3)
+    with pytest.raises(tm.ParameterError, match="harmonics"):
+        function(["levinson"], 33)
 
 
 def test_every_public_kernel_has_its_compiler() -> None:
@@ -254,9 +256,9 @@ def test_what_no_kernel_takes_is_left_to_numpy(planes: object) -> None:
 
 def test_a_kernel_is_ready_once_it_is_compiled() -> None:
     assert not tm.kernels.ready("likelihood", 4)
-    KERNELS.compiled[Key("likelihood", 4, "f")] = lambda b: b
-    assert tm.kernels.ready("likelihood", 4)
-    assert not tm.kernels.ready("likelihood", 3)
+    KERNELS.compiled[Key("likelihood", 8, "f")] = lambda b: b
+    assert tm.kernels.ready("likelihood", 4), "one kernel serves all orders up to 8"
+    assert not tm.kernels.ready("likelihood", 9)
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ class Compiler:
 @pytest.fixture
 def anew(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have nothing compiled, and nothing wanted before."""
-    fresh: Kernels[Key] = Kernels({}, _dispatch.CACHE, takes_long=lambda key: key.takes_long)
+    fresh: Kernels[Key] = Kernels({}, _dispatch.CACHE, expected_s=lambda key: key.compiling_s)
     for name, value in vars(fresh).items():
         monkeypatch.setattr(KERNELS, name, value)
 
@@ -106,6 +106,17 @@ def test_what_takes_long_to_compile_comes_last(compiler: Compiler) -> None:
         "smooth",
         "reconstruct",
     ]
+
+
+def test_what_is_being_made_ready_is_named_in_its_order(compiler: Compiler) -> None:
+    tm.kernels.prepare(["likelihood", "reconstruct", "harmonics"], 4)
+
+    named, left_s = tm.kernels.preparing(["reconstruct", "likelihood"], 4, now_s=7.0)
+
+    assert named == ["likelihood m<=8 float32", "reconstruct m=4 float32"]
+    assert left_s > 1.0
+    assert tm.kernels.preparing(["density"], 4, now_s=7.0) == ([], 0.0)
+    assert [key.name for key in compiler.finish()] == ["likelihood", "reconstruct", "harmonics"]
 
 
 def test_a_process_may_note_what_calls_want_and_make_it_ready_later(compiler: Compiler) -> None:
@@ -229,9 +240,10 @@ def test_orders_and_precisions_are_given_by_position(monkeypatch: pytest.MonkeyP
     asked: list[Key] = []
     monkeypatch.setattr(KERNELS, "make_ready", asked.append)
 
-    tm.kernels.compile([3, 4], ["float32"])
+    tm.kernels.compile([3, 4], ["float32"], names=["levinson", "likelihood", "pisarenko"])
 
-    assert {key.harmonics for key in asked} == {3, 4}
+    assert [key.name for key in asked].count("likelihood") == 1, "one serves both orders"
+    assert {key.harmonics for key in asked if key.name != "likelihood"} == {3, 4}
     assert {key.precision for key in asked} == {"f"}
 
 
@@ -299,4 +311,4 @@ def test_a_kernel_that_is_not_ready_is_made_ready_once_the_compiler_is_free(
     monkeypatch.setattr(KERNELS, "compiling", None)
     assert not tm.kernels.ready("likelihood", 4)
     assert not tm.kernels.ready("likelihood", 9), "no kernel of this order is offered"
-    assert compiler.finish() == [Key("likelihood", 4, "f")]
+    assert compiler.finish() == [Key("likelihood", 8, "f")]

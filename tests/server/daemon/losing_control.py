@@ -30,7 +30,11 @@ LIMIT_S: Final = 2.0
 DARK_S: Final = 0.3
 PATIENCE_S: Final = 60.0
 STALLED_REQUESTS: Final = 12
-LIGHT: Final = {"TRANSIENTCAM_KERNELS": "off", "NUMBA_DISABLE_JIT": "1"}
+LIGHT: Final = {
+    "TRANSIENTCAM_KERNELS": "off",
+    "NUMBA_DISABLE_JIT": "1",
+    "TRANSIENTCAM_RECONSTRUCTION__ESTIMATOR": "pisarenko",
+}
 
 
 class Zygote:

@@ -15,7 +15,6 @@ import transientcam_moments as tm
 from tests.moments.compiled_kernels import without_kernels
 from transientcam import wire
 from transientcam_driver import AppliedSequence, Camera, RawFrame, Sampling, Sequence, open_camera
-from transientcam_moments._dispatch import KERNELS, Key
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging import (
     MSGPACK,
@@ -393,60 +392,30 @@ def test_an_unknown_product_is_answered_with_the_known_ones(camera: Camera, raw:
     with_frame(camera, raw, test)
 
 
-def test_frames_are_those_of_pisarenko_until_the_likelihood_is_compiled_and_say_so(
+def test_frames_are_of_the_estimator_that_is_set_compiled_or_not(
     camera: Camera, raw: RawFrame
 ) -> None:
     async def test(pipeline: Pipeline, frame: Frame) -> None:
         pipeline.reconstruction = SettingsVersion(7, ReconstructionSettings())
         with without_kernels():
-            before = pipeline.frame(raw, camera.applied)
-            harmonics = camera.applied.sequence.harmonics
-            KERNELS.compiled[Key("likelihood", harmonics, "f")] = lambda *_: None
-            behind = pipeline.frame(raw, camera.applied)
+            meta = pipeline.frame(raw, camera.applied).meta()
 
-        estimators = [each.meta()["estimator"] for each in (frame, before, behind)]
-        assert estimators == ["pisarenko", "pisarenko", "likelihood"]
-        assert [each.meta()["reconstruction_id"] for each in (before, behind)] == [7, 7]
+        assert meta["estimator"] == "likelihood"
+        assert meta["reconstruction_id"] == 7
 
     with_frame(camera, raw, test, sensor=tm.noise.Sensor())
 
 
-@pytest.mark.parametrize("named", ["likelihood", "maximum-entropy"])
-def test_an_estimator_that_is_named_is_used_compiled_or_not(named: str) -> None:
-    settings = SettingsVersion(1, ReconstructionSettings(estimator=named))
-    assert settings.for_live_frames(Sequence(harmonics=4), ready=lambda name, m: False) == settings
+@pytest.mark.parametrize(
+    ("multiples", "technique"), [((2, 3), "unwrapped-phase"), ((2, 10, 15), "two-returns")]
+)
+def test_frequencies_with_gaps_have_an_estimator_of_their_own(
+    multiples: tuple[int, ...], technique: str
+) -> None:
+    gapped = Sequence(harmonics=len(multiples), sampling=Sampling(multiples))
 
-
-def test_two_frequencies_with_gaps_give_one_return_compiled_or_not() -> None:
-    settings = SettingsVersion(1, ReconstructionSettings())
-    gapped = Sequence(harmonics=2, sampling=Sampling((2, 3)))
-
-    assert settings.for_live_frames(gapped, ready=lambda name, m: False) == settings
-    assert technique_of(gapped) == "unwrapped-phase"
-    assert suited(settings.settings, gapped.sampling) == settings.settings
-
-
-def test_more_with_gaps_are_searched_for_pairs_once_that_is_compiled() -> None:
-    settings = SettingsVersion(1, ReconstructionSettings())
-    gapped = Sequence(harmonics=3, sampling=Sampling((2, 10, 15)))
-    asked: list[tuple[str, int]] = []
-
-    def ready(name: str, m: int) -> bool:
-        asked.append((name, m))
-        return len(asked) > 1
-
-    before, behind = (settings.for_live_frames(gapped, ready=ready) for _ in range(2))
-
-    assert asked == [("pairs", 15)] * 2
-    assert (before.settings.estimator, before.id) == ("unwrapped-phase", 1)
-    assert behind == settings
-    assert technique_of(gapped) == "two-returns"
-
-
-def test_an_estimator_that_gaps_rule_out_gives_way_to_the_automatic_one() -> None:
-    settings = ReconstructionSettings(estimator="pisarenko")
-
-    assert suited(settings, Sampling((2, 10, 15))).estimator == "automatic"
+    assert technique_of(gapped) == technique
+    assert suited(ReconstructionSettings(), gapped.sampling) == ReconstructionSettings()
 
 
 def technique_of(sequence: Sequence) -> str:
