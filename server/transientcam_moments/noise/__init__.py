@@ -29,13 +29,16 @@ from transientcam_moments.noise._moments import (
     smoothed_of,
     smoothing_factor,
 )
+from transientcam_moments.noise._of_images import CapturedImages, image_noise
 from transientcam_moments.noise._returns import ReturnNoise, direct_phase_noise, return_noise
 from transientcam_moments.noise._scatter import scatter
-from transientcam_moments.noise._sensor import Sensor
+from transientcam_moments.noise._sensor import ImageNoise, Sensor
 
 __all__ = [
+    "CapturedImages",
     "CramerRao",
     "DensityNoise",
+    "ImageNoise",
     "MomentNoise",
     "ReturnNoise",
     "Sensor",
@@ -46,6 +49,7 @@ __all__ = [
     "direct_phase_noise",
     "draw",
     "first_order",
+    "image_noise",
     "interpolation",
     "moment_noise",
     "own_share",

@@ -26,7 +26,7 @@ from transientcam_moments.images import (
     phase_noise,
     smooth,
 )
-from transientcam_moments.noise._sensor import Sensor
+from transientcam_moments.noise._sensor import ImageNoise, Sensor
 
 _FEW = 1 / 16
 """Share of the pixels up to which their neighbourhoods are quicker to average one by one."""
@@ -68,7 +68,7 @@ class MomentNoise(NamedTuple):
 
 def moment_noise(
     brightness: Array,
-    sensor: Sensor,
+    sensor: Sensor | ImageNoise,
     *,
     calibration: Array,
     zeroth: str,
@@ -82,7 +82,7 @@ def moment_noise(
     ----------
     brightness : array, shape (...)
         b_0 in DN at the exposure of one image; values below 0 count as 0.
-    sensor : Sensor
+    sensor : Sensor or ImageNoise
         What turns light into numbers.
     calibration : array, shape (m + 1,) or (m + 1, ...)
         The gains that the measured moments are divided by: of the sub-phases

@@ -6,7 +6,13 @@ import numpy as np
 
 from transientcam_moments.arrays import Array, squared
 from transientcam_moments.likelihood import chi_square_quantile
-from transientcam_moments.noise import MomentNoise, Sensor, moment_noise, smoothed_at
+from transientcam_moments.noise import (
+    ImageNoise,
+    MomentNoise,
+    Sensor,
+    moment_noise,
+    smoothed_at,
+)
 from transientcam_moments.reconstruction._settings import Settings
 
 FALSE_ALARMS: Final = 0.005
@@ -39,7 +45,7 @@ def undetected_pixels(
     moments: Array,
     brightness: Array,
     settings: Settings,
-    sensor: Sensor,
+    sensor: Sensor | ImageNoise,
     calibration: Array | None,
     ambient: Array | None,
 ) -> Array | None:

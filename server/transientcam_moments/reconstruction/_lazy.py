@@ -1,6 +1,5 @@
 """What follows from the moments of an image: each property computed once, when first read."""
 
-from collections.abc import Callable
 from functools import cached_property, partial
 from html import escape
 
@@ -37,7 +36,15 @@ from transientcam_moments.moment_problem import (
     separate,
     smallest_eigenvalue,
 )
-from transientcam_moments.noise import MomentNoise, moment_noise, scatter, smoothed_of
+from transientcam_moments.noise import (
+    CapturedImages,
+    ImageNoise,
+    MomentNoise,
+    Sensor,
+    moment_noise,
+    scatter,
+    smoothed_of,
+)
 from transientcam_moments.reconstruction._detection import undetected, undetected_pixels
 from transientcam_moments.reconstruction._flags import INVALID, Flags, flags
 from transientcam_moments.reconstruction._ranging import range_m
@@ -75,9 +82,8 @@ class Reconstruction:
         What is taken out of the moments once they are smoothed.
     spread : callable, optional
         How the likelihood uses several threads, as `kernels.over` returns it.
-    other_light : callable, optional
-        Returns the light (...) that is not the camera's, of the brightness: it has noise, too. None
-        stands for none.
+    images : CapturedImages, optional
+        What the moments were measured from, which tells their noise.
 
     Raises
     ------
@@ -99,7 +105,7 @@ class Reconstruction:
         calibration: Array | None = None,
         correction: HarmonicCorrection | None = None,
         spread: Spread = at_once,
-        other_light: Callable[[Array], Array | None] | None = None,
+        images: CapturedImages | None = None,
     ) -> None:
         if not (settings.consecutive or self._of_any_multiples):
             raise ParameterError("multiples", settings.multiples, "1 to m")
@@ -112,7 +118,7 @@ class Reconstruction:
         self._kept = kept
         self._repaired = repaired
         self._calibration = calibration
-        self._other_light = other_light
+        self._images = images
 
     @cached_property
     def measured(self) -> Array:
@@ -233,7 +239,7 @@ class Reconstruction:
     @cached_property
     def _undetected(self) -> Array | None:
         """Where the moments are no more than noise; None where none are, or it isn't known."""
-        sensor, moments = self.settings.sensor, self.smoothed
+        sensor, moments = self.image_noise, self.smoothed
         if sensor is None or self.settings.zeroth is None or self.settings.takes is None:
             return None
         if not isinstance(moments, np.ndarray):
@@ -290,9 +296,33 @@ class Reconstruction:
         return peaks(self.coefficients, threshold=self.settings.threshold)
 
     @cached_property
+    def image_noise(self) -> Sensor | ImageNoise | None:
+        """Noise of the images: of the settings' sensor, else as they show it themselves.
+
+        None of moments alone, and where the images do not tell.
+        """
+        if self.settings.sensor is not None or self._images is None:
+            return self.settings.sensor
+        return self._images.noise(self._least_brightness)
+
+    @cached_property
+    def noise_ratio(self) -> float | None:
+        """Deviation of the images, over that of the settings' sensor, where b_0 is as in the median.
+
+        None without such a sensor, and where the images do not tell.
+        """
+        sensor, brightness = self.settings.sensor, np.asarray(self._least_brightness)
+        found = None if sensor is None or self._images is None else self._images.noise(brightness)
+        if sensor is None or found is None:
+            return None
+        signal = np.median(brightness[brightness > 0]) / 2
+        stated = sensor.image_variance(np.maximum(signal + found.dark_dn - sensor.dark_dn, 0))
+        return float(np.sqrt(found.image_variance(signal) / stated))
+
+    @cached_property
     def noise(self) -> MomentNoise | None:
-        """Noise of the smoothed moments (m + 1, ...) by the sensor's; None without a sensor."""
-        sensor, moments = self.settings.sensor, self.smoothed
+        """Noise of the smoothed moments (m + 1, ...) by that of the images; None without."""
+        sensor, moments = self.image_noise, self.smoothed
         zeroth, takes = self.settings.zeroth, self.settings.takes
         if sensor is None or zeroth is None or takes is None:  # the last two go with a sensor
             return None
@@ -315,9 +345,12 @@ class Reconstruction:
     def ambient(self) -> Array | None:
         """Light (...) in DN an image that is not the camera's, by `noise.ambient_light`.
 
-        None where there is hardly any, and without images or a sensor.
+        None where there is hardly any, and without images or their noise. Light that all pixels
+        have counts as dark level where no sensor is stated.
         """
-        return None if self._other_light is None else self._other_light(self._least_brightness)
+        if self._images is None or self.image_noise is None:
+            return None
+        return self._images.ambient(self._least_brightness, self.image_noise)
 
     @property
     def _least_brightness(self) -> Array:

@@ -10,6 +10,7 @@ from transientcam_moments._kernels.one_pass import Planes
 from transientcam_moments.arrays import Array
 from transientcam_moments.images import Repair
 from transientcam_moments.moment_problem import Coefficients, Returns, levinson
+from transientcam_moments.noise import CapturedImages
 from transientcam_moments.reconstruction import Reconstruction
 from transientcam_moments.reconstruction._flags import Flags
 from transientcam_moments.reconstruction._settings import Settings
@@ -36,7 +37,7 @@ class PassedReconstruction(Reconstruction):
         Where known harmonics were taken out; none are known, when left out.
     spread : callable, optional
         As of `Reconstruction`.
-    other_light : callable, optional
+    images : CapturedImages, optional
         As of `Reconstruction`.
     """
 
@@ -50,7 +51,7 @@ class PassedReconstruction(Reconstruction):
         calibration: Array | None = None,
         corrected: Array | None = None,
         spread: Spread = at_once,
-        other_light: Callable[[Array], Array | None] | None = None,
+        images: CapturedImages | None = None,
     ) -> None:
         super().__init__(
             None,
@@ -59,7 +60,7 @@ class PassedReconstruction(Reconstruction):
             repaired=repaired,
             calibration=calibration,
             spread=spread,
-            other_light=other_light,
+            images=images,
         )
         self._measure = measure
         self.smoothed = planes.smoothed

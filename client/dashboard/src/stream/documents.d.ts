@@ -269,7 +269,8 @@ export interface CameraDocument {
   /** Where the pixels look: (column, row) along ((c - cx) / fx, (r - cy) / fy, 1), but for the
    * distortion. */
   readonly intrinsics: IntrinsicsDocument;
-  readonly sensor: SensorDocument;
+  /** As it is stated; null where nobody does, and the images of each frame tell their noise. */
+  readonly sensor: SensorDocument | null;
   /** Of a relay (docs/relay.md); null where the camera is at this service. */
   readonly origin: OriginDocument | null;
   /** As the camera itself states it now; null while it is lost. */
@@ -965,9 +966,8 @@ export interface ReconstructionDocument {
   /** Weight from which a return counts as the first, over the pixel's strongest return. */
   readonly return_threshold: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
-   * least over the scenes of docs/likelihood.md together, and `pisarenko` where the noise of the
-   * sensor is not known, and in the daemon until the kernel is compiled; each frame names its
-   * `estimator`. The paper's are `pisarenko` and
+   * least over the scenes of docs/likelihood.md together, and in the daemon `pisarenko` until the
+   * kernel is compiled; each frame names its `estimator`. The paper's are `pisarenko` and
    * `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
    * frequencies; for those with gaps `automatic` is `two-returns`, or `unwrapped-phase` where there
    * are but two and until the kernel is compiled. The others are there for comparison. */
@@ -1009,9 +1009,8 @@ export interface ReconstructionRequest {
   /** Weight from which a return counts as the first, over the pixel's strongest return. */
   readonly return_threshold?: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
-   * least over the scenes of docs/likelihood.md together, and `pisarenko` where the noise of the
-   * sensor is not known, and in the daemon until the kernel is compiled; each frame names its
-   * `estimator`. The paper's are `pisarenko` and
+   * least over the scenes of docs/likelihood.md together, and in the daemon `pisarenko` until the
+   * kernel is compiled; each frame names its `estimator`. The paper's are `pisarenko` and
    * `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
    * frequencies; for those with gaps `automatic` is `two-returns`, or `unwrapped-phase` where there
    * are but two and until the kernel is compiled. The others are there for comparison. */
@@ -1440,6 +1439,12 @@ export type Notice =
       readonly type: "notice";
       readonly kind: "calibration-changed";
       readonly calibration_id: string;
+      readonly reason: string | null;
+    }
+  | {
+      readonly type: "notice";
+      readonly kind: "noise-differs";
+      readonly ratio: number;
       readonly reason: string | null;
     }
   | {

@@ -1,6 +1,7 @@
 """How images become moments and moments become returns."""
 
 import logging
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -152,7 +153,7 @@ class Recipe:
     intrinsics
         Where the pixels look; None for a usual field of view.
     sensor
-        Whose noise the images have; None where that is not known.
+        Whose noise the images have; None where no one states it.
     """
 
     applied: AppliedSequence
@@ -169,7 +170,7 @@ class Recipe:
         sampling, chosen = self.applied.sequence.sampling, self.settings.estimator
         if not sampling.consecutive:
             return chosen if chosen in OF_ANY_MULTIPLES else _for_gaps(sampling)
-        return self.settings.technique(noise_known=self.sensor is not None)
+        return self.settings.technique
 
     @property
     def waveform(self) -> NDArray[Any] | None:
@@ -212,11 +213,12 @@ class Recipe:
     def moment_variance(self) -> NDArray[np.float64]:
         """Variance of the moments of a dark pixel, and how it grows with light: (3, m + 1).
 
-        For each DN of b_0, and for each DN an image of light that is not the camera's. Only with a
-        sensor, whose noise is an affine function of both.
+        For each DN of b_0, and for each DN an image of light that is not the camera's; the noise of
+        a sensor is an affine function of both. NaN where nobody states it and no image told.
         """
-        assert self.sensor is not None  # noqa: S101 - callers have one, or no noise to predict
         sequence = self.applied.sequence
+        if self.sensor is None:
+            return np.full((3, len(sequence.multiples) + 1), np.nan)
         noise = tm.noise.moment_noise(
             np.array([0.0, 1.0, 0.0]),
             self.sensor,
@@ -228,6 +230,13 @@ class Recipe:
         )
         dark, lit, other = np.asarray(noise.variance).T
         return np.stack([dark, lit - dark, other - dark])
+
+    def with_noise_of(self, found: tm.Reconstruction | None) -> "Recipe":
+        """Return the recipe with the noise that a frame's images show, where none is stated."""
+        if self.sensor is not None or found is None or found.image_noise is None:
+            return self
+        bits = round(math.log2(self.full_scale + 1))
+        return replace(self, sensor=found.image_noise.as_sensor(bits))
 
     def reconstruct(
         self,
