@@ -40,7 +40,7 @@ def _drawn(scene: str, folder: Path) -> tuple[Front, float]:
     name = Path(scene).stem
     planner, statistics = looked(scene)
     document = planner.tradeoff_document(Goal(), statistics)
-    values, device_s, _ = measured(scene, PRESENT, SETTINGS.technique(noise_known=True), CAPTURES)
+    values, device_s, _ = measured(scene, PRESENT, SETTINGS.technique, CAPTURES)
     figure = error_picture(document, name, (device_s, values["error"]))
     (folder / f"accuracy-{name}-error.png").write_bytes(saved(figure, "png"))
     front: Front = document["front"]

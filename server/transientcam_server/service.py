@@ -48,8 +48,8 @@ from transientcam_server.camera import (
     Timer,
     load_given,
     sensor_of,
-    stated_sensor,
     snapshot_of,
+    stated_sensor,
 )
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging import (

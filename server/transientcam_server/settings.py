@@ -15,7 +15,7 @@ from transientcam_compiled import cores
 from transientcam_moments.comparisons import TECHNIQUES
 from transientcam_moments.reconstruction import ESTIMATORS, least_harmonics
 
-_DEFAULTS = tm.Settings()  # the paper's
+_DEFAULTS = tm.Settings()
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -107,7 +107,8 @@ class ReconstructionSettings(_Group):
 class SensorSettings(_Group):
     """The sensor of a real camera, from its data sheet, if any of it is stated: predictions of
     accuracy rest on it. Where nothing is, plans assume these, and the noise of frames is measured
-    in their images."""
+    in their images.
+    """
 
     gain_e_per_dn: _Finite = Field(default=9.0, gt=0.0)
     """Electrons a digital number stands for."""

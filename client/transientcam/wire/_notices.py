@@ -111,7 +111,7 @@ NOTICES: Final[dict[str, NoticeKind]] = {
         ),
         NoticeKind(
             "noise-differs",
-            "images scatter otherwise than the stated sensor would, or, without a reason, no longer",
+            "images scatter otherwise than the stated sensor's, or, without a reason, no longer",
             {"ratio": "number", "reason": _OR_NIL},
         ),
         NoticeKind(

@@ -17,6 +17,7 @@ from transientcam_moments.noise import (
     _interpolation as interpolation,
 )
 from transientcam_moments.noise._ambient import ambient_light
+from transientcam_moments.noise._assumed import ASSUMED_NOISE, assumed_noise, free_of_scale
 from transientcam_moments.noise._cramer_rao import CramerRao, cramer_rao
 from transientcam_moments.noise._density import DensityNoise, density_noise, density_std
 from transientcam_moments.noise._draws import draw
@@ -35,6 +36,7 @@ from transientcam_moments.noise._scatter import scatter
 from transientcam_moments.noise._sensor import ImageNoise, Sensor
 
 __all__ = [
+    "ASSUMED_NOISE",
     "CapturedImages",
     "CramerRao",
     "DensityNoise",
@@ -43,12 +45,14 @@ __all__ = [
     "ReturnNoise",
     "Sensor",
     "ambient_light",
+    "assumed_noise",
     "cramer_rao",
     "density_noise",
     "density_std",
     "direct_phase_noise",
     "draw",
     "first_order",
+    "free_of_scale",
     "image_noise",
     "interpolation",
     "moment_noise",

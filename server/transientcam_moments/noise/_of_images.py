@@ -156,7 +156,8 @@ def _signal(offset: Array, half: Array) -> tuple[Array, float]:
     grown = np.cov(half, offset)
     if grown[0, 1] < _BRIGHTENS * grown[0, 0]:
         return half, float(offset.max())
-    dark_dn = float(np.quantile(offset - half, 0.01))
+    dim = offset <= np.quantile(offset, 0.25)  # where an error of b_0, as by motion, is small
+    dark_dn = float(np.quantile((offset - half)[dim], 0.1))
     return np.maximum(offset - dark_dn, 0), dark_dn
 
 

@@ -15,7 +15,6 @@ from transientcam_moments.likelihood import (
     MOST_RETURNS,
     Likelihood,
     Unwrapped,
-    assumed_noise,
     fitted,
     fitted_pairs,
     merge_returns,
@@ -206,7 +205,7 @@ class Reconstruction:
     @cached_property
     def flags(self) -> Array:
         """Flags of every pixel, uint8 of `Flags`."""
-        if self.settings.estimator not in OF_ANY_MULTIPLES or self.noise is None:
+        if self.settings.technique not in OF_ANY_MULTIPLES or self.noise is None:
             return self._flags_of_moments
         xp = namespace(self.smoothed)
         estimate = self.estimate
@@ -307,7 +306,7 @@ class Reconstruction:
 
     @cached_property
     def noise_ratio(self) -> float | None:
-        """Deviation of the images, over that of the settings' sensor, where b_0 is as in the median.
+        """Deviation of the images over that of the settings' sensor, at the median of b_0.
 
         None without such a sensor, and where the images do not tell.
         """
@@ -381,9 +380,9 @@ class Reconstruction:
     @property
     def estimate(self) -> Likelihood | Unwrapped:
         """That of the settings if it is one of `OF_ANY_MULTIPLES`; `likelihood` else."""
-        if self.settings.estimator == "two-returns":
+        if self.settings.technique == "two-returns":
             return self.two_returns
-        return self.unwrapped if self.settings.estimator == "unwrapped-phase" else self.likelihood
+        return self.unwrapped if self.settings.technique == "unwrapped-phase" else self.likelihood
 
     @property
     def _evidence(self) -> tuple[Array, MomentNoise | None, tuple[int, ...] | None, float]:
@@ -440,15 +439,13 @@ class Reconstruction:
     @cached_property
     def _separation(self) -> Separation:
         technique = self._technique
-        if self.settings.estimator in OF_ANY_MULTIPLES:
+        if self.settings.technique in OF_ANY_MULTIPLES:
             estimate = self.estimate
             if isinstance(estimate, Unwrapped):
                 return estimate.separate()
             return estimate.separate(self.settings.threshold)
-        if self.settings.estimator == "pisarenko-merged":
-            noise = assumed_noise(self.smoothed) if self.noise is None else self.noise
-            merged = merge_returns(self.returns, noise)
-            return separate(merged, self.settings.threshold)
+        if self.settings.technique == "pisarenko-merged":
+            return separate(merge_returns(self.returns, self.noise), self.settings.threshold)
         if technique is None:
             return separate(self.returns, self.settings.threshold)
         xp = namespace(self.smoothed)
@@ -461,7 +458,7 @@ class Reconstruction:
     @property
     def _technique(self) -> Technique | None:
         """The technique of the settings where this class does not implement it itself."""
-        name = self.settings.estimator
+        name = self.settings.technique
         return None if name in OWN else TECHNIQUES[name]
 
     @cached_property
@@ -475,7 +472,7 @@ class Reconstruction:
 
         That is negative where noise, or a contradiction, makes the returns brighter than b_0.
         """
-        if self.settings.estimator not in ("pisarenko", "maximum-entropy", "single-frequency"):
+        if self.settings.technique not in ("pisarenko", "maximum-entropy", "single-frequency"):
             return self.brightness - self.direct - self.indirect
         return self.returns.uniform
 
@@ -496,9 +493,9 @@ class Reconstruction:
         Raises ParameterError, as `direct` does, where the estimator needs more harmonics.
         """
         xp = namespace(self.moments)
-        if self.settings.estimator == "maximum-entropy":
+        if self.settings.technique == "maximum-entropy":
             phase = self.peaks.first_rad
-        elif self.settings.estimator == "single-frequency":
+        elif self.settings.technique == "single-frequency":
             phase = in_turn(xp.arctan2(self.moments[1].imag, self.moments[1].real))
         else:
             phase = self._separation.phase_rad
@@ -536,7 +533,7 @@ class Reconstruction:
         frequency_hz = self.settings.base_frequency_hz
         at = "" if frequency_hz is None else f" at {frequency_hz / 1e6:g} MHz"
         parts = [f"m = {order}{at}", f"pixels {' x '.join(map(str, shape)) or '1'}"]
-        parts += [f"estimator {self.settings.estimator}"]
+        parts += [f"estimator {self.settings.technique}"]
         if "range_m" in known:
             parts.append(_in_metres(self.range_m))
         computed = [name for name in _SHOWN if name in known]

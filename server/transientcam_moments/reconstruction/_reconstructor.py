@@ -58,7 +58,7 @@ class Reconstructor:
     Parameters
     ----------
     settings : Settings, optional
-        The paper's, when left out. Raw images need ``zeroth`` and ``takes`` in them, and a range
+        The defaults, when left out. Raw images need ``zeroth`` and ``takes`` in them, and a range
         ``base_frequency_hz``: these have no default.
     calibration : array, shape (m + 1,) or (m + 1, ...), optional
         Gains to divide by, as `calibrate` takes them. Raw images need them; moments without are
@@ -370,7 +370,7 @@ class Reconstructor:
 
     def _pass(self, m: int, shape: tuple[int, ...]) -> OnePass | None:
         usual = self.settings.keep == "harmonics" and self.settings.consecutive
-        usual = usual and self.settings.estimator in _BY_THE_PASS
+        usual = usual and self.settings.technique in _BY_THE_PASS
         prepare = lookup("reconstruct", m, math.prod(shape))
         masked = self._bad is None or np.shape(self._bad) == shape
         if not usual or prepare is None or not masked:
@@ -455,7 +455,7 @@ def reconstruct(
     data : array
         Real images (N, ...) in any order, or complex moments (m + 1, ...).
     settings : Settings, optional
-        Of smoothing, biasing and estimator: the paper's, when left out.
+        Of smoothing, biasing and estimator: the defaults, when left out.
     harmonic, phase_rad, frequency_hz, illumination, take : array, shape (N,), optional
         What each image shows, see `Labels`. Raw images need them, or else ``zeroth``, ``takes`` and
         ``base_frequency_hz`` in the settings and the order of `measure`.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import AppliedSequence, RawFrame, Sampling, Sequence
-from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
+from transientcam_moments.reconstruction import OF_ANY_MULTIPLES, automatic
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging._recipe.calibration import FACTORY_ID, Gains, nominal_gains
 from transientcam_server.imaging._recipe.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsics
@@ -24,8 +24,6 @@ _UNTIL_COMPILED: Final = "pisarenko"
 """In NumPy as in compiled kernels fast enough for a camera of 163 x 120 pixels."""
 _ONE_RETURN: Final = "unwrapped-phase"
 """For frequencies with gaps: in NumPy the only one that keeps up with 512 x 424 pixels."""
-_LEAST_FOR_PAIRS: Final = 3
-"""Frequencies of which two returns leave something to judge them by."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +54,7 @@ class SettingsVersion:
             kernel, until = "likelihood", _UNTIL_COMPILED
         else:
             kernel, until = "pairs", _ONE_RETURN
-            if _for_gaps(sequence.sampling) == until:
+            if automatic(sequence.multiples) == until:
                 return self
         if ready(kernel, sequence.multiples[-1]):
             return self
@@ -115,7 +113,7 @@ def suited(settings: ReconstructionSettings, sampling: Sampling) -> Reconstructi
         "the camera measures the multiples %s, which %s cannot serve: the estimator is %s",
         listed(sampling.multiples),
         settings.estimator,
-        _for_gaps(sampling),
+        automatic(sampling.multiples),
     )
     return settings.model_copy(update={"estimator": "automatic"})
 
@@ -123,11 +121,6 @@ def suited(settings: ReconstructionSettings, sampling: Sampling) -> Reconstructi
 def _serves(settings: ReconstructionSettings, sampling: Sampling) -> bool:
     """Return whether the settings' estimator goes with the multiples that are measured."""
     return sampling.consecutive or settings.estimator in ("automatic", *OF_ANY_MULTIPLES)
-
-
-def _for_gaps(sampling: Sampling) -> str:
-    """Return what `automatic` is for multiples that have gaps."""
-    return "two-returns" if len(sampling.multiples) >= _LEAST_FOR_PAIRS else _ONE_RETURN
 
 
 def listed(multiples: tuple[int, ...]) -> str:
@@ -169,7 +162,7 @@ class Recipe:
         """The estimator of its frames, by its name in `transientcam_moments`."""
         sampling, chosen = self.applied.sequence.sampling, self.settings.estimator
         if not sampling.consecutive:
-            return chosen if chosen in OF_ANY_MULTIPLES else _for_gaps(sampling)
+            return chosen if chosen in OF_ANY_MULTIPLES else automatic(sampling.multiples)
         return self.settings.technique
 
     @property
