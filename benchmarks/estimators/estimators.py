@@ -13,7 +13,7 @@ import transientcam_moments as tm
 from benchmarks.common.tables import Cell, Column, Table
 from transientcam_experiments import tradeoff
 from transientcam_moments.comparisons import TECHNIQUES, Technique
-from transientcam_server.settings import Estimator, ReconstructionSettings
+from transientcam_server.settings import Estimator
 
 SCENES = ("mirrors", "corner")
 HARMONICS = (4, 8)

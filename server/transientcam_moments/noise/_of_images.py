@@ -17,8 +17,8 @@ _IMAGES: Final = 1 << 17
 """Values of images that are looked at, in pixels spread evenly: enough for 1 %."""
 _LEAST_PIXELS: Final = 1024
 """But no fewer of them, if there are."""
-_LEAST: Final = 256
-"""Samples of noise, below which nothing is said."""
+_LEAST: Final = 64
+"""Pixels, below which nothing is said."""
 _CLIPPED: Final = 3.0
 """Deviations beyond which a sample is no noise (motion, an image out of step)."""
 _KEPT: Final = 0.97334
@@ -66,8 +66,8 @@ def image_noise(
     Returns
     -------
     ImageNoise or None
-        None where the capture does not tell: three images of a single frequency and take, less than
-        `_LEAST` samples, or no pixel alike another.
+        None where the capture does not tell: three images of a single frequency and take, less
+        than `_LEAST` pixels with light, or no noise at all.
 
     Notes
     -----
@@ -85,6 +85,8 @@ def image_noise(
     if bad_pixels is not None:
         usable &= ~np.asarray(bad_pixels).reshape(-1)
     places = np.flatnonzero(usable)
+    if places.size < _LEAST:
+        return None
     most = max(_LEAST_PIXELS, _IMAGES // (stack.shape[0] * stack.shape[1]))
     places = places[:: max(1, places.size // most)]
     # what turns with the light is read of the pixel beside, whose noise is another one
@@ -95,7 +97,7 @@ def image_noise(
     if left_out is not None:
         whole = ~np.asarray(left_out)[:, first:].reshape((*whole.shape, steps)).any(axis=2)
     samples, known, signal, dark_dn = _samples(images, light[places] / 2, whole, phases_rad)
-    if samples.size < _LEAST or not np.isfinite(samples).all():
+    if not samples.size or not np.isfinite(samples).all():
         return None
     rounded = (images == np.rint(images)).all()
     least = ROUNDING_VARIANCE if rounded else 1e-9 * float((samples**2).mean())
@@ -151,8 +153,6 @@ def _samples(
 
 def _signal(offset: Array, half: Array) -> tuple[Array, float]:
     """Return the signal (P,) and the offset that stands for none, of half of b_0."""
-    if half.size < 2:
-        return half, 0.0
     grown = np.cov(half, offset)
     if grown[0, 1] < _BRIGHTENS * grown[0, 0]:
         return half, float(offset.max())
@@ -163,11 +163,14 @@ def _signal(offset: Array, half: Array) -> tuple[Array, float]:
 
 def _fitted(samples: Array, known: Array, signal: Array, least: float) -> tuple[float, float]:
     """Return the variance without signal, and its growth with it."""
-    bins = np.searchsorted(np.quantile(signal, np.linspace(0, 1, _BINS + 1)[1:-1]), signal)
-    middle = [
-        np.median(abs(samples[:, bins == k])) if (bins == k).any() else 0 for k in range(_BINS)
-    ]
-    variance = np.maximum((np.array(middle) / _HALF_NORMAL) ** 2, least)[bins]
+    # to begin with, the line of Theil and Sen through medians, whatever a quarter of them are
+    bins = np.array_split(np.argsort(signal), _BINS)
+    middle = np.array([np.median(signal[each]) for each in bins])
+    level = (np.array([np.median(abs(samples[:, each])) for each in bins]) / _HALF_NORMAL) ** 2
+    first, second = np.triu_indices(_BINS, 1)
+    apart = np.maximum(middle[second] - middle[first], _NO_GROWTH)
+    growth = max(np.median((level[second] - level[first]) / apart), 0.0)
+    variance = np.maximum(growth * signal + np.median(level - growth * middle), least)
     left, line = samples, (least, 0.0)
     for _ in range(_ROUNDS):
         weight = (abs(left) < _CLIPPED * np.sqrt(variance)) / variance

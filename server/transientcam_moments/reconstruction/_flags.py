@@ -73,7 +73,8 @@ def flags(b: Array, *, minimum_brightness: float = 0.0, eigenvalue: Array | None
     Returns
     -------
     array, shape (...), uint8
-        Of `Flags`: NON_FINITE, NO_SIGNAL (also where b_1 to b_m are 0) and DEGENERATE. A pixel carries the first that applies.
+        Of `Flags`: NON_FINITE, NO_SIGNAL (also where b_1 to b_m are 0) and DEGENERATE. A pixel
+        carries the first that applies.
 
     Raises
     ------
