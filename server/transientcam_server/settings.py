@@ -82,14 +82,9 @@ class ReconstructionSettings(_Group):
     moments, or kept in them."""
 
     @property
-    def technique(self) -> str:
-        """The estimator by its name in `transientcam_moments`: ``automatic`` is the likelihood."""
-        return "likelihood" if self.estimator == "automatic" else self.estimator
-
-    @property
     def least_harmonics(self) -> int:
         """The smallest number of harmonics that the estimator gives a range of."""
-        return least_harmonics(self.technique)
+        return least_harmonics(self.estimator)
 
     def for_moments(self, **others: Any) -> tm.Settings:
         """Return these settings as `tm.Settings`, together with its other ones."""
@@ -97,7 +92,7 @@ class ReconstructionSettings(_Group):
             epsilon=self.bias,
             smoothing_sigma_px=self.smoothing_px,
             threshold=self.return_threshold,
-            estimator=self.technique,
+            estimator=self.estimator,
             minimum_brightness=self.minimum_brightness_dn,
             spoilt_images=self.spoilt_images,
             **others,

@@ -47,24 +47,6 @@ class MomentNoise(NamedTuple):
         """State the shapes and spans of its arrays."""
         return summary(self)
 
-    def covariance(self) -> Array:
-        """Return the covariance (2m + 1, 2m + 1, ...) of b_0, Re b_1, Im b_1, ..., Im b_m."""
-        xp = namespace(self.variance)
-        each = xp.concatenate([self.variance[:1], xp.repeat(self.variance[1:], 2, axis=0)])
-        identity = xp.eye(each.shape[0], dtype=each.dtype)
-        return identity.reshape(identity.shape + (1,) * (each.ndim - 1)) * each[None]
-
-    def deviation(self, gradient: Array) -> Array:
-        """Return the standard deviation (...) of a quantity q with dq = Re sum conj(gradient) db.
-
-        Parameters
-        ----------
-        gradient : array, shape (m + 1, ...)
-            Of q with respect to the moments.
-        """
-        xp = namespace(self.variance)
-        return xp.sqrt((squared(gradient) * self.variance).sum(axis=0))
-
 
 def moment_noise(
     brightness: Array,

@@ -25,6 +25,7 @@ _KEPT: Final = 0.97334
 """What is left of a normal variable's variance within so many of its deviations."""
 _ROUNDS: Final = 5
 _BINS: Final = 16
+_LEAST_SHARE: Final = 1 / 9
 _HALF_NORMAL: Final = 0.6745
 """Median of the modulus of a normal variable of deviation 1."""
 _NO_GROWTH: Final = 1e-9
@@ -34,34 +35,48 @@ _BRIGHTENS: Final = 0.5
 """Growth of an offset with half of b_0, from which on it holds the light; tap A less B has none."""
 
 
-def image_noise(
-    takes: Array,
-    brightness: Array,
-    *,
-    phases_rad: Sequence[float],
-    first: int = 0,
-    saturated_pixels: Array | None = None,
-    left_out: Array | None = None,
-    bad_pixels: Array | None = None,
-) -> ImageNoise | None:
-    """Measure the noise of the images of one capture.
+class CapturedImages(NamedTuple):
+    """Raw images that moments are measured from, for what only they tell.
 
-    Parameters
+    Attributes
     ----------
     takes : array, shape (T, N, ...)
-        Raw images as `measure` takes them.
-    brightness : array, shape (...)
-        What is known of b_0, in DN.
+        As `measure` takes them.
     phases_rad : sequence of float
         Of the images of each frequency.
     first : int
         How many images of a take come before those at the phases.
-    saturated_pixels : boolean array, shape (...), optional
-        Pixels that are not used, nor those beside them.
+    saturated_pixels, bad_pixels : boolean array, shape (...), optional
+        Pixels that are not used, nor those beside saturated ones.
     left_out : boolean array, shape (T, N), optional
         Images that are not as they were captured: none of that frequency and take is used.
-    bad_pixels : boolean array, shape (...), optional
-        Pixels that are not used.
+    sigma_px : float
+        With which the moments are smoothed.
+    """
+
+    takes: Array
+    phases_rad: Sequence[float]
+    first: int = 0
+    saturated_pixels: Array | None = None
+    bad_pixels: Array | None = None
+    left_out: Array | None = None
+    sigma_px: float = 0.0
+
+    def ambient(self, brightness: Array, sensor: Sensor | ImageNoise) -> Array | None:
+        """Return light that is not the camera's, by `ambient_light` of the first frequency."""
+        if abs(np.exp(1j * np.asarray(self.phases_rad)).sum()) > _WHOLE:
+            return None
+        return ambient_light(
+            self.takes[0, self.first : self.first + len(self.phases_rad)],
+            brightness,
+            sensor,
+            sigma_px=self.sigma_px,
+            bad_pixels=self.bad_pixels,
+        )
+
+
+def image_noise(captured: CapturedImages, brightness: Array) -> ImageNoise | None:
+    """Measure the noise of the images of one capture, of which b_0 is known (...), in DN.
 
     Returns
     -------
@@ -77,11 +92,14 @@ def image_noise(
     is more than noise in it; even harmonics of the light turn with twice the phase, and are fitted
     along.
     """
+    takes, phases_rad, first, saturated_pixels, bad_pixels, left_out, _ = captured
     steps = len(phases_rad)
     stack = np.asarray(takes).reshape((len(takes), takes.shape[1], -1))
     usable = np.isfinite(light := np.asarray(brightness).reshape(-1)) & (light > 0)
     if saturated_pixels is not None:
-        usable &= ~_widened(np.asarray(saturated_pixels)).reshape(-1)
+        from scipy.ndimage import binary_dilation  # heavy, and seldom needed
+
+        usable &= ~binary_dilation(saturated_pixels).reshape(-1)
     if bad_pixels is not None:
         usable &= ~np.asarray(bad_pixels).reshape(-1)
     places = np.flatnonzero(usable)
@@ -102,15 +120,6 @@ def image_noise(
     rounded = (images == np.rint(images)).all()
     least = ROUNDING_VARIANCE if rounded else 1e-9 * float((samples**2).mean())
     return ImageNoise(*_fitted(samples, known, signal, least), dark_dn) if least > 0 else None
-
-
-def _widened(mask: Array) -> Array:
-    """Return where a pixel or, in an image, one beside it is."""
-    if mask.ndim != 2 or not mask.any():
-        return mask
-    wide = np.pad(mask, 1)
-    near = [np.roll(wide, shift, axis) for axis in (0, 1) for shift in (-1, 1)]
-    return np.asarray(np.logical_or.reduce([wide, *near])[1:-1, 1:-1])
 
 
 def _samples(
@@ -171,6 +180,8 @@ def _fitted(samples: Array, known: Array, signal: Array, least: float) -> tuple[
     apart = np.maximum(middle[second] - middle[first], _NO_GROWTH)
     growth = max(np.median((level[second] - level[first]) / apart), 0.0)
     variance = np.maximum(growth * signal + np.median(level - growth * middle), least)
+    for each, found in zip(bins, level, strict=True):  # of light with even harmonics it is no line
+        variance[each] = np.maximum(variance[each], _LEAST_SHARE * found)
     left, line = samples, (least, 0.0)
     for _ in range(_ROUNDS):
         weight = (abs(left) < _CLIPPED * np.sqrt(variance)) / variance
@@ -194,47 +205,3 @@ def _line(signal: Array, squares: Array, weight: Array, least: float) -> tuple[f
     growth = min(max(growth, 0.0), (mean - least) / middle if middle > 0 else 0.0)
     growth = max(growth, _NO_GROWTH)
     return max(mean - growth * middle, least), growth
-
-
-class CapturedImages(NamedTuple):
-    """Raw images that moments were measured from, for what only they tell.
-
-    Attributes
-    ----------
-    takes, first, phases_rad, saturated_pixels, left_out, bad_pixels
-        As `image_noise` has them.
-    sigma_px : float
-        With which the moments are smoothed.
-    """
-
-    takes: Array
-    first: int
-    phases_rad: Sequence[float]
-    saturated_pixels: Array | None
-    left_out: Array | None
-    bad_pixels: Array | None
-    sigma_px: float
-
-    def noise(self, brightness: Array) -> ImageNoise | None:
-        """Return the noise of the images of this brightness (...), by `image_noise`."""
-        return image_noise(
-            self.takes,
-            brightness,
-            phases_rad=self.phases_rad,
-            first=self.first,
-            saturated_pixels=self.saturated_pixels,
-            left_out=self.left_out,
-            bad_pixels=self.bad_pixels,
-        )
-
-    def ambient(self, brightness: Array, sensor: Sensor | ImageNoise) -> Array | None:
-        """Return light that is not the camera's, by `ambient_light` of the first frequency."""
-        if abs(np.exp(1j * np.asarray(self.phases_rad)).sum()) > _WHOLE:
-            return None
-        return ambient_light(
-            self.takes[0, self.first : self.first + len(self.phases_rad)],
-            brightness,
-            sensor,
-            sigma_px=self.sigma_px,
-            bad_pixels=self.bad_pixels,
-        )

@@ -40,6 +40,7 @@ from transientcam_moments.noise import (
     ImageNoise,
     MomentNoise,
     Sensor,
+    image_noise,
     moment_noise,
     scatter,
     smoothed_of,
@@ -302,7 +303,7 @@ class Reconstruction:
         """
         if self.settings.sensor is not None or self._images is None:
             return self.settings.sensor
-        return self._images.noise(self._least_brightness)
+        return image_noise(self._images, self._least_brightness)
 
     @cached_property
     def noise_ratio(self) -> float | None:
@@ -311,7 +312,11 @@ class Reconstruction:
         None without such a sensor, and where the images do not tell.
         """
         sensor, brightness = self.settings.sensor, np.asarray(self._least_brightness)
-        found = None if sensor is None or self._images is None else self._images.noise(brightness)
+        found = (
+            None
+            if sensor is None or self._images is None
+            else image_noise(self._images, brightness)
+        )
         if sensor is None or found is None:
             return None
         signal = np.median(brightness[brightness > 0]) / 2

@@ -326,11 +326,11 @@ class Reconstructor:
             left_out = changed | repaired.left_out | repaired.unrepaired
         return CapturedImages(
             takes,
-            ZEROTH_IMAGES[zeroth] if zeroth == "on-off" else 0,
             self.settings.sampled_rad,
+            ZEROTH_IMAGES[zeroth] if zeroth == "on-off" else 0,
             None if recovered is None else recovered.saturated,
-            left_out,
             self._bad,
+            left_out,
             self.settings.smoothing_sigma_px,
         )
 

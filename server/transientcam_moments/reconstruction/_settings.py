@@ -40,8 +40,8 @@ ESTIMATORS = (
 
 
 def automatic(multiples: tuple[int, ...] | None) -> str:
-    """Return the estimator that "automatic" is for frequencies; None are consecutive ones."""
-    if multiples is None or multiples[-1] == len(multiples):
+    """Return the estimator that "automatic" is for frequencies; none stand for consecutive ones."""
+    if not multiples or multiples[-1] == len(multiples):
         return "likelihood"
     return "two-returns" if len(multiples) >= _LEAST_FOR_PAIRS else "unwrapped-phase"
 

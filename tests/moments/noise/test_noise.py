@@ -163,12 +163,6 @@ def test_noise_at_some_pixels_is_that_of_the_whole_image_there(
     np.testing.assert_allclose(found, whole.reshape(4, -1), rtol=1e-12)
 
 
-def test_covariance_is_diagonal_over_real_and_imaginary_parts() -> None:
-    covariance = noise.MomentNoise(np.array([[1.0], [2.0], [3.0]])).covariance()
-
-    np.testing.assert_array_equal(covariance[..., 0], np.diag([1.0, 2.0, 2.0, 3.0, 3.0]))
-
-
 @given(brightness=st.floats(0, 3000), takes=st.integers(1, 64), factor=st.floats(0.1, 1.0))
 def test_variance_falls_with_takes_and_grows_with_lost_modulation(
     brightness: float, takes: int, factor: float
@@ -440,7 +434,7 @@ PHASES = np.linspace(0, 6, 7)
 
 
 @pytest.mark.parametrize("zeroth", ["low-frequency", "estimated"])
-@pytest.mark.parametrize("m", [1, 3, 8])
+@pytest.mark.parametrize("m", [1, 3])
 def test_density_varies_as_its_differences_predict(m: int, zeroth: str) -> None:
     b, of_moments = random_pixels(m, m, seed=m, pixels=300)
     of_moments = noise.MomentNoise(1e-12 * of_moments.variance)  # far within first order

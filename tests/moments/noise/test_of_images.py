@@ -1,5 +1,7 @@
 """The noise of images from the images: against the sensor that drew them, whatever is before it."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -46,8 +48,11 @@ def drawn(
     return stack, light.astype(float)
 
 
-def phases_of(count: int) -> tuple[float, ...]:
-    return tuple(2 * np.pi * k / count for k in range(count))
+def measured(
+    images: NDArray[np.float64], light: NDArray[np.float64], phases: int = 4, **options: Any
+) -> tm.noise.ImageNoise | None:
+    phases_rad = tuple(2 * np.pi * k / phases for k in range(phases))
+    return tm.noise.image_noise(tm.noise.CapturedImages(images, phases_rad, **options), light)
 
 
 def ratio(
@@ -76,7 +81,7 @@ def test_the_deviation_is_that_of_the_sensor(
 ) -> None:
     images, light = drawn(sensor, phases=phases, takes=takes)
 
-    found = tm.noise.image_noise(images, light, phases_rad=phases_of(phases))
+    found = measured(images, light, phases)
 
     assert np.abs(ratio(found, sensor, light) - 1).max() < 0.05
 
@@ -88,7 +93,7 @@ def test_even_harmonics_and_motion_are_no_noise(takes: int) -> None:
     moving, _ = drawn(sensor, takes=takes, moving=0.05)
 
     for images, most in ((uneven, 0.05), (moving, 0.2)):
-        found = tm.noise.image_noise(images, light, phases_rad=phases_of(4))
+        found = measured(images, light)
         assert np.abs(ratio(found, sensor, light) - 1).max() < most
 
 
@@ -102,9 +107,7 @@ def test_saturated_and_bad_pixels_and_changed_images_are_left_out() -> None:
     mask = np.zeros(SHAPE, dtype=bool)
     mask[:29] = True  # and the row beside is not used either
 
-    found = tm.noise.image_noise(
-        images, light, phases_rad=phases_of(4), left_out=left_out, saturated_pixels=mask
-    )
+    found = measured(images, light, left_out=left_out, saturated_pixels=mask)
 
     assert np.abs(ratio(found, sensor, light) - 1).max() < 0.05
 
@@ -113,7 +116,7 @@ def test_differences_of_two_taps_have_the_noise_of_the_light_of_both() -> None:
     sensor = tm.noise.Sensor(dark_dn=2000.0)
     images, light = drawn(sensor, taps=2)
 
-    found = tm.noise.image_noise(images, light, phases_rad=phases_of(4))
+    found = measured(images, light)
 
     assert found is not None
     true = sensor.image_variance(light)
@@ -126,8 +129,8 @@ def test_the_noise_of_real_numbers_is_free_of_their_unit(unit: float) -> None:
     images = images + np.random.default_rng(3).random(images.shape)
     at = np.array([100.0, 500.0])
 
-    one = tm.noise.image_noise(images, light, phases_rad=phases_of(4))
-    other = tm.noise.image_noise(unit * images, unit * light, phases_rad=phases_of(4))
+    one = measured(images, light)
+    other = measured(unit * images, unit * light)
 
     assert one is not None
     assert other is not None
@@ -139,9 +142,8 @@ def test_the_noise_of_real_numbers_is_free_of_their_unit(unit: float) -> None:
 @pytest.mark.parametrize("shape", [(1, 3, 9, 8), (1, 3, 8, 8), (1, 16, 2, 2), (1, 16, 9, 8)])
 def test_a_capture_that_does_not_tell_has_no_noise(shape: tuple[int, ...]) -> None:
     light = np.zeros(shape[2:]) if shape[2] == 9 else np.ones(shape[2:])
-    phases = phases_of(3 if shape[1] == 3 else 4)
 
-    assert tm.noise.image_noise(np.ones(shape), light, phases_rad=phases) is None
+    assert measured(np.ones(shape), light, 3 if shape[1] == 3 else 4) is None
 
 
 def test_a_reconstruction_measures_the_noise_and_holds_a_stated_sensor_against_it() -> None:
@@ -155,16 +157,16 @@ def test_a_reconstruction_measures_the_noise_and_holds_a_stated_sensor_against_i
         return tm.reconstruct(images[0].astype(np.uint16), given, calibration=np.ones(M + 1))
 
     assert settings.technique == "likelihood"
-    measured, known, wrong = found(None), found(true), found(stated)
-    assert measured.noise is not None
+    own, known, wrong = found(None), found(true), found(stated)
+    assert own.noise is not None
     assert known.noise is not None
-    ratios = np.sqrt(measured.noise.variance[1:] / known.noise.variance[1:])
+    ratios = np.sqrt(own.noise.variance[1:] / known.noise.variance[1:])
     assert abs(np.median(ratios) - 1) < 0.05
     assert known.noise_ratio == pytest.approx(1, abs=0.05)
     assert wrong.noise_ratio == pytest.approx(0.5, abs=0.05)
-    assert measured.noise_ratio is None
-    assert measured.image_noise is not None
-    as_sensor = measured.image_noise.as_sensor(12)
+    assert own.noise_ratio is None
+    assert own.image_noise is not None
+    as_sensor = own.image_noise.as_sensor(12)
     np.testing.assert_allclose(
-        as_sensor.image_variance(light) / measured.image_noise.image_variance(light), 1, rtol=0.01
+        as_sensor.image_variance(light) / own.image_noise.image_variance(light), 1, rtol=0.01
     )

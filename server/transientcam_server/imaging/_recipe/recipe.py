@@ -160,10 +160,10 @@ class Recipe:
     @property
     def technique(self) -> str:
         """The estimator of its frames, by its name in `transientcam_moments`."""
-        sampling, chosen = self.applied.sequence.sampling, self.settings.estimator
-        if not sampling.consecutive:
-            return chosen if chosen in OF_ANY_MULTIPLES else automatic(sampling.multiples)
-        return self.settings.technique
+        sampling = self.applied.sequence.sampling
+        if self.settings.estimator == "automatic" or not _serves(self.settings, sampling):
+            return automatic(sampling.multiples)
+        return self.settings.estimator
 
     @property
     def waveform(self) -> NDArray[Any] | None:
