@@ -97,9 +97,9 @@ def image_noise(captured: CapturedImages, brightness: Array) -> ImageNoise | Non
     stack = np.asarray(takes).reshape((len(takes), takes.shape[1], -1))
     usable = np.isfinite(light := np.asarray(brightness).reshape(-1)) & (light > 0)
     if saturated_pixels is not None:
-        from scipy.ndimage import binary_dilation  # heavy, and seldom needed
-
-        usable &= ~binary_dilation(saturated_pixels).reshape(-1)
+        full = np.asarray(saturated_pixels)
+        near = [np.roll(full, by, axis) for axis in range(full.ndim) for by in (-1, 0, 1)]
+        usable &= ~np.logical_or.reduce(near).reshape(-1)
     if bad_pixels is not None:
         usable &= ~np.asarray(bad_pixels).reshape(-1)
     places = np.flatnonzero(usable)

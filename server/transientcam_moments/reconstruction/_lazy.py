@@ -1,5 +1,6 @@
 """What follows from the moments of an image: each property computed once, when first read."""
 
+from collections.abc import Callable
 from functools import cached_property, partial
 from html import escape
 
@@ -239,18 +240,27 @@ class Reconstruction:
     @cached_property
     def _undetected(self) -> Array | None:
         """Where the moments are no more than noise; None where none are, or it isn't known."""
-        sensor, moments = self.image_noise, self.smoothed
-        if sensor is None or self.settings.zeroth is None or self.settings.takes is None:
+        moments, noise_of = self.smoothed, self._noise_of(None)
+        if noise_of is None:
             return None
         if not isinstance(moments, np.ndarray):
             return undetected(moments, self.noise) if self.noise is not None else None
-        return undetected_pixels(
-            moments,
-            self._least_brightness,
-            self.settings,
-            sensor,
-            self._calibration,
-            self.ambient,
+        sigma_px, gains = self.settings.smoothing_sigma_px, self._calibration
+        brightness = self._least_brightness
+        return undetected_pixels(moments, brightness, noise_of, sigma_px, gains, self.ambient)
+
+    def _noise_of(self, gains: Array | None) -> Callable[..., MomentNoise] | None:
+        """Return what tells the noise of moments divided by gains, of the brightness."""
+        zeroth, takes = self.settings.zeroth, self.settings.takes
+        if self.image_noise is None or zeroth is None or takes is None:
+            return None  # the last two go with a sensor, and with images
+        return partial(
+            moment_noise,
+            sensor=self.image_noise,
+            calibration=np.ones(len(self.smoothed)) if gains is None else gains,
+            zeroth=zeroth,
+            takes=takes,
+            phases_rad=self.settings.sampled_rad,
         )
 
     def add_flag(self, flag: Flags, where: Array) -> None:
@@ -326,19 +336,9 @@ class Reconstruction:
     @cached_property
     def noise(self) -> MomentNoise | None:
         """Noise of the smoothed moments (m + 1, ...) by that of the images; None without."""
-        sensor, moments = self.image_noise, self.smoothed
-        zeroth, takes = self.settings.zeroth, self.settings.takes
-        if sensor is None or zeroth is None or takes is None:  # the last two go with a sensor
+        moments, noise_of = self.smoothed, self._noise_of(self._calibration)
+        if noise_of is None:
             return None
-        gains = self._calibration
-        noise_of = partial(
-            moment_noise,
-            sensor=sensor,
-            calibration=np.ones(moments.shape[0]) if gains is None else gains,
-            zeroth=zeroth,
-            takes=takes,
-            phases_rad=self.settings.sampled_rad,
-        )
         brightness, ambient = self._least_brightness, self.ambient
         if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
             sigma_px = self.settings.smoothing_sigma_px
