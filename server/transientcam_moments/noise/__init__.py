@@ -17,7 +17,7 @@ from transientcam_moments.noise import (
     _interpolation as interpolation,
 )
 from transientcam_moments.noise._ambient import ambient_light
-from transientcam_moments.noise._assumed import ASSUMED_NOISE, assumed_noise, free_of_scale
+from transientcam_moments.noise._assumed import ASSUMED_NOISE, free_of_scale
 from transientcam_moments.noise._cramer_rao import CramerRao, cramer_rao
 from transientcam_moments.noise._density import density_std
 from transientcam_moments.noise._draws import draw
@@ -44,7 +44,6 @@ __all__ = [
     "ReturnNoise",
     "Sensor",
     "ambient_light",
-    "assumed_noise",
     "cramer_rao",
     "density_std",
     "direct_phase_noise",

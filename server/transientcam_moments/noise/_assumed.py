@@ -18,13 +18,6 @@ _P = ParamSpec("_P")
 _T = TypeVar("_T", bound=Any)
 
 
-def assumed_noise(b: Array) -> MomentNoise:
-    """Return `ASSUMED_NOISE` for moments (m + 1, ...), whose squares are in range."""
-    xp = namespace(b)
-    size = _size(b)
-    return MomentNoise(xp.broadcast_to((ASSUMED_NOISE * size) ** 2, b.shape).astype(b.real.dtype))
-
-
 def free_of_scale(
     estimate: Callable[Concatenate[Array, MomentNoise, _P], _T],
 ) -> Callable[Concatenate[Array, MomentNoise | None, _P], _T]:
@@ -41,20 +34,17 @@ def free_of_scale(
         planes, trailing = moment_planes(b)
         xp = namespace(planes)
         with np.errstate(invalid="ignore"):  # of pixels that are not finite
-            size = _size(planes)
+            size = xp.maximum(abs(planes.real), abs(planes.imag)).max(axis=0)
             power = xp.where(xp.isfinite(size), xp.frexp(size)[1], 0)
             power = xp.clip(power, -_LARGEST_POWER, _LARGEST_POWER)
-            near = planes * xp.ldexp(xp.ones_like(size), -power)
-            noise = MomentNoise(assumed_noise(near).variance.reshape((-1, *trailing)))
-            found = estimate(near.reshape((-1, *trailing)), noise, *others, **options)
+            down = xp.ldexp(xp.ones_like(size), -power)
+            near = (planes * down).reshape((-1, *trailing))
+            variance = (ASSUMED_NOISE * size * down).reshape(trailing) ** 2
+            noise = MomentNoise(xp.broadcast_to(variance, near.shape))
+            found = estimate(near, noise, *others, **options)
         unit = xp.ldexp(xp.ones_like(size), power).reshape(trailing)
         named = {name: getattr(found, name) * unit for name in _WITH_UNIT if hasattr(found, name)}
         whole: _T = found._replace(**named)
         return whole
 
     return scaled
-
-
-def _size(b: Array) -> Array:
-    xp = namespace(b)
-    return xp.maximum(abs(b.real), abs(b.imag)).max(axis=0)

@@ -1,6 +1,6 @@
-"""The noise of raw images from the images themselves: what no light at any phase explains.
+"""The noise of raw images from the images themselves.
 
-The images of one frequency are offset + amplitude cos(phase - theta): what of them is orthogonal to
+Those of one frequency are offset + amplitude cos(phase - theta): what of them is orthogonal to
 these three, such as I_0 - I_90 + I_180 - I_270, is noise alone, whatever stands before the camera.
 """
 
@@ -13,10 +13,8 @@ from transientcam_moments.arrays import Array
 from transientcam_moments.noise._ambient import ambient_light
 from transientcam_moments.noise._sensor import ROUNDING_VARIANCE, ImageNoise, Sensor
 
-_IMAGES: Final = 1 << 17
-"""Values of images that are looked at, in pixels spread evenly: enough for 1 %."""
-_LEAST_PIXELS: Final = 1024
-"""But no fewer of them, if there are."""
+_IMAGES, _LEAST_PIXELS = 1 << 17, 1024
+"""Values of images that are looked at, for 1 %, in pixels spread evenly; but no fewer of them."""
 _LEAST: Final = 64
 """Pixels, below which nothing is said."""
 _CLIPPED: Final = 3.0
@@ -87,10 +85,8 @@ def image_noise(captured: CapturedImages, brightness: Array) -> ImageNoise | Non
     Notes
     -----
     A weighted least squares fit, whose weights are its own, of squares within three of its
-    deviations. With three phases there is nothing left of one frequency, but the offset is the same
-    at all of them. What is left of several takes is held against its mean over these, where there
-    is more than noise in it; even harmonics of the light turn with twice the phase, and are fitted
-    along.
+    deviations. Offsets are the same at all frequencies: they serve where there are but three
+    phases. Several takes are held against their mean; even harmonics turn with twice the phase.
     """
     takes, phases_rad, first, saturated_pixels, bad_pixels, left_out, _ = captured
     steps = len(phases_rad)

@@ -97,12 +97,12 @@ class ImageNoise(NamedTuple):
         """Electrons a digital number stands for."""
         return 1 / self.variance_per_dn
 
-    def as_sensor(self, bits: int) -> Sensor:
-        """Return the sensor of whole numbers of so many bits with this noise."""
+    def as_sensor(self, highest_dn: int) -> Sensor:
+        """Return the sensor of whole numbers up to the highest one with this noise."""
         dark_dn, gain = max(self.dark_dn, 0.0), self.gain_e_per_dn
         read = self.image_variance(np.float64(dark_dn - self.dark_dn)) - ROUNDING_VARIANCE
         read_e = math.sqrt(max(read, 0.0)) * gain
-        return Sensor(gain, gain * (1 << bits), read_e, dark_dn, bits)
+        return Sensor(gain, gain * highest_dn, read_e, dark_dn, highest_dn.bit_length())
 
     def image_variance(self, signal: Array) -> Array:
         """Return the variance of one image in DN^2 at a mean signal in DN above the dark level."""

@@ -72,7 +72,7 @@ def undetected_pixels(
     """
     planes = len(moments)
     size = np.ones(planes) if calibration is None else squared(np.asarray(calibration) + 0j)
-    of_light = noise_of(np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])).variance[1]
+    of_light = noise_of(np.eye(3)[1], ambient=np.eye(3)[2]).variance[1]
     dark, lit, other = (_limit(planes - 1) * of_light).tolist()
     with np.errstate(invalid="ignore", over="ignore"):
         most = dark + (lit - dark) * np.maximum(brightness, 0)
@@ -85,7 +85,8 @@ def undetected_pixels(
         noise = smoothed_at(noise_of, brightness, doubtful, sigma_px, ambient=ambient).variance
     else:
         light = brightness.reshape(-1)[doubtful]
-        noise = noise_of(light, 0.0 if ambient is None else ambient.reshape(-1)[doubtful]).variance
+        other = 0.0 if ambient is None else ambient.reshape(-1)[doubtful]
+        noise = noise_of(light, ambient=other).variance
     size = size.reshape((planes, -1))
     size = size if size.shape[1] == 1 else size[:, doubtful]
     found = np.zeros(brightness.size, dtype=bool)

@@ -322,12 +322,10 @@ class Reconstruction:
         None without such a sensor, and where the images do not tell.
         """
         sensor, brightness = self.settings.sensor, np.asarray(self._least_brightness)
-        found = (
-            None
-            if sensor is None or self._images is None
-            else image_noise(self._images, brightness)
-        )
-        if sensor is None or found is None:
+        if sensor is None or self._images is None:
+            return None
+        found = image_noise(self._images, brightness)
+        if found is None:
             return None
         signal = np.median(brightness[brightness > 0]) / 2
         stated = sensor.image_variance(np.maximum(signal + found.dark_dn - sensor.dark_dn, 0))

@@ -320,17 +320,13 @@ class Reconstructor:
         """
         if not isinstance(takes, np.ndarray):
             return None
-        left_out = None
-        if repaired is not None:
-            changed = repaired.repaired | repaired.filled
-            left_out = changed | repaired.left_out | repaired.unrepaired
         return CapturedImages(
             takes,
             self.settings.sampled_rad,
             ZEROTH_IMAGES[zeroth] if zeroth == "on-off" else 0,
             None if recovered is None else recovered.saturated,
             self._bad,
-            left_out,
+            None if repaired is None else np.logical_or.reduce(repaired[1:]),
             self.settings.smoothing_sigma_px,
         )
 

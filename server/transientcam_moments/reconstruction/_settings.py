@@ -16,8 +16,6 @@ CORRUPT_IMAGES = ("keep", "repair", "fill")
 
 OF_ANY_MULTIPLES = ("likelihood", "two-returns", "unwrapped-phase")
 """Estimators that serve moments of any multiples of the base frequency."""
-_LEAST_FOR_PAIRS = 3
-"""Frequencies of which two returns leave something to judge them by."""
 OWN = (
     "pisarenko",
     "maximum-entropy",
@@ -43,7 +41,8 @@ def automatic(multiples: tuple[int, ...] | None) -> str:
     """Return the estimator that "automatic" is for frequencies; none stand for consecutive ones."""
     if not multiples or multiples[-1] == len(multiples):
         return "likelihood"
-    return "two-returns" if len(multiples) >= _LEAST_FOR_PAIRS else "unwrapped-phase"
+    # two returns of three frequencies leave something to judge them by
+    return "two-returns" if len(multiples) > 2 else "unwrapped-phase"
 
 
 def least_harmonics(estimator: str) -> int:

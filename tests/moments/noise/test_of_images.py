@@ -166,7 +166,7 @@ def test_a_reconstruction_measures_the_noise_and_holds_a_stated_sensor_against_i
     assert wrong.noise_ratio == pytest.approx(0.5, abs=0.05)
     assert own.noise_ratio is None
     assert own.image_noise is not None
-    as_sensor = own.image_noise.as_sensor(12)
+    as_sensor = own.image_noise.as_sensor(4095)
     np.testing.assert_allclose(
         as_sensor.image_variance(light) / own.image_noise.image_variance(light), 1, rtol=0.01
     )

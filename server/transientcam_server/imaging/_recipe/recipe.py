@@ -1,7 +1,6 @@
 """How images become moments and moments become returns."""
 
 import logging
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -228,8 +227,7 @@ class Recipe:
         """Return the recipe with the noise that a frame's images show, where none is stated."""
         if self.sensor is not None or found is None or found.image_noise is None:
             return self
-        bits = round(math.log2(self.full_scale + 1))
-        return replace(self, sensor=found.image_noise.as_sensor(bits))
+        return replace(self, sensor=found.image_noise.as_sensor(round(self.full_scale)))
 
     def reconstruct(
         self,
