@@ -200,4 +200,4 @@ def _line(signal: Array, squares: Array, weight: Array, least: float) -> tuple[f
     growth = ((signal - middle) * squares).sum() / spread if spread > 0 else 0.0
     growth = min(max(growth, 0.0), (mean - least) / middle if middle > 0 else 0.0)
     growth = max(growth, _NO_GROWTH)
-    return max(mean - growth * middle, least), growth
+    return float(max(mean - growth * middle, least)), float(growth)
