@@ -12,8 +12,7 @@ from transientcam_moments.noise._moments import MomentNoise
 ASSUMED_NOISE: Final = 0.01
 """Standard deviation over the largest moment, where none is given."""
 _WITH_UNIT: Final = ("weight", "weight_std", "tail", "tail_std")
-_LARGEST_POWER: Final = 126
-"""Of 2, that is a normal number in single precision, as its inverse is."""
+_LARGEST_POWER: Final = 126  # of 2, that is a normal number in single precision, as its inverse
 _P = ParamSpec("_P")
 _T = TypeVar("_T", bound=Any)
 

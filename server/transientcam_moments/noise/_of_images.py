@@ -19,16 +19,13 @@ _LEAST: Final = 64
 """Pixels, below which nothing is said."""
 _CLIPPED: Final = 3.0
 """Deviations beyond which a sample is no noise (motion, an image out of step)."""
-_KEPT: Final = 0.97334
-"""What is left of a normal variable's variance within so many of its deviations."""
+_KEPT: Final = 0.97334  # of a normal variable's variance within so many of its deviations
 _ROUNDS: Final = 5
 _BINS: Final = 16
 _LEAST_SHARE: Final = 1 / 9
-_HALF_NORMAL: Final = 0.6745
-"""Median of the modulus of a normal variable of deviation 1."""
+_HALF_NORMAL: Final = 0.6745  # median of the modulus of a normal variable of deviation 1
 _NO_GROWTH: Final = 1e-9
-_WHOLE: Final = 1e-6
-"""Sum of the phasors of phases that are spread evenly over a period, at most."""
+_WHOLE: Final = 1e-6  # sum of the phasors of phases that are spread evenly, at most
 _BRIGHTENS: Final = 0.5
 """Growth of an offset with half of b_0, from which on it holds the light; tap A less B has none."""
 
