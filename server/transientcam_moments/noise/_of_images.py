@@ -147,9 +147,11 @@ def _samples(
             z = phasor[used, at].mean(axis=0)
             found.append(left.reshape((-1, half.size)))
             turning.append(np.broadcast_to(z * z / np.maximum(abs(z), _NO_GROWTH), found[-1].shape))
-    samples, twice = np.concatenate(found), np.concatenate(turning)
-    constant = np.ones_like(samples)
-    known = np.stack([constant, constant * signal, twice.real, twice.imag], axis=1)
+    samples: Array = np.concatenate(found)
+    twice: Array = np.concatenate(turning)
+    known = np.stack(
+        [0 * samples + 1, 0 * samples + signal, np.real(twice), np.imag(twice)], axis=1
+    )
     return samples, known, signal, dark_dn
 
 
