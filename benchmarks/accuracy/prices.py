@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.accuracy.capturing import SETTINGS, dimmest_dn_per_s, looked, measured
+from benchmarks.accuracy.capturing import dimmest_dn_per_s, looked, measured
 from benchmarks.common.tables import Table
 from transientcam_driver import Sequence as Capture
 from transientcam_experiments.tradeoff.picture import blank, error_picture, errors_m, saved
@@ -40,7 +40,7 @@ def _drawn(scene: str, folder: Path) -> tuple[Front, float]:
     name = Path(scene).stem
     planner, statistics = looked(scene)
     document = planner.tradeoff_document(Goal(), statistics)
-    values, device_s, _ = measured(scene, PRESENT, SETTINGS.technique(noise_known=True), CAPTURES)
+    values, device_s, _ = measured(scene, PRESENT, "likelihood", CAPTURES)
     figure = error_picture(document, name, (device_s, values["error"]))
     (folder / f"accuracy-{name}-error.png").write_bytes(saved(figure, "png"))
     front: Front = document["front"]

@@ -13,7 +13,7 @@ import transientcam_moments as tm
 from benchmarks.common.tables import Cell, Column, Table
 from transientcam_experiments import tradeoff
 from transientcam_moments.comparisons import TECHNIQUES, Technique
-from transientcam_server.settings import Estimator, ReconstructionSettings
+from transientcam_server.settings import Estimator
 
 SCENES = ("mirrors", "corner")
 HARMONICS = (4, 8)
@@ -112,7 +112,7 @@ def _best(records: list[tradeoff.Record], quantity: str) -> str:
 
 def _fewer_outliers(records: list[tradeoff.Record]) -> str:
     """Say which have fewer outliers there than the default."""
-    default = ReconstructionSettings().technique(noise_known=False)
+    default = "pisarenko"
     share = {str(each.point["estimator"]): each.values["range_outliers"] for each in records}
     ours = share[default] or 0.0
     fewer = [f"`{name}`" for name, value in share.items() if value is not None and value < ours]

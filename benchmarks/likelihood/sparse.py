@@ -50,7 +50,7 @@ def _bound() -> Table:
             "b_0, its root mean square over the responses.",
         ],
     )
-    settings = tm.Settings(base_frequency_hz=BASE_HZ)
+    settings = tm.Settings(base_frequency_hz=BASE_HZ, estimator="pisarenko")
     for returns, m in CASES:
         b, phase, weight = scene(returns, m, random)
         noise = tm.noise.MomentNoise(np.full(b.shape, NOISE_SHARE**2))

@@ -49,6 +49,7 @@ from transientcam_server.camera import (
     load_given,
     sensor_of,
     snapshot_of,
+    stated_sensor,
 )
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging import (
@@ -85,6 +86,9 @@ _WORKERS_END_S = 1.0
 _OPEN_S = 5.0
 _KEPT_S = 0.1
 """An answer to what switched the light off waits for the disk no longer."""
+_NOISE_FRAMES: Final = 16
+"""So many frames after another the noise of the images is held against the stated sensor's."""
+_SAME_NOISE: Final = 1.2
 WORKER_THREADS: Final = "worker"
 """What the names of their threads begin with."""
 
@@ -116,6 +120,8 @@ class Service:
         Set once the service ends: what takes long asks for it.
     simulating
         Held while another simulated scene is prepared.
+    sensor
+        As the camera, its origin or the settings state it; None where none does.
     observers
         Notified of every event of the acquisition, and of every frame that was the newest.
     """
@@ -136,7 +142,9 @@ class Service:
             settings.workers, WORKER_THREADS, initializer=tm.kernels.use_one_thread
         )
         self.workers = Workers(self._executor, count=settings.workers)
-        self._sensor = sensor = sensor_of(camera, settings.sensor)
+        self.sensor = stated_sensor(camera, settings.sensor)
+        sensor = sensor_of(camera, settings.sensor)
+        self._noise_checked, self._noise_differs = 0, False
         reconstruction = self._of_origin(
             suited(settings.reconstruction, camera.capabilities.sampling)
         )
@@ -147,7 +155,7 @@ class Service:
             camera,
             reconstruction,
             self.workers,
-            sensor=sensor,
+            sensor=self.sensor,
             calibration=_calibration(camera, settings, kept),
             intrinsics=lambda: self.intrinsics,
             images_known=self.has_images,
@@ -213,11 +221,6 @@ class Service:
             "service_id": self._service_id,
             "path": list(path),
         }
-
-    @property
-    def sensor(self) -> tm.noise.Sensor:
-        """The sensor of the camera, which predictions of noise rest on."""
-        return self._sensor
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
@@ -376,7 +379,7 @@ class Service:
                 "spec": self.settings.camera,
                 "scene": None if simulation is None else simulation.scene,
                 "intrinsics": asdict(self.intrinsics),
-                "sensor": asdict(self._sensor),
+                "sensor": None if self.sensor is None else asdict(self.sensor),
             },
             calibration={"id": calibration_id(gains)},
             calibration_planes=None if gains is None else gains.planes,
@@ -486,7 +489,25 @@ class Service:
             if frame not in computing:
                 for observer in self.observers:
                     observer.superseded(frame.meta())
+                if self.sensor is not None and frame.number >= self._noise_checked + _NOISE_FRAMES:
+                    self._noise_checked = frame.number
+                    self.workers.start(self._check_noise(frame))
         self._superseded = computing
+
+    async def _check_noise(self, frame: Frame) -> None:
+        """Notify clients when the images of a frame are not as noisy as their sensor is stated."""
+        ratio = await frame.noise_ratio()
+        if ratio is None:
+            return
+        differs = not 1 / _SAME_NOISE <= ratio <= _SAME_NOISE
+        if differs != self._noise_differs:
+            self._noise_differs, reason = differs, None
+            if differs:
+                reason = (
+                    f"The images scatter {ratio:.2f} times as much as the stated sensor's would"
+                )
+                _log.warning("%s", reason)
+            self.hub.notify("noise-differs", {"ratio": ratio, "reason": reason})
 
     async def _keep_light(self) -> None:
         """Prove to the camera's thread, again and again, that clients are served and use it."""

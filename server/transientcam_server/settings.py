@@ -15,7 +15,7 @@ from transientcam_compiled import cores
 from transientcam_moments.comparisons import TECHNIQUES
 from transientcam_moments.reconstruction import ESTIMATORS, least_harmonics
 
-_DEFAULTS = tm.Settings()  # the paper's
+_DEFAULTS = tm.Settings()
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -67,8 +67,7 @@ class ReconstructionSettings(_Group):
     """Weight from which a return counts as the first, over the pixel's strongest return."""
     estimator: Estimator = "automatic"
     """What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
-    least over the scenes of docs/likelihood.md together, and `pisarenko` where the noise of the
-    sensor is not known; each frame names its `estimator`. The paper's are `pisarenko` and
+    least over the scenes of docs/likelihood.md together; each frame names its `estimator`. The paper's are `pisarenko` and
     `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
     frequencies; for those with gaps `automatic` is `two-returns`, or `unwrapped-phase` where there
     are but two. The others are there for comparison. Until its kernel is compiled the same
@@ -82,20 +81,10 @@ class ReconstructionSettings(_Group):
     """Odd harmonics of the modulation, where the calibration has measured them: taken out of the
     moments, or kept in them."""
 
-    def technique(self, *, noise_known: bool) -> str:
-        """Return the estimator by its name in `transientcam_moments`.
-
-        ``automatic`` is the likelihood where the noise of the sensor is known, and Pisarenko's
-        returns elsewhere: what the likelihood then assumes is no measurement.
-        """
-        if self.estimator != "automatic":
-            return self.estimator
-        return "likelihood" if noise_known else "pisarenko"
-
     @property
     def least_harmonics(self) -> int:
         """The smallest number of harmonics that the estimator gives a range of."""
-        return least_harmonics(self.technique(noise_known=True))
+        return least_harmonics(self.estimator)
 
     def for_moments(self, **others: Any) -> tm.Settings:
         """Return these settings as `tm.Settings`, together with its other ones."""
@@ -103,7 +92,7 @@ class ReconstructionSettings(_Group):
             epsilon=self.bias,
             smoothing_sigma_px=self.smoothing_px,
             threshold=self.return_threshold,
-            estimator=self.technique(noise_known=others.get("sensor") is not None),
+            estimator=self.estimator,
             minimum_brightness=self.minimum_brightness_dn,
             spoilt_images=self.spoilt_images,
             **others,
@@ -111,7 +100,10 @@ class ReconstructionSettings(_Group):
 
 
 class SensorSettings(_Group):
-    """The sensor of a real camera, from its data sheet; predictions of accuracy rest on it."""
+    """The sensor of a real camera, from its data sheet, if any of it is stated: predictions of
+    accuracy rest on it. Where nothing is, plans assume these, and the noise of frames is measured
+    in their images.
+    """
 
     gain_e_per_dn: _Finite = Field(default=9.0, gt=0.0)
     """Electrons a digital number stands for."""

@@ -110,6 +110,11 @@ NOTICES: Final[dict[str, NoticeKind]] = {
             {"calibration_id": "string", "reason": _OR_NIL},
         ),
         NoticeKind(
+            "noise-differs",
+            "images scatter otherwise than the stated sensor's, or, without a reason, no longer",
+            {"ratio": "number", "reason": _OR_NIL},
+        ),
+        NoticeKind(
             "reconstruction-changed",
             "how frames are computed from now on",
             {"reconstruction": "object"},

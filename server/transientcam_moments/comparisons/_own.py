@@ -7,7 +7,7 @@ from transientcam_moments.comparisons._estimate import (
     SparseEstimate,
 )
 from transientcam_moments.comparisons._technique import Technique, from_first, from_zeroth
-from transientcam_moments.likelihood import assumed_noise, likelihood, merge_returns
+from transientcam_moments.likelihood import likelihood, merge_returns
 from transientcam_moments.moment_problem import levinson, pisarenko
 
 
@@ -33,8 +33,7 @@ def merged_estimate(b: Array) -> SparseEstimate:
 
     Their noise is not known here: it is what `transientcam_moments.likelihood` assumes.
     """
-    found = pisarenko(b)
-    merged = merge_returns(found, assumed_noise(b))
+    merged = merge_returns(pisarenko(b))
     return SparseEstimate(merged.phase_rad, merged.weight, merged.uniform)
 
 

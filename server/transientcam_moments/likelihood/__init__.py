@@ -34,7 +34,6 @@ from transientcam_moments.likelihood._choice import (
 from transientcam_moments.likelihood._estimate import (
     MODEL_ERROR,
     Likelihood,
-    assumed_noise,
     fitted,
     likelihood,
     places_of,
@@ -88,7 +87,6 @@ __all__ = [
     "Unwrapped",
     "X",
     "Y",
-    "assumed_noise",
     "chi_square_quantile",
     "choice",
     "fitted",

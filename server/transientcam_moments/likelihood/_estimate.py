@@ -30,10 +30,8 @@ from transientcam_moments.likelihood._chi_square import (
 from transientcam_moments.likelihood._choice import MARGIN, MOST_RETURNS, TAIL_SHAPE
 from transientcam_moments.likelihood._planar import Data, fit
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, Returns, Separation, separate
-from transientcam_moments.noise import MomentNoise
+from transientcam_moments.noise import MomentNoise, free_of_scale
 
-ASSUMED_NOISE: Final = 0.01
-"""Standard deviation over the largest moment, where none is given."""
 MODEL_ERROR: Final = 4e-3
 """What calibration, and light of no model, leave in the moments of a camera, over the largest: as
 large as the bias of Sec. 4.3. docs/likelihood.md has the evidence."""
@@ -174,8 +172,8 @@ def likelihood(
     noise : MomentNoise, optional
         Of shape (N, ...) or (N,). Moments with a variance that is 0, infinite or NaN count as not
         measured, and may be anything: as b_0 of ``zeroth="estimated"``. When left out, every part
-        of a moment has the standard deviation `ASSUMED_NOISE` times the pixel's largest one, and
-        all that is said of deviations and chi-square is relative to that.
+        of a moment has the standard deviation `noise.ASSUMED_NOISE` times the pixel's largest one,
+        and all that is said of deviations and chi-square is relative to that.
     harmonics : sequence of int, optional
         Which multiples of the base frequency they are, N different ones of 0 to 32 in any order;
         0 to N - 1 when left out.
@@ -224,9 +222,10 @@ def likelihood(
     return fitted(b, noise, on_threads(threads), harmonics, returns, tail_shape, model_error)
 
 
+@free_of_scale
 def fitted(
     b: Array,
-    noise: MomentNoise | None,
+    noise: MomentNoise,
     spread: Spread,
     harmonics: Sequence[int] | None = None,
     returns: int = MOST_RETURNS,
@@ -250,7 +249,7 @@ def fitted(
 
 def dense(
     planes: Array,
-    noise: MomentNoise | None,
+    noise: MomentNoise,
     harmonics: Sequence[int] | None,
     trailing: tuple[int, ...],
 ) -> tuple[Array, Array]:
@@ -280,12 +279,10 @@ def places_of(harmonics: Sequence[int] | None, count: int) -> tuple[int, ...]:
     return places
 
 
-def variance_of(noise: MomentNoise | None, planes: Array, trailing: tuple[int, ...]) -> Array:
+def variance_of(noise: MomentNoise, planes: Array, trailing: tuple[int, ...]) -> Array:
     """Return the variance (N, P) of each part of the moments; raises as `likelihood`."""
     xp = namespace(planes)
     real = planes.real.dtype
-    if noise is None:
-        return as_array(assumed_noise(planes).variance)
     variance = as_array(noise.variance)
     shape = tuple(variance.shape)
     if shape not in ((planes.shape[0],), (planes.shape[0], *trailing)):
@@ -293,13 +290,6 @@ def variance_of(noise: MomentNoise | None, planes: Array, trailing: tuple[int, .
         raise ShapeError("noise", f"of shape {shape}", expected)
     flat = variance.reshape((planes.shape[0], -1))
     return xp.broadcast_to(xp.asarray(flat).astype(real), planes.shape)
-
-
-def assumed_noise(b: Array) -> MomentNoise:
-    """Return the noise of moments (m + 1, ...) where none is known: `ASSUMED_NOISE`."""
-    xp = namespace(b)
-    size = xp.maximum(abs(b.real), abs(b.imag)).max(axis=0)
-    return MomentNoise(xp.broadcast_to((ASSUMED_NOISE * size) ** 2, b.shape).astype(b.real.dtype))
 
 
 @accelerated("likelihood")

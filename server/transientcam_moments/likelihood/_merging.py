@@ -6,19 +6,20 @@ from transientcam_moments.arrays import Array, as_array, in_turn, namespace, squ
 from transientcam_moments.errors import ShapeError
 from transientcam_moments.likelihood._chi_square import SIGNIFICANCE, chi_square_quantile
 from transientcam_moments.moment_problem import Returns
-from transientcam_moments.noise import MomentNoise
+from transientcam_moments.noise import ASSUMED_NOISE, MomentNoise
 
 
-def merge_returns(returns: Returns, noise: MomentNoise) -> Returns:
+def merge_returns(returns: Returns, noise: MomentNoise | None = None) -> Returns:
     """Merge neighbouring returns wherever one return explains the moments as well, but for noise.
 
     Parameters
     ----------
     returns : Returns
         From `pisarenko`, of shape (m, ...).
-    noise : MomentNoise
+    noise : MomentNoise, optional
         Of the moments, (m + 1, ...) or (m + 1,). Moments with a variance that is 0, infinite or NaN
-        count as not measured.
+        count as not measured; where no b_j was, nothing is merged. When left out, `ASSUMED_NOISE`
+        times the light of the pixel.
 
     Returns
     -------
@@ -40,20 +41,27 @@ def merge_returns(returns: Returns, noise: MomentNoise) -> Returns:
     """
     xp = namespace(returns.weight)
     slots, trailing = returns.weight.shape[0], tuple(returns.weight.shape[1:])
-    variance = as_array(noise.variance)
-    if tuple(variance.shape) not in ((slots + 1,), (slots + 1, *trailing)):
-        expected = f"({slots + 1},) or {(slots + 1, *trailing)}"
-        raise ShapeError("noise", f"of shape {tuple(variance.shape)}", expected)
     real = returns.weight.dtype
-    variance = variance.reshape((slots + 1, -1))[1:]
+    phase, weight = (part.reshape((slots, -1)) for part in returns[:2])
+    count, before = returns.count.reshape(-1), weight.sum(axis=0)
+    # in parts of the light, whose squares neither vanish nor overflow
+    light = before + xp.maximum(returns.uniform.reshape(-1), 0)
+    light = xp.where(light > 0, light, 1)
+    if noise is None:
+        variance = xp.full((slots, 1), ASSUMED_NOISE**2)
+    else:
+        variance = as_array(noise.variance)
+        if tuple(variance.shape) not in ((slots + 1,), (slots + 1, *trailing)):
+            expected = f"({slots + 1},) or {(slots + 1, *trailing)}"
+            raise ShapeError("noise", f"of shape {tuple(variance.shape)}", expected)
+        variance = variance.reshape((slots + 1, -1))[1:] / light / light
     known = (variance > 0) & (variance < np.inf)
     precision = xp.where(known, 1 / xp.where(known, variance, 1), 0).astype(real)
-    phase, weight = (part.reshape((slots, -1)) for part in returns[:2])
-    count = returns.count.reshape(-1)
-    before = weight.sum(axis=0)
+    weight = weight / light
     limit = chi_square_quantile(2 * slots, SIGNIFICANCE)
     for _ in range(slots - 1):
         phase, weight, count = _merge_once(phase, weight, count, precision, limit)
+    weight = weight * light
     lost = before - weight.sum(axis=0)
     return Returns(
         phase.reshape((slots, *trailing)).astype(real),
@@ -89,7 +97,7 @@ def _merge_once(
     misfit = all_of - total * shared
     misfit = xp.where((slot < count) & (count > 1), misfit, np.inf)
     best = xp.argmin(misfit, axis=0)[None]
-    fits = (xp.take_along_axis(misfit, best, axis=0) <= limit)[0]
+    fits = (xp.take_along_axis(misfit, best, axis=0) <= limit)[0] & (precision > 0).any(axis=0)
     here = fits & (slot == best)
     gone = fits & (slot == xp.take_along_axis(after, best, axis=0))
     merged = in_turn(xp.arctan2(mean.imag, mean.real))

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from transientcam_compiled import Spread
 from transientcam_moments._dispatch import accelerated, on_threads
 from transientcam_moments.arrays import Array, by_blocks, in_range, moment_planes, namespace
+from transientcam_moments.errors import ParameterError
 from transientcam_moments.likelihood import _pair_fit as pair_fit
 from transientcam_moments.likelihood._choice import COUNT, PLANES, SCORE, nothing
 from transientcam_moments.likelihood._estimate import Likelihood, dense, prepared, results
 from transientcam_moments.likelihood._planar import Data, SharpFit, varied, where
 from transientcam_moments.likelihood._sharp import SETTLED
-from transientcam_moments.noise import MomentNoise
+from transientcam_moments.noise import MomentNoise, free_of_scale
 
 PHASES_PER_PERIOD: Final = 8
 """Of the grid, in a period of the highest frequency; docs/cameras.md has what is missed."""
@@ -89,7 +90,8 @@ def two_returns(
     ShapeError
         When `b` is not 2 to 33 planes of numbers, or noise or harmonics don't fit it.
     ParameterError
-        For other harmonics or model errors, and for less than one thread.
+        For other harmonics or model errors, for less than one thread, and for arrays that JAX
+        traces: two returns are found with NumPy, outside of `jax.jit` and `jax.grad`.
 
     Notes
     -----
@@ -103,9 +105,10 @@ def two_returns(
     return fitted_pairs(b, noise, on_threads(threads), harmonics, model_error)
 
 
+@free_of_scale
 def fitted_pairs(
     b: Array,
-    noise: MomentNoise | None,
+    noise: MomentNoise,
     spread: Spread,
     harmonics: Sequence[int] | None = None,
     model_error: float = 0.0,
@@ -114,7 +117,11 @@ def fitted_pairs(
     planes, trailing = moment_planes(b)
     in_range("model_error", model_error, 0.0, 1.0, "0 to 1")
     xp = namespace(planes)
-    filled = (np.asarray(part) for part in dense(planes, noise, harmonics, trailing))
+    try:
+        filled = [np.asarray(part) for part in dense(planes, noise, harmonics, trailing)]
+    except TypeError as error:  # JAX's, of an array that has no values yet
+        limit = "an array with values: pairs are chosen by these, outside of jax.jit and jax.grad"
+        raise ParameterError("b", type(planes).__name__, limit) from error
     found = _estimated(*filled, float(model_error), spread=spread)
     shaped = (xp.asarray(part).reshape((*part.shape[:-1], *trailing)) for part in found)
     return Likelihood._make([*shaped, 0])

@@ -26,7 +26,7 @@ from transientcam_moments.likelihood._chi_square import (
 )
 from transientcam_moments.likelihood._estimate import places_of, variance_of
 from transientcam_moments.moment_problem import Separation
-from transientcam_moments.noise import MomentNoise
+from transientcam_moments.noise import MomentNoise, free_of_scale
 
 SAME_DEVIATIONS: Final = 4.0
 """Wrap counts whose phases are no further apart than so many deviations are one hypothesis."""
@@ -134,6 +134,8 @@ def unwrap(
 
     Notes
     -----
+    Noise smaller than the rounding of the moments' precision counts as that large.
+
     Minimises sum_j (arg b_j + 2 pi n_j - j phi)^2 / s_j^2 over phi and whole n_j, with
     s_j = std(b_j) / |b_j|; compare Droeschel, Holz and Behnke 2010 (Multi-frequency phase
     unwrapping for time-of-flight cameras), who do so for two frequencies. As phi goes around, the
@@ -141,6 +143,13 @@ def unwrap(
     constant, so that these intervals, as many as the sum of all j / g, are all wrap counts that
     can be the best.
     """
+    return _unwrapped(b, noise, harmonics, model_error)
+
+
+@free_of_scale
+def _unwrapped(
+    b: Array, noise: MomentNoise, harmonics: Sequence[int] | None, model_error: float
+) -> Unwrapped:
     planes, trailing = moment_planes(b)
     in_range("model_error", model_error, 0.0, 1.0, "0 to 1")
     places = places_of(harmonics, planes.shape[0])
@@ -168,8 +177,10 @@ def _unwrap(b: Array, variance: Array, multiples: list[int], error: float) -> tu
         size = xp.where(seen, abs(b), 0)
         largest = size.max(axis=0)
         usable = xp.isfinite(largest) & (largest > 0)
-        inverse = xp.where(seen & usable, 1 / (variance + (error * largest) ** 2), 0)
-        precision = xp.where(usable, inverse * size * size, 0)
+        # over the largest moment: the squares of what is small neither vanish nor overflow
+        noise = xp.maximum(xp.sqrt(variance) / largest, 4 * float(np.finfo(size.dtype).eps))
+        inverse = xp.where(seen & usable, 1 / (noise**2 + error**2), 0)
+        precision = xp.where(usable, inverse * (size / largest) ** 2, 0)
         angle = xp.where(seen & usable, xp.arctan2(b.imag, b.real), 0)
         std = 1 / xp.sqrt(_sum(j * j * each for j, each in zip(coprime, precision, strict=True)))
         best, phase, second = _search(list(angle), list(precision), coprime, SAME_DEVIATIONS * std)

@@ -72,7 +72,9 @@ def smallest_eigenvalue(b: Array) -> Array:
 
     Notes
     -----
-    Sec. 4.3 and 5.1; Householder's reflections, then Laguerre's iteration.
+    Sec. 4.3 and 5.1; Householder's reflections, then Laguerre's iteration. JAX compiles it, `bias`
+    and `estimate_zeroth`, but has no derivative of them: `jax.grad` raises ValueError, and forward
+    mode gives NaN. What follows from moments that need no biasing (`levinson`, `density`) has one.
     """
     planes, trailing = moment_planes(b)
     return _eigenvalues(planes).reshape(trailing)

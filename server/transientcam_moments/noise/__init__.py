@@ -1,9 +1,9 @@
 """How noise of the sensor becomes uncertainty of moments, returns, range and density.
 
 From a sensor to the covariance of calibrated moments (`moment_noise`), from there to first order
-to the returns (`return_noise`) and the density (`density_noise`, `density_std`), with the bound
-that no unbiased estimate of the returns falls below (`cramer_rao`). `return_noise` and
-`density_noise` mark where first order holds. Where it does not, `draw` gives noisy moments to put
+to the returns (`return_noise`) and the density (`density_std`), with the bound
+that no unbiased estimate of the returns falls below (`cramer_rao`). `return_noise` marks
+where first order holds. Where it does not, `draw` gives noisy moments to put
 through the estimator itself. ::
 
     noise = tm.noise.moment_noise(b[0].real, sensor, calibration=gain, zeroth="on-off")
@@ -17,8 +17,9 @@ from transientcam_moments.noise import (
     _interpolation as interpolation,
 )
 from transientcam_moments.noise._ambient import ambient_light
+from transientcam_moments.noise._assumed import ASSUMED_NOISE, free_of_scale
 from transientcam_moments.noise._cramer_rao import CramerRao, cramer_rao
-from transientcam_moments.noise._density import DensityNoise, density_noise, density_std
+from transientcam_moments.noise._density import density_std
 from transientcam_moments.noise._draws import draw
 from transientcam_moments.noise._moments import (
     MomentNoise,
@@ -29,23 +30,27 @@ from transientcam_moments.noise._moments import (
     smoothed_of,
     smoothing_factor,
 )
+from transientcam_moments.noise._of_images import CapturedImages, image_noise
 from transientcam_moments.noise._returns import ReturnNoise, direct_phase_noise, return_noise
 from transientcam_moments.noise._scatter import scatter
-from transientcam_moments.noise._sensor import Sensor
+from transientcam_moments.noise._sensor import ImageNoise, Sensor
 
 __all__ = [
+    "ASSUMED_NOISE",
+    "CapturedImages",
     "CramerRao",
-    "DensityNoise",
+    "ImageNoise",
     "MomentNoise",
     "ReturnNoise",
     "Sensor",
     "ambient_light",
     "cramer_rao",
-    "density_noise",
     "density_std",
     "direct_phase_noise",
     "draw",
     "first_order",
+    "free_of_scale",
+    "image_noise",
     "interpolation",
     "moment_noise",
     "own_share",

@@ -11,7 +11,7 @@ import numpy as np
 
 from transientcam_moments.arrays import Array
 from transientcam_moments.images import smooth
-from transientcam_moments.noise._sensor import Sensor
+from transientcam_moments.noise._sensor import ImageNoise, Sensor
 
 _LOOKED_AT: Final = 4096
 """Pixels, spread evenly, that say whether there is ambient light."""
@@ -25,7 +25,7 @@ _FEW: Final = 0.01
 def ambient_light(
     images: Array,
     brightness: Array,
-    sensor: Sensor,
+    sensor: Sensor | ImageNoise,
     *,
     sigma_px: float = 0.0,
     bad_pixels: Array | None = None,
@@ -38,7 +38,7 @@ def ambient_light(
         Of one frequency, at phases that are spread evenly over a period.
     brightness : array, shape (...)
         b_0 in DN, smoothed; NaN where it is not known.
-    sensor : Sensor
+    sensor : Sensor or ImageNoise
         Its dark level is that of the images.
     sigma_px : float
         With which the brightness was smoothed: so is the mean of the images.
@@ -67,7 +67,7 @@ def ambient_light(
     return np.maximum(np.nan_to_num(signal - brightness / 2), 0).astype(brightness.dtype)
 
 
-def _any(images: Array, brightness: Array, sensor: Sensor) -> bool:
+def _any(images: Array, brightness: Array, sensor: Sensor | ImageNoise) -> bool:
     """Whether more pixels have clearly more light than b_0 explains than have clearly less."""
     flat = brightness.reshape(-1)
     step = max(1, flat.size // _LOOKED_AT)

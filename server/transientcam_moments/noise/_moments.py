@@ -26,7 +26,7 @@ from transientcam_moments.images import (
     phase_noise,
     smooth,
 )
-from transientcam_moments.noise._sensor import Sensor
+from transientcam_moments.noise._sensor import ImageNoise, Sensor
 
 _FEW = 1 / 16
 """Share of the pixels up to which their neighbourhoods are quicker to average one by one."""
@@ -47,28 +47,10 @@ class MomentNoise(NamedTuple):
         """State the shapes and spans of its arrays."""
         return summary(self)
 
-    def covariance(self) -> Array:
-        """Return the covariance (2m + 1, 2m + 1, ...) of b_0, Re b_1, Im b_1, ..., Im b_m."""
-        xp = namespace(self.variance)
-        each = xp.concatenate([self.variance[:1], xp.repeat(self.variance[1:], 2, axis=0)])
-        identity = xp.eye(each.shape[0], dtype=each.dtype)
-        return identity.reshape(identity.shape + (1,) * (each.ndim - 1)) * each[None]
-
-    def deviation(self, gradient: Array) -> Array:
-        """Return the standard deviation (...) of a quantity q with dq = Re sum conj(gradient) db.
-
-        Parameters
-        ----------
-        gradient : array, shape (m + 1, ...)
-            Of q with respect to the moments.
-        """
-        xp = namespace(self.variance)
-        return xp.sqrt((squared(gradient) * self.variance).sum(axis=0))
-
 
 def moment_noise(
     brightness: Array,
-    sensor: Sensor,
+    sensor: Sensor | ImageNoise,
     *,
     calibration: Array,
     zeroth: str,
@@ -82,7 +64,7 @@ def moment_noise(
     ----------
     brightness : array, shape (...)
         b_0 in DN at the exposure of one image; values below 0 count as 0.
-    sensor : Sensor
+    sensor : Sensor or ImageNoise
         What turns light into numbers.
     calibration : array, shape (m + 1,) or (m + 1, ...)
         The gains that the measured moments are divided by: of the sub-phases

@@ -16,6 +16,9 @@ CLEAR = 8.0
 """Standard deviations that returns must keep from vanishing, from each other, from the ends of the
 turn and from the threshold for first order to hold."""
 
+_ROUNDING = 1024.0
+"""Of sums of terms that cancel each other, in eps: they are known to a thousandth."""
+
 
 class ReturnNoise(NamedTuple):
     """Standard deviations of returns; shapes as of `Returns` and `Separation`.
@@ -165,8 +168,10 @@ def _first(returns: Returns, used: Array, threshold: float) -> Array:
 
 
 def _of_sum(bound: CramerRao, chosen: Array) -> Array:
-    """Variance of the sum of the chosen weights."""
+    """Variance of the sum of the chosen weights; at least what rounding leaves of its terms."""
     xp = namespace(bound.covariance)
     count = chosen.shape[0]
     both = chosen[:, None] & chosen[None]
-    return xp.where(both, bound.covariance[:count, :count], 0).sum(axis=(0, 1))
+    terms = xp.where(both, bound.covariance[:count, :count], 0)
+    least = _ROUNDING * float(np.finfo(terms.dtype).eps) * abs(terms).sum(axis=(0, 1))
+    return xp.maximum(terms.sum(axis=(0, 1)), least)

@@ -2,11 +2,14 @@
 
 import math
 from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
 
 from transientcam_moments.arrays import Array
 from transientcam_moments.errors import ParameterError
 
-_ROUNDING_VARIANCE = 1 / 12
+ROUNDING_VARIANCE = 1 / 12
 """Of rounding to whole digital numbers, spread evenly over one."""
 
 
@@ -69,4 +72,38 @@ class Sensor:
         so does rounding, as long as the noise before it is no finer than a digital number.
         """
         gain = self.gain_e_per_dn
-        return signal / gain + (self.read_noise_e / gain) ** 2 + _ROUNDING_VARIANCE
+        return signal / gain + (self.read_noise_e / gain) ** 2 + ROUNDING_VARIANCE
+
+
+class ImageNoise(NamedTuple):
+    """Variance of raw images, a straight line over their signal, as a `Sensor` has it.
+
+    Attributes
+    ----------
+    dark_variance : float
+        Of an image without signal, in DN^2: read noise, and light that all pixels have.
+    variance_per_dn : float
+        What a DN of signal adds, in DN: the inverse gain.
+    dark_dn : float
+        What counts as no signal.
+    """
+
+    dark_variance: float
+    variance_per_dn: float
+    dark_dn: float
+
+    @property
+    def gain_e_per_dn(self) -> float:
+        """Electrons a digital number stands for."""
+        return 1 / self.variance_per_dn
+
+    def as_sensor(self, highest_dn: int) -> Sensor:
+        """Return the sensor of whole numbers up to the highest one with this noise."""
+        dark_dn, gain = max(self.dark_dn, 0.0), self.gain_e_per_dn
+        read = self.image_variance(np.float64(dark_dn - self.dark_dn)) - ROUNDING_VARIANCE
+        read_e = math.sqrt(max(read, 0.0)) * gain
+        return Sensor(gain, gain * highest_dn, read_e, dark_dn, highest_dn.bit_length())
+
+    def image_variance(self, signal: Array) -> Array:
+        """Return the variance of one image in DN^2 at a mean signal in DN above the dark level."""
+        return signal * self.variance_per_dn + self.dark_variance

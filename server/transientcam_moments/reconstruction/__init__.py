@@ -9,6 +9,7 @@ from transientcam_moments.reconstruction._settings import (
     ESTIMATORS,
     OF_ANY_MULTIPLES,
     Settings,
+    automatic,
     least_harmonics,
 )
 
@@ -22,6 +23,7 @@ __all__ = [
     "Reconstruction",
     "Reconstructor",
     "Settings",
+    "automatic",
     "flags",
     "least_harmonics",
     "range_m",

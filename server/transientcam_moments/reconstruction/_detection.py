@@ -1,13 +1,13 @@
 """Whether a pixel's moments are more than noise: else their phases, and a range, mean nothing."""
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 
 from transientcam_moments.arrays import Array, squared
 from transientcam_moments.likelihood import chi_square_quantile
-from transientcam_moments.noise import MomentNoise, Sensor, moment_noise, smoothed_at
-from transientcam_moments.reconstruction._settings import Settings
+from transientcam_moments.noise import MomentNoise, smoothed_at
 
 FALSE_ALARMS: Final = 0.005
 """Share of the pixels without light that are taken for lit."""
@@ -38,8 +38,8 @@ def undetected(moments: Array, noise: MomentNoise) -> Array:
 def undetected_pixels(
     moments: Array,
     brightness: Array,
-    settings: Settings,
-    sensor: Sensor,
+    noise_of: Callable[..., MomentNoise],
+    sigma_px: float,
     calibration: Array | None,
     ambient: Array | None,
 ) -> Array | None:
@@ -48,11 +48,13 @@ def undetected_pixels(
     Parameters
     ----------
     moments : NumPy array, shape (m + 1, ...)
-        Smoothed by the settings.
+        Smoothed.
     brightness : array, shape (...)
         What is known of b_0.
-    settings
-        With ``zeroth`` and ``takes``.
+    noise_of : callable
+        Returns the noise of moments that no gain was taken out of, as `smoothed_of` takes it.
+    sigma_px : float
+        With which they were smoothed.
     calibration : array, shape (m + 1,) or (m + 1, ...), optional
         Gains that the moments were divided by; 1, when left out.
     ambient : array, shape (...), optional
@@ -69,21 +71,8 @@ def undetected_pixels(
     b_1 alone is above that is lit, and needs no look at its neighbours.
     """
     planes = len(moments)
-
-    def noise_of(light: Array, ambient: Array | float = 0.0) -> MomentNoise:
-        """Return the noise of moments that no gain was taken out of."""
-        return moment_noise(
-            light,
-            sensor,
-            calibration=np.ones(planes),
-            zeroth=str(settings.zeroth),
-            takes=settings.takes or 1,
-            ambient=ambient,
-            phases_rad=settings.sampled_rad,
-        )
-
     size = np.ones(planes) if calibration is None else squared(np.asarray(calibration) + 0j)
-    of_light = noise_of(np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])).variance[1]
+    of_light = noise_of(np.eye(3)[1], ambient=np.eye(3)[2]).variance[1]
     dark, lit, other = (_limit(planes - 1) * of_light).tolist()
     with np.errstate(invalid="ignore", over="ignore"):
         most = dark + (lit - dark) * np.maximum(brightness, 0)
@@ -92,13 +81,12 @@ def undetected_pixels(
         doubtful = np.flatnonzero(~(squared(moments[1]) * size[1] >= most))
     if not doubtful.size:
         return None
-    if moments.ndim == 3 and settings.smoothing_sigma_px > 0:
-        noise = smoothed_at(
-            noise_of, brightness, doubtful, settings.smoothing_sigma_px, ambient=ambient
-        ).variance
+    if moments.ndim == 3 and sigma_px > 0:
+        noise = smoothed_at(noise_of, brightness, doubtful, sigma_px, ambient=ambient).variance
     else:
         light = brightness.reshape(-1)[doubtful]
-        noise = noise_of(light, 0.0 if ambient is None else ambient.reshape(-1)[doubtful]).variance
+        other = 0.0 if ambient is None else ambient.reshape(-1)[doubtful]
+        noise = noise_of(light, ambient=other).variance
     size = size.reshape((planes, -1))
     size = size if size.shape[1] == 1 else size[:, doubtful]
     found = np.zeros(brightness.size, dtype=bool)

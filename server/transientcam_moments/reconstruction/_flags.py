@@ -18,8 +18,8 @@ class Flags(IntFlag):
     Few sharp returns leave none, and noise takes it from others: normal.
     """
     NO_SIGNAL = 2
-    """No light: b_0 is not above the least brightness, or no moment is above the noise, where that
-    is known."""
+    """No light: b_0 is not above the least brightness, or no other moment is above the noise, or
+    above rounding where noise is not known: uniform light, or for m = 1 opposite returns."""
     SATURATED = 4
     """An image was at the end of its scale.
 
@@ -73,7 +73,8 @@ def flags(b: Array, *, minimum_brightness: float = 0.0, eigenvalue: Array | None
     Returns
     -------
     array, shape (...), uint8
-        Of `Flags`: NON_FINITE, NO_SIGNAL and DEGENERATE. A pixel carries the first that applies.
+        Of `Flags`: NON_FINITE, NO_SIGNAL (also where b_1 to b_m are 0) and DEGENERATE. A pixel
+        carries the first that applies.
 
     Raises
     ------
@@ -90,9 +91,9 @@ def flags(b: Array, *, minimum_brightness: float = 0.0, eigenvalue: Array | None
     finite = xp.isfinite(planes[0].imag)
     for part in (b0, *(plane.real for plane in planes[1:]), *(plane.imag for plane in planes[1:])):
         finite = finite & (abs(part) < largest)
-    dark = finite & ~(b0 > minimum_brightness)
     # an eigenvalue is known to about eps times the order of the matrix
     rounding = 4 * len(planes) * float(limits.eps)
+    dark = finite & ~((b0 > minimum_brightness) & (abs(planes[1:]).max(axis=0) > rounding * b0))
     degenerate = finite & ~dark & ~(smallest.reshape(-1) > rounding * b0)
     out = xp.where(finite, 0, int(Flags.NON_FINITE))
     out = xp.where(dark, int(Flags.NO_SIGNAL), out)

@@ -16,7 +16,6 @@ from transientcam_moments.likelihood import (
     MOST_RETURNS,
     Likelihood,
     Unwrapped,
-    assumed_noise,
     fitted,
     fitted_pairs,
     merge_returns,
@@ -37,7 +36,16 @@ from transientcam_moments.moment_problem import (
     separate,
     smallest_eigenvalue,
 )
-from transientcam_moments.noise import MomentNoise, moment_noise, scatter, smoothed_of
+from transientcam_moments.noise import (
+    CapturedImages,
+    ImageNoise,
+    MomentNoise,
+    Sensor,
+    image_noise,
+    moment_noise,
+    scatter,
+    smoothed_of,
+)
 from transientcam_moments.reconstruction._detection import undetected, undetected_pixels
 from transientcam_moments.reconstruction._flags import INVALID, Flags, flags
 from transientcam_moments.reconstruction._ranging import range_m
@@ -75,9 +83,8 @@ class Reconstruction:
         What is taken out of the moments once they are smoothed.
     spread : callable, optional
         How the likelihood uses several threads, as `kernels.over` returns it.
-    other_light : callable, optional
-        Returns the light (...) that is not the camera's, of the brightness: it has noise, too. None
-        stands for none.
+    images : CapturedImages, optional
+        What the moments were measured from, which tells their noise.
 
     Raises
     ------
@@ -99,7 +106,7 @@ class Reconstruction:
         calibration: Array | None = None,
         correction: HarmonicCorrection | None = None,
         spread: Spread = at_once,
-        other_light: Callable[[Array], Array | None] | None = None,
+        images: CapturedImages | None = None,
     ) -> None:
         if not (settings.consecutive or self._of_any_multiples):
             raise ParameterError("multiples", settings.multiples, "1 to m")
@@ -112,7 +119,7 @@ class Reconstruction:
         self._kept = kept
         self._repaired = repaired
         self._calibration = calibration
-        self._other_light = other_light
+        self._images = images
 
     @cached_property
     def measured(self) -> Array:
@@ -200,7 +207,7 @@ class Reconstruction:
     @cached_property
     def flags(self) -> Array:
         """Flags of every pixel, uint8 of `Flags`."""
-        if self.settings.estimator not in OF_ANY_MULTIPLES or self.noise is None:
+        if self.settings.technique not in OF_ANY_MULTIPLES or self.noise is None:
             return self._flags_of_moments
         xp = namespace(self.smoothed)
         estimate = self.estimate
@@ -233,18 +240,27 @@ class Reconstruction:
     @cached_property
     def _undetected(self) -> Array | None:
         """Where the moments are no more than noise; None where none are, or it isn't known."""
-        sensor, moments = self.settings.sensor, self.smoothed
-        if sensor is None or self.settings.zeroth is None or self.settings.takes is None:
+        moments, noise_of = self.smoothed, self._noise_of(None)
+        if noise_of is None:
             return None
         if not isinstance(moments, np.ndarray):
             return undetected(moments, self.noise) if self.noise is not None else None
-        return undetected_pixels(
-            moments,
-            self._least_brightness,
-            self.settings,
-            sensor,
-            self._calibration,
-            self.ambient,
+        sigma_px, gains = self.settings.smoothing_sigma_px, self._calibration
+        brightness = self._least_brightness
+        return undetected_pixels(moments, brightness, noise_of, sigma_px, gains, self.ambient)
+
+    def _noise_of(self, gains: Array | None) -> Callable[..., MomentNoise] | None:
+        """Return what tells the noise of moments divided by gains, of the brightness."""
+        zeroth, takes = self.settings.zeroth, self.settings.takes
+        if self.image_noise is None or zeroth is None or takes is None:
+            return None  # the last two go with a sensor, and with images
+        return partial(
+            moment_noise,
+            sensor=self.image_noise,
+            calibration=np.ones(len(self.smoothed)) if gains is None else gains,
+            zeroth=zeroth,
+            takes=takes,
+            phases_rad=self.settings.sampled_rad,
         )
 
     def add_flag(self, flag: Flags, where: Array) -> None:
@@ -290,21 +306,37 @@ class Reconstruction:
         return peaks(self.coefficients, threshold=self.settings.threshold)
 
     @cached_property
-    def noise(self) -> MomentNoise | None:
-        """Noise of the smoothed moments (m + 1, ...) by the sensor's; None without a sensor."""
-        sensor, moments = self.settings.sensor, self.smoothed
-        zeroth, takes = self.settings.zeroth, self.settings.takes
-        if sensor is None or zeroth is None or takes is None:  # the last two go with a sensor
+    def image_noise(self) -> Sensor | ImageNoise | None:
+        """Noise of the images: of the settings' sensor, else as they show it themselves.
+
+        None of moments alone, and where the images do not tell.
+        """
+        if self.settings.sensor is not None or self._images is None:
+            return self.settings.sensor
+        return image_noise(self._images, self._least_brightness)
+
+    @cached_property
+    def noise_ratio(self) -> float | None:
+        """Deviation of the images over that of the settings' sensor, at the median of b_0.
+
+        None without such a sensor, and where the images do not tell.
+        """
+        sensor, brightness = self.settings.sensor, np.asarray(self._least_brightness)
+        if sensor is None or self._images is None:
             return None
-        gains = self._calibration
-        noise_of = partial(
-            moment_noise,
-            sensor=sensor,
-            calibration=np.ones(moments.shape[0]) if gains is None else gains,
-            zeroth=zeroth,
-            takes=takes,
-            phases_rad=self.settings.sampled_rad,
-        )
+        found = image_noise(self._images, brightness)
+        if found is None:
+            return None
+        signal = np.median(brightness[brightness > 0]) / 2
+        stated = sensor.image_variance(np.maximum(signal + found.dark_dn - sensor.dark_dn, 0))
+        return float(np.sqrt(found.image_variance(signal) / stated))
+
+    @cached_property
+    def noise(self) -> MomentNoise | None:
+        """Noise of the smoothed moments (m + 1, ...) by that of the images; None without."""
+        moments, noise_of = self.smoothed, self._noise_of(self._calibration)
+        if noise_of is None:
+            return None
         brightness, ambient = self._least_brightness, self.ambient
         if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
             sigma_px = self.settings.smoothing_sigma_px
@@ -315,9 +347,12 @@ class Reconstruction:
     def ambient(self) -> Array | None:
         """Light (...) in DN an image that is not the camera's, by `noise.ambient_light`.
 
-        None where there is hardly any, and without images or a sensor.
+        None where there is hardly any, and without images or their noise. Light that all pixels
+        have counts as dark level where no sensor is stated.
         """
-        return None if self._other_light is None else self._other_light(self._least_brightness)
+        if self._images is None or self.image_noise is None:
+            return None
+        return self._images.ambient(self._least_brightness, self.image_noise)
 
     @property
     def _least_brightness(self) -> Array:
@@ -348,9 +383,9 @@ class Reconstruction:
     @property
     def estimate(self) -> Likelihood | Unwrapped:
         """That of the settings if it is one of `OF_ANY_MULTIPLES`; `likelihood` else."""
-        if self.settings.estimator == "two-returns":
+        if self.settings.technique == "two-returns":
             return self.two_returns
-        return self.unwrapped if self.settings.estimator == "unwrapped-phase" else self.likelihood
+        return self.unwrapped if self.settings.technique == "unwrapped-phase" else self.likelihood
 
     @property
     def _evidence(self) -> tuple[Array, MomentNoise | None, tuple[int, ...] | None, float]:
@@ -407,15 +442,13 @@ class Reconstruction:
     @cached_property
     def _separation(self) -> Separation:
         technique = self._technique
-        if self.settings.estimator in OF_ANY_MULTIPLES:
+        if self.settings.technique in OF_ANY_MULTIPLES:
             estimate = self.estimate
             if isinstance(estimate, Unwrapped):
                 return estimate.separate()
             return estimate.separate(self.settings.threshold)
-        if self.settings.estimator == "pisarenko-merged":
-            noise = assumed_noise(self.smoothed) if self.noise is None else self.noise
-            merged = merge_returns(self.returns, noise)
-            return separate(merged, self.settings.threshold)
+        if self.settings.technique == "pisarenko-merged":
+            return separate(merge_returns(self.returns, self.noise), self.settings.threshold)
         if technique is None:
             return separate(self.returns, self.settings.threshold)
         xp = namespace(self.smoothed)
@@ -428,7 +461,7 @@ class Reconstruction:
     @property
     def _technique(self) -> Technique | None:
         """The technique of the settings where this class does not implement it itself."""
-        name = self.settings.estimator
+        name = self.settings.technique
         return None if name in OWN else TECHNIQUES[name]
 
     @cached_property
@@ -442,7 +475,7 @@ class Reconstruction:
 
         That is negative where noise, or a contradiction, makes the returns brighter than b_0.
         """
-        if self.settings.estimator not in ("pisarenko", "maximum-entropy", "single-frequency"):
+        if self.settings.technique not in ("pisarenko", "maximum-entropy", "single-frequency"):
             return self.brightness - self.direct - self.indirect
         return self.returns.uniform
 
@@ -463,9 +496,9 @@ class Reconstruction:
         Raises ParameterError, as `direct` does, where the estimator needs more harmonics.
         """
         xp = namespace(self.moments)
-        if self.settings.estimator == "maximum-entropy":
+        if self.settings.technique == "maximum-entropy":
             phase = self.peaks.first_rad
-        elif self.settings.estimator == "single-frequency":
+        elif self.settings.technique == "single-frequency":
             phase = in_turn(xp.arctan2(self.moments[1].imag, self.moments[1].real))
         else:
             phase = self._separation.phase_rad
@@ -503,7 +536,7 @@ class Reconstruction:
         frequency_hz = self.settings.base_frequency_hz
         at = "" if frequency_hz is None else f" at {frequency_hz / 1e6:g} MHz"
         parts = [f"m = {order}{at}", f"pixels {' x '.join(map(str, shape)) or '1'}"]
-        parts += [f"estimator {self.settings.estimator}"]
+        parts += [f"estimator {self.settings.technique}"]
         if "range_m" in known:
             parts.append(_in_metres(self.range_m))
         computed = [name for name in _SHOWN if name in known]

@@ -10,8 +10,9 @@ from transientcam_moments._kernels.one_pass import Planes
 from transientcam_moments.arrays import Array
 from transientcam_moments.images import Repair
 from transientcam_moments.moment_problem import Coefficients, Returns, levinson
+from transientcam_moments.noise import CapturedImages
 from transientcam_moments.reconstruction import Reconstruction
-from transientcam_moments.reconstruction._flags import Flags
+from transientcam_moments.reconstruction._flags import INVALID, Flags
 from transientcam_moments.reconstruction._settings import Settings
 
 
@@ -36,7 +37,7 @@ class PassedReconstruction(Reconstruction):
         Where known harmonics were taken out; none are known, when left out.
     spread : callable, optional
         As of `Reconstruction`.
-    other_light : callable, optional
+    images : CapturedImages, optional
         As of `Reconstruction`.
     """
 
@@ -50,7 +51,7 @@ class PassedReconstruction(Reconstruction):
         calibration: Array | None = None,
         corrected: Array | None = None,
         spread: Spread = at_once,
-        other_light: Callable[[Array], Array | None] | None = None,
+        images: CapturedImages | None = None,
     ) -> None:
         super().__init__(
             None,
@@ -59,16 +60,19 @@ class PassedReconstruction(Reconstruction):
             repaired=repaired,
             calibration=calibration,
             spread=spread,
-            other_light=other_light,
+            images=images,
         )
         self._measure = measure
         self.smoothed = planes.smoothed
         self._corrected = planes.smoothed, corrected
         self.validity = planes.validity
+        nothing = (planes.count == 0) & (planes.flags & int(INVALID) == 0)  # as of uniform light
         self._flags_of_moments = planes.flags
+        if nothing.any():
+            self._flags_of_moments = planes.flags | np.uint8(Flags.NO_SIGNAL) * nothing
         self.returns = Returns(planes.phase_rad, planes.weight, planes.uniform, planes.count)
         self.brightness = planes.brightness
-        if settings.estimator == "pisarenko":  # else they follow from another estimate
+        if settings.technique == "pisarenko":  # else they follow from another estimate
             self.uniform = planes.uniform
             self.direct = planes.direct
             self.indirect = planes.indirect
@@ -76,7 +80,7 @@ class PassedReconstruction(Reconstruction):
                 self.range_m = planes.range_m
         if self._undetected is not None:
             no_signal = np.where(self._undetected, np.uint8(Flags.NO_SIGNAL), np.uint8(0))
-            self._flags_of_moments = planes.flags | no_signal
+            self._flags_of_moments = self._flags_of_moments | no_signal
             if "range_m" in vars(self):
                 self.range_m = np.where(self._undetected, np.float32(np.nan), planes.range_m)
 

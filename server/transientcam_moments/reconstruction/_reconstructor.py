@@ -3,7 +3,6 @@
 import math
 import threading
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -37,7 +36,7 @@ from transientcam_moments.images import (
     smooth,
     takes_first,
 )
-from transientcam_moments.noise import ambient_light
+from transientcam_moments.noise import CapturedImages
 from transientcam_moments.reconstruction._labels import Labels
 from transientcam_moments.reconstruction._lazy import Reconstruction
 from transientcam_moments.reconstruction._one_pass import PassedReconstruction
@@ -47,7 +46,6 @@ from transientcam_moments.reconstruction._sparse_frequencies import GappedRecons
 
 _BY_THE_PASS = ("pisarenko", "pisarenko-merged", *OF_ANY_MULTIPLES)
 """Estimators that follow from the pass's returns or moments."""
-_WHOLE = 1e-6  # sum of the phasors of phases that are spread evenly over a period, at most
 _SHAPES = 4  # of images that a reconstructor keeps prepared
 
 
@@ -60,7 +58,7 @@ class Reconstructor:
     Parameters
     ----------
     settings : Settings, optional
-        The paper's, when left out. Raw images need ``zeroth`` and ``takes`` in them, and a range
+        The defaults, when left out. Raw images need ``zeroth`` and ``takes`` in them, and a range
         ``base_frequency_hz``: these have no default.
     calibration : array, shape (m + 1,) or (m + 1, ...), optional
         Gains to divide by, as `calibrate` takes them. Raw images need them; moments without are
@@ -144,6 +142,7 @@ class Reconstructor:
         recovered = self._recovered(takes, zeroth)
         if recovered is not None:
             takes = recovered.images
+        images = self._images(takes, zeroth, repaired, recovered)
         # behind the smoothing, where a waveform is known: harmonics are taken out there
         one_pass = None if self._waveform is not None else self._pass_of_images(takes, zeroth)
         if one_pass is not None:
@@ -155,7 +154,7 @@ class Reconstructor:
                 repaired=repaired,
                 calibration=self._calibration,
                 spread=spread,
-                other_light=self._other_light(takes, zeroth),
+                images=images,
             )
         moments, kept = self._measured(takes, None if repaired is None else repaired.left_out)
         if recovered is not None:
@@ -168,8 +167,7 @@ class Reconstructor:
             saturated_pixels = saturated(stack, full_scale=self.settings.full_scale)
             if self._bad is not None:  # their own values are not used
                 saturated_pixels = saturated_pixels & ~self._bad
-        other_light = self._other_light(takes, zeroth)
-        return self._of_moments(moments, saturated_pixels, kept, spread, repaired, other_light)
+        return self._of_moments(moments, saturated_pixels, kept, spread, repaired, images)
 
     def of_measured(
         self,
@@ -215,7 +213,7 @@ class Reconstructor:
         kept: Array | None,
         spread: Spread,
         repaired: Repair | None = None,
-        other_light: Callable[[Array], Array | None] | None = None,
+        images: CapturedImages | None = None,
     ) -> Reconstruction:
         """Go on from calibrated moments."""
         if not self.settings.consecutive:
@@ -227,7 +225,7 @@ class Reconstructor:
                 kept=kept,
                 calibration=self._calibration,
                 spread=spread,
-                other_light=other_light,
+                images=images,
             )
         one_pass = self._pass_of_moments(moments)
         correction = self._correction(moments)
@@ -242,7 +240,7 @@ class Reconstructor:
                 calibration=self._calibration,
                 correction=correction,
                 spread=spread,
-                other_light=other_light,
+                images=images,
             )
         smoothed = moments
         if moments.ndim == 3:
@@ -260,7 +258,7 @@ class Reconstructor:
             calibration=self._calibration,
             corrected=corrected,
             spread=spread,
-            other_light=other_light,
+            images=images,
         )
 
     def _correction(self, moments: Array) -> HarmonicCorrection | None:
@@ -313,22 +311,23 @@ class Reconstructor:
         first = ZEROTH_IMAGES[zeroth] if zeroth == "on-off" else 0
         return recover_saturated(takes, first, self.settings.sampled_rad, self.settings.full_scale)
 
-    def _other_light(self, takes: Array, zeroth: str) -> Callable[[Array], Array | None] | None:
-        """Return what tells light that is not the camera's, of the first take's first frequency.
+    def _images(
+        self, takes: Array, zeroth: str, repaired: Repair | None, recovered: Recovered | None
+    ) -> CapturedImages | None:
+        """Return what tells the noise of images, and light that is not the camera's.
 
-        It depends on values, which are not known yet where JAX traces a function.
+        Both depend on values, which are not known yet where JAX traces a function.
         """
-        sensor, phases_rad = self.settings.sensor, self.settings.sampled_rad
-        whole = abs(np.exp(1j * np.asarray(phases_rad)).sum()) < _WHOLE
-        if sensor is None or not whole or not isinstance(takes, np.ndarray):
+        if not isinstance(takes, np.ndarray):
             return None
-        first = ZEROTH_IMAGES[zeroth] if zeroth == "on-off" else 0
-        return partial(
-            ambient_light,
-            takes[0, first : first + len(phases_rad)],
-            sensor=sensor,
-            sigma_px=self.settings.smoothing_sigma_px,
-            bad_pixels=self._bad,
+        return CapturedImages(
+            takes,
+            self.settings.sampled_rad,
+            ZEROTH_IMAGES[zeroth] if zeroth == "on-off" else 0,
+            None if recovered is None else recovered.saturated,
+            self._bad,
+            None if repaired is None else np.logical_or.reduce(repaired[1:]),
+            self.settings.smoothing_sigma_px,
         )
 
     def _measured(self, takes: Array, left_out: Array | None = None) -> tuple[Array, Array]:
@@ -367,7 +366,7 @@ class Reconstructor:
 
     def _pass(self, m: int, shape: tuple[int, ...]) -> OnePass | None:
         usual = self.settings.keep == "harmonics" and self.settings.consecutive
-        usual = usual and self.settings.estimator in _BY_THE_PASS
+        usual = usual and self.settings.technique in _BY_THE_PASS
         prepare = lookup("reconstruct", m, math.prod(shape))
         masked = self._bad is None or np.shape(self._bad) == shape
         if not usual or prepare is None or not masked:
@@ -452,7 +451,7 @@ def reconstruct(
     data : array
         Real images (N, ...) in any order, or complex moments (m + 1, ...).
     settings : Settings, optional
-        Of smoothing, biasing and estimator: the paper's, when left out.
+        Of smoothing, biasing and estimator: the defaults, when left out.
     harmonic, phase_rad, frequency_hz, illumination, take : array, shape (N,), optional
         What each image shows, see `Labels`. Raw images need them, or else ``zeroth``, ``takes`` and
         ``base_frequency_hz`` in the settings and the order of `measure`.

@@ -37,6 +37,14 @@ ESTIMATORS = (
 """What the range may be taken from; see `transientcam_moments.comparisons`."""
 
 
+def automatic(multiples: tuple[int, ...] | None) -> str:
+    """Return the estimator that "automatic" is for frequencies; none stand for consecutive ones."""
+    if not multiples or multiples[-1] == len(multiples):
+        return "likelihood"
+    # two returns of three frequencies leave something to judge them by
+    return "two-returns" if len(multiples) > 2 else "unwrapped-phase"
+
+
 def least_harmonics(estimator: str) -> int:
     """Return the smallest m that an estimator gives a range of."""
     return TECHNIQUES[estimator].least_harmonics if estimator in TECHNIQUES else 1
@@ -71,10 +79,11 @@ class Settings:
         The range is that of the first return, or peak, with this share of the strongest one's
         weight, or density.
     estimator : str
-        What the range is taken from: "pisarenko" as the paper has it, "pisarenko-merged" (see
-        `merge_returns`), "maximum-entropy", "likelihood", "two-returns" (see `two_returns`),
-        "unwrapped-phase" (see `unwrap`), "single-frequency", which is the usual arg b_1, or another
-        of the `comparisons` of moments.
+        What the range is taken from: "automatic" is "likelihood", or "two-returns" where the
+        multiples have gaps ("unwrapped-phase" of two). By name also "pisarenko" as the paper has
+        it, "pisarenko-merged" (see `merge_returns`), "maximum-entropy", "two-returns" (see
+        `two_returns`), "unwrapped-phase" (see `unwrap`), "single-frequency", which is the usual
+        arg b_1, or another of the `comparisons` of moments.
     minimum_brightness : float
         Pixels with b_0 at or below it have no signal, in the unit of the moments.
     full_scale : float
@@ -85,8 +94,8 @@ class Settings:
         frame before, or kept as they are.
     sensor : noise.Sensor, optional
         Whose noise the images have; "likelihood", "two-returns" and "unwrapped-phase" weigh the
-        moments by it, and "pisarenko-merged" merges by it; all assume some without one, see
-        `likelihood`.
+        moments by it, and "pisarenko-merged" merges by it. Without one it is measured in the
+        images (`noise.image_noise`), and of moments alone some is assumed, see `likelihood`.
     """
 
     base_frequency_hz: float | None = None
@@ -98,7 +107,7 @@ class Settings:
     keep: str = "harmonics"
     smoothing_sigma_px: float = SIGMA_PX
     threshold: float = DIRECT_THRESHOLD
-    estimator: str = "pisarenko"
+    estimator: str = "automatic"
     minimum_brightness: float = 0.0
     full_scale: float = 4095.0
     spoilt_images: str = "repair"
@@ -123,13 +132,18 @@ class Settings:
         chosen("keep", self.keep, ("harmonics", "brightness"))
         in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
         in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
-        chosen("estimator", self.estimator, ESTIMATORS)
+        chosen("estimator", self.estimator, ("automatic", *ESTIMATORS))
         chosen("spoilt_images", self.spoilt_images, CORRUPT_IMAGES)
 
     @property
     def least_harmonics(self) -> int:
         """The smallest m that the estimator gives a range of."""
-        return least_harmonics(self.estimator)
+        return least_harmonics(self.technique)
+
+    @property
+    def technique(self) -> str:
+        """The estimator, also where it is automatic."""
+        return automatic(self.multiples) if self.estimator == "automatic" else self.estimator
 
     @property
     def sampled_rad(self) -> tuple[float, ...]:

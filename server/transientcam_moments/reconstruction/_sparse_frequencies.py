@@ -8,7 +8,7 @@ import numpy as np
 from transientcam_moments.arrays import Array, namespace
 from transientcam_moments.errors import ParameterError
 from transientcam_moments.images import smooth
-from transientcam_moments.likelihood import MODEL_ERROR, Unwrapped, assumed_noise
+from transientcam_moments.likelihood import MODEL_ERROR, Unwrapped
 from transientcam_moments.moment_problem import Coefficients, Peaks, Returns, Separation
 from transientcam_moments.noise import MomentNoise
 from transientcam_moments.reconstruction._flags import Flags
@@ -90,7 +90,7 @@ class GappedReconstruction(Reconstruction):
         measured = (0, *multiples) if self._has_zeroth else multiples
         planes = self.smoothed[-len(measured) :]
         if self.noise is None:
-            return planes, assumed_noise(planes), measured, 0.0
+            return planes, None, measured, 0.0
         return planes, MomentNoise(self.noise.variance[-len(planes) :]), measured, MODEL_ERROR
 
     @cached_property
@@ -111,11 +111,11 @@ class GappedReconstruction(Reconstruction):
 
     @cached_property
     def _separation(self) -> Separation:
-        if self.settings.estimator not in OF_ANY_MULTIPLES:
+        if self.settings.technique not in OF_ANY_MULTIPLES:
             limit = (
                 f"one of {', '.join(OF_ANY_MULTIPLES)}, for the multiples {self.settings.multiples}"
             )
-            raise ParameterError("estimator", self.settings.estimator, limit)
+            raise ParameterError("estimator", self.settings.technique, limit)
         return super()._separation
 
     @cached_property

@@ -40,7 +40,13 @@ from transientcam_server.camera._lease import (
 from transientcam_server.camera._light import LightGuard
 from transientcam_server.camera._origin_lease import OriginLease
 from transientcam_server.camera._shared import SharedAcquisition
-from transientcam_server.camera._source import LightRules, sensor_of, snapshot_of, start_with
+from transientcam_server.camera._source import (
+    LightRules,
+    sensor_of,
+    snapshot_of,
+    start_with,
+    stated_sensor,
+)
 from transientcam_server.camera._status import AcquisitionStatus, State
 from transientcam_server.camera._supervision import Supervision
 
@@ -87,4 +93,5 @@ __all__ = [
     "sensor_of",
     "snapshot_of",
     "start_with",
+    "stated_sensor",
 ]

@@ -19,12 +19,20 @@ UNUSED_S: Final = 300.0
 """Of a camera that shines at somebody."""
 
 
+def stated_sensor(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor | None:
+    """Return the sensor of a camera; None where neither it nor the settings state any of it."""
+    if isinstance(camera, RelayCamera):
+        return camera.origin.sensor
+    stated = camera.simulation is not None or settings.model_fields_set
+    return sensor_of(camera, settings) if stated else None
+
+
 def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
     """Return the sensor of a camera: a simulated one has its own, a real one the settings'.
 
     A relayed one has what its origin states. The dark level is the camera's where it has one.
     """
-    if isinstance(camera, RelayCamera):
+    if isinstance(camera, RelayCamera) and camera.origin.sensor is not None:
         return camera.origin.sensor
     model = settings if camera.simulation is None else camera.simulation.sensor
     dark_dn = camera.capabilities.dark_dn

@@ -20,7 +20,7 @@ def checks(spec: str) -> Iterator[Reported]:
     except DriverError as error:
         yield "fault", "products", f"what the camera can do cannot be read: {error}", None
         return
-    # a daemon has the sensor's figures from the simulation or from its settings, never none
+    # a sensor is stated, or images tell their noise
     absent = absent_products(
         capabilities, truth_known=simulated, noise_known=True, images_known=images_known
     )

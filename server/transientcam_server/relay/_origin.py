@@ -27,7 +27,7 @@ from transientcam_server.settings import CorruptImages
 
 _CAPABILITIES: Final = TypeAdapter(Capabilities)
 _CORRUPT_IMAGES: Final[TypeAdapter[CorruptImages]] = TypeAdapter(CorruptImages)
-_SENSOR: Final = TypeAdapter(tm.noise.Sensor)
+_SENSOR: Final = TypeAdapter(tm.noise.Sensor | None)
 _CREDITS: Final = 2
 """One frame travels while another is taken: more would only make frames older."""
 _TRANSIENT: Final = (HTTPStatus.REQUEST_TIMEOUT, HTTPStatus.TOO_MANY_REQUESTS)
@@ -62,7 +62,7 @@ class Described:
     version: str
     role: str
     capabilities: Capabilities
-    sensor: tm.noise.Sensor
+    sensor: tm.noise.Sensor | None
     intrinsics: Mapping[str, Any]
     sequence: Mapping[str, Any]
     calibration: Calibration | None

@@ -13,7 +13,6 @@ import transientcam_moments as tm
 from tests.moments.oracles import moments_of_returns
 from transientcam_moments.likelihood import (
     _chi_square as chi_square,
-    _estimate as estimate,
     choice,
     sharp,
     tail,
@@ -500,7 +499,7 @@ def test_without_noise_a_share_of_the_light_is_assumed() -> None:
 
     assumed = tm.likelihood(b)
 
-    std = np.broadcast_to(estimate.ASSUMED_NOISE * size, b.shape)
+    std = np.broadcast_to(tm.noise.ASSUMED_NOISE * size, b.shape)
     stated = tm.likelihood(b, tm.noise.MomentNoise(std**2))
     assert np.array_equal(assumed.chi_square, stated.chi_square, equal_nan=True)
 

@@ -163,12 +163,6 @@ def test_noise_at_some_pixels_is_that_of_the_whole_image_there(
     np.testing.assert_allclose(found, whole.reshape(4, -1), rtol=1e-12)
 
 
-def test_covariance_is_diagonal_over_real_and_imaginary_parts() -> None:
-    covariance = noise.MomentNoise(np.array([[1.0], [2.0], [3.0]])).covariance()
-
-    np.testing.assert_array_equal(covariance[..., 0], np.diag([1.0, 2.0, 2.0, 3.0, 3.0]))
-
-
 @given(brightness=st.floats(0, 3000), takes=st.integers(1, 64), factor=st.floats(0.1, 1.0))
 def test_variance_falls_with_takes_and_grows_with_lost_modulation(
     brightness: float, takes: int, factor: float
@@ -440,65 +434,46 @@ PHASES = np.linspace(0, 6, 7)
 
 
 @pytest.mark.parametrize("zeroth", ["low-frequency", "estimated"])
-@pytest.mark.parametrize("m", [1, 2, 3, 4])
-def test_density_varies_as_predicted_wherever_first_order_holds(m: int, zeroth: str) -> None:
-    b, of_moments = random_pixels(m, m, seed=30 + m, pixels=80)
+@pytest.mark.parametrize("m", [1, 3])
+def test_density_varies_as_its_differences_predict(m: int, zeroth: str) -> None:
+    b, of_moments = random_pixels(m, m, seed=m, pixels=300)
+    of_moments = noise.MomentNoise(1e-12 * of_moments.variance)  # far within first order
     if zeroth == "estimated":
-        of_moments.variance[0] = 0
         b[0] = 0
-    predicted = noise.density_noise(b, of_moments, PHASES, zeroth=zeroth)
-    drawn = noise.draw(b, of_moments, np.random.default_rng(m), draws=DRAWS)
-    drawn = tm.estimate_zeroth(drawn) if zeroth == "estimated" else tm.bias(drawn).moments
 
-    observed = tm.density(tm.levinson(drawn), PHASES).std(axis=1)
+    def height(b: np.ndarray) -> np.ndarray:
+        biased = tm.estimate_zeroth(b) if zeroth == "estimated" else tm.bias(b).moments
+        return np.asarray(tm.density(tm.levinson(biased), PHASES))
 
-    assert predicted.holds.sum() > 4
-    assert abs(observed / predicted.std - 1)[predicted.holds].max() < WITHIN
+    squares = np.zeros((len(PHASES), 300))
+    for j in range(m + 1):
+        for direction in (1.0, 1j)[: 1 if j == 0 else 2]:
+            if j == 0 and zeroth == "estimated":
+                continue
+            step = np.zeros_like(b)
+            step[j] = direction * np.sqrt(of_moments.variance[j])
+            squares += ((height(b + step) - height(b - step)) / 2) ** 2
 
+    found = noise.density_std(b, of_moments, PHASES, zeroth=zeroth)
 
-@pytest.mark.parametrize("zeroth", ["low-frequency", "estimated"])
-@pytest.mark.parametrize("m", [1, 3, 8])
-def test_the_deviation_of_whole_frames_is_that_of_each_pixel(m: int, zeroth: str) -> None:
-    b, of_moments = random_pixels(m, min(m, 2), seed=m, pixels=3000)
-    b[:, 1], b[0, 2] = 0, np.nan
-
-    found = noise.density_std(
-        b.reshape((m + 1, 50, 60)),
-        noise.MomentNoise(of_moments.variance.reshape((m + 1, 50, 60))),
-        np.linspace(0, 6, 50),
-        zeroth=zeroth,
-    )
-
-    expected = noise.density_noise(b, of_moments, np.linspace(0, 6, 50), zeroth=zeroth).std
-    assert found.shape == (50, 50, 60)
     assert found.dtype == np.float32
-    assert np.isnan(expected[:, 1]).all()
-    np.testing.assert_allclose(found.reshape(expected.shape), expected, rtol=1e-2)
+    off = abs(found / np.sqrt(squares) - 1)
+    assert np.median(off) < 1e-3
+    assert (off < 0.01).mean() > 0.97  # the others are where eigenvalues meet
 
 
 def test_a_pixel_without_light_has_no_noise_and_disturbs_no_other() -> None:
-    b, of_moments = random_pixels(3, 2, seed=1, pixels=5)
+    b, of_moments = random_pixels(3, 2, seed=1, pixels=6)
     broken = b.copy()
     broken[:, 1], broken[2, 3] = 0, np.inf
 
-    found = noise.density_noise(broken, of_moments, PHASES)
+    found = noise.density_std(broken, of_moments, PHASES)
 
-    expected = noise.density_noise(b, of_moments, PHASES)
-    others = [0, 2, 4]
-    assert np.array_equal(found.std[:, others], expected.std[:, others])
-    assert np.isnan(found.std[:, [1, 3]]).all()
-    assert not found.holds[:, [1, 3]].any()
-
-
-def test_density_of_a_nearly_singular_or_barely_biased_pixel_is_not_predicted() -> None:
-    phase, weight = np.array([[1.0], [3.0]]), np.array([[1.0], [0.8]])
-    singular = moments_of(phase, weight, 1e-6, 4)
-    barely = moments_of(phase, weight, 4e-3 * 1.8 / (1 - 4e-3), 2)
-    plain = moments_of(phase, weight, 0.3, 2)
-
-    for b, holds in ((singular, False), (barely, False), (plain, True)):
-        found = noise.density_noise(b, white(b, 1e-3), PHASES)
-        assert bool(found.holds.any()) is holds
+    others = [0, 2, 4, 5]
+    np.testing.assert_allclose(
+        found[:, others], noise.density_std(b, of_moments, PHASES)[:, others], rtol=1e-5
+    )
+    assert np.isnan(found[:, [1, 3]]).all()
 
 
 # -- what is refused ---------------------------------------------------------------------------

@@ -102,11 +102,19 @@ def test_the_compiled_pass_finds_the_same_pixels() -> None:
     assert (compiled.has_range != expected).mean() < 0.001  # rounded at the limit
 
 
-def test_without_a_sensor_nothing_is_taken_for_noise() -> None:
+def test_without_a_sensor_images_tell_their_noise_and_moments_alone_have_none() -> None:
     raw = captured(np.zeros(SHAPE), "estimated")
     stated = tm.Settings(estimator="pisarenko", zeroth="estimated", takes=1, base_frequency_hz=F_HZ)
 
-    assert tm.reconstruct(raw, stated, calibration=np.ones(5)).has_range.mean() > 0.99
+    assert tm.reconstruct(raw, stated, calibration=np.ones(5)).has_range.mean() < 0.01
+    moments = tm.measure(raw, zeroth="estimated")
+    assert tm.reconstruct(moments, stated, calibration=np.ones(5)).has_range.mean() > 0.99
+
+
+def test_uniform_light_has_no_signal() -> None:
+    found = tm.reconstruct(np.array([[2.0, 2.0], [0.0, 1.0]]) + 0j, tm.Settings(F_HZ))
+
+    assert (found.flags & tm.Flags.NO_SIGNAL > 0).tolist() == [True, False]
 
 
 @pytest.mark.parametrize("kind", ["raw", "moments"])

@@ -73,7 +73,8 @@ def test_labelled_images_in_any_order_have_their_range(sequence: Sequence, shuff
         images, labels = images[order], {name: each[order] for name, each in labels.items()}
     gain = np.ones(sequence.harmonics + 1)
 
-    found = tm.reconstruct(images, tm.Settings(smoothing_sigma_px=0.0), **labels, calibration=gain)
+    settings = tm.Settings(smoothing_sigma_px=0.0, estimator="pisarenko")
+    found = tm.reconstruct(images, settings, **labels, calibration=gain)
 
     phase = np.linspace(0.5, 4.0, 12).reshape(SHAPE)
     np.testing.assert_allclose(found.range_m, tm.range_m(phase, F_HZ), atol=2e-3)
@@ -161,7 +162,7 @@ def test_texts_of_results_say_what_they_are() -> None:
     found = tm.reconstruct(moments(2), tm.Settings(F_HZ, smoothing_sigma_px=0.0))
 
     assert repr(found) == (
-        "<Reconstruction m = 2 at 17 MHz, pixels 3 x 4, estimator pisarenko; computed: nothing>"
+        "<Reconstruction m = 2 at 17 MHz, pixels 3 x 4, estimator likelihood; computed: nothing>"
     )
     assert repr(found.returns) == "<Returns m = 2, pixels 3 x 4; returns: 1 in 100.0%>"
     _ = found.range_m

@@ -27,7 +27,7 @@ def scene(m: int, *, noise: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.nda
     return b, phase, weight
 
 
-PLAIN = tm.Settings(base_frequency_hz=FREQUENCY_HZ, smoothing_sigma_px=0.0)
+PLAIN = tm.Settings(base_frequency_hz=FREQUENCY_HZ, smoothing_sigma_px=0.0, estimator="pisarenko")
 
 
 def test_direct_and_indirect_light_are_separated() -> None:

@@ -269,7 +269,8 @@ export interface CameraDocument {
   /** Where the pixels look: (column, row) along ((c - cx) / fx, (r - cy) / fy, 1), but for the
    * distortion. */
   readonly intrinsics: IntrinsicsDocument;
-  readonly sensor: SensorDocument;
+  /** As it is stated; null where nobody does, and the images of each frame tell their noise. */
+  readonly sensor: SensorDocument | null;
   /** Of a relay (docs/relay.md); null where the camera is at this service. */
   readonly origin: OriginDocument | null;
   /** As the camera itself states it now; null while it is lost. */
@@ -536,9 +537,8 @@ export interface InfoDocument {
   readonly history: HistoryDocument;
   /** Streams open now. */
   readonly clients: number;
-  /** What frames are computed without until it is compiled: more slowly, with the same results;
-   * null where nothing is being prepared. */
-  readonly kernels: KernelsDocument | null;
+  /** Which compiled kernels are ready; the others are computed with NumPy meanwhile. */
+  readonly kernels: Readonly<Record<string, unknown>>;
   /** Settings of the reconstruction. */
   readonly reconstruction: Readonly<Record<string, number | string>>;
 }
@@ -584,14 +584,6 @@ export interface JobDocument {
 export interface JobsDocument {
   /** The newest first. */
   readonly jobs: readonly JobDocument[];
-}
-
-/** Compiled code for the present sequence and estimator that is still being prepared. */
-export interface KernelsDocument {
-  /** kernels by their names, the next one first */
-  readonly preparing: readonly string[];
-  /** about how long it takes until the last one is ready */
-  readonly left_s: number;
 }
 
 /** Who controls the camera. */
@@ -974,12 +966,11 @@ export interface ReconstructionDocument {
   /** Weight from which a return counts as the first, over the pixel's strongest return. */
   readonly return_threshold: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
-   * least over the scenes of docs/likelihood.md together, and `pisarenko` where the noise of the
-   * sensor is not known; each frame names its `estimator`. The paper's are `pisarenko` and
+   * least over the scenes of docs/likelihood.md together, and in the daemon `pisarenko` until the
+   * kernel is compiled; each frame names its `estimator`. The paper's are `pisarenko` and
    * `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
    * frequencies; for those with gaps `automatic` is `two-returns`, or `unwrapped-phase` where there
-   * are but two. The others are there for comparison. Until its kernel is compiled the same
-   * estimator runs in NumPy, more slowly. */
+   * are but two and until the kernel is compiled. The others are there for comparison. */
   readonly estimator:
     | "automatic"
     | "pisarenko"
@@ -1018,12 +1009,11 @@ export interface ReconstructionRequest {
   /** Weight from which a return counts as the first, over the pixel's strongest return. */
   readonly return_threshold?: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
-   * least over the scenes of docs/likelihood.md together, and `pisarenko` where the noise of the
-   * sensor is not known; each frame names its `estimator`. The paper's are `pisarenko` and
+   * least over the scenes of docs/likelihood.md together, and in the daemon `pisarenko` until the
+   * kernel is compiled; each frame names its `estimator`. The paper's are `pisarenko` and
    * `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
    * frequencies; for those with gaps `automatic` is `two-returns`, or `unwrapped-phase` where there
-   * are but two. The others are there for comparison. Until its kernel is compiled the same
-   * estimator runs in NumPy, more slowly. */
+   * are but two and until the kernel is compiled. The others are there for comparison. */
   readonly estimator?:
     | "automatic"
     | "pisarenko"
@@ -1449,6 +1439,12 @@ export type Notice =
       readonly type: "notice";
       readonly kind: "calibration-changed";
       readonly calibration_id: string;
+      readonly reason: string | null;
+    }
+  | {
+      readonly type: "notice";
+      readonly kind: "noise-differs";
+      readonly ratio: number;
       readonly reason: string | null;
     }
   | {

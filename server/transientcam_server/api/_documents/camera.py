@@ -73,7 +73,8 @@ class CameraDocument(Document):
     intrinsics: IntrinsicsDocument
     """Where the pixels look: (column, row) along ((c - cx) / fx, (r - cy) / fy, 1), but for the
     distortion."""
-    sensor: SensorDocument
+    sensor: SensorDocument | None
+    """As it is stated; null where nobody does, and the images of each frame tell their noise."""
     origin: OriginDocument | None = None
     """Of a relay (docs/relay.md); null where the camera is at this service."""
     status: dict[str, Any] | None = None

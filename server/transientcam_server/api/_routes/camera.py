@@ -32,7 +32,7 @@ async def read_camera(service: ServiceOf) -> CameraDocument:
         light_warning=light_warning(camera),
         capabilities=asdict(camera.capabilities),
         intrinsics=CameraDocument.IntrinsicsDocument(**asdict(service.intrinsics)),
-        sensor=CameraDocument.SensorDocument(**asdict(service.sensor)),
+        sensor=service.sensor and CameraDocument.SensorDocument(**asdict(service.sensor)),
         origin=_origin(service.relay),
         status=status,
         counters=asdict(camera.counters),

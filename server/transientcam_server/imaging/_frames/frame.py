@@ -59,7 +59,8 @@ class Frame:
     raw
         The labelled images.
     recipe
-        Sequence, settings and gains that its products are computed with.
+        Sequence, settings and gains that its products are computed with; its noise is that of the
+        images, once they are reconstructed, where no sensor is stated.
     previous
         The capture before, where its images may be filled in from it.
     past
@@ -107,6 +108,11 @@ class Frame:
             truth=self._truth,
             past=True,
         )
+
+    async def noise_ratio(self) -> float | None:
+        """Return `tm.Reconstruction.noise_ratio`; None also while nothing is computed."""
+        found = self._computed.reconstruction
+        return found and (await self._workers.run_long(lambda: found.noise_ratio))[0]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -194,6 +200,7 @@ class Frame:
                         # frames at once take a core each, which is less work than sharing all
                         self._spread if alone else tm.kernels.at_once,
                     )
+                self.recipe = self.recipe.with_noise_of(self._computed.reconstruction)
                 self._reconstruct_s = (self._reconstruct_s or 0.0) + elapsed_s
                 for stage in requested:
                     self._settle(self._stages[stage], self._computed, stage)

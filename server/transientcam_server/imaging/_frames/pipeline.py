@@ -47,7 +47,8 @@ class Source(Protocol):
 class Pipeline:
     """Makes frames of the captures of one camera; on the event loop.
 
-    From ``sensor``, where it is known, the deviation of each frame's range is predicted.
+    From ``sensor``, or from the images where none is stated, the deviation of each frame's range is
+    predicted.
     ``intrinsics`` returns where the pixels of the next frame look. ``images_known`` says whether
     captures have images, and not their moments alone (`MomentFrame`).
 
@@ -89,7 +90,7 @@ class Pipeline:
         self.absent = absent_products(
             camera.capabilities,
             truth_known=self._truth is not None,
-            noise_known=sensor is not None,
+            noise_known=sensor is not None or images_known,
             images_known=images_known,
         )
         self.products: dict[str, Product] = {

@@ -75,7 +75,7 @@ def compute(
         if computed.reconstruction is None:
             computed.reconstruction = found = recipe.reconstruct(raw, previous, spread=spread)
             _read(found, FIRST)
-            _flag_contradictions(recipe, found)
+            _flag_contradictions(recipe.with_noise_of(found), found)
             computed.pixels = pixel_counts(found)
             computed.ambient_dn = _ambient_dn(recipe, found)
         else:
@@ -90,6 +90,7 @@ def compute(
                 _read(found, stage)
             except Exception as error:
                 computed.failures[stage] = error
+    recipe = recipe.with_noise_of(found)
     if recipe.sensor is not None and "returns" in requested and "returns" not in computed.failures:
         computed.range_noise = _range_noise(recipe, found, raw.number)
     return computed

@@ -17,7 +17,7 @@ def absent_products(
     truth_known
         Whether a simulation knows the true range.
     noise_known
-        Whether the noise of the sensor is known.
+        Whether the noise of the sensor is stated, or there are images to tell it.
     images_known
         Whether they have images, and not their moments alone.
     """

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import AppliedSequence, RawFrame, Sampling, Sequence
-from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
+from transientcam_moments.reconstruction import OF_ANY_MULTIPLES, automatic
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging._recipe.calibration import FACTORY_ID, Gains, nominal_gains
 from transientcam_server.imaging._recipe.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsics
@@ -18,14 +18,11 @@ from transientcam_server.imaging._recipe.moment_frame import MomentFrame
 from transientcam_server.settings import ReconstructionSettings
 
 _log = logging.getLogger("transientcam_server.imaging.recipe")
-_ONE_RETURN: Final = "unwrapped-phase"
 _KERNELS_OF: Final[dict[str, tuple[str, ...]]] = {
     "likelihood": ("likelihood",),
     "two-returns": ("pairs",),
     "maximum-entropy": ("levinson", "peaks"),
 }
-_LEAST_FOR_PAIRS: Final = 3
-"""Frequencies of which two returns leave something to judge them by."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +91,7 @@ def suited(settings: ReconstructionSettings, sampling: Sampling) -> Reconstructi
         "the camera measures the multiples %s, which %s cannot serve: the estimator is %s",
         listed(sampling.multiples),
         settings.estimator,
-        _for_gaps(sampling),
+        automatic(sampling.multiples),
     )
     return settings.model_copy(update={"estimator": "automatic"})
 
@@ -102,11 +99,6 @@ def suited(settings: ReconstructionSettings, sampling: Sampling) -> Reconstructi
 def _serves(settings: ReconstructionSettings, sampling: Sampling) -> bool:
     """Return whether the settings' estimator goes with the multiples that are measured."""
     return sampling.consecutive or settings.estimator in ("automatic", *OF_ANY_MULTIPLES)
-
-
-def _for_gaps(sampling: Sampling) -> str:
-    """Return what `automatic` is for multiples that have gaps."""
-    return "two-returns" if len(sampling.multiples) >= _LEAST_FOR_PAIRS else _ONE_RETURN
 
 
 def listed(multiples: tuple[int, ...]) -> str:
@@ -132,7 +124,7 @@ class Recipe:
     intrinsics
         Where the pixels look; None for a usual field of view.
     sensor
-        Whose noise the images have; None where that is not known.
+        Whose noise the images have; None where no one states it.
     """
 
     applied: AppliedSequence
@@ -146,10 +138,10 @@ class Recipe:
     @property
     def technique(self) -> str:
         """The estimator of its frames, by its name in `transientcam_moments`."""
-        sampling, chosen = self.applied.sequence.sampling, self.settings.estimator
-        if not sampling.consecutive:
-            return chosen if chosen in OF_ANY_MULTIPLES else _for_gaps(sampling)
-        return self.settings.technique(noise_known=self.sensor is not None)
+        sampling = self.applied.sequence.sampling
+        if self.settings.estimator == "automatic" or not _serves(self.settings, sampling):
+            return automatic(sampling.multiples)
+        return self.settings.estimator
 
     @property
     def kernels(self) -> tuple[str, ...]:
@@ -198,11 +190,12 @@ class Recipe:
     def moment_variance(self) -> NDArray[np.float64]:
         """Variance of the moments of a dark pixel, and how it grows with light: (3, m + 1).
 
-        For each DN of b_0, and for each DN an image of light that is not the camera's. Only with a
-        sensor, whose noise is an affine function of both.
+        For each DN of b_0, and for each DN an image of light that is not the camera's; the noise of
+        a sensor is an affine function of both. NaN where nobody states it and no image told.
         """
-        assert self.sensor is not None  # noqa: S101 - callers have one, or no noise to predict
         sequence = self.applied.sequence
+        if self.sensor is None:
+            return np.full((3, len(sequence.multiples) + 1), np.nan)
         noise = tm.noise.moment_noise(
             np.array([0.0, 1.0, 0.0]),
             self.sensor,
@@ -214,6 +207,12 @@ class Recipe:
         )
         dark, lit, other = np.asarray(noise.variance).T
         return np.stack([dark, lit - dark, other - dark])
+
+    def with_noise_of(self, found: tm.Reconstruction | None) -> "Recipe":
+        """Return the recipe with the noise that a frame's images show, where none is stated."""
+        if self.sensor is not None or found is None or found.image_noise is None:
+            return self
+        return replace(self, sensor=found.image_noise.as_sensor(round(self.full_scale)))
 
     def reconstruct(
         self,
