@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from transientcam_driver import Camera, CameraState, NotStreaming, RawFrame
-from transientcam_server.camera._acquisition import Acquisition
+from transientcam_server.camera._acquisition import Acquisition, outdated
 from transientcam_server.camera._darkness import KeptCause
 from transientcam_server.camera._events import (
     Event,
@@ -40,11 +40,18 @@ class SharedAcquisition(Acquisition):
             LightConfirmedEvent() if ended else LightUnconfirmedEvent(self._unconfirmed)
         )
 
-    def set_running(self, running: bool, *, cause: KeptCause = "stop") -> "Future[None]":
+    @property
+    def offs(self) -> int:
+        """Counts how often the light was to go off, here."""
+        return self._origin.offs
+
+    def set_running(
+        self, running: bool, *, cause: KeptCause = "stop", offs: int | None = None
+    ) -> "Future[None]":
         """Start behind other changes, or stop at once, as `safe_off`."""
         if running:
-            offs = self._origin.offs
-            return self.submit(lambda: self._start(offs))
+            asked = self.offs if offs is None else offs
+            return self.submit(lambda: self._start(asked))
         return self._off(self._origin.begin_stop())
 
     def safe_off(self) -> "Future[None]":
@@ -75,9 +82,8 @@ class SharedAcquisition(Acquisition):
         url = self._origin.url
         raise Problem(kinds.CAMERA_BUSY, f"The camera belongs to {url}: calibrate it there.")
 
-    def _light_is_held(self) -> bool:
-        self._act_on_lapse()
-        return False  # the origin guards its light by itself
+    def _end_uncontrolled(self) -> None:
+        self._act_on_lapse()  # the origin guards its light by itself
 
     def _step(self) -> None:
         super()._step()
@@ -113,11 +119,12 @@ class SharedAcquisition(Acquisition):
         """Leave the light to the origin: only what clients ask for goes there."""
         self._started = False
 
-    def _start(self, offs: tuple[int, int]) -> None:
-        self._origin.start_unless(offs)
+    def _start(self, offs: int) -> None:
+        if not self._origin.start_unless(offs):
+            raise outdated()
         self._follow()
 
-    def _set_running(self, running: bool, cause: KeptCause = "stop") -> None:
+    def _stop(self, cause: KeptCause = "stop") -> None:
         """Stop where a lease has lapsed."""
         self._off(self._origin.begin_stop())
 

@@ -128,6 +128,8 @@ class Acceptor:
         Whether frames are sent or recorded at present, for which time has to be left.
     tls
         With what connections are encrypted; None for not at all.
+    offs
+        As `ReadLimiter` has it.
     """
 
     def __init__(
@@ -138,7 +140,9 @@ class Acceptor:
         limits: LimitSettings,
         watched: Callable[[], bool],
         tls: ssl.SSLContext | None = None,
+        offs: Callable[[], int] = lambda: 0,
     ) -> None:
+        self._offs = offs
         self._loop = asyncio.get_running_loop()
         self._listener = listener
         self._protocol = protocol
@@ -202,13 +206,16 @@ class Acceptor:
             self._first.hold_others()  # from now on, not only when it is read in its turn
         if problem is None:
             release = partial(self._admission.release, host)
-            self._start(self._connect(connection, host, release), self._requests.account(host))
+            connecting = self._connect(connection, host, release, self._offs())
+            self._start(connecting, self._requests.account(host))
         else:
             self._reserve.take(connection, host, problem)
 
     def _connect_beyond(self, candidate: Candidate) -> None:
         release = partial(self._reserve.release, candidate)
-        connecting = self._connect(candidate.connection, candidate.host, release, candidate)
+        connecting = self._connect(
+            candidate.connection, candidate.host, release, self._offs(), candidate
+        )
         self._start(connecting, self._first.account(candidate.host))
 
     def _start(self, connecting: Coroutine[Any, Any, None], account: Account) -> None:
@@ -237,6 +244,7 @@ class Acceptor:
         connection: socket.socket,
         host: str,
         release: Callable[[], None],
+        offs: int,
         candidate: Candidate | None = None,
     ) -> None:
         """Hand a connection to a protocol once its handshake is done."""
@@ -251,6 +259,8 @@ class Acceptor:
                 first=self._first.account(host),
                 beyond=None if candidate is None else self._refusal(candidate.problem),
                 lost=counted.close,
+                offs=self._offs,
+                arrived=offs if self._tls is None and arrived(connection) else None,
             )
             if candidate is not None:
                 candidate.limiter = limiter

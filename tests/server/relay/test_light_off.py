@@ -15,6 +15,7 @@ from tests.server.streaming import VIDEO
 from tests.serving import Served, serving
 from tests.waiting import wait_until
 from transientcam_server.camera import _origin_lease as origin_lease
+from transientcam_server.errors import OriginRefused
 from transientcam_server.relay import _delivery as delivery
 
 ORIGIN = "sim:wall?noise=off"
@@ -178,7 +179,20 @@ def test_a_start_that_was_asked_for_before_does_not(
     assert before is not None
     offs = before.offs
     assert send(relay, "POST", SAFE_OFF, wait_s=PATIENCE_S)[0] == 200
-    before.start_unless(offs)
+    assert not before.start_unless(offs)
+    assert not is_lit(lit)
+
+
+def test_a_start_that_it_overtakes_on_the_way_does_not(
+    lit: Served, link: Forwarder, relay: Served
+) -> None:
+    """The relay has asked for it, and its network delivers what switches off first."""
+    before = relay.service.relay
+    assert before is not None
+    seen = before._link.offs()
+    assert send(relay, "POST", SAFE_OFF, wait_s=PATIENCE_S)[0] == 200
+    with pytest.raises(OriginRefused, match="switched off after this"):
+        before._link.start(offs=seen)
     assert not is_lit(lit)
 
 

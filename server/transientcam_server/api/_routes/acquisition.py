@@ -9,9 +9,10 @@ from fastapi import APIRouter, Header, Request
 
 from transientcam_server.api._auth import Role
 from transientcam_server.api._auth.permissions import TO_LIGHT, needs, require
-from transientcam_server.api._dependencies import ServiceOf
+from transientcam_server.api._dependencies import OffsOf, ServiceOf
 from transientcam_server.api._documents.camera import AcquisitionDocument, AcquisitionRequest
 from transientcam_server.api._problems import documented
+from transientcam_server.camera import outdated
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.service import Service
 
@@ -46,23 +47,29 @@ async def read_acquisition(service: ServiceOf) -> AcquisitionDocument:
         kinds.INVALID_REQUEST,
         kinds.MAY_NOT_LIGHT,
         kinds.CAMERA_BUSY,
+        kinds.START_OUTDATED,
         kinds.CAMERA_FAILED,
         kinds.CAMERA_LOST,
         kinds.LIGHT_UNCONFIRMED,
     ),
 )
 async def change_acquisition(
-    service: ServiceOf, wanted: AcquisitionRequest, http: Request, prefer: _Prefer = None
+    service: ServiceOf,
+    wanted: AcquisitionRequest,
+    http: Request,
+    offs: OffsOf,
+    prefer: _Prefer = None,
 ) -> AcquisitionDocument:
     """Start or stop capturing; the camera's light is off while it does not.
 
     Starting takes the right `may_light`. The light goes on once it was announced for the setting
-    `light.delay_s`: `state` is `arming` until then. Stopping ends calibrations that are measured or
+    `light.delay_s`: `state` is `arming` until then. A start that arrived before the light was to go
+    off, and is handled afterwards, is refused. Stopping ends calibrations that are measured or
     wait for that, and holds over a restart of the service.
     """
     if wanted.running:
         require(http, service, TO_LIGHT)
-        await asyncio.wrap_future(service.acquisition.set_running(True))
+        await asyncio.wrap_future(_start(service, offs, wanted.offs))
     else:
         await _confirmed(service, service.acquisition.set_running(False), prefer)
     return _document(service)
@@ -86,6 +93,13 @@ async def switch_off(service: ServiceOf, prefer: _Prefer = None) -> AcquisitionD
     """
     await _confirmed(service, service.acquisition.safe_off(), prefer)
     return _document(service)
+
+
+def _start(service: Service, arrived: int, wanted: int | None) -> "Future[None]":
+    """Start, unless the light was to go off since that arrived, or was another time wanted."""
+    if wanted is not None and wanted != arrived:
+        raise outdated()
+    return service.acquisition.set_running(True, offs=arrived)
 
 
 async def _confirmed(service: Service, off: "Future[None]", prefer: str | None) -> None:
