@@ -159,11 +159,8 @@ class Service:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._rules = rules = LightRules.of(camera, settings)
         self._light = LightGuard(unserved_s=rules.unserved_s, unused_s=rules.unused_s)
-        self._darkness = (
-            Darkness(settings.light.directory, rules.unit)
-            if self.relay is None and rules.unit is not None
-            else None
-        )
+        unit = rules.unit if self.relay is None else f"relay:{self.relay.url}"
+        self._darkness = None if unit is None else Darkness(settings.light.directory, unit)
         self.acquisition = (
             Acquisition(
                 camera,
@@ -174,7 +171,12 @@ class Service:
                 supervision=Supervision(camera, silence_s=settings.limits.unserved_s),
             )
             if self.relay is None
-            else SharedAcquisition(self.relay, report=self._from_acquisition, light=self._light)
+            else SharedAcquisition(
+                self.relay,
+                report=self._from_acquisition,
+                light=self._light,
+                darkness=self._darkness,
+            )
         )
         self.origin_lease = (
             None if self.relay is None else OriginLease(self.relay, self.acquisition)

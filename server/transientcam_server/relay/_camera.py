@@ -246,7 +246,8 @@ class RelayCamera(HostCamera):
         self._state = CameraState.DISCONNECTED
         if self.switching_off:
             _log.error(
-                "%s has not confirmed that its light is off, and is not asked again", self.url
+                "%s has not confirmed that its light is off, and is asked at the next start",
+                self.url,
             )
         for each in (self._safe_off, self._stop, *self._releasing):
             each.end("this service ends")

@@ -163,7 +163,7 @@ def test_a_start_that_arrived_before_a_safe_off_lights_nothing(lit: Daemon) -> N
     url = lit.client.base_url
     with socket.create_connection((url.host, url.port or 0), PATIENCE_S) as early:
         early.sendall(
-            b"PUT /api/v1/acquisition HTTP/1.1\r\nHost: lab\r\nConnection: close\r\n"
+            b"PUT /api/v1/acquisition HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n"
             b'Content-Type: application/json\r\nContent-Length: 17\r\n\r\n{"running":'
         )
         lit.client.get("/livez")  # what came before it was read
