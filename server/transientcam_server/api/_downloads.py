@@ -71,14 +71,14 @@ async def answer(
     except FileNotFoundError:
         raise _deleted(gone) from None
     return _File(
-        path,
-        status,
+        _span(wanted, status.st_size),
         disk=disk,
         gone=gone,
+        path=path,
+        stat_result=status,
         headers=None if tag is None else {"ETag": tag},
         media_type=media_type,
         filename=filename,
-        span=_span(wanted, status.st_size),
     )
 
 
@@ -109,55 +109,43 @@ def _deleted(gone: ProblemKind) -> Problem:
 
 
 def _span(wanted: str | None, size: int) -> tuple[int, int] | None:
-    """Return begin and end of the range that is wanted; None for all."""
-    if wanted is None or not _is_usable(wanted, size) or "," in wanted:
+    """Return begin and end of the range that is wanted; None for all.
+
+    Raises
+    ------
+    Problem
+        ``range-not-satisfiable``: it lies beyond the end.
+    """
+    if wanted is None or not _RANGES.fullmatch(wanted.strip()):
         return None
-    first, _, last = (each.strip() for each in wanted.partition("=")[2].partition("-"))
-    begin = int(first) if first else max(0, size - int(last))
-    return begin, min(size, int(last) + 1) if first and last else size
-
-
-def _is_usable(wanted: str, size: int) -> bool:
-    """Return whether a Range header is one; refuse one that lies beyond the end."""
-    if not _RANGES.fullmatch(wanted.strip()):
-        return False
     ranges = [each.strip().partition("-") for each in wanted.partition("=")[2].split(",")]
     if any(first and last and int(last) < int(first) for first, _, last in ranges):
-        return False
+        return None
     if any(int(first) >= size if first else not int(last) for first, _, last in ranges):
         detail = f"The file has {size} bytes."
         raise Problem(kinds.RANGE_NOT_SATISFIABLE, detail, field="range", value=wanted, limit=size)
-    return True
+    (first, _, last), *others = ranges
+    begin = int(first) if first else max(0, size - int(last))
+    return None if others else (begin, min(size, int(last) + 1) if first and last else size)
 
 
 class _File(FileResponse):
-    """A file, or a range of it, read by the threads of the disk; the framework makes its headers."""
+    """A file, or a range of it, read on threads of the disk; the framework makes its headers."""
 
     def __init__(
-        self,
-        path: Path,
-        status: os.stat_result,
-        *,
-        disk: DiskThreads,
-        gone: ProblemKind,
-        headers: dict[str, str] | None,
-        media_type: str,
-        filename: str | None,
-        span: tuple[int, int] | None,
+        self, span: tuple[int, int] | None, *, disk: DiskThreads, gone: ProblemKind, **about: Any
     ) -> None:
-        super().__init__(
-            path, headers=headers, media_type=media_type, filename=filename, stat_result=status
-        )
-        self._disk, self._gone, self._span, self._size = disk, gone, span, status.st_size
+        super().__init__(**about)
+        self._span, self._disk, self._gone = span, disk, gone
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer, once the beginning is read; the answer ends short where the disk then fails."""
-        begin, end = 0, self._size
+        begin, end = 0, (size := int(self.headers["content-length"]))
         tags = (None, self.headers["etag"], self.headers["last-modified"])
         if self._span is not None and Headers(scope=scope).get("if-range") in tags:
             begin, end = self._span
             self.status_code = 206
-            self.headers["content-range"] = f"bytes {begin}-{end - 1}/{self._size}"
+            self.headers["content-range"] = f"bytes {begin}-{end - 1}/{size}"
             self.headers["content-length"] = str(end - begin)
         try:
             file = await self._disk.run(partial(Path(self.path).open, "rb", buffering=0))

@@ -156,8 +156,11 @@ class Acquisition:
                 self._light.turned()  # as this was served
                 asked = self.offs if offs is None else offs
                 return self.submit(lambda: self._start(asked))
-            self._offs += 1
-            return self.submit(lambda: self._stop(cause))
+            return self._begin_stop(cause)
+
+    def _begin_stop(self, cause: KeptCause) -> "Future[None]":
+        self._offs += 1
+        return self.submit(lambda: self._stop(cause))
 
     def safe_off(self) -> "Future[None]":
         """Stop capturing and switch the light off, by the request that no state refuses.

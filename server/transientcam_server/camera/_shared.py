@@ -59,14 +59,8 @@ class SharedAcquisition(Acquisition):
         """Counts how often the light was to go off, here."""
         return self._origin.offs
 
-    def set_running(
-        self, running: bool, *, cause: KeptCause = "stop", offs: int | None = None
-    ) -> "Future[None]":
-        """Start behind other changes, or stop at once, as `safe_off`."""
-        if running:
-            asked = self.offs if offs is None else offs
-            return self.submit(lambda: self._start(asked))
-        return self._off(self._origin.begin_stop, "stop")
+    def _begin_stop(self, cause: KeptCause) -> "Future[None]":
+        return self._off(self._origin.begin_stop, cause)
 
     def safe_off(self) -> "Future[None]":
         """Switch the light off at the origin, at once; done once the origin has confirmed that.
@@ -141,7 +135,7 @@ class SharedAcquisition(Acquisition):
 
     def _stop(self, cause: KeptCause = "stop") -> None:
         """Stop where a lease has lapsed."""
-        self._off(self._origin.begin_stop, cause)
+        self._begin_stop(cause)
 
     def _off(self, begin: Callable[[], "Future[None]"], cause: KeptCause) -> "Future[None]":
         def follow(done: "Future[None]") -> None:

@@ -85,30 +85,20 @@ def reconstruct_on_cluster(
     """Reconstruct one recording, or all of a directory, on a cluster.
 
     Of a directory those that cannot be are named, and the others reconstructed.
-
-    Raises
-    ------
-    typer.Exit
-        Some could not be.
     """
     console = Terminal(stderr=True)
-    outputs = _outputs(place, output)
+    outputs, failed = _outputs(place, output), 0
     with cluster_client(workers, dask, console) as client:
         from transientcam_server.offline import reconstruct_on, recording_at
 
-        def reconstruct(place: str, into: str) -> None:
-            with recording_at(place, token=token) as opened:
-                options = wanted.options(opened.header)
-            with progress_bar("reconstructing") as advance:
-                frames, before = reconstruct_on(
-                    client, place, into, options, token=token, progress=advance
-                )
-            _report(into, options.products, frames, before, as_json=as_json)
-
-        failed = 0
         for each, into in outputs.items():
             try:
-                reconstruct(each, into)
+                with recording_at(each, token=token) as opened:
+                    options = wanted.options(opened.header)
+                with progress_bar("reconstructing") as advance:
+                    frames, before = reconstruct_on(
+                        client, each, into, options, token=token, progress=advance
+                    )
             except (MissingExtra, MixedVersions):
                 raise
             except Exception as error:  # of a file that anybody may have written
@@ -116,6 +106,8 @@ def reconstruct_on_cluster(
                     raise
                 console.print(plain(f"{each}: {error}"), soft_wrap=True)
                 failed += 1
+            else:
+                _report(into, options.products, frames, before, as_json=as_json)
     if failed:
         console.print(f"{failed} of {len(outputs)} recordings are not reconstructed")
         raise typer.Exit(code=1)

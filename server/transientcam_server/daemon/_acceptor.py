@@ -27,7 +27,9 @@ from transientcam_server.settings import LimitSettings
 
 _log = logging.getLogger("transientcam_server.daemon.acceptor")
 AT_ONCE: Final = 16
-"""Connections accepted before other tasks run."""
+"""Connections accepted before other tasks run; more where that takes less than `ACCEPT_S`."""
+ACCEPT_S: Final = 0.004
+"""One that switches the light off waits behind a flood of others until all are accepted."""
 PAUSE_S: Final = 0.5
 """Before the next one is accepted where the system has no descriptors left."""
 REQUESTS_SHARE: Final = 0.4
@@ -187,7 +189,9 @@ class Acceptor:
         await asyncio.gather(*self._handshakes, return_exceptions=True)
 
     def _accept(self) -> None:
-        for _ in range(AT_ONCE):
+        until_s, accepted = self._loop.time() + ACCEPT_S, 0
+        while accepted < AT_ONCE or self._loop.time() < until_s:
+            accepted += 1
             try:
                 connection, address = self._listener.accept()
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
@@ -213,9 +217,7 @@ class Acceptor:
 
     def _connect_beyond(self, candidate: Candidate) -> None:
         release = partial(self._reserve.release, candidate)
-        connecting = self._connect(
-            candidate.connection, candidate.host, release, self._offs(), candidate
-        )
+        connecting = self._connect(candidate.connection, candidate.host, release, None, candidate)
         self._start(connecting, self._first.account(candidate.host))
 
     def _start(self, connecting: Coroutine[Any, Any, None], account: Account) -> None:
@@ -244,7 +246,7 @@ class Acceptor:
         connection: socket.socket,
         host: str,
         release: Callable[[], None],
-        offs: int,
+        offs: int | None,
         candidate: Candidate | None = None,
     ) -> None:
         """Hand a connection to a protocol once its handshake is done."""

@@ -69,7 +69,9 @@ async def change_acquisition(
     """
     if wanted.running:
         require(http, service, TO_LIGHT)
-        await asyncio.wrap_future(_start(service, offs, wanted.offs))
+        if wanted.offs not in (None, offs):
+            raise outdated()
+        await asyncio.wrap_future(service.acquisition.set_running(True, offs=offs))
     else:
         await _confirmed(service, service.acquisition.set_running(False), prefer)
     return _document(service)
@@ -93,13 +95,6 @@ async def switch_off(service: ServiceOf, prefer: _Prefer = None) -> AcquisitionD
     """
     await _confirmed(service, service.acquisition.safe_off(), prefer)
     return _document(service)
-
-
-def _start(service: Service, arrived: int, wanted: int | None) -> "Future[None]":
-    """Start, unless the light was to go off since that arrived, or was another time wanted."""
-    if wanted is not None and wanted != arrived:
-        raise outdated()
-    return service.acquisition.set_running(True, offs=arrived)
 
 
 async def _confirmed(service: Service, off: "Future[None]", prefer: str | None) -> None:
