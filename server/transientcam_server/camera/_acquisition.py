@@ -332,8 +332,7 @@ class Acquisition:
     def _may_light(self, offs: int) -> bool:
         """Announce the light; return whether it may begin, watched: the one gate of all light."""
         self._announce()
-        announced = self._announcement.light_on_in_s is None
-        return announced and self._is_watched() and self._offs == offs
+        return self._announcement.light_on_in_s is None and self._is_watched() and self._offs == offs
 
     def _announce(self) -> None:
         if self._announcement.begin() and self._announcement.delay_s:

@@ -44,10 +44,8 @@ class ReadLimiter(asyncio.BufferedProtocol):
         the limits.
     lost
         Called once when the connection has ended.
-    offs
-        Returns how often the light was to go off; a start that arrived before does not light.
-    arrived
-        The same when the first request arrived; None where nothing of it is here.
+    offs, arrived
+        How often the light was to go off; when the first request arrived, if any of it is here.
     """
 
     def __init__(

@@ -155,12 +155,12 @@ class Origin:
         with self._changing():
             return self._client.configure(**sequence)
 
-    def offs(self) -> int:
-        """Return how often its light was to go off, by its own count."""
+    def offs(self) -> int | None:
+        """Return how often its light was to go off; None of one that is too old to say so."""
         with self._answering():
-            return int(self._client.acquisition["offs"])
+            return self._client.acquisition.get("offs")
 
-    def start(self, *, offs: int) -> None:
+    def start(self, *, offs: int | None) -> None:
         """Start the capture, unless its light was to go off since there were so many ``offs``."""
         with self._changing():
             self._client.start(offs=offs)

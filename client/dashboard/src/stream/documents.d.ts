@@ -23,9 +23,9 @@ export interface AcquisitionDocument {
   /** Time until the light goes on, while `state` is `arming`; null else. */
   readonly light_on_in_s: number | null;
   /** What ended the capture: `stop`, `safe-off`, `lapse` of a lease, the `device` (its interlock),
-   * that it was `unused` or clients `unserved`, or the `supervisor` beside this service; or why none began: `start`, where
-   * the service starts none by itself, and where what is kept of the light is `unreadable` or
-   * `unwritable`. Null while it is running, and of a relay. */
+   * that it was `unused` or clients `unserved`, or the `supervisor` beside this service; or why none
+   * began: `start`, where the service starts none by itself, and where what is kept of the light is
+   * `unreadable` or `unwritable`. Null while it is running, and of a relay. */
   readonly off_because:
     | "stop"
     | "safe-off"
