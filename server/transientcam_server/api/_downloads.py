@@ -109,13 +109,7 @@ def _deleted(gone: ProblemKind) -> Problem:
 
 
 def _span(wanted: str | None, size: int) -> tuple[int, int] | None:
-    """Return begin and end of the range that is wanted; None for all.
-
-    Raises
-    ------
-    Problem
-        ``range-not-satisfiable``: it lies beyond the end.
-    """
+    """Return begin and end of the range that is wanted; None for all. Refuse one beyond the end."""
     if wanted is None or not _RANGES.fullmatch(wanted.strip()):
         return None
     ranges = [each.strip().partition("-") for each in wanted.partition("=")[2].split(",")]

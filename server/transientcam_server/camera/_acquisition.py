@@ -142,13 +142,13 @@ class Acquisition:
     ) -> "Future[None]":
         """Start or stop capturing; stopping also ends jobs that have the camera or wait for it.
 
-        ``offs`` is what `offs` was when a start was asked for, None for now; the future raises
-        `Problem` (``start-outdated``) where the light was to go off since.
+        ``offs`` is what `offs` was when a start was asked for, None for now.
 
         Raises
         ------
         Problem
-            ``camera-busy`` if it is to start while a job has exclusive use of the camera.
+            ``start-outdated``, by the future, if the light was to go off since; ``camera-busy`` if
+            it is to start while a job has exclusive use of the camera.
         """
         with self._occupied:
             if running:
@@ -332,7 +332,9 @@ class Acquisition:
     def _may_light(self, offs: int) -> bool:
         """Announce the light; return whether it may begin, watched: the one gate of all light."""
         self._announce()
-        return self._announcement.light_on_in_s is None and self._is_watched() and self._offs == offs
+        return (
+            self._announcement.light_on_in_s is None and self._is_watched() and self._offs == offs
+        )
 
     def _announce(self) -> None:
         if self._announcement.begin() and self._announcement.delay_s:

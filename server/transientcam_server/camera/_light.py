@@ -68,8 +68,7 @@ class LightGuard:
 
     def unserved(self) -> str | None:
         """Return why a capture has to end that no client can stop, or None."""
-        age_s = self._clock() - self._turned_s
-        if age_s <= self._unserved_s:
+        if self._clock() - self._turned_s <= self._unserved_s:
             return None
         return f"none was served for {self._unserved_s:g} s"
 
