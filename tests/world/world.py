@@ -180,7 +180,7 @@ class Loop(asyncio.BaseEventLoop):
         asyncio._set_running_loop(self)
         try:
             for _ in range(20):
-                self._run_once()
+                self._run_once()  # type: ignore[attr-defined]  # what a loop without sockets turns by
         finally:
             asyncio._set_running_loop(None)
         if not task.done():

@@ -4,7 +4,6 @@ import asyncio
 import logging
 import os
 import re
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -142,7 +141,7 @@ class _File(FileResponse):
             self.headers["content-range"] = f"bytes {begin}-{end - 1}/{size}"
             self.headers["content-length"] = str(end - begin)
         try:
-            file = await self._disk.run(partial(Path(self.path).open, "rb", buffering=0))
+            file = await self._disk.run(lambda: Path(self.path).open("rb", buffering=0))
         except FileNotFoundError:
             raise _deleted(self._gone) from None
         left = asyncio.create_task(_disconnected(receive))
