@@ -141,23 +141,23 @@ class _File(FileResponse):
             self.headers["content-range"] = f"bytes {begin}-{end - 1}/{size}"
             self.headers["content-length"] = str(end - begin)
         try:
-            file = await self._disk.run(lambda: Path(self.path).open("rb", buffering=0))
+            file = await self._disk.run(os.open, self.path, os.O_RDONLY)
         except FileNotFoundError:
             raise _deleted(self._gone) from None
         left = asyncio.create_task(_disconnected(receive))
         try:
-            data = await self._disk.run(os.pread, file.fileno(), min(_PIECE, end - begin), begin)
+            data = await self._disk.run(os.pread, file, min(_PIECE, end - begin), begin)
             head = {"status": self.status_code, "headers": self.raw_headers}
             await send({"type": "http.response.start", **head})
             while begin + len(data) < end and data and not left.done():
                 await send({"type": "http.response.body", "body": data, "more_body": True})
                 begin += len(data)
-                data = await self._read_on(file.fileno(), begin, end)
+                data = await self._read_on(file, begin, end)
             if begin + len(data) == end:
                 await send({"type": "http.response.body", "body": data})
         finally:
             left.cancel()
-            self._disk.submit(file.close)
+            self._disk.submit(os.close, file)
 
     async def _read_on(self, descriptor: int, begin: int, end: int) -> bytes:
         try:

@@ -408,7 +408,8 @@ def test_the_body_of_a_download_waits_for_a_disk_as_all_else_does(
             answers.wait()
         return os.pread(*arguments)
 
-    monkeypatch.setattr(downloads, "os", SimpleNamespace(pread=hanging))
+    replaced = SimpleNamespace(**{**vars(os), "pread": hanging})
+    monkeypatch.setattr(downloads, "os", replaced)
     monkeypatch.setattr(downloads, "_PIECE", 1024)
     monkeypatch.setattr(daemon.service.recordings.disk, "_stalled_s", 0.1)
     answer = http.get(url)
