@@ -68,15 +68,14 @@ class LightGuard:
 
     def unserved(self) -> str | None:
         """Return why a capture has to end that no client can stop, or None."""
-        if self._clock() - self._turned_s <= self._unserved_s:
-            return None
-        return f"none was served for {self._unserved_s:g} s"
+        late = self._clock() - self._turned_s > self._unserved_s
+        return f"none was served for {self._unserved_s:g} s" if late else None
 
     def unused(self) -> str | None:
         """Return why a capture has to end that nobody uses, or None."""
-        if self._clock() - self._used_s <= self._unused_s:
-            return None
-        return f"no viewer, reader, recording, job or lease for {self._unused_s:g} s"
+        late = self._clock() - self._used_s > self._unused_s
+        words = f"no viewer, reader, recording, job or lease for {self._unused_s:g} s"
+        return words if late else None
 
 
 class Announcement:

@@ -129,8 +129,7 @@ class ReadLimiter(asyncio.BufferedProtocol):
         self.account.done()
         self.account = self._requests
         here = more or bool(self._portion)
-        self._begun = None if here else b""
-        self.offs = self._last_offs if here else None
+        self._begun, self.offs = (None, self._last_offs) if here else (b"", None)
 
     def refuse(self) -> None:
         """Answer with the refusal, and end the connection; as soon as there is one."""
