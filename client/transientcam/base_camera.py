@@ -137,9 +137,9 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         """Long-running jobs of the daemon: their progress and their end."""
         return Jobs(self._ask)
 
-    def start(self) -> _Document:
-        """Start the capture."""
-        return self._ask(changes.set_running(True))
+    def start(self, *, offs: int | None = None) -> _Document:
+        """Start the capture; not where the acquisition's ``offs`` is another than this by now."""
+        return self._ask(changes.set_running(True, offs=offs))
 
     def stop(self) -> _Document:
         """Stop the capture."""

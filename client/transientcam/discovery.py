@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 SERVICE_TYPE: Final = "_transientcam._tcp.local."
 WEB_TYPE: Final = "_http._tcp.local."
-STATES: Final = ("arming", "starting", "streaming", "stopped", "calibrating", "lost", "held")
+STATES: Final = ("arming", "starting", "streaming", "stopped", "calibrating", "lost")
 """What a camera can be said to do; the states of ``GET /camera``."""
 MAX_CAMERAS: Final = 256
 """Names that one search asks for: any host may announce as many as it likes."""

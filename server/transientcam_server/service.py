@@ -35,9 +35,7 @@ from transientcam_server.camera import (
     LightArmingEvent,
     LightConfirmedEvent,
     LightGuard,
-    LightHeldEvent,
     LightOffEvent,
-    LightReleasedEvent,
     LightRules,
     LightUnconfirmedEvent,
     OriginChanged,
@@ -168,12 +166,9 @@ class Service:
         )
         self._loop: asyncio.AbstractEventLoop | None = None
         self._rules = rules = LightRules.of(camera, settings)
-        self._light = LightGuard(unserved_s=settings.limits.unserved_s, unused_s=rules.unused_s)
-        self._darkness = (
-            Darkness(settings.light.directory, rules.unit)
-            if self.relay is None and rules.unit is not None
-            else None
-        )
+        self._light = LightGuard(unserved_s=rules.unserved_s, unused_s=rules.unused_s)
+        unit = rules.unit if self.relay is None else f"relay:{self.relay.url}"
+        self._darkness = None if unit is None else Darkness(settings.light.directory, unit)
         self.acquisition = (
             Acquisition(
                 camera,
@@ -184,7 +179,12 @@ class Service:
                 supervision=Supervision(camera, silence_s=settings.limits.unserved_s),
             )
             if self.relay is None
-            else SharedAcquisition(self.relay, report=self._from_acquisition, light=self._light)
+            else SharedAcquisition(
+                self.relay,
+                report=self._from_acquisition,
+                light=self._light,
+                darkness=self._darkness,
+            )
         )
         self.origin_lease = (
             None if self.relay is None else OriginLease(self.relay, self.acquisition)
@@ -319,8 +319,6 @@ class Service:
         reasons = []
         if status.state == "lost":
             reasons.append(f"the camera is lost: {status.reason}")
-        if status.state == "held":
-            reasons.append(f"the light is held off: {status.reason}")
         if status.state == "arming":
             reasons.append("the light is announced and not on yet")
         if status.state in ("starting", "streaming") and not status.frames:
@@ -451,10 +449,6 @@ class Service:
                 self.hub.notify("light-arming", {"in_s": in_s})
             case LightOffEvent(dark):
                 self.hub.notify("light-off", {"because": dark.cause, "reason": str(dark)})
-            case LightHeldEvent(reason):
-                self.hub.notify("light-held", {"reason": reason})
-            case LightReleasedEvent():
-                self.hub.notify("light-released", {})
             case LightUnconfirmedEvent(reason):
                 self.hub.notify("light-unconfirmed", {"reason": reason})
             case LightConfirmedEvent():

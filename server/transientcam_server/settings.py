@@ -236,9 +236,9 @@ class LimitSettings(_Group):
     """Of the processor time of the event loop's thread: what answering one address may take while
     frames are sent or recorded. Nothing is refused; its next request is read later."""
     unserved_s: _Finite = Field(default=1.0, ge=0.5, le=60.0)
-    """Time without any client being served, after which the light is switched off until they are:
-    no client could switch it off meanwhile. After the same time without the camera's thread the
-    supervisor, a process of its own, switches it off until somebody starts."""
+    """Time without any client being served, after which the capture ends: no client could switch
+    the light off meanwhile. After the same time without the camera's thread the supervisor, a
+    process of its own, ends it. A camera that shines at nobody (sim:) goes on."""
     plan_s: _Finite = Field(default=300.0, gt=0.0, le=86400.0)
     """Time for a plan, or a look at the scene, to be computed; then it is given up."""
     head_s: _Finite = Field(default=10.0, gt=0.0, le=3600.0)

@@ -196,8 +196,11 @@ def test_viewers_readers_recordings_jobs_and_leases_use_the_capture(tmp_path: Pa
             next(preview.iter_raw())
             used.append(service._is_used())
         wait_until(lambda: not service._is_used())
+        busy = threading.Event()
+        service.acquisition.submit(lambda: busy.wait(PATIENCE_S))  # or the job might have ended
         job = httpx.post(f"{url}/calibrations", json={"frames": 2}).json()
         used.append(service._is_used())
+        busy.set()
         httpx.post(f"{url}/jobs/{job['id']}/cancel").raise_for_status()
         wait_until(lambda: not service._is_used())
         before = service.hub.reads

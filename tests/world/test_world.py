@@ -15,5 +15,8 @@ def test_no_world_shows_a_violation(part: int) -> None:
 
     assert violations == []
     # the draws reach what they are about
-    for each in ("chunk", "disk", "safe-off", "restart", "cut", "half open", "unplug"):
+    for each in (
+        *("chunk", "disk", "safe-off", "relayed safe-off", "restart", "cut"),
+        *("half open", "unplug", "unserved"),
+    ):
         assert happened[each], each

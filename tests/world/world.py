@@ -1,13 +1,15 @@
-"""A world in one process: a camera, a daemon's logic, two clients, a network and a disk.
+"""A world in one process: a camera, a daemon's logic, a relay, two clients, a network and a disk.
 
 One scheduler steps all of them by one virtual clock; a seed draws what goes wrong, and when. What
-runs is the product's: acquisition, light guard, lease, library, recorder, writer, recovery, and
-what answers the keys of Zarr. What is modelled is what is outside of it: the camera's hardware
-with its heartbeat, the network (delayed, cut, half open: a request arrives and its answer does
-not), the disk below the calls of the system, and clients. Threads are replaced by steps, so races
-between threads are not here, nor are event loop, HTTP, relays and streams.
+runs is the product's: acquisition, light guard, lease, library, recorder, writer, recovery, what
+answers the keys of Zarr, and what a relay delivers. What is modelled is what is outside of it: the
+camera's hardware with its heartbeat, the network (delayed, cut, half open: a request arrives and
+its answer does not), in which order HTTP has requests handled (those that switch off go first), the
+disk below the calls of the system, and clients. Threads are replaced by steps, so races between
+threads are not here, nor are the parser of HTTP, a relay's frames and streams.
 """
 
+import asyncio
 import heapq
 import itertools
 import json
@@ -49,6 +51,7 @@ from transientcam_server.recording import (
     recovery,
     swmr,
 )
+from transientcam_server.relay._delivery import Delivery
 from transientcam_server.settings import RecordingSettings
 
 LASTS_S: Final = 6.0
@@ -56,6 +59,9 @@ TICK_S: Final = 0.1
 FRAME_S: Final = 0.25
 HEARTBEAT_S: Final = 2.0
 LEASE_S: Final = 1.5
+UNSERVED_S: Final = 1.0
+REPEATED_S: Final = 20.0
+"""Until a relay has repeated what did not arrive, however long its network was cut."""
 OFF_WITHIN_S: Final = 0.5
 """After a lease has lapsed or safe-off was confirmed: a step of each object, and the guard's."""
 GIVE_UP_S: Final = 4.0
@@ -154,6 +160,39 @@ class Device:
         return FRAMES[self._number % len(FRAMES)]
 
 
+class Loop(asyncio.BaseEventLoop):
+    """An event loop in virtual time, which has no sockets."""
+
+    def __init__(self, clock: Clock) -> None:
+        super().__init__()
+        self._clock = clock
+        self._selector = SimpleNamespace(select=lambda timeout: [])
+
+    def time(self) -> float:
+        return self._clock()
+
+    def run(self, coroutine: Any) -> None:
+        """Run it as time passes."""
+        task = self.create_task(coroutine)
+        self._clock.later(0.0, lambda: self._turn(task))
+
+    def _turn(self, task: "asyncio.Task[None]") -> None:
+        asyncio._set_running_loop(self)
+        try:
+            for _ in range(20):
+                self._run_once()  # type: ignore[attr-defined]  # what a loop without sockets turns by
+        finally:
+            asyncio._set_running_loop(None)
+        if not task.done():
+            self._clock.later(TICK_S, lambda: self._turn(task))
+
+    def _process_events(self, events: object) -> None:
+        """Do nothing: there are none."""
+
+    def _write_to_self(self) -> None:
+        """Do nothing: it turns by itself."""
+
+
 class _AtOnce:
     """Switches the light off in the place of the thread that does."""
 
@@ -192,13 +231,14 @@ class Disk:
 
 
 class _Stepped:
-    """In place of a thread: the scheduler does what it would do."""
+    """In place of a thread: the scheduler does what it would do, or a loop in virtual time."""
 
-    def __init__(self, **_: object) -> None:
-        pass
+    def __init__(self, *, target: Callable[[], None], name: str, **_: object) -> None:
+        self._begin = target if name == "relay-delivery" else None
 
     def start(self) -> None:
-        pass
+        if self._begin is not None:
+            self._begin()
 
 
 class _Commands(list[Callable[[], None]]):
@@ -219,7 +259,7 @@ class Daemon:
 
     def __init__(self, world: "World") -> None:
         self._world, clock = world, world.clock
-        self._light = LightGuard(unserved_s=1.0, clock=clock)
+        self._light = LightGuard(unserved_s=UNSERVED_S, clock=clock)
         self.acquisition = Acquisition(
             world.device,  # type: ignore[arg-type]
             report=self._happened,
@@ -322,6 +362,11 @@ class World:
         self.open = 0
         self.dark_since_s: float | None = self.clock()
         self._dead_since_s: float | None = None
+        self._unserved_since_s: float | None = None
+        self._switched_off_s = 0.0
+        self._arrived_s, self._offs = 0.0, 0
+        self.loop = Loop(self.clock)
+        self.relay = Delivery(self._relayed)
         self._lease_id: str | None = None
         self._holds_until_s = 0.0
 
@@ -357,6 +402,7 @@ class World:
                 mock.patch.multiple(os, **calls),
                 mock.patch.object(layout, "image", return_value=_IMAGE),
                 mock.patch.object(threading, "Thread", _Stepped),
+                mock.patch.object(asyncio, "run", self.loop.run),
                 mock.patch.object(
                     secrets, "token_hex", side_effect=(f"{each:06x}" for each in ids)
                 ),
@@ -367,6 +413,13 @@ class World:
     def _end(self) -> None:
         """Restart on a disk that works, and hold what is there against what was said."""
         self.clock.run(self.clock() + GIVE_UP_S)
+        if self.relay.unconfirmed:
+            self.clock.run(self.clock() + REPEATED_S)
+        if self.relay.unconfirmed:
+            self._fail("a relay's safe-off never came to the daemon")
+        if self.open:  # what the relay repeated meanwhile
+            self.clock.run(self.clock() + GIVE_UP_S)
+        self.loop.close()
         if self.open:
             self._fail(f"{self.open} requests did not end")
         self.disk.fails_in = None
@@ -429,6 +482,7 @@ class World:
             self.clock.later(draw.uniform(0.1, 2.0), self._plug)
         elif what == "unserved":
             self.daemon.served = False
+            self._unserved_since_s = self._unserved_since_s or now_s
             self.clock.later(draw.uniform(0.1, 3.0), self._serve)
         elif what == "delete":  # behind the daemon's back
             path = draw.choice([*sorted(self.directory.glob("*.h5*")), None])
@@ -439,20 +493,29 @@ class World:
     def _start(self) -> None:
         self.disk.fails_in = None  # or it could not even recover
         self.daemon, self._dead_since_s = Daemon(self), None
+        self.dark_since_s, self._unserved_since_s = self.clock(), None
 
     def _plug(self) -> None:
         self.device.plugged = True
         self.device._lit = False
 
     def _serve(self) -> None:
-        self.daemon.served = True
+        self.daemon.served, self._unserved_since_s = True, None
 
     # -- the network -----------------------------------------------------------------------------
 
     def _ask(
-        self, name: str, work: Callable[[Daemon], Any], answered: Callable[[Any], None]
+        self,
+        name: str,
+        work: Callable[[Daemon], Any],
+        answered: Callable[[Any], None],
+        *,
+        first: bool = False,
     ) -> None:
-        """Send a request; what the client gets is a result, a Problem, or None if it gave up."""
+        """Send a request; what the client gets is a result, a Problem, or None if it gave up.
+
+        One that goes ``first`` is handled as soon as it arrives, others when it is their turn.
+        """
         self.open += 1
         self.happened[name] += 1
 
@@ -464,12 +527,22 @@ class World:
 
         request = Request(ended)
         self.clock.later(GIVE_UP_S, lambda: request.end(None))
-        self.clock.later(self.draw.uniform(0.0, 0.5), lambda: self._arrive(work, request))
+        self.clock.later(self.draw.uniform(0.0, 0.5), lambda: self._arrive(work, request, first))
 
-    def _arrive(self, work: Callable[[Daemon], Any], request: Request) -> None:
-        daemon = self.daemon
-        if self.clock() < self.cut_until_s or not daemon.alive or not daemon.served:
+    def _arrive(self, work: Callable[[Daemon], Any], request: Request, first: bool) -> None:
+        daemon, now_s = self.daemon, self.clock()
+        if now_s < self.cut_until_s or not daemon.alive or not daemon.served:
             return
+        offs = daemon.acquisition.offs
+
+        def handle() -> None:
+            if daemon.alive and daemon.served:
+                self._arrived_s, self._offs = now_s, offs
+                self._handle(daemon, work, request)
+
+        self.clock.later(0.0 if first else self.draw.uniform(0.0, 0.4), handle)
+
+    def _handle(self, daemon: Daemon, work: Callable[[Daemon], Any], request: Request) -> None:
         try:
             answer = work(daemon)
         except Problem as problem:
@@ -511,17 +584,32 @@ class World:
     def _light(self) -> None:
         def start(daemon: Daemon) -> None:
             if daemon.lease.current is not None:
-                daemon.acquisition.set_running(True)
-                self.dark_since_s = None
+                daemon.acquisition.set_running(True, offs=self._offs)
+                if self._arrived_s > self._switched_off_s:
+                    self.dark_since_s = None
+                else:
+                    self.happened["overtaken"] += 1
 
         self._ask("light", start, lambda answer: None)
 
     def _off(self) -> None:
-        def off(daemon: Daemon) -> None:
-            daemon.acquisition.safe_off()
-            self.dark_since_s = self.clock()
+        if self.draw.random() < 0.5:
+            self._ask("safe-off", self._switch_off, lambda answer: None, first=True)
+        else:
+            self.relay.begin()
 
-        self._ask("safe-off", off, lambda answer: None)
+    def _switch_off(self, daemon: Daemon) -> bool:
+        daemon.acquisition.safe_off()
+        self.dark_since_s = self._switched_off_s = self.clock()
+        return True
+
+    async def _relayed(self) -> None:
+        """Send a safe-off on from the relay."""
+        answer: asyncio.Future[Any] = self.loop.create_future()
+        took = lambda found: None if answer.done() else answer.set_result(found)  # noqa: E731
+        self._ask("relayed safe-off", self._switch_off, took, first=True)
+        if await answer is None:
+            raise CameraLost("no answer")
 
     def _record(self) -> None:
         frames = self.draw.choice((None, 1, 5))
@@ -607,6 +695,9 @@ class World:
         """Require it to be off where it has to be."""
         now_s = self.clock()
         self._again(0.3, self._check_light)
+        since_s = self._unserved_since_s
+        if since_s is not None and now_s - since_s > UNSERVED_S + OFF_WITHIN_S:
+            self.dark_since_s = self.dark_since_s or now_s  # until somebody starts
         if not self.device.lit:
             return
         if self._dead_since_s is not None and now_s - self._dead_since_s > HEARTBEAT_S:

@@ -24,9 +24,10 @@ def set_reconstruction(settings: Mapping[str, Any]) -> Request[dict[str, Any]]:
     return document("reconstruction", method="PUT", body=settings)
 
 
-def set_running(running: bool) -> Request[dict[str, Any]]:
-    """Build the request that starts or stops the capture."""
-    return document("acquisition", method="PUT", body={"running": running})
+def set_running(running: bool, *, offs: int | None = None) -> Request[dict[str, Any]]:
+    """Build the request that starts or stops the capture; a start unless ``offs`` has changed."""
+    body = {"running": running} | ({} if offs is None else {"offs": offs})
+    return document("acquisition", method="PUT", body=body)
 
 
 def safe_off() -> Request[dict[str, Any]]:

@@ -41,8 +41,6 @@ _REPORTS: Final[Mapping[str, Callable[[Mapping[str, Any]], Report]]] = {
         "warning", "camera", f"the light goes on in {said['in_s']:g} s"
     ),
     "light-off": lambda said: Report("warning", "camera", f"the light is off: {said['reason']}"),
-    "light-held": lambda said: Report("warning", "camera", f"the light is off: {said['reason']}"),
-    "light-released": lambda said: Report("info", "camera", "the light goes on again"),
     "light-unconfirmed": lambda said: Report("warning", "camera", said["reason"]),
     "dropped": lambda said: Report(
         "warning",

@@ -60,12 +60,6 @@ NOTICES: Final[dict[str, NoticeKind]] = {
             {"because": "string", "reason": "string"},
         ),
         NoticeKind(
-            "light-held",
-            "the light was switched off because clients were not served",
-            {"reason": "string"},
-        ),
-        NoticeKind("light-released", "the light goes on again"),
-        NoticeKind(
             "light-unconfirmed",
             "the light was to go off and may be on",
             {"reason": "string"},

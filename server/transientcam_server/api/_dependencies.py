@@ -18,6 +18,16 @@ ServiceOf = Annotated[Service, Depends(_service)]
 """The service that a route belongs to."""
 
 
+async def _offs(request: Request, service: ServiceOf) -> int:
+    # set where the first byte was read; without a connection of the service's own it is now
+    offs: int | None = request.scope.get("state", {}).get("offs")
+    return service.acquisition.offs if offs is None else offs
+
+
+OffsOf = Annotated[int, Depends(_offs)]
+"""What `Acquisition.offs` was when a request arrived."""
+
+
 async def _metrics(request: Request) -> Metrics:
     metrics: Metrics = request.app.state.metrics
     return metrics

@@ -1,5 +1,7 @@
 """Files as answers: whole, or the parts that a broken download still lacks."""
 
+import asyncio
+import logging
 import os
 import re
 from pathlib import Path
@@ -7,11 +9,14 @@ from typing import Annotated, Any, Final
 
 from fastapi import Header
 from fastapi.responses import FileResponse, Response
-from starlette.types import Message, Receive, Scope, Send
+from starlette.datastructures import Headers
+from starlette.types import Receive, Scope, Send
 
 from transientcam_server.errors import Problem, ProblemKind, kinds
 from transientcam_server.recording import DiskThreads
 
+_log = logging.getLogger("transientcam_server.api.downloads")
+_PIECE: Final = 1024 * 1024
 _RANGES: Final = re.compile(
     r"bytes=\s*({0}-{0}?|-{0})(\s*,\s*({0}-{0}?|-{0}))*\s*".replace("{0}", r"(\d{1,18})"), re.ASCII
 )
@@ -39,7 +44,7 @@ async def answer(
     filename: str | None = None,
     tag: str | None = None,
 ) -> FileResponse:
-    """Return a file, or the range of it that is wanted.
+    """Return a file, or the range of it that is wanted; of several ranges all.
 
     A header that is no range is ignored, as RFC 9110 (Sec. 14.2) has it.
 
@@ -65,13 +70,14 @@ async def answer(
     except FileNotFoundError:
         raise _deleted(gone) from None
     return _File(
-        path,
-        status,
+        _span(wanted, status.st_size),
+        disk=disk,
         gone=gone,
+        path=path,
+        stat_result=status,
         headers=None if tag is None else {"ETag": tag},
         media_type=media_type,
         filename=filename,
-        ranges=_is_usable(wanted, status.st_size),
     )
 
 
@@ -89,13 +95,11 @@ def part(data: bytes, wanted: str | None, *, media_type: str, tag: str) -> Respo
         ``range-not-satisfiable``.
     """
     headers = {"ETag": tag, "Accept-Ranges": "bytes"}
-    size = len(data)
-    if wanted is None or "," in wanted or not _is_usable(wanted, size):
+    span = _span(wanted, len(data))
+    if span is None:
         return Response(data, media_type=media_type, headers=headers)
-    first, _, last = (each.strip() for each in wanted.partition("=")[2].partition("-"))
-    begin = int(first) if first else max(0, size - int(last))
-    end = min(size, int(last) + 1) if first and last else size
-    headers["Content-Range"] = f"bytes {begin}-{end - 1}/{size}"
+    begin, end = span
+    headers["Content-Range"] = f"bytes {begin}-{end - 1}/{len(data)}"
     return Response(data[begin:end], 206, media_type=media_type, headers=headers)
 
 
@@ -103,59 +107,66 @@ def _deleted(gone: ProblemKind) -> Problem:
     return Problem(gone, "It was deleted meanwhile.")
 
 
-def _is_usable(wanted: str | None, size: int) -> bool:
-    """Return whether a Range header is one; refuse one that lies beyond the end."""
+def _span(wanted: str | None, size: int) -> tuple[int, int] | None:
+    """Return begin and end of the range that is wanted; None for all. Refuse one beyond the end."""
     if wanted is None or not _RANGES.fullmatch(wanted.strip()):
-        return False
+        return None
     ranges = [each.strip().partition("-") for each in wanted.partition("=")[2].split(",")]
     if any(first and last and int(last) < int(first) for first, _, last in ranges):
-        return False
+        return None
     if any(int(first) >= size if first else not int(last) for first, _, last in ranges):
         detail = f"The file has {size} bytes."
         raise Problem(kinds.RANGE_NOT_SATISFIABLE, detail, field="range", value=wanted, limit=size)
-    return True
+    (first, _, last), *others = ranges
+    begin = int(first) if first else max(0, size - int(last))
+    return None if others else (begin, min(size, int(last) + 1) if first and last else size)
 
 
 class _File(FileResponse):
-    """A file, in larger pieces than the framework's 64 KiB."""
-
-    chunk_size = 1024 * 1024
+    """A file, or a range of it, read on threads of the disk; the framework makes its headers."""
 
     def __init__(
-        self,
-        path: Path,
-        status: os.stat_result,
-        *,
-        gone: ProblemKind,
-        headers: dict[str, str] | None,
-        media_type: str,
-        filename: str | None,
-        ranges: bool,
+        self, span: tuple[int, int] | None, *, disk: DiskThreads, gone: ProblemKind, **about: Any
     ) -> None:
-        super().__init__(
-            path, headers=headers, media_type=media_type, filename=filename, stat_result=status
-        )
-        self._gone, self._ranges = gone, ranges
+        super().__init__(**about)
+        self._span, self._disk, self._gone = span, disk, gone
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer; the framework would refuse a header that is no range.
-
-        It also begins an answer before it opens the file, which may be gone by then.
-        """
-        if not self._ranges:
-            headers = [each for each in scope["headers"] if each[0] != b"range"]
-            scope = {**scope, "headers": headers}
-        begun: list[Message] = []
-
-        async def send_once_open(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                begun.append(message)
-                return
-            while begun:
-                await send(begun.pop())
-            await send(message)
-
+        """Answer, once the beginning is read; the answer ends short where the disk then fails."""
+        begin, end = 0, (size := int(self.headers["content-length"]))
+        tags = (None, self.headers["etag"], self.headers["last-modified"])
+        if self._span is not None and Headers(scope=scope).get("if-range") in tags:
+            begin, end = self._span
+            self.status_code = 206
+            self.headers["content-range"] = f"bytes {begin}-{end - 1}/{size}"
+            self.headers["content-length"] = str(end - begin)
         try:
-            await super().__call__(scope, receive, send_once_open)
+            file = await self._disk.run(os.open, self.path, os.O_RDONLY)
         except FileNotFoundError:
             raise _deleted(self._gone) from None
+        left = asyncio.create_task(_disconnected(receive))
+        try:
+            data = await self._disk.run(os.pread, file, min(_PIECE, end - begin), begin)
+            head = {"status": self.status_code, "headers": self.raw_headers}
+            await send({"type": "http.response.start", **head})
+            while begin + len(data) < end and data and not left.done():
+                await send({"type": "http.response.body", "body": data, "more_body": True})
+                begin += len(data)
+                data = await self._read_on(file, begin, end)
+            if begin + len(data) == end:
+                await send({"type": "http.response.body", "body": data})
+        finally:
+            left.cancel()
+            self._disk.submit(os.close, file)
+
+    async def _read_on(self, descriptor: int, begin: int, end: int) -> bytes:
+        try:
+            return await self._disk.run(os.pread, descriptor, min(_PIECE, end - begin), begin)
+        except (OSError, Problem) as error:
+            _log.warning("the rest of %s cannot be sent: %s", self.path, error)
+            return b""
+
+
+async def _disconnected(receive: Receive) -> None:
+    while (await receive())["type"] != "http.disconnect":
+        pass

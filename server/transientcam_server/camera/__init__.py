@@ -5,7 +5,7 @@ which client may change it; `Jobs` run long work one after another; `Calibrator`
 """
 
 from transientcam_server.camera import _lease as lease
-from transientcam_server.camera._acquisition import Acquisition
+from transientcam_server.camera._acquisition import Acquisition, outdated
 from transientcam_server.camera._calibration_store import (
     CalibrationStore,
     StoredCalibration,
@@ -20,9 +20,7 @@ from transientcam_server.camera._events import (
     Event,
     LightArmingEvent,
     LightConfirmedEvent,
-    LightHeldEvent,
     LightOffEvent,
-    LightReleasedEvent,
     LightUnconfirmedEvent,
     OriginChanged,
     SequenceChanged,
@@ -75,9 +73,7 @@ __all__ = [
     "LightArmingEvent",
     "LightConfirmedEvent",
     "LightGuard",
-    "LightHeldEvent",
     "LightOffEvent",
-    "LightReleasedEvent",
     "LightRules",
     "LightUnconfirmedEvent",
     "OriginChanged",
@@ -90,6 +86,7 @@ __all__ = [
     "Timer",
     "lease",
     "load_given",
+    "outdated",
     "sensor_of",
     "snapshot_of",
     "start_with",

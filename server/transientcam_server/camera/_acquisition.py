@@ -7,6 +7,7 @@ their results are futures.
 import logging
 import math
 import queue
+import secrets
 import threading
 import time
 from collections import deque
@@ -33,9 +34,7 @@ from transientcam_server.camera._events import (
     Captured,
     Event,
     LightArmingEvent,
-    LightHeldEvent,
     LightOffEvent,
-    LightReleasedEvent,
     SequenceChanged,
 )
 from transientcam_server.camera._light import Announcement, LightGuard
@@ -56,6 +55,11 @@ BACKOFF_S: Final = (0.1, 0.2, 0.5, 1.0)
 STALLED_PERIODS: Final = 5.0
 STALLED_MIN_S: Final = 2.0
 _RATE_FRAMES = 32
+
+
+def outdated() -> Problem:
+    """Return the problem of a start that was asked for before the light was to go off."""
+    return Problem(kinds.START_OUTDATED, "The light was switched off after this was asked for.")
 
 
 class Acquisition:
@@ -80,7 +84,7 @@ class Acquisition:
         self._darkness = darkness
         self._supervision = supervision or Supervision(None, silence_s=math.inf)
         self._dark: Dark | None = None
-        self._offs = 0
+        self._offs = self._allowed = secrets.randbits(31)  # not those of before a restart
         self._camera = camera
         self._off_switch = OffSwitch(camera.safe_off)
         self._report = report
@@ -94,7 +98,6 @@ class Acquisition:
         self._running = True
         self._connected = True
         self._lost: str | None = None
-        self._held: str | None = None
         self._started = False
         self._attempts = 0
         self._frames = 0
@@ -134,20 +137,30 @@ class Acquisition:
             self.require_free()
             return self.submit(lambda: self._configure(sequence, expected))
 
-    def set_running(self, running: bool, *, cause: KeptCause = "stop") -> "Future[None]":
+    def set_running(
+        self, running: bool, *, cause: KeptCause = "stop", offs: int | None = None
+    ) -> "Future[None]":
         """Start or stop capturing; stopping also ends jobs that have the camera or wait for it.
+
+        ``offs`` is what `offs` was when a start was asked for, None for now.
 
         Raises
         ------
         Problem
-            ``camera-busy`` if it is to start while a job has exclusive use of the camera.
+            ``start-outdated``, by the future, if the light was to go off since; ``camera-busy`` if
+            it is to start while a job has exclusive use of the camera.
         """
         with self._occupied:
             if running:
                 self.require_free()
-            else:
-                self._offs += 1
-            return self.submit(lambda: self._set_running(running, cause))
+                self._light.turned()  # as this was served
+                asked = self.offs if offs is None else offs
+                return self.submit(lambda: self._start(asked))
+            return self._begin_stop(cause)
+
+    def _begin_stop(self, cause: KeptCause) -> "Future[None]":
+        self._offs += 1
+        return self.submit(lambda: self._stop(cause))
 
     def safe_off(self) -> "Future[None]":
         """Stop capturing and switch the light off, by the request that no state refuses.
@@ -165,7 +178,7 @@ class Acquisition:
 
     @property
     def offs(self) -> int:
-        """How often the light was to go off; a job of before the last does not light any more."""
+        """Counts how often the light was to go off: what was asked for before does not light."""
         return self._offs
 
     def device_status(self) -> "Future[Status]":
@@ -237,11 +250,12 @@ class Acquisition:
             rate_hz=rate_hz,
             frames=self._frames,
             frame_age_s=age_s,
-            reason=self._lost or self._held or (None if dark is None else str(dark)),
+            reason=self._lost or (None if dark is None else str(dark)),
             stalled=state in ("starting", "streaming") and age_s > self._stall_after_s(),
             light_on_in_s=self._announcement.light_on_in_s,
             off_because=None if dark is None else dark.cause,
             off_kept=None if dark is None or darkness is None else darkness.written.done(),
+            offs=self.offs,
         )
 
     def _state(self) -> State:
@@ -253,8 +267,6 @@ class Acquisition:
             return "calibrating"
         if not self._running:
             return "stopped"
-        if self._held is not None:
-            return "held"
         return "streaming" if self._started else "starting"
 
     def _stall_after_s(self) -> float:
@@ -295,9 +307,8 @@ class Acquisition:
             self._go_dark(Dark("supervisor", reason))
 
     def _step(self) -> None:
-        if self._light_is_held():
-            self._run_commands(wait_s=READ_TIMEOUT_S)
-        elif not self._connected:
+        self._end_uncontrolled()
+        if not self._connected:
             self._look_for_camera()
         elif self._restored is not None:
             self._configure(self._restored)
@@ -307,7 +318,7 @@ class Acquisition:
             self._camera.status()  # detects an unplug while nothing is read
             self._camera_works()
         elif not self._started:
-            if self._may_light():
+            if self._may_light(self._allowed):
                 self._camera.start()
                 self._started = True
                 self._moved_s = self._read_s = self._clock()
@@ -318,10 +329,12 @@ class Acquisition:
         else:
             self._read()
 
-    def _may_light(self) -> bool:
+    def _may_light(self, offs: int) -> bool:
         """Announce the light; return whether it may begin, watched: the one gate of all light."""
         self._announce()
-        return self._announcement.light_on_in_s is None and self._is_watched()
+        return (
+            self._announcement.light_on_in_s is None and self._is_watched() and self._offs == offs
+        )
 
     def _announce(self) -> None:
         if self._announcement.begin() and self._announcement.delay_s:
@@ -334,31 +347,20 @@ class Acquisition:
         self._act_on_supervisor(reason)
         return reason is None
 
-    def _light_is_held(self) -> bool:
-        """Switch the light off where it may not stay on; return whether it has to stay off."""
+    def _end_uncontrolled(self) -> None:
+        """End a capture that may not go on: nobody uses it, or nobody could stop it."""
         self._act_on_lapse()
-        if self._running and (unused := self._light.unused()) is not None:
+        if self._running and (unserved := self._light.unserved()) is not None:
+            self._offs += 1
+            self._go_dark(Dark("unserved", unserved))
+        elif self._running and (unused := self._light.unused()) is not None:
             self._go_dark(Dark("unused", unused))
-        reason = self._light.unserved()
-        if reason is None or not self._running:
-            if self._held is not None:
-                self._held = None
-                self._moved_s = self._clock()
-                self._report(LightReleasedEvent())
-            return False
-        if self._held is None:
-            self._held = reason
-            _log.error("the light is switched off: %s", reason)
-            self._arrivals_s.clear()
-            self._report(LightHeldEvent(reason))
-            self._end_light()
-        return True
 
     def _act_on_lapse(self) -> None:
         if self._light.lapsed():
             _log.warning("a lease lapsed, and the loop that serves clients is late to act on it")
             self._offs += 1
-            self._set_running(False, "lapse")
+            self._stop("lapse")
 
     def _end_light(self) -> None:
         """Switch the light off; the next one is announced anew."""
@@ -410,25 +412,29 @@ class Acquisition:
         self._report(SequenceChanged(applied))
         return applied
 
-    def _set_running(self, running: bool, cause: KeptCause = "stop") -> None:
-        if not running:
-            if self._running or cause == "stop":  # a lapse ends nothing that has ended already
-                self._go_dark(Dark(cause))
-        elif not self._running:
-            try:
-                self._require_interlock()
-            except CameraFault:
-                raise
-            except CameraError as error:  # it starts once it is found, or answers
-                _log.info("whether the interlock is closed is not known: %s", error)
-            self._light.used()
-            self._arrivals_s.clear()
-            self._moved_s = self._clock()
-            self._running, self._dark = True, None
-            if self._darkness is not None:
-                self._darkness.keep(None)
-            if self._connected:
-                self._announce()  # by the time it is answered
+    def _stop(self, cause: KeptCause = "stop") -> None:
+        if self._running or cause == "stop":  # a lapse ends nothing that has ended already
+            self._go_dark(Dark(cause))
+
+    def _start(self, offs: int) -> None:
+        if self._running and self._offs == offs:
+            return
+        try:
+            self._require_interlock()
+        except CameraFault:
+            raise
+        except CameraError as error:  # it starts once it is found, or answers
+            _log.info("whether the interlock is closed is not known: %s", error)
+        if self._offs != offs:
+            raise outdated()
+        self._light.used()
+        self._arrivals_s.clear()
+        self._moved_s = self._clock()
+        self._running, self._dark, self._allowed = True, None, offs
+        if self._darkness is not None:
+            self._darkness.keep(None)
+        if self._connected:
+            self._announce()  # by the time it is answered
 
     def _go_dark(self, dark: Dark) -> None:
         """End the capture, and keep that it ended, also where the camera fails."""
@@ -479,7 +485,7 @@ class Acquisition:
         before = self._camera.applied
         try:
             go_on()
-            while not self._may_light():
+            while not self._may_light(offs):
                 self._run_commands(wait_s=READ_TIMEOUT_S)
                 go_on()
             self._arrivals_s.clear()

@@ -222,8 +222,12 @@ class Calibrator:
             await asyncio.to_thread(self.store.remember_active, self.active_id, None)
         return deleted
 
-    def measure(self, options: CalibrationOptions, applied: Callable[[], AppliedSequence]) -> Job:
+    def measure(
+        self, options: CalibrationOptions, applied: Callable[[], AppliedSequence], *, offs: int
+    ) -> Job:
         """Start measuring with the present sequence; the job's result is the calibration.
+
+        ``offs`` is as `Acquisition.occupy` has it.
 
         Raises
         ------
@@ -242,8 +246,6 @@ class Calibrator:
                 value=options.frames,
                 limit=f"at most {most}",
             )
-
-        offs = self._acquisition.offs  # a light that is switched off while the job waits stays off
 
         async def work(job: Job) -> dict[str, Any]:
             await asyncio.to_thread(self.store.require_room)  # checked before anything is captured

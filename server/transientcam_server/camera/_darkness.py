@@ -13,7 +13,7 @@ from typing import Final, Literal
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 _log = logging.getLogger("transientcam_server.camera.darkness")
-KeptCause = Literal["stop", "safe-off", "lapse", "device", "unused", "supervisor"]
+KeptCause = Literal["stop", "safe-off", "lapse", "device", "unused", "unserved", "supervisor"]
 Cause = KeptCause | Literal["start", "unreadable", "unwritable"]
 RETRY_S: Final = 1.0
 CLOSE_S: Final = 2.0
@@ -26,6 +26,7 @@ _WORDS: Final[dict[Cause, str]] = {
     "lapse": "a lease lapsed",
     "device": "the device keeps its light off",
     "unused": "nobody used the capture",
+    "unserved": "no client could have switched the light off",
     "supervisor": "the process that watches the light switched it off",
     "unreadable": "what is kept of the light cannot be read",
     "unwritable": "that the light is off could not be kept",

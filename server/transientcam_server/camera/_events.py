@@ -41,18 +41,6 @@ class LightOffEvent:
 
 
 @dataclass(frozen=True, slots=True)
-class LightHeldEvent:
-    """The light was switched off although frames are to be captured."""
-
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class LightReleasedEvent:
-    """The light goes on again after `LightHeldEvent`."""
-
-
-@dataclass(frozen=True, slots=True)
 class LightUnconfirmedEvent:
     """The light was to go off, and that takes long to be confirmed: it may be on."""
 
@@ -82,8 +70,6 @@ Event = (
     | CameraRecoveredEvent
     | LightArmingEvent
     | LightOffEvent
-    | LightHeldEvent
-    | LightReleasedEvent
     | LightUnconfirmedEvent
     | LightConfirmedEvent
     | SequenceChanged

@@ -45,7 +45,7 @@ class LightGuard:
     # -- from the loop -------------------------------------------------------------------------
 
     def turned(self) -> None:
-        """Note that clients are served."""
+        """Note that clients are served; from any thread."""
         self._turned_s = self._clock()
 
     def lapses_at(self, time_s: float | None) -> None:
@@ -67,17 +67,15 @@ class LightGuard:
         return True
 
     def unserved(self) -> str | None:
-        """Return why the light has to be off for now, or None."""
-        age_s = self._clock() - self._turned_s
-        if age_s <= self._unserved_s:
-            return None
-        return f"no client was served for {self._unserved_s:g} s, so none could switch it off"
+        """Return why a capture has to end that no client can stop, or None."""
+        late = self._clock() - self._turned_s > self._unserved_s
+        return f"none was served for {self._unserved_s:g} s" if late else None
 
     def unused(self) -> str | None:
         """Return why a capture has to end that nobody uses, or None."""
-        if self._clock() - self._used_s <= self._unused_s:
-            return None
-        return f"no viewer, reader, recording, job or lease for {self._unused_s:g} s"
+        late = self._clock() - self._used_s > self._unused_s
+        words = f"no viewer, reader, recording, job or lease for {self._unused_s:g} s"
+        return words if late else None
 
 
 class Announcement:

@@ -1,13 +1,14 @@
 """Has a camera that others capture with, too: of another service, which this one relays."""
 
+import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
 from typing import TypeVar
 
-from transientcam_driver import Camera, CameraState, NotStreaming, RawFrame
-from transientcam_server.camera._acquisition import Acquisition
-from transientcam_server.camera._darkness import KeptCause
+from transientcam_driver import Camera, CameraLost, CameraState, NotStreaming, RawFrame
+from transientcam_server.camera._acquisition import Acquisition, outdated
+from transientcam_server.camera._darkness import Dark, Darkness, KeptCause
 from transientcam_server.camera._events import (
     Event,
     LightConfirmedEvent,
@@ -27,12 +28,19 @@ class SharedAcquisition(Acquisition):
 
     Whether frames are captured, and with which sequence, is up to the origin. What this service
     does by itself (it starts, ends, or serves no client for a while) changes nothing there.
+    ``darkness`` keeps what the origin has not confirmed, which is repeated after a restart.
     """
 
     def __init__(
-        self, camera: RelayCamera, *, report: Callable[[Event], None], light: LightGuard
+        self,
+        camera: RelayCamera,
+        *,
+        report: Callable[[Event], None],
+        light: LightGuard,
+        darkness: Darkness | None = None,
     ) -> None:
-        super().__init__(camera, report=report, light=light)
+        super().__init__(camera, report=report, light=light, darkness=darkness)
+        self._keeping = threading.Lock()
         self._origin = camera
         self._known = camera.origin
         self._running = self._started = camera.state is CameraState.STREAMING
@@ -40,19 +48,26 @@ class SharedAcquisition(Acquisition):
             LightConfirmedEvent() if ended else LightUnconfirmedEvent(self._unconfirmed)
         )
 
-    def set_running(self, running: bool, *, cause: KeptCause = "stop") -> "Future[None]":
-        """Start behind other changes, or stop at once, as `safe_off`."""
-        if running:
-            offs = self._origin.offs
-            return self.submit(lambda: self._start(offs))
-        return self._off(self._origin.begin_stop())
+    def start(self, *, dark: Dark | None = None) -> None:
+        """Start the thread, and repeat what was not confirmed before a restart."""
+        super().start()
+        if dark is not None and dark.cause != "unwritable":
+            self.safe_off()
+
+    @property
+    def offs(self) -> int:
+        """Counts how often the light was to go off, here."""
+        return self._origin.offs
+
+    def _begin_stop(self, cause: KeptCause) -> "Future[None]":
+        return self._off(self._origin.begin_stop, cause)
 
     def safe_off(self) -> "Future[None]":
         """Switch the light off at the origin, at once; done once the origin has confirmed that.
 
         It waits for no thread here, and is sent again until then.
         """
-        return self._off(self._origin.begin_safe_off())
+        return self._off(self._origin.begin_safe_off, "safe-off")
 
     def status(self) -> AcquisitionStatus:
         """Return the present status; never waits."""
@@ -75,9 +90,8 @@ class SharedAcquisition(Acquisition):
         url = self._origin.url
         raise Problem(kinds.CAMERA_BUSY, f"The camera belongs to {url}: calibrate it there.")
 
-    def _light_is_held(self) -> bool:
-        self._act_on_lapse()
-        return False  # the origin guards its light by itself
+    def _end_uncontrolled(self) -> None:
+        self._act_on_lapse()  # the origin guards its light by itself
 
     def _step(self) -> None:
         super()._step()
@@ -113,21 +127,35 @@ class SharedAcquisition(Acquisition):
         """Leave the light to the origin: only what clients ask for goes there."""
         self._started = False
 
-    def _start(self, offs: tuple[int, int]) -> None:
-        self._origin.start_unless(offs)
+    def _start(self, offs: int) -> None:
+        if not self._origin.start_unless(offs):
+            raise outdated()
+        self._forget_off()
         self._follow()
 
-    def _set_running(self, running: bool, cause: KeptCause = "stop") -> None:
+    def _stop(self, cause: KeptCause = "stop") -> None:
         """Stop where a lease has lapsed."""
-        self._off(self._origin.begin_stop())
+        self._begin_stop(cause)
 
-    def _off(self, off: "Future[None]") -> "Future[None]":
+    def _off(self, begin: Callable[[], "Future[None]"], cause: KeptCause) -> "Future[None]":
         def follow(done: "Future[None]") -> None:
             if done.exception() is None:
                 self._running = self._started = False
+            if not isinstance(done.exception(), CameraLost):  # by which this service ends
+                self._forget_off()
 
+        with self._keeping:
+            if self._darkness is not None:
+                self._darkness.keep(Dark(cause))
+            off = begin()
         off.add_done_callback(follow)
         return off
+
+    def _forget_off(self) -> None:
+        """Keep no longer that the light is to go off, unless there is more to be confirmed."""
+        with self._keeping:
+            if self._darkness is not None and not self._origin.switching_off:
+                self._darkness.keep(None)
 
     @property
     def _unconfirmed(self) -> str:

@@ -58,6 +58,7 @@ class LightRules:
     capture_at_start: bool
     delay_s: float
     unused_s: float
+    unserved_s: float
 
     @classmethod
     def of(cls, camera: Camera, settings: Settings) -> Self:
@@ -72,6 +73,7 @@ class LightRules:
             capture_at_start=not shines if capture is None else capture,
             delay_s=delay_s if delay_s is not None else DELAY_S if shines else 0.0,
             unused_s=unused_s or math.inf,
+            unserved_s=settings.limits.unserved_s if shines else math.inf,
         )
 
 

@@ -5,7 +5,7 @@ from typing import Literal
 
 from transientcam_server.camera._darkness import Cause
 
-State = Literal["arming", "starting", "streaming", "stopped", "calibrating", "lost", "held"]
+State = Literal["arming", "starting", "streaming", "stopped", "calibrating", "lost"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,7 @@ class AcquisitionStatus:
     state
         ``arming`` while the light is announced; ``streaming`` also before the first frame;
         ``stopped`` until somebody starts; ``calibrating`` while a calibration has exclusive use of
-        the camera; ``held`` while the light is off because clients are not served.
+        the camera.
     running
         Whether frames are to be captured.
     rate_hz
@@ -27,9 +27,11 @@ class AcquisitionStatus:
     frame_age_s
         Since the last frame, or since the start where there was none.
     reason
-        Why the camera is lost, held or stopped, or the light may be on.
+        Why the camera is lost or stopped, or the light may be on.
     stalled
         Whether frames are to be captured and the camera is there, but none came for too long.
+    offs
+        Counts how often the light was to go off.
     light_on_in_s
         Time until the light goes on; None where none is announced.
     off_because, off_kept
@@ -46,6 +48,7 @@ class AcquisitionStatus:
     frame_age_s: float
     reason: str | None
     stalled: bool
+    offs: int
     light_on_in_s: float | None = None
     off_because: Cause | None = None
     off_kept: bool | None = None

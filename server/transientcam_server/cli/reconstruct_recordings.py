@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from transientcam.cli.terminal import Terminal, echo
+from transientcam.text import plain
 from transientcam_server.cli.cluster import cluster_client
 from transientcam_server.cli.progress import progress_bar
+from transientcam_server.errors import MissingExtra, MixedVersions
 
 if TYPE_CHECKING:
     from transientcam_server.offline import BatchOptions
@@ -80,20 +82,35 @@ def reconstruct_on_cluster(
     *,
     as_json: bool,
 ) -> None:
-    """Reconstruct one recording, or all of a directory, on a cluster."""
+    """Reconstruct one recording, or all of a directory, on a cluster.
+
+    Of a directory those that cannot be are named, and the others reconstructed.
+    """
     console = Terminal(stderr=True)
-    outputs = _outputs(place, output)
+    outputs, failed = _outputs(place, output), 0
     with cluster_client(workers, dask, console) as client:
         from transientcam_server.offline import reconstruct_on, recording_at
 
         for each, into in outputs.items():
-            with recording_at(each, token=token) as opened:
-                options = wanted.options(opened.header)
-            with progress_bar("reconstructing") as advance:
-                frames, before = reconstruct_on(
-                    client, each, into, options, token=token, progress=advance
-                )
-            _report(into, options.products, frames, before, as_json=as_json)
+            try:
+                with recording_at(each, token=token) as opened:
+                    options = wanted.options(opened.header)
+                with progress_bar("reconstructing") as advance:
+                    frames, before = reconstruct_on(
+                        client, each, into, options, token=token, progress=advance
+                    )
+            except (MissingExtra, MixedVersions):
+                raise
+            except Exception as error:  # of a file that anybody may have written
+                if len(outputs) == 1:
+                    raise
+                console.print(plain(f"{each}: {error}"), soft_wrap=True)
+                failed += 1
+            else:
+                _report(into, options.products, frames, before, as_json=as_json)
+    if failed:
+        console.print(f"{failed} of {len(outputs)} recordings are not reconstructed")
+        raise typer.Exit(code=1)
 
 
 def _outputs(place: str, output: str) -> dict[str, str]:
@@ -106,7 +123,7 @@ def _outputs(place: str, output: str) -> dict[str, str]:
                 f"{output} must end in .zarr, which a cluster writes", param_hint="--output"
             )
         return {place: _absolute(output)}
-    files = sorted(Path(place).resolve().glob("*.h5"))
+    files = sorted(each for each in Path(place).resolve().glob("*.h5") if each.is_file())
     if not files:
         raise typer.BadParameter(f"{place} has no recording (.h5)", param_hint="INPUT")
     return {str(file): f"{_absolute(output)}/{file.stem}.zarr" for file in files}

@@ -27,7 +27,9 @@ from transientcam_server.settings import LimitSettings
 
 _log = logging.getLogger("transientcam_server.daemon.acceptor")
 AT_ONCE: Final = 16
-"""Connections accepted before other tasks run."""
+"""Connections accepted before other tasks run; more where that takes less than `ACCEPT_S`."""
+ACCEPT_S: Final = 0.004
+"""One that switches the light off waits behind a flood of others until all are accepted."""
 PAUSE_S: Final = 0.5
 """Before the next one is accepted where the system has no descriptors left."""
 REQUESTS_SHARE: Final = 0.4
@@ -128,6 +130,8 @@ class Acceptor:
         Whether frames are sent or recorded at present, for which time has to be left.
     tls
         With what connections are encrypted; None for not at all.
+    offs
+        As `ReadLimiter` has it.
     """
 
     def __init__(
@@ -138,7 +142,9 @@ class Acceptor:
         limits: LimitSettings,
         watched: Callable[[], bool],
         tls: ssl.SSLContext | None = None,
+        offs: Callable[[], int] = lambda: 0,
     ) -> None:
+        self._offs = offs
         self._loop = asyncio.get_running_loop()
         self._listener = listener
         self._protocol = protocol
@@ -183,7 +189,9 @@ class Acceptor:
         await asyncio.gather(*self._handshakes, return_exceptions=True)
 
     def _accept(self) -> None:
-        for _ in range(AT_ONCE):
+        until_s, accepted = self._loop.time() + ACCEPT_S, 0
+        while accepted < AT_ONCE or self._loop.time() < until_s:
+            accepted += 1
             try:
                 connection, address = self._listener.accept()
             except (BlockingIOError, InterruptedError, ConnectionAbortedError):
@@ -202,13 +210,14 @@ class Acceptor:
             self._first.hold_others()  # from now on, not only when it is read in its turn
         if problem is None:
             release = partial(self._admission.release, host)
-            self._start(self._connect(connection, host, release), self._requests.account(host))
+            connecting = self._connect(connection, host, release, self._offs())
+            self._start(connecting, self._requests.account(host))
         else:
             self._reserve.take(connection, host, problem)
 
     def _connect_beyond(self, candidate: Candidate) -> None:
         release = partial(self._reserve.release, candidate)
-        connecting = self._connect(candidate.connection, candidate.host, release, candidate)
+        connecting = self._connect(candidate.connection, candidate.host, release, None, candidate)
         self._start(connecting, self._first.account(candidate.host))
 
     def _start(self, connecting: Coroutine[Any, Any, None], account: Account) -> None:
@@ -237,6 +246,7 @@ class Acceptor:
         connection: socket.socket,
         host: str,
         release: Callable[[], None],
+        offs: int | None,
         candidate: Candidate | None = None,
     ) -> None:
         """Hand a connection to a protocol once its handshake is done."""
@@ -251,6 +261,8 @@ class Acceptor:
                 first=self._first.account(host),
                 beyond=None if candidate is None else self._refusal(candidate.problem),
                 lost=counted.close,
+                offs=self._offs,
+                arrived=offs if self._tls is None and arrived(connection) else None,
             )
             if candidate is not None:
                 candidate.limiter = limiter

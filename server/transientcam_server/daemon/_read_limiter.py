@@ -44,6 +44,8 @@ class ReadLimiter(asyncio.BufferedProtocol):
         the limits.
     lost
         Called once when the connection has ended.
+    offs, arrived
+        How often the light was to go off; when the first request arrived, if any of it is here.
     """
 
     def __init__(
@@ -55,6 +57,8 @@ class ReadLimiter(asyncio.BufferedProtocol):
         first: Account,
         lost: Callable[[], None],
         beyond: bytes | None = None,
+        offs: Callable[[], int] = lambda: 0,
+        arrived: int | None = None,
     ) -> None:
         self.protocol = protocol
         self.account = requests
@@ -63,6 +67,8 @@ class ReadLimiter(asyncio.BufferedProtocol):
         self._streams = streams
         self._first = first
         self._lost = lost
+        self._now = offs
+        self._last_offs = self.offs = arrived
         self._refused = False
         self._begun: bytes | None = b""  # what may become a request that goes first
         self._valve: Valve | None = None
@@ -91,6 +97,8 @@ class ReadLimiter(asyncio.BufferedProtocol):
         assert self._valve is not None  # noqa: S101 - bytes come after the connection
         portion = bytes(_portion.buffer[:nbytes])
         self._portion += portion
+        self._last_offs = self._now()
+        self.offs = self._last_offs if self.offs is None else self.offs
         goes_first = self._goes_first(portion)
         if self.beyond is not None and not goes_first:
             if goes_first is False:
@@ -120,7 +128,8 @@ class ReadLimiter(asyncio.BufferedProtocol):
         """Look at the next request; ``more`` if a part of it came with the last one."""
         self.account.done()
         self.account = self._requests
-        self._begun = None if more or self._portion else b""
+        here = more or bool(self._portion)
+        self._begun, self.offs = (None, self._last_offs) if here else (b"", None)
 
     def refuse(self) -> None:
         """Answer with the refusal, and end the connection; as soon as there is one."""
@@ -191,6 +200,11 @@ class Valve:
     def expect(self, *, more: bool) -> None:
         """Note that the next request is expected; ``more`` if a part of it is here."""
         self._limiter.expect(more=more)
+
+    @property
+    def offs(self) -> int | None:
+        """How often the light was to go off when the request arrived."""
+        return self._limiter.offs
 
     @property
     def held(self) -> bool:

@@ -181,6 +181,7 @@ class Server(uvicorn.Server):
             limits=self._settings.limits,
             watched=lambda: self._service.watched,
             tls=self.config.ssl,
+            offs=lambda: self._service.acquisition.offs,
         )
 
     @contextmanager

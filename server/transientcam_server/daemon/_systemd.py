@@ -123,8 +123,6 @@ def status_line(status: AcquisitionStatus) -> str:
     match status.state:
         case "lost":
             return f"the camera is lost: {status.reason}"
-        case "held":
-            return f"the light is held off: {status.reason}"
         case "arming":
             return "the light is announced and not on yet"
         case "stopped":

@@ -230,6 +230,13 @@ CAMERA_BUSY: Final = ProblemKind(
     "A job has exclusive use of the camera until it has ended; `job` is its id. Cancel it, or wait "
     "for it. Switching the light off is possible meanwhile, and ends the job.",
 )
+START_OUTDATED: Final = ProblemKind(
+    "start-outdated",
+    409,
+    "The light was switched off meanwhile",
+    "The light was to go off after this start was asked for, or the service was started anew: it "
+    "stays off. Ask again if it is to go on.",
+)
 RECORDING_DAMAGED: Final = ProblemKind(
     "recording-damaged",
     409,

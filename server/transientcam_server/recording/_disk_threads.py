@@ -72,14 +72,7 @@ class DiskThreads:
         Problem
             ``disk-stalled``, if nothing is done for so long. Work that has begun goes on.
         """
-        future: Future[_T] = Future()
-        self._waiting.put((future, self.around(partial(work, *arguments))))
-        if not self._idle.acquire(blocking=False) and self._threads < _COUNT:
-            self._threads += 1
-            threading.Thread(
-                target=self._serve, name=f"{DISK_THREADS[0]}-{self._threads}", daemon=True
-            ).start()
-        result = asyncio.wrap_future(future)
+        result = asyncio.wrap_future(self.submit(work, *arguments))
         latest_s = self._clock() + max(_LONGEST_S, self._stalled_s)
         try:
             while True:
@@ -91,6 +84,17 @@ class DiskThreads:
                     raise stalled(self._stalled_s)
         finally:
             result.cancel()  # what has not begun never does
+
+    def submit(self, work: Callable[..., _T], *arguments: Any) -> "Future[_T]":
+        """Begin ``work`` on one of the threads, as soon as one is free."""
+        future: Future[_T] = Future()
+        self._waiting.put((future, self.around(partial(work, *arguments))))
+        if not self._idle.acquire(blocking=False) and self._threads < _COUNT:
+            self._threads += 1
+            threading.Thread(
+                target=self._serve, name=f"{DISK_THREADS[0]}-{self._threads}", daemon=True
+            ).start()
+        return future
 
     def close(self) -> None:
         """End the threads that do not wait for the disk."""

@@ -36,7 +36,7 @@ _SLICE_S: Final = 0.05
 SILENT_S: Final = 1.0
 SILENT_PERIODS: Final = 5.0
 """Without a frame for so long, the larger of both, the origin is asked whether it captures."""
-_CAPTURING: Final = frozenset(("arming", "starting", "streaming", "held"))
+_CAPTURING: Final = frozenset(("arming", "starting", "streaming"))
 
 
 class RelayCamera(HostCamera):
@@ -93,6 +93,7 @@ class RelayCamera(HostCamera):
         self._gone: str | None = None
         self._heard_s = 0.0
         self._stop_lease: str | None = None
+        self._first_offs = secrets.randbits(31)
         self._releasing: list[Delivery] = []
         self._safe_off = Delivery(
             lambda: origin.send_apart(AsyncCamera.safe_off), changed=self._takes_long
@@ -151,23 +152,30 @@ class RelayCamera(HostCamera):
         self.start_unless(self.offs)
 
     @property
-    def offs(self) -> tuple[int, int]:
-        """How often the light was to go off: it counts `safe_off` and `stop`."""
-        return self._safe_off.asked, self._stop.asked
+    def offs(self) -> int:
+        """Counts how often the light was to go off: `safe_off` and `stop`."""
+        return self._first_offs + self._safe_off.asked + self._stop.asked
 
-    def start_unless(self, offs: tuple[int, int]) -> None:
-        """As `start`, unless the light was to go off since there were so many ``offs``."""
+    def start_unless(self, offs: int) -> bool:
+        """As `start`; return False where the light was to go off since there were so many ``offs``.
+
+        The origin refuses a start that one of its own, or one from here, overtakes on the way.
+        """
         self._require_connected()
-        if self.offs != offs or not (
-            self.switching_off or self._state is not CameraState.STREAMING
-        ):
-            return
-        self._link.set_running(True)
-        for off, asked in zip((self._safe_off, self._stop), offs, strict=True):
-            off.end("the capture was started meanwhile", asked=asked)
-        with self._control:
-            self._switched_on = True
-            self._begin()
+        asked = self._safe_off.asked, self._stop.asked
+        if self._first_offs + sum(asked) != offs:
+            return False
+        if self.switching_off or self._state is not CameraState.STREAMING:
+            there = self._link.offs()
+            if self.offs != offs:
+                return False
+            self._link.start(offs=there)
+            for off, count in zip((self._safe_off, self._stop), asked, strict=True):
+                off.end("the capture was started meanwhile", asked=count)
+            with self._control:
+                self._switched_on = True
+                self._begin()
+        return True
 
     def stop(self) -> None:
         """Stop the capture at the origin, for all its clients."""
@@ -233,12 +241,13 @@ class RelayCamera(HostCamera):
             return
         if self._switched_on:
             with suppress(CameraError):
-                self._link.set_running(False)
+                self._link.stop()
         self._closed = True
         self._state = CameraState.DISCONNECTED
         if self.switching_off:
             _log.error(
-                "%s has not confirmed that its light is off, and is not asked again", self.url
+                "%s has not confirmed that its light is off, and is asked at the next start",
+                self.url,
             )
         for each in (self._safe_off, self._stop, *self._releasing):
             each.end("this service ends")

@@ -155,10 +155,20 @@ class Origin:
         with self._changing():
             return self._client.configure(**sequence)
 
-    def set_running(self, running: bool) -> None:
-        """Start or stop the capture."""
+    def offs(self) -> int | None:
+        """Return how often its light was to go off; None of one that is too old to say so."""
+        with self._answering():
+            return self._client.acquisition.get("offs")
+
+    def start(self, *, offs: int | None) -> None:
+        """Start the capture, unless its light was to go off since there were so many ``offs``."""
         with self._changing():
-            _ = self._client.start() if running else self._client.stop()
+            self._client.start(offs=offs)
+
+    def stop(self) -> None:
+        """Stop the capture."""
+        with self._changing():
+            self._client.stop()
 
     @property
     def lease_id(self) -> str | None:

@@ -298,13 +298,15 @@ def test_meanwhile_nothing_is_read_and_what_would_disturb_it_is_refused() -> Non
             begun.set()
             until(end, go_on)
 
-        occupied = one.acquisition.occupy("job-1", work, offs=0)
+        occupied = one.acquisition.occupy("job-1", work, offs=one.acquisition.offs)
         assert begun.wait(PATIENCE_S)
         one.camera.deliver(1)
         for disturb in (
             lambda: one.acquisition.configure(Sequence()),
             lambda: one.acquisition.set_running(True),
-            lambda: one.acquisition.occupy("job-2", lambda camera, go_on: None, offs=0),
+            lambda: one.acquisition.occupy(
+                "job-2", lambda camera, go_on: None, offs=one.acquisition.offs
+            ),
         ):
             with pytest.raises(Problem) as caught:
                 disturb()
@@ -325,7 +327,9 @@ def test_meanwhile_nothing_is_read_and_what_would_disturb_it_is_refused() -> Non
 def test_switching_the_light_off_breaks_it_off(command: str) -> None:
     with running() as one:
         occupied = one.acquisition.occupy(
-            "job-1", lambda camera, go_on: until(threading.Event(), go_on), offs=0
+            "job-1",
+            lambda camera, go_on: until(threading.Event(), go_on),
+            offs=one.acquisition.offs,
         )
         if command == "safe_off":
             one.acquisition.safe_off().result(PATIENCE_S)
@@ -340,7 +344,9 @@ def test_switching_the_light_off_breaks_it_off(command: str) -> None:
 def test_what_it_counted_anew_is_reported_and_frames_of_it_are_known() -> None:
     with running() as one:
         one.acquisition.occupy(
-            "job-1", lambda camera, go_on: camera.configure(APPLIED.sequence), offs=0
+            "job-1",
+            lambda camera, go_on: camera.configure(APPLIED.sequence),
+            offs=one.acquisition.offs,
         ).result(PATIENCE_S)
         changed = one.event()
         one.camera.deliver(1, epoch=2)
@@ -358,7 +364,7 @@ def test_a_sequence_that_it_left_behind_is_put_back() -> None:
 
     with running() as one:
         with pytest.raises(CameraLost):
-            one.acquisition.occupy("job-1", leave, offs=0).result(PATIENCE_S)
+            one.acquisition.occupy("job-1", leave, offs=one.acquisition.offs).result(PATIENCE_S)
         changed = one.event()
 
     assert isinstance(changed, SequenceChanged)
@@ -367,7 +373,9 @@ def test_a_sequence_that_it_left_behind_is_put_back() -> None:
 
 def test_one_that_was_taken_back_has_the_camera_no_more() -> None:
     one = Running()
-    occupied = one.acquisition.occupy("job-1", lambda camera, go_on: None, offs=0)
+    occupied = one.acquisition.occupy(
+        "job-1", lambda camera, go_on: None, offs=one.acquisition.offs
+    )
     assert occupied.cancel()
 
     one.acquisition.require_free()
@@ -457,7 +465,9 @@ def test_a_restart_is_announced_anew_but_nothing_while_the_light_is_on() -> None
         one.now_s = 3.0
         one.camera.deliver(1)
         assert numbers(one.event()) == [1]
-        one.acquisition.occupy("job", lambda camera, go_on: go_on(), offs=0).result(PATIENCE_S)
+        one.acquisition.occupy(
+            "job", lambda camera, go_on: go_on(), offs=one.acquisition.offs
+        ).result(PATIENCE_S)
         one.camera.deliver(2)
         assert numbers(one.event()) == [2]
 
@@ -505,7 +515,9 @@ def test_a_job_announces_its_light_and_a_safe_off_before_it_ends_the_job() -> No
     began = threading.Event()
     one.acquisition.start(dark=Dark("start"))
     try:
-        occupied = one.acquisition.occupy("job", lambda camera, go_on: began.set(), offs=0)
+        occupied = one.acquisition.occupy(
+            "job", lambda camera, go_on: began.set(), offs=one.acquisition.offs
+        )
         assert one.event() == LightArmingEvent(3.0)
         status = one.acquisition.status()
         assert (status.state, status.running, status.reason) == ("arming", False, None)
@@ -532,6 +544,33 @@ def test_a_job_that_waited_when_the_light_was_switched_off_does_not_light() -> N
         ).result(PATIENCE_S)
 
     assert began.is_set()
+
+
+@pytest.mark.parametrize("command", ["safe_off", "stop"])
+def test_a_start_that_waited_when_the_light_was_switched_off_does_not_light(command: str) -> None:
+    with running() as one:
+        one.acquisition.set_running(False).result(PATIENCE_S)
+        began, go_on = threading.Event(), threading.Event()
+        one.acquisition.submit(lambda: (began.set(), go_on.wait(PATIENCE_S)))
+        assert began.wait(PATIENCE_S)
+        start = one.acquisition.set_running(True)
+        off = (
+            one.acquisition.safe_off()
+            if command == "safe_off"
+            else one.acquisition.set_running(False)
+        )
+        go_on.set()
+        off.result(PATIENCE_S)
+        with pytest.raises(Problem) as refused:
+            start.result(PATIENCE_S)
+        one.settle()
+        calls = list(one.camera.calls)
+        one.acquisition.set_running(True).result(PATIENCE_S)
+        one.settle()
+
+    assert refused.value.kind is kinds.START_OUTDATED
+    assert calls.count("start") == 1
+    assert one.camera.calls.count("start") == 2
 
 
 def test_a_device_that_shuts_its_light_off_stays_dark_until_somebody_starts() -> None:

@@ -12,10 +12,10 @@ from tests.waiting import wait_until
 from transientcam_driver import Camera, CameraError, CameraState, open_camera
 from transientcam_server.camera import (
     Acquisition,
+    Dark,
     Event,
     LightGuard,
-    LightHeldEvent,
-    LightReleasedEvent,
+    LightOffEvent,
 )
 from transientcam_server.camera._light import LATE_S
 
@@ -37,7 +37,7 @@ def test_the_light_needs_a_loop_that_turned_within_the_time() -> None:
     clock.now_s += 1.0
     assert guard.unserved() is None
     clock.now_s += 0.01
-    assert guard.unserved() == "no client was served for 1 s, so none could switch it off"
+    assert guard.unserved() == "none was served for 1 s"
     guard.turned()
     assert guard.unserved() is None
 
@@ -62,7 +62,7 @@ def test_a_lease_that_is_renewed_or_ended_in_time_does_not_lapse() -> None:
     assert not guard.lapsed()
 
 
-def test_the_thread_of_the_camera_switches_it_off_and_on_again() -> None:
+def test_the_thread_of_the_camera_switches_it_off_until_somebody_starts() -> None:
     guard, clock = guarded()
     camera = ScriptedCamera()
     events: queue.SimpleQueue[Event] = queue.SimpleQueue()
@@ -77,11 +77,12 @@ def test_the_thread_of_the_camera_switches_it_off_and_on_again() -> None:
         while camera.calls != ["start"]:
             acquisition.device_status().result(PATIENCE_S)
         clock.now_s += 2.0
-        held = events.get(timeout=PATIENCE_S)
-        acquisition.device_status().result(PATIENCE_S)
-        off, status = list(camera.calls), acquisition.status()
+        unserved = events.get(timeout=PATIENCE_S)
         guard.turned()
-        released = events.get(timeout=PATIENCE_S)
+        for _ in range(3):
+            acquisition.device_status().result(PATIENCE_S)
+        off, status = list(camera.calls), acquisition.status()
+        acquisition.set_running(True).result(PATIENCE_S)
         while camera.calls == off:
             acquisition.device_status().result(PATIENCE_S)
 
@@ -92,10 +93,9 @@ def test_the_thread_of_the_camera_switches_it_off_and_on_again() -> None:
     finally:
         acquisition.stop()
 
-    assert isinstance(held, LightHeldEvent)
-    assert isinstance(released, LightReleasedEvent)
+    assert unserved == LightOffEvent(Dark("unserved", "none was served for 1 s"))
     assert off == ["start", "stop"]
-    assert (status.state, status.running, status.reason) == ("held", True, held.reason)
+    assert (status.state, status.off_because) == ("stopped", "unserved")
     assert camera.calls == ["start", "stop", "start", "stop", "safe_off"]
 
 

@@ -51,7 +51,7 @@ def rules(spec: str, **settings: Any) -> LightRules:
 def test_a_simulated_camera_captures_from_the_start_without_delay_and_for_ever() -> None:
     found = rules("sim:wall?seed=1")
 
-    assert found == LightRules("sim:wall?seed=1", True, 0.0, math.inf)
+    assert found == LightRules("sim:wall?seed=1", True, 0.0, math.inf, math.inf)
 
 
 @pytest.mark.parametrize("spec", ["usb", "usb:42", "kinect2:emulated", "tofcam660:10.0.0.1", "own"])
@@ -59,11 +59,11 @@ def test_any_other_camera_starts_dark_and_is_known_by_its_serial_number(spec: st
     with open_camera("sim:wall") as camera:
         about = camera.capabilities
 
-    assert rules(spec) == LightRules(f"{about.model} {about.serial}", False, 3.0, 300.0)
+    assert rules(spec) == LightRules(f"{about.model} {about.serial}", False, 3.0, 300.0, 1.0)
 
 
 def test_a_recording_is_replayed_from_the_start_and_nothing_is_kept_of_it() -> None:
-    assert rules("recording:a.h5") == LightRules(None, True, 0.0, math.inf)
+    assert rules("recording:a.h5") == LightRules(None, True, 0.0, math.inf, math.inf)
 
 
 @pytest.mark.parametrize("spec", ["sim:wall", "usb", "recording:a.h5"])

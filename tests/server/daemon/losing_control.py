@@ -2,11 +2,13 @@
 
 Each camera is a process of its own, and says itself when its light is on. The daemon is another one
 and reaches it by real calls of libusb; so does its supervisor. ``python -m
-tests.server.daemon.losing_control TIMES`` does everything so many times, and prints how long the
-light stayed on.
+tests.server.daemon.losing_control TIMES [KIND ...]`` does everything so many times, and prints how
+often the light was off in time and then stayed off until somebody started it, also over a restart,
+and how long it was on at most.
 """
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -15,7 +17,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,6 +25,8 @@ import httpx
 import psutil
 
 from tests.driver.cameras.open_usb.usbfs.processes import EmulatedCamera, emulated_camera
+from tests.server.relay.forwarder import Forwarder, forwarding
+from tests.serving import Served, serving
 from tests.waiting import wait_until
 
 KINDS: Final = ("usb", "kinect2", "opt8241")
@@ -57,6 +61,7 @@ class Zygote:
             **camera.environment,
             "STATE_DIRECTORY": str(state),
             "TRANSIENTCAM_LIMITS__UNSERVED_S": str(silence_s),
+            "TRANSIENTCAM_LIGHT__DELAY_S": "0",
         }
         arguments = ["serve", "--json", "--camera", camera.kind, "--port", "0"]
         asked = {"arguments": [*arguments, "--log-level", "error"], "environment": environment}
@@ -90,6 +95,7 @@ class Control:
         self._silence_s = silence_s
         self._fifos = 0
         self._client: httpx.Client | None = None
+        self.url = ""
         self.process: psutil.Process | None = None
 
     def light(self) -> None:
@@ -112,6 +118,7 @@ class Control:
         self.close()
         told = self._zygote.daemon(self.camera, self._folder, self._silence_s)
         self.process = psutil.Process(told["pid"])
+        self.url = told["url"]
         self._client = httpx.Client(base_url=told["url"], timeout=PATIENCE_S)
 
     def safe_off(self) -> None:
@@ -159,6 +166,16 @@ class Control:
             yield
         asking.join()
 
+    def stays_off(self) -> bool:
+        """Return whether it is dark, and is so after a restart, until somebody starts."""
+        assert self.process is not None
+        running = self.process.is_running() and self.process.status() != psutil.STATUS_STOPPED
+        before = not running or self.state()[0] == "stopped"
+        self.start()
+        dark = before and self.goes_off() == 0.0 and self.state()[0] == "stopped"
+        self.light()
+        return dark
+
     def goes_off(self) -> float:
         """Wait until the camera says that its light stays off; return when it was on last, in s.
 
@@ -176,15 +193,19 @@ class Control:
         wait_until(dark)
         return lit_s - begin_s
 
-    def close(self) -> None:
-        if self._client is not None:
-            self._client.close()
-            self._client = None
+    def end(self) -> None:
+        """End the daemon, however it is."""
         if self.process is not None:
             with suppress(psutil.NoSuchProcess):
                 self.process.kill()
             self.process.wait(PATIENCE_S)
-            self.process = None
+
+    def close(self) -> None:
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+        self.end()
+        self.process = None
 
 
 def _killed(control: Control) -> float:
@@ -284,8 +305,55 @@ def lose(control: Control, event: str) -> float:
     control.light()
     took_s = EVENTS[event](control)
     if event in ENDING:
-        control.close()
+        control.end()
     return took_s
+
+
+NETWORKS: Final = {"0 s": 0.0, "4 s": 4.0, "silent": math.inf}
+HOPS: Final = 3
+
+
+class Relays:
+    """Relays one behind the other, and the networks between them: the camera's is the first."""
+
+    def __init__(self, control: Control, stack: ExitStack) -> None:
+        self._control = control
+        self._links: list[Forwarder] = []
+        self._relays: list[Served] = []
+        url = control.url
+        for _ in range(HOPS):
+            self._links.append(stack.enter_context(forwarding(url)))
+            relay = f"relay:{self._links[-1].url}?timeout_s={PATIENCE_S:g}"
+            self._relays.append(stack.enter_context(serving(relay)))
+            url = self._relays[-1].url
+
+    def safe_off(self, hop: int, delay_s: float) -> tuple[bool, float]:
+        """Request it; return whether the light then stays off, and how long it was on.
+
+        That is beyond what the networks take; of silent ones from when they speak.
+        """
+        self._control.light()
+        silent = delay_s == math.inf
+        for each in self._links:
+            each.delay_s = 0.0 if silent else delay_s
+            if silent:
+                each.silence()
+        begin_s = time.monotonic()
+        where = f"{self._relays[hop - 1].url}/api/v1/acquisition/safe-off"
+        httpx.post(where, headers={"Prefer": "wait=0"}, timeout=PATIENCE_S)
+        if silent:
+            assert self._control.camera.lit
+            begin_s = time.monotonic()
+            for each in self._links:
+                each.speak()
+        asked_s = time.monotonic() - begin_s
+        took_s = asked_s + self._control.goes_off() - (0.0 if silent else hop * delay_s)
+        for each in self._links:
+            each.delay_s = 0.0
+        services = [each.service.acquisition for each in self._relays]
+        wait_until(lambda: not any(each.status().switching_off for each in services))
+        dark = self._control.state()[0] == "stopped" and self._control.goes_off() == 0.0
+        return dark, took_s
 
 
 @contextmanager
@@ -304,22 +372,34 @@ def main() -> None:
     times = int(sys.argv[1])
     kinds = sys.argv[2:] or KINDS
     zygote = Zygote()
-    took_s: dict[tuple[str, str], list[float]] = {}
+    found: dict[str, dict[str, list[tuple[bool, float]]]] = {}
+
+    def note(event: str, kind: str, dark: bool, took_s: float) -> None:
+        found.setdefault(event, {}).setdefault(kind, []).append((dark, took_s))
+        print(kind, event, "dark" if dark else "NOT DARK", took_s, file=sys.stderr, flush=True)
+
     for kind in kinds:
         with controlled(zygote, kind) as control:
             for _ in range(times):
                 for event in EVENTS:
-                    took_s.setdefault((event, kind), []).append(lose(control, event))
-                    print(kind, event, took_s[event, kind][-1], file=sys.stderr)
-            print(kind, flush=True)
+                    took_s = lose(control, event)
+                    note(event, kind, control.stays_off(), took_s)
+            with ExitStack() as stack:
+                relays = Relays(control, stack)
+                for _ in range(times):
+                    for hop in range(1, HOPS + 1):
+                        for network, delay_s in NETWORKS.items():
+                            event = f"safe-off at relay {hop}, network {network}"
+                            note(event, kind, *relays.safe_off(hop, delay_s))
     zygote.close()
     print("| event | " + " | ".join(kinds) + " |")
-    for name in EVENTS:
-        cells = (took_s[name, kind] for kind in kinds)
-        shown = (
-            f"{sum(t < LIMIT_S for t in each)} of {len(each)}, {max(each):.2f} s" for each in cells
+    for event, each in found.items():
+        cells = (
+            f"{sum(dark and took_s < LIMIT_S for dark, took_s in tries)} of {len(tries)}, "
+            f"{max(took_s for _, took_s in tries):.2f} s"
+            for tries in each.values()
         )
-        print(f"| {name} | " + " | ".join(shown) + " |")
+        print(f"| {event} | " + " | ".join(cells) + " |")
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ the device itself says that its light is off, and asks why.
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -145,18 +146,44 @@ def test_a_client_that_is_gone_leaves_a_lease_that_lapses(lit: Daemon) -> None:
     assert not lit.camera.watchdog_tripped
 
 
-def test_a_loop_that_is_stuck_puts_the_light_out_and_it_is_back_with_the_loop(
+def test_a_loop_that_is_stuck_puts_the_light_out_until_somebody_starts(
     lit: Daemon, watching: Client, tmp_path: Path
 ) -> None:
     with lit.stuck(tmp_path):
         goes_off(lit)
         assert not lit.camera.watchdog_tripped  # it was switched off, not left alone
-    held = watching.notice("light-held")
-    watching.notice("light-released")
+    off = watching.notice("light-off")
 
-    assert "no client was served for 1 s" in held.details["reason"]
-    wait_until(lambda: lit.camera.lit)
-    assert lit.state() in ("starting", "streaming")
+    assert off.details["because"] == "unserved"
+    assert (lit.state(), lit.camera.lit) == ("stopped", False)
+
+
+def test_a_start_that_arrived_before_a_safe_off_lights_nothing(lit: Daemon) -> None:
+    """It begins first, on a connection of its own, and is complete only afterwards."""
+    url = lit.client.base_url
+    with socket.create_connection((url.host, url.port or 0), PATIENCE_S) as early:
+        early.sendall(
+            b"PUT /api/v1/acquisition HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n"
+            b'Content-Type: application/json\r\nContent-Length: 17\r\n\r\n{"running":'
+        )
+        lit.client.get("/livez")  # what came before it was read
+        lit.client.post("/api/v1/acquisition/safe-off").raise_for_status()
+        early.sendall(b" true}")
+        answer = early.makefile("rb").read()
+
+    assert b" 409 " in answer.partition(b"\r\n")[0]
+    assert b"/problems/start-outdated" in answer
+    assert (lit.state(), lit.camera.lit) == ("stopped", False)
+
+
+def test_a_start_of_what_was_seen_before_a_safe_off_lights_nothing(lit: Daemon) -> None:
+    seen = lit.acquisition()["offs"]
+    lit.client.post("/api/v1/acquisition/safe-off").raise_for_status()
+    answer = lit.client.put("/api/v1/acquisition", json={"running": True, "offs": seen})
+
+    assert (answer.status_code, answer.json()["type"]) == (409, "/problems/start-outdated")
+    assert not lit.camera.lit
+    lit.put("acquisition", {"running": True, "offs": lit.acquisition()["offs"]})
 
 
 def test_a_lease_that_lapses_while_the_loop_is_stuck_keeps_the_light_off(

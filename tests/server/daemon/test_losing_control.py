@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from tests.driver.cameras.open_usb.usbfs.processes import missing_libraries, skip_or_fail
-from tests.server.daemon.losing_control import EVENTS, Control, Zygote, controlled, lose
+from tests.server.daemon.losing_control import EVENTS, KINDS, Control, Zygote, controlled, lose
 from tests.waiting import wait_until
 
 FEWER = "stuck camera thread", "USB stall", "supervisor SIGKILL", "SIGSTOP", "SIGKILL"
@@ -59,6 +59,15 @@ def test_a_kinect_goes_dark_which_has_no_watchdog(kinect2: Control, event: str) 
 @pytest.mark.parametrize("event", FEWER)
 def test_an_opt8241_goes_dark_which_has_no_watchdog(opt8241: Control, event: str) -> None:
     lose(opt8241, event)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_after_a_restart_it_stays_dark_until_somebody_starts(
+    request: pytest.FixtureRequest, kind: str
+) -> None:
+    control: Control = request.getfixturevalue(kind)
+    lose(control, "SIGKILL")
+    assert control.stays_off()
 
 
 def test_after_a_pause_it_stays_dark_until_somebody_starts(opt8241: Control) -> None:

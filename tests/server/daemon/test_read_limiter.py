@@ -59,7 +59,9 @@ class Connection:
         *,
         costs_s: float = 0.0,
         first: FairQueue | None = None,
+        arrived: int | None = None,
     ) -> None:
+        self.offs = 0
         self.protocol = Protocol(loop, costs_s=costs_s)
         self.transport = Transport()
         self.lost = 0
@@ -69,6 +71,8 @@ class Connection:
             streams=loop.turns().account("client"),
             first=(first or loop.turns()).account("client"),
             lost=self._count,
+            offs=lambda: self.offs,
+            arrived=arrived,
         )
         self.limiter.connection_made(cast("asyncio.Transport", self.transport))
 
@@ -92,6 +96,32 @@ def test_what_arrives_is_handed_over_at_once_in_portions() -> None:
 
     assert [len(each) for each in connection.protocol.received] == [PORTION_BYTES] * 2 + [10]
     assert connection.transport.reading
+
+
+def test_a_request_has_the_count_of_when_its_first_byte_was_read() -> None:
+    loop = Loop()
+    connection = Connection(loop, loop.turns())
+    limiter = connection.limiter
+
+    connection.send(b"GET /")
+    connection.offs = 1
+    connection.send(b"livez HTTP/1.1\r\n\r\nGET")
+    assert limiter.offs == 0
+    connection.offs = 2
+    limiter.expect(more=True)  # the second one began with what came last
+    assert limiter.offs == 1
+    limiter.expect(more=False)
+    connection.send(b"GET")
+    assert limiter.offs == 2
+
+
+def test_what_had_arrived_before_a_connection_is_read_has_the_count_of_then() -> None:
+    loop = Loop()
+    connection = Connection(loop, loop.turns(), arrived=0)
+    connection.offs = 1
+    connection.send(b"GET")
+
+    assert connection.limiter.offs == 0
 
 
 def test_a_flood_is_read_for_its_share_of_the_time_and_no_more() -> None:

@@ -40,7 +40,7 @@ def calibration_file(data: bytes) -> None:
 def byte_range(data: bytes) -> None:
     """Read the Range header of a download of 1000 bytes."""
     with contextlib.suppress(Problem):
-        downloads._is_usable(data.decode("latin-1"), 1000)
+        downloads._span(data.decode("latin-1"), 1000)
 
 
 TARGETS: Final[dict[str, Callable[[bytes], None]]] = {

@@ -21,6 +21,7 @@ import transientcam
 import transientcam_moments as tm
 from tests.moments.compiled_kernels import without_kernels
 from tests.server.recording.made import record
+from tests.waiting import wait_until
 from transientcam.cli import run
 from transientcam_server.errors import ClusterError, InputError, MixedVersions, StorageError
 from transientcam_server.offline import (
@@ -84,6 +85,13 @@ def client() -> Iterator[distributed.Client]:
         yield client
 
 
+def idle(client: distributed.Client) -> bool:
+    """Return whether no task is left, those that were cancelled while they ran included."""
+    left = client.run_on_scheduler(lambda dask_scheduler: len(dask_scheduler.tasks))
+    running = client.run(lambda dask_worker: len(dask_worker.state.tasks))
+    return not left and not any(running.values())
+
+
 def assert_same(output: str, serial: dict[str, Any]) -> None:
     """Hold a store against the serial run, bit for bit."""
     dataset = xarray.open_zarr(output)
@@ -122,6 +130,7 @@ def test_a_run_that_was_interrupted_is_gone_on_with(
     output = str(tmp_path / "a.zarr")
     with pytest.raises(KeyboardInterrupt):
         reconstruct_on(client, str(source), output, OPTIONS, progress=interrupt)
+    wait_until(lambda: idle(client))  # what had begun goes on, and writes
     begun: Any = zarr.open_group(output, mode="r")
     assert begun.attrs["state"] == "unfinished"
     missing = begun["frame"][:] == cluster.MISSING
@@ -312,6 +321,16 @@ def test_the_command_takes_the_address_of_a_scheduler_and_a_directory(
     assert "range of 2 frames" in capsys.readouterr().err
     for name in ("a", "b"):
         assert xarray.open_zarr(tmp_path / "out" / f"{name}.zarr")["range"].shape[0] == 2
+    whole = (recordings / "a.h5").read_bytes()
+    (recordings / "0 torn.h5").write_bytes(whole[:3000])
+    (recordings / "1 flipped.h5").write_bytes(bytes(each ^ 0xFF for each in whole))
+    (recordings / "2 empty.h5").touch()
+    os.mkfifo(recordings / "3 pipe.h5")
+    assert run(["reconstruct", str(recordings), "-o", str(tmp_path / "again"), *options]) == 1
+    said = capsys.readouterr().err
+    assert all(name in said for name in ("0 torn.h5", "1 flipped.h5", "2 empty.h5"))
+    assert "3 of 5 recordings are not reconstructed" in said
+    assert xarray.open_zarr(tmp_path / "again" / "b.zarr")["range"].shape[0] == 2
     assert run(["reconstruct", str(source), "-o", "a.h5", *options]) == 2
     assert run(["reconstruct", str(source), "-o", "a.zarr", *options, "--workers", "2"]) == 2
     assert run(["reconstruct", str(tmp_path / "out"), "-o", "a.zarr", *options]) == 2

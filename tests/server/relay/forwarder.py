@@ -2,8 +2,10 @@
 
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from queue import SimpleQueue
 from urllib.parse import urlsplit
 
 
@@ -14,6 +16,8 @@ class Forwarder:
     ----------
     target
         The other address.
+    delay_s
+        How long after it came something is passed on.
     admitting
         Whether new connections are passed on; otherwise they are cut.
     seen
@@ -22,8 +26,10 @@ class Forwarder:
 
     def __init__(self, url: str) -> None:
         self.target = url
+        self.delay_s = 0.0
         self.admitting = True
         self.seen = b""
+        self._closing = threading.Event()
         self._passing = threading.Event()
         self._passing.set()
         self._listener = socket.create_server(("127.0.0.1", 0))
@@ -52,6 +58,7 @@ class Forwarder:
 
     def close(self) -> None:
         """End all."""
+        self._closing.set()
         self.speak()
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)
@@ -83,15 +90,24 @@ class Forwarder:
             self._run(self._pass_on, service, client)
 
     def _pass_on(self, source: socket.socket, sink: socket.socket) -> None:
+        waiting: SimpleQueue[tuple[float, bytes]] = SimpleQueue()
+        self._run(self._deliver, waiting, sink)
         with suppress(OSError):
             while data := source.recv(1 << 16):
                 self.seen = (self.seen + data)[-(1 << 17) :]
+                waiting.put((time.monotonic() + self.delay_s, data))
+        waiting.put((0.0, b""))
+
+    def _deliver(self, waiting: "SimpleQueue[tuple[float, bytes]]", sink: socket.socket) -> None:
+        with suppress(OSError):
+            while (item := waiting.get())[1]:
+                self._closing.wait(max(0.0, item[0] - time.monotonic()))
                 self._passing.wait()
-                sink.sendall(data)
+                sink.sendall(item[1])
         with suppress(OSError):
             sink.shutdown(socket.SHUT_RDWR)
 
-    def _run(self, function: object, *arguments: socket.socket) -> None:
+    def _run(self, function: object, *arguments: object) -> None:
         thread = threading.Thread(target=function, args=arguments, name="forwarder")  # type: ignore[arg-type]
         self._threads.append(thread)
         thread.start()

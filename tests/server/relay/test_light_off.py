@@ -4,6 +4,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -15,6 +16,7 @@ from tests.server.streaming import VIDEO
 from tests.serving import Served, serving
 from tests.waiting import wait_until
 from transientcam_server.camera import _origin_lease as origin_lease
+from transientcam_server.errors import OriginRefused
 from transientcam_server.relay import _delivery as delivery
 
 ORIGIN = "sim:wall?noise=off"
@@ -58,8 +60,8 @@ def relay(link: Forwarder) -> Iterator[Served]:
         link.speak()
 
 
-def behind(link: Forwarder) -> Any:
-    return serving(f"relay:{link.url}?timeout_s={PATIENCE_S:g}")
+def behind(link: Forwarder, **settings: Any) -> Any:
+    return serving(f"relay:{link.url}?timeout_s={PATIENCE_S:g}", **settings)
 
 
 def is_lit(origin: Served) -> bool:
@@ -178,8 +180,43 @@ def test_a_start_that_was_asked_for_before_does_not(
     assert before is not None
     offs = before.offs
     assert send(relay, "POST", SAFE_OFF, wait_s=PATIENCE_S)[0] == 200
-    before.start_unless(offs)
+    assert not before.start_unless(offs)
     assert not is_lit(lit)
+
+
+def test_a_start_that_it_overtakes_on_the_way_does_not(
+    lit: Served, link: Forwarder, relay: Served
+) -> None:
+    """The relay has asked for it, and its network delivers what switches off first."""
+    before = relay.service.relay
+    assert before is not None
+    seen = before._link.offs()
+    assert send(relay, "POST", SAFE_OFF, wait_s=PATIENCE_S)[0] == 200
+    with pytest.raises(OriginRefused, match="switched off after this"):
+        before._link.start(offs=seen)
+    assert not is_lit(lit)
+
+
+@pytest.mark.parametrize("off", OFF.values(), ids=list(OFF))
+def test_what_was_not_confirmed_is_repeated_after_a_restart_and_once_only(
+    lit: Served, link: Forwarder, tmp_path: Path, off: Callable[..., Any]
+) -> None:
+    kept = {"light": {"directory": tmp_path}}
+    with behind(link, **kept) as relay:
+        link.admitting = False  # connections that stand are good, each attempt is a new one
+        assert off(relay)[0] == 504
+    link.admitting = True
+    assert is_lit(lit)
+    with behind(link, **kept) as relay:
+        wait_until(lambda: not is_lit(lit))
+        wait_until(lambda: not acquisition(relay)["switching_off"])
+    with transientcam.Camera(lit.url, timeout_s=PATIENCE_S) as camera:
+        camera.start()
+    wait_until(lambda: is_lit(lit))
+    with behind(link, **kept) as relay:
+        wait_until(lambda: acquisition(relay)["state"] == "streaming")
+        assert not acquisition(relay)["switching_off"]
+    assert is_lit(lit)
 
 
 def test_it_goes_through_three_relays_at_once(lit: Served) -> None:

@@ -108,10 +108,6 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
       return { words: `The camera's light goes on in ${fixed(notice.in_s, 1, "s")}.`, tone: "bad" };
     case "light-off":
       return { words: `The light is off: ${notice.reason}.`, tone: "plain" };
-    case "light-held":
-      return { words: `The light was switched off${notice.reason ? `: ${notice.reason}` : ""}.`, tone: "bad" };
-    case "light-released":
-      return { words: "The light is on again.", tone: "good" };
     case "light-unconfirmed":
       return { words: `${notice.reason.charAt(0).toUpperCase()}${notice.reason.slice(1)}.`, tone: "bad" };
     case "light-confirmed":

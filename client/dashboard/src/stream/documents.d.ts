@@ -9,7 +9,7 @@ export interface AbsentDocument {
 /** Whether frames are captured, and how fast. */
 export interface AcquisitionDocument {
   readonly running: boolean;
-  readonly state: "arming" | "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
+  readonly state: "arming" | "starting" | "streaming" | "stopped" | "calibrating" | "lost";
   /** Why the camera is lost, or its light is off or may be on. */
   readonly reason: string | null;
   /** Measured over the last frames; null before there are two. */
@@ -23,13 +23,26 @@ export interface AcquisitionDocument {
   /** Time until the light goes on, while `state` is `arming`; null else. */
   readonly light_on_in_s: number | null;
   /** What ended the capture: `stop`, `safe-off`, `lapse` of a lease, the `device` (its interlock),
-   * that it was `unused`, or the `supervisor` beside this service; or why none began: `start`, where
-   * the service starts none by itself, and where what is kept of the light is `unreadable` or
-   * `unwritable`. Null while it is running, and of a relay. */
-  readonly off_because: "stop" | "safe-off" | "lapse" | "device" | "unused" | "supervisor" | "start" | "unreadable" | "unwritable" | null;
+   * that it was `unused` or clients `unserved`, or the `supervisor` beside this service; or why none
+   * began: `start`, where the service starts none by itself, and where what is kept of the light is
+   * `unreadable` or `unwritable`. Null while it is running, and of a relay. */
+  readonly off_because:
+    | "stop"
+    | "safe-off"
+    | "lapse"
+    | "device"
+    | "unused"
+    | "unserved"
+    | "supervisor"
+    | "start"
+    | "unreadable"
+    | "unwritable"
+    | null;
   /** Whether the light stays off over a restart of the service; false while the disk has not taken
    * it. Null while the capture is running, and of a relay. */
   readonly off_kept: boolean | null;
+  /** Counts how often the light was to go off, from a number drawn when the service starts. */
+  readonly offs: number;
   /** Whether the light was to go off and may still be on: a relay's origin has not confirmed it,
    * and is asked again until it does. */
   readonly switching_off: boolean;
@@ -40,6 +53,9 @@ export interface AcquisitionRequest {
   /** Whether frames are captured; the light is off while they are not, and starts with a delay
    * after it was announced. Starting takes the right `may_light`. */
   readonly running: boolean;
+  /** Refuse a start, with `start-outdated`, where the acquisition's `offs` is another number by
+   * now; without it, where it has changed since the request arrived. */
+  readonly offs?: number | null;
 }
 
 /** The calibration that frames are to be calibrated by. */
@@ -257,7 +273,7 @@ export interface CallerDocument {
 
 /** The camera: what it can do, and how it is. */
 export interface CameraDocument {
-  readonly state: "arming" | "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
+  readonly state: "arming" | "starting" | "streaming" | "stopped" | "calibrating" | "lost";
   /** Why it is lost, or its light is off. */
   readonly reason: string | null;
   readonly simulated: boolean;
@@ -644,7 +660,7 @@ export interface NeighbourDocument {
   readonly api: string;
   readonly tls: boolean;
   /** What its camera does; empty where that is not announced. */
-  readonly state: "" | "arming" | "starting" | "streaming" | "stopped" | "calibrating" | "lost" | "held";
+  readonly state: "" | "arming" | "starting" | "streaming" | "stopped" | "calibrating" | "lost";
   /** since it answered, in s */
   readonly seen_s: number;
 }
@@ -1378,15 +1394,6 @@ export type Notice =
       readonly kind: "light-off";
       readonly because: string;
       readonly reason: string;
-    }
-  | {
-      readonly type: "notice";
-      readonly kind: "light-held";
-      readonly reason: string;
-    }
-  | {
-      readonly type: "notice";
-      readonly kind: "light-released";
     }
   | {
       readonly type: "notice";

@@ -102,12 +102,14 @@ class AcquisitionDocument(Document):
     """Time until the light goes on, while `state` is `arming`; null else."""
     off_because: Cause | None = None
     """What ended the capture: `stop`, `safe-off`, `lapse` of a lease, the `device` (its interlock),
-    that it was `unused`, or the `supervisor` beside this service; or why none began: `start`, where
-    the service starts none by itself, and where what is kept of the light is `unreadable` or
-    `unwritable`. Null while it is running, and of a relay."""
+    that it was `unused` or clients `unserved`, or the `supervisor` beside this service; or why none
+    began: `start`, where the service starts none by itself, and where what is kept of the light is
+    `unreadable` or `unwritable`. Null while it is running, and of a relay."""
     off_kept: bool | None = None
     """Whether the light stays off over a restart of the service; false while the disk has not taken
     it. Null while the capture is running, and of a relay."""
+    offs: int
+    """Counts how often the light was to go off, from a number drawn when the service starts."""
     switching_off: bool
     """Whether the light was to go off and may still be on: a relay's origin has not confirmed it,
     and is asked again until it does."""
@@ -123,3 +125,6 @@ class AcquisitionRequest(Document):
     running: bool
     """Whether frames are captured; the light is off while they are not, and starts with a delay
     after it was announced. Starting takes the right `may_light`."""
+    offs: int | None = None
+    """Refuse a start, with `start-outdated`, where the acquisition's `offs` is another number by
+    now; without it, where it has changed since the request arrived."""

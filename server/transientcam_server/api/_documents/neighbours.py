@@ -24,9 +24,7 @@ class NeighboursDocument(Document):
         firmware: str
         api: str = Field(description="versions of its interface")
         tls: bool
-        state: Literal[
-            "", "arming", "starting", "streaming", "stopped", "calibrating", "lost", "held"
-        ]
+        state: Literal["", "arming", "starting", "streaming", "stopped", "calibrating", "lost"]
         """What its camera does; empty where that is not announced."""
         seen_s: float = Field(ge=0.0, description="since it answered, in s")
 

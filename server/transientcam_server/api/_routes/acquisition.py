@@ -9,9 +9,10 @@ from fastapi import APIRouter, Header, Request
 
 from transientcam_server.api._auth import Role
 from transientcam_server.api._auth.permissions import TO_LIGHT, needs, require
-from transientcam_server.api._dependencies import ServiceOf
+from transientcam_server.api._dependencies import OffsOf, ServiceOf
 from transientcam_server.api._documents.camera import AcquisitionDocument, AcquisitionRequest
 from transientcam_server.api._problems import documented
+from transientcam_server.camera import outdated
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.service import Service
 
@@ -46,23 +47,31 @@ async def read_acquisition(service: ServiceOf) -> AcquisitionDocument:
         kinds.INVALID_REQUEST,
         kinds.MAY_NOT_LIGHT,
         kinds.CAMERA_BUSY,
+        kinds.START_OUTDATED,
         kinds.CAMERA_FAILED,
         kinds.CAMERA_LOST,
         kinds.LIGHT_UNCONFIRMED,
     ),
 )
 async def change_acquisition(
-    service: ServiceOf, wanted: AcquisitionRequest, http: Request, prefer: _Prefer = None
+    service: ServiceOf,
+    wanted: AcquisitionRequest,
+    http: Request,
+    offs: OffsOf,
+    prefer: _Prefer = None,
 ) -> AcquisitionDocument:
     """Start or stop capturing; the camera's light is off while it does not.
 
     Starting takes the right `may_light`. The light goes on once it was announced for the setting
-    `light.delay_s`: `state` is `arming` until then. Stopping ends calibrations that are measured or
+    `light.delay_s`: `state` is `arming` until then. A start that arrived before the light was to go
+    off, and is handled afterwards, is refused. Stopping ends calibrations that are measured or
     wait for that, and holds over a restart of the service.
     """
     if wanted.running:
         require(http, service, TO_LIGHT)
-        await asyncio.wrap_future(service.acquisition.set_running(True))
+        if wanted.offs not in (None, offs):
+            raise outdated()
+        await asyncio.wrap_future(service.acquisition.set_running(True, offs=offs))
     else:
         await _confirmed(service, service.acquisition.set_running(False), prefer)
     return _document(service)

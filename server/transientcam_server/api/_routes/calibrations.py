@@ -12,7 +12,7 @@ from starlette.requests import ClientDisconnect
 from transientcam_server.api import _downloads as downloads
 from transientcam_server.api._auth import Role
 from transientcam_server.api._auth.permissions import needs
-from transientcam_server.api._dependencies import ServiceOf
+from transientcam_server.api._dependencies import OffsOf, ServiceOf
 from transientcam_server.api._documents.calibration import (
     MAX_NAME,
     ActivationRequest,
@@ -89,7 +89,7 @@ async def read_calibrations(service: ServiceOf) -> CalibrationsDocument:
 )
 @needs(Role.OPERATOR, lease=True, light=True)
 async def measure_calibration(
-    service: ServiceOf, response: Response, wanted: CalibrationRequest
+    service: ServiceOf, response: Response, wanted: CalibrationRequest, offs: OffsOf
 ) -> JobDocument:
     """Start a job that measures a calibration with the present sequence.
 
@@ -106,7 +106,7 @@ async def measure_calibration(
         detail = "A calibration would end it; stop it first."
         raise Problem(kinds.RECORDING_RUNS, detail, recording=running)
     order = CalibrationOptions(**wanted.model_dump())
-    job = service.calibrations.measure(order, lambda: service.applied)
+    job = service.calibrations.measure(order, lambda: service.applied, offs=offs)
     return accepted(job, response)
 
 

@@ -1,9 +1,12 @@
+import itertools
 import json
 import os
 import shutil
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import httpx
@@ -390,6 +393,32 @@ def test_a_file_that_is_deleted_as_its_answer_begins_is_unknown(
 
     assert answer.status_code == 404
     assert answer.json()["type"] == "/problems/unknown-recording"
+
+
+def test_the_body_of_a_download_waits_for_a_disk_as_all_else_does(
+    http: httpx.Client, daemon: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    url = f"{RECORDINGS}/{recorded(http)['id']}/file"
+    answers, reads = threading.Event(), itertools.count()
+    hangs_at = 0
+
+    def hanging(*arguments: int) -> bytes:
+        assert threading.current_thread().name.startswith("disk")
+        if next(reads) == hangs_at:
+            answers.wait()
+        return os.pread(*arguments)
+
+    replaced = SimpleNamespace(**{**vars(os), "pread": hanging})
+    monkeypatch.setattr(downloads, "os", replaced)
+    monkeypatch.setattr(downloads, "_PIECE", 1024)
+    monkeypatch.setattr(daemon.service.recordings.disk, "_stalled_s", 0.1)
+    answer = http.get(url)
+    assert (answer.status_code, answer.json()["type"]) == (503, "/problems/disk-stalled")
+    hangs_at, reads = 2, itertools.count()
+    with pytest.raises(httpx.RemoteProtocolError):
+        http.get(url)
+    answers.set()
+    assert http.get(url).status_code == 200
 
 
 def test_a_file_that_is_no_recording_is_listed_as_damaged_and_can_be_deleted(
