@@ -553,8 +553,9 @@ export interface InfoDocument {
   readonly history: HistoryDocument;
   /** Streams open now. */
   readonly clients: number;
-  /** Which compiled kernels are ready; the others are computed with NumPy meanwhile. */
-  readonly kernels: Readonly<Record<string, unknown>>;
+  /** What frames are computed without until it is compiled: more slowly, with the same results;
+   * null where nothing is being prepared. */
+  readonly kernels: KernelsDocument | null;
   /** Settings of the reconstruction. */
   readonly reconstruction: Readonly<Record<string, number | string>>;
 }
@@ -600,6 +601,14 @@ export interface JobDocument {
 export interface JobsDocument {
   /** The newest first. */
   readonly jobs: readonly JobDocument[];
+}
+
+/** Compiled code for the present sequence and estimator that is still being prepared. */
+export interface KernelsDocument {
+  /** kernels by their names, the next one first */
+  readonly preparing: readonly string[];
+  /** about how long it takes until the last one is ready */
+  readonly left_s: number;
 }
 
 /** Who controls the camera. */
@@ -982,11 +991,11 @@ export interface ReconstructionDocument {
   /** Weight from which a return counts as the first, over the pixel's strongest return. */
   readonly return_threshold: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
-   * least over the scenes of docs/likelihood.md together, and in the daemon `pisarenko` until the
-   * kernel is compiled; each frame names its `estimator`. The paper's are `pisarenko` and
+   * least over the scenes of docs/likelihood.md together; each frame names its `estimator`. The paper's are `pisarenko` and
    * `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
    * frequencies; for those with gaps `automatic` is `two-returns`, or `unwrapped-phase` where there
-   * are but two and until the kernel is compiled. The others are there for comparison. */
+   * are but two. The others are there for comparison. Until its kernel is compiled the same
+   * estimator runs in NumPy, more slowly. */
   readonly estimator:
     | "automatic"
     | "pisarenko"
@@ -1025,11 +1034,11 @@ export interface ReconstructionRequest {
   /** Weight from which a return counts as the first, over the pixel's strongest return. */
   readonly return_threshold?: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
-   * least over the scenes of docs/likelihood.md together, and in the daemon `pisarenko` until the
-   * kernel is compiled; each frame names its `estimator`. The paper's are `pisarenko` and
+   * least over the scenes of docs/likelihood.md together; each frame names its `estimator`. The paper's are `pisarenko` and
    * `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
    * frequencies; for those with gaps `automatic` is `two-returns`, or `unwrapped-phase` where there
-   * are but two and until the kernel is compiled. The others are there for comparison. */
+   * are but two. The others are there for comparison. Until its kernel is compiled the same
+   * estimator runs in NumPy, more slowly. */
   readonly estimator?:
     | "automatic"
     | "pisarenko"
