@@ -132,7 +132,8 @@ def by_worker(path: Path) -> _Array:
     """Return the range that a worker of `transientcam reconstruct --workers` computes."""
     with h5py.File(path) as file:
         options = BatchOptions(("range",), _settings(file))
-    return computed(Job.of(str(path), options), 0, 1)["range"][0]
+    ranges: _Array = computed(Job.of(str(path), options), 0, 1)["range"][0]
+    return ranges
 
 
 def _settings(file: h5py.File) -> ReconstructionSettings:

@@ -1,8 +1,8 @@
 """The noise of moments of which none is known, whatever their unit."""
 
 from collections.abc import Callable
-from functools import wraps
-from typing import Any, Concatenate, Final, ParamSpec, TypeVar
+from functools import update_wrapper
+from typing import Any, Concatenate, Final, ParamSpec, TypeVar, cast
 
 import numpy as np
 
@@ -26,7 +26,6 @@ def free_of_scale(
     the noise over- or underflow, and what has their unit is brought back.
     """
 
-    @wraps(estimate)
     def scaled(b: Array, noise: MomentNoise | None, *others: _P.args, **options: _P.kwargs) -> _T:
         if noise is not None:
             return estimate(b, noise, *others, **options)
@@ -46,4 +45,6 @@ def free_of_scale(
         whole: _T = found._replace(**named)
         return whole
 
-    return scaled
+    return cast(
+        "Callable[Concatenate[Array, MomentNoise | None, _P], _T]", update_wrapper(scaled, estimate)
+    )

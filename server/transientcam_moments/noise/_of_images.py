@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from transientcam_moments.arrays import Array
 from transientcam_moments.noise._ambient import ambient_light
@@ -88,7 +89,8 @@ def image_noise(captured: CapturedImages, brightness: Array) -> ImageNoise | Non
     takes, phases_rad, first, saturated_pixels, bad_pixels, left_out, _ = captured
     steps = len(phases_rad)
     stack = np.asarray(takes).reshape((len(takes), takes.shape[1], -1))
-    usable = np.isfinite(light := np.asarray(brightness).reshape(-1)) & (light > 0)
+    light = np.asarray(brightness).reshape(-1)
+    usable: NDArray[np.bool_] = np.isfinite(light) & (light > 0)
     if saturated_pixels is not None:
         full = np.asarray(saturated_pixels)
         near = [np.roll(full, by, axis) for axis in range(full.ndim) for by in (-1, 0, 1)]
@@ -104,13 +106,13 @@ def image_noise(captured: CapturedImages, brightness: Array) -> ImageNoise | Non
     both = np.stack([places, np.minimum(places + 1, light.size - 1)])
     images = stack[:, first:, both].astype(float)
     images = images.reshape((len(stack), -1, steps, *both.shape))
-    whole = np.ones(images.shape[:2], dtype=bool)
+    whole: NDArray[np.bool_] = np.ones(images.shape[:2], dtype=bool)
     if left_out is not None:
         whole = ~np.asarray(left_out)[:, first:].reshape((*whole.shape, steps)).any(axis=2)
     samples, known, signal, dark_dn = _samples(images, light[places] / 2, whole, phases_rad)
     if not samples.size or not np.isfinite(samples).all():
         return None
-    rounded = (images == np.rint(images)).all()
+    rounded = bool((images == np.rint(images)).all())
     least = ROUNDING_VARIANCE if rounded else 1e-9 * float((samples**2).mean())
     return ImageNoise(*_fitted(samples, known, signal, least), dark_dn) if least > 0 else None
 

@@ -27,7 +27,7 @@ def drawn(
     random = np.random.default_rng(seed)
     row, column = np.mgrid[: SHAPE[0], : SHAPE[1]]
     light = 300.0 + 15.0 * column + 300.0 * (row // 10 % 2)
-    images = []
+    images: list[NDArray[np.float64]] = []
     for _ in range(takes):
         for j in range(1, M + 1):
             for theta in 2 * np.pi * np.arange(phases) / phases:
@@ -62,7 +62,8 @@ def ratio(
     assert found is not None
     level = sensor.dark_dn + light / 2
     true = sensor.image_variance(light / 2)
-    return np.sqrt(found.image_variance(level - found.dark_dn) / true)
+    ratios: NDArray[np.float64] = np.sqrt(found.image_variance(level - found.dark_dn) / true)
+    return ratios
 
 
 @pytest.mark.parametrize(
@@ -165,7 +166,7 @@ def test_a_reconstruction_measures_the_noise_and_holds_a_stated_sensor_against_i
     assert known.noise_ratio == pytest.approx(1, abs=0.05)
     assert wrong.noise_ratio == pytest.approx(0.5, abs=0.05)
     assert own.noise_ratio is None
-    assert own.image_noise is not None
+    assert isinstance(own.image_noise, tm.noise.ImageNoise)
     as_sensor = own.image_noise.as_sensor(4095)
     np.testing.assert_allclose(
         as_sensor.image_variance(light) / own.image_noise.image_variance(light), 1, rtol=0.01

@@ -551,7 +551,12 @@ def test_a_start_that_waited_when_the_light_was_switched_off_does_not_light(comm
     with running() as one:
         one.acquisition.set_running(False).result(PATIENCE_S)
         began, go_on = threading.Event(), threading.Event()
-        one.acquisition.submit(lambda: (began.set(), go_on.wait(PATIENCE_S)))
+
+        def hold() -> None:
+            began.set()
+            go_on.wait(PATIENCE_S)
+
+        one.acquisition.submit(hold)
         assert began.wait(PATIENCE_S)
         start = one.acquisition.set_running(True)
         off = (

@@ -87,6 +87,7 @@ class FakeAcquisition:
             running=True,
             rate_hz=10.6,
             frames=self.frames,
+            offs=0,
             frame_age_s=7.0,
             reason="unplugged" if self.state == "lost" else None,
             stalled=self.stalled,

@@ -24,7 +24,7 @@ async def read_camera(service: ServiceOf) -> CameraDocument:
     if service.acquisition.status().state != "lost":
         with contextlib.suppress(CameraError):  # `state` and `reason` then report it
             status = _document(await asyncio.wrap_future(service.acquisition.device_status()))
-    acquisition = service.acquisition.status()
+    acquisition, sensor = service.acquisition.status(), service.sensor
     return CameraDocument(
         state=acquisition.state,
         reason=acquisition.reason,
@@ -32,7 +32,7 @@ async def read_camera(service: ServiceOf) -> CameraDocument:
         light_warning=light_warning(camera),
         capabilities=asdict(camera.capabilities),
         intrinsics=CameraDocument.IntrinsicsDocument(**asdict(service.intrinsics)),
-        sensor=service.sensor and CameraDocument.SensorDocument(**asdict(service.sensor)),
+        sensor=None if sensor is None else CameraDocument.SensorDocument(**asdict(sensor)),
         origin=_origin(service.relay),
         status=status,
         counters=asdict(camera.counters),

@@ -112,7 +112,9 @@ class Frame:
     async def noise_ratio(self) -> float | None:
         """Return `tm.Reconstruction.noise_ratio`; None also while nothing is computed."""
         found = self._computed.reconstruction
-        return found and (await self._workers.run_long(lambda: found.noise_ratio))[0]
+        if found is None:
+            return None
+        return (await self._workers.run_long(lambda: found.noise_ratio))[0]
 
     @property
     def shape(self) -> tuple[int, int]:

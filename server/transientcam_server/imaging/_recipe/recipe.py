@@ -1,7 +1,7 @@
 """How images become moments and moments become returns."""
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -210,9 +210,10 @@ class Recipe:
 
     def with_noise_of(self, found: tm.Reconstruction | None) -> "Recipe":
         """Return the recipe with the noise that a frame's images show, where none is stated."""
-        if self.sensor is not None or found is None or found.image_noise is None:
+        noise = None if self.sensor is not None or found is None else found.image_noise
+        if not isinstance(noise, tm.noise.ImageNoise):
             return self
-        return replace(self, sensor=found.image_noise.as_sensor(round(self.full_scale)))
+        return replace(self, sensor=noise.as_sensor(round(self.full_scale)))
 
     def reconstruct(
         self,
