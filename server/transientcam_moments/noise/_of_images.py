@@ -108,7 +108,8 @@ def image_noise(captured: CapturedImages, brightness: Array) -> ImageNoise | Non
     images = images.reshape((len(stack), -1, steps, *both.shape))
     whole: NDArray[np.bool_] = np.ones(images.shape[:2], dtype=bool)
     if left_out is not None:
-        whole = ~np.asarray(left_out)[:, first:].reshape((*whole.shape, steps)).any(axis=2)
+        gone = np.asarray(left_out, dtype=bool)[:, first:].reshape((*whole.shape, steps))
+        whole = ~np.logical_or.reduce(gone, axis=2)
     samples, known, signal, dark_dn = _samples(images, light[places] / 2, whole, phases_rad)
     if not samples.size or not np.isfinite(samples).all():
         return None
