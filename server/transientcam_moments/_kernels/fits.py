@@ -30,25 +30,28 @@ from transientcam_moments.likelihood import (
     LENGTH,
     LENGTH_VARIANCE,
     MARGIN,
+    MEAN,
     PHASE_VARIANCE,
     PRIOR,
+    SHAPE,
     STEPS,
     TAIL,
-    TAIL_SHAPE,
+    TAIL_SHAPES,
     TAIL_VARIANCE,
     WEIGHT,
     WEIGHT_VARIANCE,
     X,
     Y,
+    average,
     choice,
     sharp,
     tail,
 )
 from transientcam_moments.moment_problem import phase_of
 
-__all__ = ["fit", "fit_one", "portable", "vary", "write"]  # portable gives arithmetic its meaning
+__all__ = ["fit", "fit_again", "fit_one", "portable", "vary", "write"]  # portable gives arithmetic its meaning
 
-_MEAN = DELAY_RAD / TAIL_SHAPE
+_MEAN = DELAY_RAD / TAIL_SHAPES[0]
 DAMPING = 6
 """Place of the damping in the state of a tail: x, y, w, v, d, t, damping, chi-square."""
 
@@ -126,8 +129,45 @@ def fit(
     active: Mask, bar: Plane,
 ) -> Any:  # fmt: skip
     """Add a return and fit all of them, until `active` pixels have settled; return chi-square."""
-    m = len(order)
     cost = _new(order, returns, turns, data_r, data_i, weight, x, y, w, pr, pi, rr, ri)
+    return _improve(
+        order, returns, unknowns, steps, data_r, data_i, weight, x, y, w, pr, pi, rr, ri, cost,
+        active, bar,
+    )  # fmt: skip
+
+
+@njit(error_model="numpy")
+def fit_again(
+    order: Length, returns: Length, unknowns: Length, steps: int, data_r: Bank, data_i: Bank,
+    weight: Bank, from_x: Bank, from_y: Bank, x: Bank, y: Bank, w: Bank, cost: Plane, active: Mask,
+    bar: Plane,
+) -> Any:  # fmt: skip
+    """Fit returns from other points on as well; keep the better ones and return chi-square."""
+    pr, pi = product_bank(cost, order, returns), product_bank(cost, order, returns)
+    rr, ri = bank(cost, order, 1), bank(cost, order, 1)
+    size = bank(cost, returns, 0)
+    for k in range(len(returns)):
+        sharp.powers(order, from_x[k], from_y[k], k, pr, pi)
+    sharp.weigh(order, returns, data_r, data_i, weight, pr, pi, size)
+    sharp.remains(order, returns, data_r, data_i, pr, pi, size, rr, ri)
+    tried = _improve(
+        order, returns, unknowns, steps, data_r, data_i, weight, from_x, from_y, size, pr, pi, rr,
+        ri, sharp.chi_square(order, weight, rr, ri), active, bar,
+    )  # fmt: skip
+    better = active & (tried < cost)
+    for k in range(len(returns)):
+        x[k], y[k] = select(better, from_x[k], x[k]), select(better, from_y[k], y[k])
+        w[k] = select(better, size[k], w[k])
+    return select(better, tried, cost)
+
+
+@njit(error_model="numpy")
+def _improve(
+    order: Length, returns: Length, unknowns: Length, steps: int, data_r: Bank, data_i: Bank,
+    weight: Bank, x: Bank, y: Bank, w: Bank, pr: Bank, pi: Bank, rr: Bank, ri: Bank, cost: Plane,
+    active: Mask, bar: Plane,
+) -> Any:  # fmt: skip
+    m = len(order)
     damping = select(active, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
     for _ in range(steps):
         if not some(damping < sharp.SETTLED):
@@ -151,7 +191,7 @@ def start_tail(x2: Bank, y2: Bank, w2: Bank, active: Mask, state: Bank) -> None:
 
 @njit(error_model="numpy")
 def step_tail(
-    order: Length, powers: Length, unknowns: Length, steps: int, data_r: Bank, data_i: Bank,
+    order: Length, power: int, unknowns: Length, steps: int, data_r: Bank, data_i: Bank,
     weight: Bank, state: Bank, bar: Plane,
 ) -> None:  # fmt: skip
     """Take at most so many steps of a return with a tail, until all pixels have settled."""
@@ -161,8 +201,9 @@ def step_tail(
     qr, qi = bank(like, order, 1), bank(like, order, 1)
     rr, ri = bank(like, order, 1), bank(like, order, 1)
     lag = bank(like, order, 1)
-    tail.shape(order, powers, d, lag, qr, qi)
+    tail.shape(order, power, d, lag, qr, qi)
     tail.turn_back(order, data_r, data_i, x, y, ur, ui)
+    w, v = tail.weigh(order, weight, ur, ui, qr, qi)
     tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
     cost = sharp.chi_square(order, weight, rr, ri) + PRIOR * t * t
     damping = state[DAMPING]
@@ -170,7 +211,7 @@ def step_tail(
         if not some(damping < sharp.SETTLED):
             break
         x, y, w, v, d, t, cost, damping = tail.step(
-            order, powers, unknowns, data_r, data_i, weight, PRIOR, x, y, w, v, d, t, lag, qr, qi,
+            order, power, unknowns, data_r, data_i, weight, PRIOR, x, y, w, v, d, t, lag, qr, qi,
             rr, ri, cost, damping, bar,
         )  # fmt: skip
     state[0], state[1], state[2], state[3], state[4], state[5] = x, y, w, v, d, t
@@ -223,7 +264,7 @@ def write(
         simd.store(planes[2 * size + k], p, first[k])
         simd.store(planes[3 * size + k], p, second[k])
     tailed = usable & with_tail & (found[TAIL] > 0.0)
-    delay = float(TAIL_SHAPE) * found[LENGTH]
+    delay = found[SHAPE] * found[LENGTH]
     rest = 4 * size
     simd.store(planes[rest], p, select(tailed, found[TAIL] * scale, 0.0))
     std = root(found[TAIL_VARIANCE]) * scale
@@ -232,6 +273,10 @@ def write(
     std = delay * root(found[LENGTH_VARIANCE])
     simd.store(planes[rest + 3], p, select(tailed, std, nan))
     simd.store(planes[rest + 4], p, select(usable, found[CHI_SQUARE], nan))
+    std = root(average.variance(numbers, found))
+    simd.store(planes[rest + 5], p, select(keys[0] < far, found[MEAN], nan))
+    simd.store(planes[rest + 6], p, select(keys[0] < far, std, nan))
+    simd.store(planes[rest + 7], p, select(tailed, found[SHAPE], 0.0))
     unknowns = select(with_tail, 4.0 * one, 2.0 * found[COUNT])
     simd.store(free, p, select(usable, numbers - unknowns, 0.0))
     simd.store(count, p, there)
@@ -266,4 +311,6 @@ def vary(order: Length, weight: Bank, found: Bank) -> None:
     if some(choice.chosen((0, 0, 0), found)):
         choice.vary_returns(order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, found)
     if some(choice.has_tail(found)):
-        choice.vary_tail(order, (0, 0, 0), (0, 0, 0, 0), weight, PRIOR, found)
+        for power in TAIL_SHAPES:
+            if some(found[SHAPE] == float(power)):
+                choice.vary_tail(order, power, (0, 0, 0, 0), weight, PRIOR, found)

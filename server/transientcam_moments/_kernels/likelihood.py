@@ -16,6 +16,7 @@ from transientcam_moments._kernels.arrays import (
     Complexes,
     ComplexPlanes,
     Counts,
+    RealPlane,
     RealPlanes,
     Reals,
 )
@@ -27,6 +28,7 @@ from transientcam_moments._kernels.stages import (
     finish,
     fit_first,
     fit_second,
+    fit_shapes,
     fit_third,
     offer_tails,
     rows_of,
@@ -34,13 +36,14 @@ from transientcam_moments._kernels.stages import (
     take_three,
 )
 from transientcam_moments.arrays import Length
-from transientcam_moments.likelihood import MOST_RETURNS, TAIL_SHAPE, choice
+from transientcam_moments.likelihood import MOST_RETURNS, TAIL_SHAPES, choice
+from transientcam_moments.moment_problem import half_turns
 
 
 @njit(nogil=True, error_model="numpy")
 def fit_returns(
-    order: Length, slots: Length, turns: RealPlanes, b: ComplexPlanes, variance: RealPlanes, error:
-    float, planes: RealPlanes, free: Counts, count: Counts, start: int, stop: int,
+    order: Length, slots: Length, turns: RealPlanes, half_turns: RealPlane, b: ComplexPlanes,
+    variance: RealPlanes, error: float, threshold: float, planes: RealPlanes, free: Counts, count: Counts, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; each model where simpler ones leave enough."""
     size = rows_of(order) * ROW
@@ -49,9 +52,11 @@ def fit_returns(
     third = np.empty(size, planes.dtype)
     for first in range(start, stop, PIXELS_AT_ONCE):
         last = min(first + PIXELS_AT_ONCE, stop)
-        more = fit_first(order, turns, b, variance, error, first, last, stop, all_rooms, rooms)
+        more = fit_first(
+            order, turns, b, variance, error, first, last, stop, threshold, all_rooms, rooms
+        )
         if len(order) >= 2 and more > 0:
-            moving = fit_second(order, turns, rooms, more, late)
+            moving = fit_second(order, turns, threshold, rooms, more, late)
             if moving > 0:
                 still = step_late(order, TAIL_ROUNDS[1], late, moving, later)
                 if still > 0:
@@ -60,8 +65,9 @@ def fit_returns(
                 bring_back(rooms, more, late)
             three = offer_tails(order, rooms, more, third)
             if len(order) >= 3 and three > 0:
-                fit_third(order, turns, third, three)
+                fit_third(order, turns, half_turns, threshold, third, three)
                 take_three(rooms, more, third)
+            fit_shapes(order, rooms, more)
         finish(order, slots, all_rooms, rooms, first, last, stop, planes, free, count)
 
 
@@ -69,29 +75,34 @@ def likelihood_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile the estimate of order m; see the table in ``_kernels``."""
     order, slots = (0,) * m, (0,) * min(MOST_RETURNS, m)
     run = entry(fit_returns, m, precision, slots=len(slots))
-    turns = choice.turns_of(m).astype(precision)
+    turns, halves = choice.turns_of(m).astype(precision), half_turns(m, precision)
 
     def kernel(
         b: Complexes,
         variance: Reals,
         returns: int,
-        tail_shape: int,
+        shapes: tuple[int, ...],
         error: float,
+        threshold: float,
         *,
         spread: Spread = at_once,
     ) -> tuple[Any, ...] | None:
-        if (returns, tail_shape) != (MOST_RETURNS, TAIL_SHAPE):
+        if (returns, shapes) != (MOST_RETURNS, TAIL_SHAPES):
             return None
         pixels, size = b.shape[1], len(slots)
         moments, noise = np.ascontiguousarray(b), np.ascontiguousarray(variance)
-        planes = empty((4 * size + 5, pixels), precision)
+        planes = empty((4 * size + 8, pixels), precision)
         free, count = empty(pixels, np.int32), empty(pixels, np.int32)
 
         def part(start: int, stop: int) -> None:
-            run(order, slots, turns, moments, noise, error, planes, free, count, start, stop)
+            run(
+                order, slots, turns, halves, moments, noise, error, threshold, planes, free, count,
+                start, stop,
+            )  # fmt: skip
 
         spread(part, pixels)
         four = (planes[k * size : (k + 1) * size] for k in range(4))
-        return (*four, *planes[4 * size :], free, count)
+        *rest, mean, std, shape = planes[4 * size :]
+        return (*four, *rest, free, count, mean, std, shape.astype(np.int32))
 
     return kernel

@@ -241,7 +241,7 @@ def fit_pairs(
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
     rr, ri = bank(one, order, 1), bank(one, order, 1)
     pr, pi = bank(one, order, 0), bank(one, order, 0)
-    weight, found = bank(one, order, 1), bank(one, (), 22)
+    weight, found = bank(one, order, 1), bank(one, (), 27)
     kr, ki = bank(one, order, 1), bank(one, order, 1)
     kw, share = bank(one, order, 1), bank(one, order, 1)
     x, y, w = bank(one, (), 2), bank(one, (), 2), bank(one, (), 2)
@@ -293,7 +293,7 @@ def fit_pairs(
             lead = select(found[COUNT] == 2.0, lead, far)
         vary(order, weight, found)
         write((0, 0), found, scale, numbers, usable, p, planes, free, count)
-        simd.store(planes[13], p, lead)
+        simd.store(planes[16], p, lead)
 
 
 def pairs_kernel(m: int, precision: str) -> Callable[..., Any]:
@@ -312,7 +312,7 @@ def pairs_kernel(m: int, precision: str) -> Callable[..., Any]:
         pixels = b.shape[1]
         moments, noise = np.ascontiguousarray(b), np.ascontiguousarray(variance)
         places = np.array([j for j, plane in enumerate(noise) if plane.any()], np.int64)
-        planes = np.empty((14, pixels), precision)
+        planes = np.empty((17, pixels), precision)
         free, count = np.empty(pixels, np.int32), np.empty(pixels, np.int32)
 
         def part(start: int, stop: int) -> None:
@@ -327,7 +327,7 @@ def pairs_kernel(m: int, precision: str) -> Callable[..., Any]:
             *planes[8:13],
             free,
             count,
-            planes[13],
+            planes[16],
         )
 
     return kernel

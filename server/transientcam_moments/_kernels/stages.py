@@ -1,5 +1,6 @@
 """Stages of the likelihood's kernel: each does a block of pixels, packed in rows (`packing`)."""
 
+import math
 from typing import Any, Final
 
 from numba import njit
@@ -9,6 +10,7 @@ from transientcam_moments._kernels.arrays import Complexes, Counts, Reals
 from transientcam_moments._kernels.fits import (
     DAMPING,
     fit,
+    fit_again,
     fit_one,
     start_tail,
     step_tail,
@@ -19,14 +21,20 @@ from transientcam_moments._kernels.packing import ROW, pack, put, take, unpack
 from transientcam_moments._kernels.portable import bank, infinity, product_bank, select, some
 from transientcam_moments.arrays import Bank, Length, Mask, Plane
 from transientcam_moments.likelihood import (
+    CHI_SQUARE,
     FITTED,
+    MORE_TAIL_STEPS,
     PLANES,
     PRIOR,
     SCORE,
+    SPLIT,
     STEPS,
+    TAIL_SHAPES,
     TAIL_STEPS,
+    average,
     choice,
     sharp,
+    start,
 )
 
 TAIL_ROUNDS: Final = (3, 3, TAIL_STEPS - 6)
@@ -84,7 +92,7 @@ def _pack_data(
 @njit(error_model="numpy")
 def fit_first(
     order: Length, turns: Reals, b: Complexes, variance: Reals, error: float, first: int, last: int,
-    end: int, all_rooms: Reals, rooms: Reals,
+    end: int, threshold: float, all_rooms: Reals, rooms: Reals,
 ) -> int:  # fmt: skip
     """Fit one return to the pixels first..last; pack and count those that it leaves something of.
 
@@ -95,7 +103,7 @@ def fit_first(
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
     rr, ri = bank(one, order, 1), bank(one, order, 1)
     pr, pi = bank(one, order, 0), bank(one, order, 0)
-    weight, found = bank(one, order, 1), bank(one, (), 22)
+    weight, found = bank(one, order, 1), bank(one, (), 27)
     points = bank(one, (), 6)
     x, y, w = bank(one, (), 1), bank(one, (), 1), bank(one, (), 1)
     count = 0
@@ -103,6 +111,10 @@ def fit_first(
         scale, numbers, usable, penalty = fit_one(
             order, turns, b, variance, error, min(left, end - step), one, data_r, data_i, weight, x,
             y, w, pr, pi, rr, ri, found,
+        )  # fmt: skip
+        average.join_returns(
+            order, (0,), (0, 0), weight, x, y, w, found[CHI_SQUARE], penalty, threshold, usable,
+            found,
         )  # fmt: skip
         at = left - first
         put(found, _FOUND, all_rooms, 0, at)
@@ -124,15 +136,19 @@ def fit_first(
 
 
 @njit(error_model="numpy")
-def fit_second(order: Length, turns: Reals, rooms: Reals, count: int, late: Reals) -> int:
+def fit_second(
+    order: Length, turns: Reals, threshold: float, rooms: Reals, count: int, late: Reals
+) -> int:
     """Fit two returns, and first steps of a tail; pack and count the pixels that need more."""
     one = simd.ones(rooms, 1)
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
     rr, ri = bank(one, order, 1), bank(one, order, 1)
     pr, pi = product_bank(one, order, (0, 0)), product_bank(one, order, (0, 0))
-    weight, found = bank(one, order, 1), bank(one, (), 22)
+    weight, found = bank(one, order, 1), bank(one, (), 27)
     points, state = bank(one, (), 6), bank(one, (), 8)
     x, y, w = bank(one, (), 2), bank(one, (), 2), bank(one, (), 2)
+    from_x, from_y = bank(one, (), 2), bank(one, (), 2)
+    cosine, sine = math.cos(SPLIT / len(order)), math.sin(SPLIT / len(order))
     moving = 0
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
@@ -146,16 +162,26 @@ def fit_second(order: Length, turns: Reals, rooms: Reals, count: int, late: Real
             order, (0, 0), (0, 0, 0, 0), STEPS[1], turns, data_r, data_i, weight, x, y, w, pr, pi,
             rr, ri, active, infinity(one),
         )  # fmt: skip
+        missed = active & choice.missed(cost, numbers)
+        if some(missed):
+            choice.split(points[0], points[1], cosine, sine, from_x, from_y)
+            cost = fit_again(
+                order, (0, 0), (0, 0, 0, 0), STEPS[1], data_r, data_i, weight, from_x, from_y, x, y,
+                w, cost, missed, infinity(one),
+            )  # fmt: skip
         allowed = active & (numbers >= 4.0)
         choice.offer_returns((0, 0), x, y, w, cost, penalty, allowed, found)
+        average.join_returns(
+            order, (0, 0), (0, 0, 0, 0), weight, x, y, w, cost, penalty, threshold, allowed, found
+        )
         put(found, _FOUND, rooms, 0, at)
         for k in range(2):
             points[3 * k], points[3 * k + 1], points[3 * k + 2] = x[k], y[k], w[k]
         put(points, (0, 0, 0, 0, 0, 0), rooms, _POINTS, at)
         start_tail(x, y, w, allowed, state)
-        bar = found[SCORE] - 4.0 * penalty
+        bar = average.bar_of_tail(penalty, found)
         step_tail(
-            order, (0, 0, 0), (0, 0, 0, 0), TAIL_ROUNDS[0], data_r, data_i, weight, state, bar
+            order, TAIL_SHAPES[0], (0, 0, 0, 0), TAIL_ROUNDS[0], data_r, data_i, weight, state, bar
         )
         put(state, _STATE, rooms, _TAIL, at)
         moving += _pack_moving(order, one, data_r, data_i, weight, state, bar, late, moving)
@@ -188,7 +214,7 @@ def step_late(order: Length, steps: int, rooms: Reals, count: int, late: Reals) 
         take(state, _STATE, one, rooms, _TAIL, at)
         _take_data(order, one, data_r, data_i, weight, rooms, at)
         bar = simd.load(one, rooms, _PENALTY * ROW + at)
-        step_tail(order, (0, 0, 0), (0, 0, 0, 0), steps, data_r, data_i, weight, state, bar)
+        step_tail(order, TAIL_SHAPES[0], (0, 0, 0, 0), steps, data_r, data_i, weight, state, bar)
         put(state, _STATE, rooms, _TAIL, at)
         moving += _pack_moving(order, one, data_r, data_i, weight, state, bar, late, moving)
     simd.store(late, (_TAIL + DAMPING) * ROW + moving, sharp.SETTLED * one)
@@ -214,7 +240,7 @@ def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
     """Choose tails where they are better; pack and count the pixels that leave something then."""
     one = simd.ones(rooms, 1)
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
-    weight, found = bank(one, order, 1), bank(one, (), 22)
+    weight, found = bank(one, order, 1), bank(one, (), 27)
     points, state = bank(one, (), 6), bank(one, (), 8)
     packed = 0
     for at in range(0, count, simd.width(one)):
@@ -223,38 +249,83 @@ def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
         penalty = simd.load(one, rooms, _PENALTY * ROW + at)
         numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
         allowed = (penalty > 0.0) & (numbers >= 4.0)
-        choice.offer_tail(
-            PRIOR, state[0], state[1], state[2], state[3], state[4], state[5], state[7], penalty,
-            allowed, found,
-        )  # fmt: skip
+        _take_data(order, one, data_r, data_i, weight, rooms, at)
+        _offer_tail(order, TAIL_SHAPES[0], weight, state, penalty, allowed, found)
         put(found, _FOUND, rooms, 0, at)
         more = _needs_three(found, penalty, numbers)
         if len(order) >= 3 and some(more):
             take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
-            _take_data(order, one, data_r, data_i, weight, rooms, at)
             pack(more, points, (0, 0, 0, 0, 0, 0), third, _POINTS, packed)
             pack(more, found, _FOUND, third, 0, packed)
             _pack_data(order, more, data_r, data_i, weight, third, packed)
+            simd.pack(third, _NUMBERS * ROW + packed, more, numbers)
             packed += simd.pack(third, _PENALTY * ROW + packed, more, penalty)
     simd.store(third, _PENALTY * ROW + packed, 0.0 * one)
     return packed
 
 
-@njit(forceinline=True, error_model="numpy")
-def _needs_three(found: Bank, penalty: Plane, numbers: Plane) -> Any:
-    return (penalty > 0.0) & (found[SCORE] > 6.0 * penalty) & (numbers >= 6.0)
+@njit(error_model="numpy")
+def _offer_tail(
+    order: Length, power: int, weight: Bank, state: Bank, penalty: Plane, allowed: Mask, found: Bank
+) -> None:
+    """Choose a tail where it is better, and take it into the average."""
+    x, y, w, v, d, t, cost = state[0], state[1], state[2], state[3], state[4], state[5], state[7]
+    choice.offer_tail(power, PRIOR, x, y, w, v, d, t, cost, penalty, allowed, found)
+    average.join_tail(
+        order, power, (0, 0, 0, 0), weight, PRIOR, len(TAIL_SHAPES), x, y, w, v, d, t, cost,
+        penalty, allowed, found,
+    )  # fmt: skip
 
 
 @njit(error_model="numpy")
-def fit_third(order: Length, turns: Reals, rooms: Reals, count: int) -> None:
+def fit_shapes(order: Length, rooms: Reals, count: int) -> None:
+    """Fit tails of further shapes where the first one is not far worse than the best model."""
+    one = simd.ones(rooms, 1)
+    data_r, data_i = bank(one, order, 1), bank(one, order, 1)
+    weight, found = bank(one, order, 1), bank(one, (), 27)
+    first, state = bank(one, (), 8), bank(one, (), 8)
+    for at in range(0, count, simd.width(one)):
+        take(found, _FOUND, one, rooms, 0, at)
+        take(first, _STATE, one, rooms, _TAIL, at)
+        penalty = simd.load(one, rooms, _PENALTY * ROW + at)
+        numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
+        worth = choice.worth_more_shapes(first[7], found) & (penalty > 0.0) & (numbers >= 4.0)
+        if not some(worth):
+            continue
+        _take_data(order, one, data_r, data_i, weight, rooms, at)
+        for k in range(1, len(TAIL_SHAPES)):
+            power = TAIL_SHAPES[k]
+            for i in range(8):
+                state[i] = first[i]
+            state[4] = first[4] * (float(TAIL_SHAPES[0]) / float(power))
+            state[DAMPING] = select(worth, sharp.FIRST_DAMPING * one, sharp.SETTLED)
+            bar = average.bar_of_tail(penalty, found)
+            step_tail(
+                order, power, (0, 0, 0, 0), MORE_TAIL_STEPS, data_r, data_i, weight, state, bar
+            )
+            _offer_tail(order, power, weight, state, penalty, worth, found)
+        put(found, _FOUND, rooms, 0, at)
+
+
+@njit(forceinline=True, error_model="numpy")
+def _needs_three(found: Bank, penalty: Plane, numbers: Plane) -> Any:
+    bar = average.bar_of_returns(6, penalty, found)
+    return (penalty > 0.0) & (bar > 0.0) & (numbers >= 6.0)
+
+
+@njit(error_model="numpy")
+def fit_third(
+    order: Length, turns: Reals, half_turns: Reals, threshold: float, rooms: Reals, count: int
+) -> None:
     """Fit three returns, and choose them where they are better."""
     one = simd.ones(rooms, 1)
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
     rr, ri = bank(one, order, 1), bank(one, order, 1)
     pr, pi = product_bank(one, order, (0, 0, 0)), product_bank(one, order, (0, 0, 0))
-    weight, found = bank(one, order, 1), bank(one, (), 22)
+    weight, found = bank(one, order, 1), bank(one, (), 27)
     points = bank(one, (), 6)
     x, y, w = bank(one, (), 3), bank(one, (), 3), bank(one, (), 3)
+    from_x, from_y = bank(one, (), 3), bank(one, (), 3)
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
         take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
@@ -263,11 +334,24 @@ def fit_third(order: Length, turns: Reals, rooms: Reals, count: int) -> None:
         active = penalty > 0.0
         for k in range(2):
             x[k], y[k], w[k] = points[3 * k], points[3 * k + 1], points[3 * k + 2]
+        numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
+        bar = average.bar_of_returns(6, penalty, found)
         cost = fit(
             order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], turns, data_r, data_i, weight, x, y, w,
-            pr, pi, rr, ri, active, found[SCORE] - 6.0 * penalty,
+            pr, pi, rr, ri, active, bar,
         )  # fmt: skip
+        missed = active & choice.missed(cost, numbers - 4.0)
+        if some(missed):
+            start.pisarenko(order, half_turns, data_r, data_i, from_x, from_y)
+            cost = fit_again(
+                order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], data_r, data_i, weight, from_x,
+                from_y, x, y, w, cost, missed, bar,
+            )  # fmt: skip
         choice.offer_returns((0, 0, 0), x, y, w, cost, penalty, active, found)
+        average.join_returns(
+            order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, x, y, w, cost, penalty, threshold, active,
+            found,
+        )  # fmt: skip
         put(found, _FOUND, rooms, 0, at)
 
 
@@ -275,7 +359,7 @@ def fit_third(order: Length, turns: Reals, rooms: Reals, count: int) -> None:
 def take_three(rooms: Reals, count: int, third: Reals) -> None:
     """Put what was found with three returns back among all that were fitted with two."""
     one = simd.ones(rooms, 1)
-    found = bank(one, (), 22)
+    found = bank(one, (), 27)
     done = 0
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
@@ -298,7 +382,7 @@ def finish(
     """
     one = simd.ones(planes, 1)
     step = simd.width(one)
-    weight, found = bank(one, order, 1), bank(one, (), 22)
+    weight, found = bank(one, order, 1), bank(one, (), 27)
     size = len(order) + 1
     done = 0
     for left in range(first, last, step):

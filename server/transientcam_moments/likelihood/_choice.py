@@ -27,18 +27,28 @@ X, Y, WEIGHT = 0, 3, 6
 TAIL, LENGTH = 9, 10
 """Light v of the tail, and d; both 0 where there is no tail."""
 CHI_SQUARE, SCORE, COUNT = 11, 12, 13
-FITTED: Final = 14
+SHAPE: Final = 14
+"""p of the tail; 0 where there is none."""
+MEAN, SPREAD, LEAST_SCORE, TOTAL = 15, 16, 17, 18
+"""Of the average over models; see `average`."""
+FITTED: Final = 19
 """So many planes the fits fill; those behind have the variances of what was chosen."""
-WEIGHT_VARIANCE, PHASE_VARIANCE = 14, 17
+WEIGHT_VARIANCE, PHASE_VARIANCE = 19, 22
 """First plane of the variances of weights and phases of each return."""
-TAIL_VARIANCE, LENGTH_VARIANCE = 20, 21
+TAIL_VARIANCE, LENGTH_VARIANCE = 25, 26
 """The variances of v and of log d; 0 where there is no tail."""
-PLANES: Final = 22
+PLANES: Final = 27
 STEPS: Final = (4, 8, 10)
 """Of the fits of one, two and three returns."""
 TAIL_STEPS: Final = 10
-TAIL_SHAPE: Final = 3
-"""Shape of the gamma distribution of the tail; docs/likelihood.md has the evidence."""
+MORE_TAIL_STEPS: Final = 5
+"""Of the fit of each further shape, which begins with what the first one found."""
+TAIL_SHAPES: Final = (3, 1, 2, 5)
+"""Shapes of the gamma distribution of the tail, the first one tried first."""
+WORTH: Final = 100.0
+"""Further shapes are tried where the first leaves less than so often what the best model does."""
+SPLIT: Final = 1.6
+"""Over m, in radians: the second start of two returns is one return split by twice this."""
 DELAY_RAD: Final = 0.75
 """Mean of the prior of the tail's mean delay; its standard deviation is a factor e."""
 PRIOR: Final = 1.0
@@ -90,6 +100,7 @@ def offer_returns(
             found[first + k] = select(better, zero, found[first + k])
     found[TAIL] = select(better, zero, found[TAIL])
     found[LENGTH] = select(better, zero, found[LENGTH])
+    found[SHAPE] = select(better, zero, found[SHAPE])
     found[CHI_SQUARE] = select(better, cost, found[CHI_SQUARE])
     found[SCORE] = select(better, score, found[SCORE])
     found[COUNT] = select(better, float(count) + zero, found[COUNT])
@@ -123,6 +134,17 @@ def vary_returns(
         found[PHASE_VARIANCE + k] = select(here, variance, found[PHASE_VARIANCE + k])
 
 
+def split(x: Array, y: Array, cosine: float, sine: float, xs: Bank, ys: Bank) -> None:
+    """Put two points as far before a point of the unit circle as behind it in `xs` and `ys`."""
+    xs[0], ys[0] = x * cosine + y * sine, y * cosine - x * sine
+    xs[1], ys[1] = x * cosine - y * sine, y * cosine + x * sine
+
+
+def missed(cost: Array, numbers: Array) -> Any:
+    """Say where the fit of two returns leaves more than noise does: another start may do better."""
+    return cost > numbers
+
+
 def start_of_tail(x: Bank, y: Bank, w: Bank, mean: float) -> tuple[Array, ...]:
     """Return point, light, light of the tail, d over the prior's mean, and its logarithm.
 
@@ -146,7 +168,13 @@ def start_of_tail(x: Bank, y: Bank, w: Bank, mean: float) -> tuple[Array, ...]:
     return sx, sy, sw, sv, ratio, logarithm(ratio)
 
 
+def worth_more_shapes(cost: Array, found: Bank) -> Any:
+    """Say where a tail that leaves `cost` is near enough to the best model for other shapes."""
+    return cost < WORTH * (found[CHI_SQUARE] + 10.0)
+
+
 def offer_tail(
+    power: int,
     prior: float,
     x: Array,
     y: Array,
@@ -169,19 +197,20 @@ def offer_tail(
         for first in (X, Y, WEIGHT):
             found[first + k] = select(better, zero, found[first + k])
     found[TAIL], found[LENGTH] = select(better, v, found[TAIL]), select(better, d, found[LENGTH])
+    found[SHAPE] = select(better, float(power) + zero, found[SHAPE])
     found[CHI_SQUARE] = select(better, larger(cost - prior * t * t, zero), found[CHI_SQUARE])
     found[SCORE] = select(better, score, found[SCORE])
     found[COUNT] = select(better, 1.0 + zero, found[COUNT])
 
 
 def vary_tail(
-    order: Length, powers: Length, unknowns: Length, weight: Bank, prior: float, found: Bank
+    order: Length, power: int, unknowns: Length, weight: Bank, prior: float, found: Bank
 ) -> None:
-    """Put the variances of a return with a tail in `found` wherever it was chosen."""
-    here = has_tail(found)
+    """Put the variances of a return with a tail of one shape in `found` wherever it was chosen."""
+    here = has_tail(found) & (found[SHAPE] == float(power))
     spread = bank(weight[0], unknowns, 0)
     w, v, d = found[WEIGHT], found[TAIL], found[LENGTH]
-    tail.deviations(order, powers, unknowns, weight, prior, w, v, d, spread)
+    tail.deviations(order, power, unknowns, weight, prior, w, v, d, spread)
     found[WEIGHT_VARIANCE] = select(here, spread[0], found[WEIGHT_VARIANCE])
     found[PHASE_VARIANCE] = select(here, spread[2], found[PHASE_VARIANCE])
     found[TAIL_VARIANCE] = select(here, spread[1], found[TAIL_VARIANCE])

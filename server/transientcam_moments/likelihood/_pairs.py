@@ -116,8 +116,13 @@ def fitted_pairs(
     xp = namespace(planes)
     filled = (np.asarray(part) for part in dense(planes, noise, harmonics, trailing))
     found = _estimated(*filled, float(model_error), spread=spread)
-    shaped = (xp.asarray(part).reshape((*part.shape[:-1], *trailing)) for part in found)
-    return Likelihood._make([*shaped, 0])
+    *shaped, lead = (xp.asarray(part).reshape((*part.shape[:-1], *trailing)) for part in found)
+    none = xp.full_like(lead, np.nan)
+    shape = xp.zeros(trailing, dtype=np.int32)
+    chosen = Likelihood._make([*shaped, none, none, lead, shape, float("nan")])
+    return chosen._replace(
+        average_rad=chosen.separate().phase_rad, average_std_rad=chosen.direct_phase_std_rad()
+    )
 
 
 @accelerated("pairs")
@@ -131,7 +136,8 @@ def _estimate(b: Array, variance: Array, error: float) -> tuple[Array, ...]:
         data, scale, usable = prepared(b, variance, error)
         found, lead = _fit(data)
         slots = min(2, b.shape[0] - 1)
-        return *results(found, data, scale, usable, slots, 0), lead.astype(scale.dtype)
+        parts = results(found, data, scale, usable, slots)
+        return *parts[:-3], lead.astype(scale.dtype)
 
 
 def _fit(data: Data) -> tuple[Array, Array]:
@@ -152,7 +158,7 @@ def _fit(data: Data) -> tuple[Array, Array]:
     # chi-square cannot become less than 0: no model with more unknowns is better below
     if len(data.re) > 2:
         planes = where(planes[SCORE] > 4 * data.penalty, more, data, (), planes)
-    return varied(data, planes[:-1], 2, 0), planes[-1]
+    return varied(data, planes[:-1], 2, ()), planes[-1]
 
 
 class _Pairs:

@@ -6,26 +6,37 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from transientcam_moments.arrays import Array, namespace
-from transientcam_moments.likelihood import _sharp as sharp, _tail as tail
+from transientcam_moments.arrays import Array, namespace, some
+from transientcam_moments.likelihood import (
+    _average as average,
+    _sharp as sharp,
+    _start as start,
+    _tail as tail,
+)
 from transientcam_moments.likelihood._choice import (
     DELAY_RAD,
+    MORE_TAIL_STEPS,
     MOST_RETURNS,
     PLANES,
     PRIOR,
     SCORE,
+    SHAPE,
+    SPLIT,
     STEPS,
     TAIL_STEPS,
     chosen,
-    has_tail,
+    missed,
     nothing,
     offer_returns,
     offer_tail,
+    split,
     start_of_tail,
     turns_of,
     vary_returns,
     vary_tail,
+    worth_more_shapes,
 )
+from transientcam_moments.moment_problem import half_turns
 
 
 class Data(NamedTuple):
@@ -50,10 +61,11 @@ class Data(NamedTuple):
     numbers: Array
 
 
-def fit(data: Data, most: int, shape: int) -> Array:
+def fit(data: Data, most: int, shapes: tuple[int, ...], threshold: float) -> Array:
     """Return what is found of every pixel (PLANES, P), as `choice` lays it out.
 
-    `most` is the largest number of sharp returns, 1 to 3; `shape` that of the tail, 0 for none.
+    `most` is the largest number of sharp returns, 1 to 3; `shapes` are those of the tail, the first
+    one tried first; `threshold` is that of the direct return.
     """
     xp = namespace(data.re)
     m = data.re.shape[0] - 1
@@ -63,36 +75,63 @@ def fit(data: Data, most: int, shape: int) -> Array:
     nothing(data.penalty, far, found)
     one = SharpFit.start(data, 1, None, far)
     one.offer(found, data.numbers >= 0)
+    one.join(found, data.numbers >= 0, threshold)
     planes = xp.stack(found)
-    if most < 2 and not (shape and m >= 2):
-        return varied(data, planes, 1, 0)
+    if most < 2 and not (shapes and m >= 2):
+        return varied(data, planes, 1, ())
 
-    def more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+    def of_two(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
         found = list(planes)
+        enough = data.numbers >= 4
         two = SharpFit.start(data, 2, before, np.inf + 0 * data.penalty)
+        x, y = [data.re[0]] * 2, [data.re[0]] * 2
+        angle = SPLIT / m
+        split(before[0][0], before[1][0], float(np.cos(angle)), float(np.sin(angle)), x, y)
+        two.try_also(x, y, missed(two.cost, data.numbers), np.inf + 0 * data.penalty)
         if most >= 2:
-            two.offer(found, data.numbers >= 4)
-        if shape:
-            _offer_tail(data, two, shape, found)
-        done = xp.stack(found)
-        if most < MOST_RETURNS:
-            return done
+            two.offer(found, enough)
+            two.join(found, enough, threshold)
+        late = TailFit(data, two, shapes[0]) if shapes else None
+        if late is not None:
+            late.improve(TAIL_STEPS, found)
+            late.offer(found, len(shapes))
 
-        def most_of_all(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+        def of_three(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
             found = list(planes)
-            bar = found[SCORE] - 6 * data.penalty
-            SharpFit.start(data, 3, before, bar).offer(found, data.numbers >= 6)
+            three = SharpFit.start(data, 3, before, average.bar_of_returns(6, data.penalty, found))
+            x, y = [data.re[0]] * 3, [data.re[0]] * 3
+            turns = namespace(planes).asarray(half_turns(m, data.re.dtype))
+            start.pisarenko((0,) * m, turns, list(data.re), list(data.im), x, y)
+            again = missed(three.cost, data.numbers - 4)
+            three.try_also(x, y, again, average.bar_of_returns(6, data.penalty, found))
+            three.offer(found, data.numbers >= 6)
+            three.join(found, data.numbers >= 6, threshold)
             return namespace(planes).stack(found)
 
-        still = done[SCORE] > 6 * data.penalty
-        return where(still, most_of_all, data, two.state(), done)
+        done = xp.stack(found)
+        if most >= MOST_RETURNS:
+            still = average.bar_of_returns(6, data.penalty, found) > 0
+            done = where(still, of_three, data, two.state(), done)
+        if late is not None and len(shapes) > 1:
+
+            def of_shapes(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+                found = list(planes)
+                for shape in shapes[1:]:
+                    other = TailFit.again(data, before, shapes[0], shape)
+                    other.improve(MORE_TAIL_STEPS, found)
+                    other.offer(found, len(shapes))
+                return namespace(planes).stack(found)
+
+            worth = worth_more_shapes(late.cost, done) & enough
+            done = where(worth, of_shapes, data, late.state, done)
+        return done
 
     # chi-square cannot become less than 0: no model with more unknowns is better below
-    planes = where(planes[SCORE] > 4 * data.penalty, more, data, one.state(), planes)
-    return varied(data, planes, most, shape)
+    planes = where(planes[SCORE] > 4 * data.penalty, of_two, data, one.state(), planes)
+    return varied(data, planes, most, shapes)
 
 
-def varied(data: Data, planes: Array, most: int, shape: int) -> Array:
+def varied(data: Data, planes: Array, most: int, shapes: tuple[int, ...]) -> Array:
     """Return what was found with the variances of what was chosen."""
     order = (0,) * (len(data.re) - 1)
 
@@ -101,15 +140,17 @@ def varied(data: Data, planes: Array, most: int, shape: int) -> Array:
         vary_returns(order, (0,) * count, (0,) * (2 * count), data.weight, found)
         return namespace(planes).stack(found)
 
-    def of_tail(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+    def of_tail(shape: int, data: Data, before: tuple[Array, ...], planes: Array) -> Array:
         found = list(planes)
-        vary_tail(order, (0,) * shape, (0,) * 4, data.weight, PRIOR, found)
+        vary_tail(order, shape, (0,) * 4, data.weight, PRIOR, found)
         return namespace(planes).stack(found)
 
     for count in range(1, most + 1):
         here = chosen((0,) * count, planes)
         planes = where(here, partial(of_returns, count), data, (), planes)
-    return where(has_tail(planes), of_tail, data, (), planes) if shape else planes
+    for shape in shapes:
+        planes = where(planes[SHAPE] == shape, partial(of_tail, shape), data, (), planes)
+    return planes
 
 
 def where(
@@ -171,8 +212,8 @@ class SharpFit:
         fit._look()
         return fit
 
-    def improve(self, steps: int, bar: Array) -> None:
-        """Take at most so many steps to a lower chi-square."""
+    def improve(self, steps: int, bar: Array, active: Array | None = None) -> None:
+        """Take at most so many steps to a lower chi-square, of the pixels that are `active`."""
         data = self.data
 
         def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
@@ -185,9 +226,11 @@ class SharpFit:
 
         banks = (tuple(part) for part in (self._pr, self._pi, self.w, self._rr, self._ri))
         damping = sharp.FIRST_DAMPING + 0 * self.cost
+        if active is not None:
+            damping = namespace(damping).where(active, damping, sharp.SETTLED + 0 * damping)
         state = _times(steps, step, (*banks, self.cost, damping), _moving)
         self._pr, self._pi, self.w, self._rr, self._ri = (list(part) for part in state[:5])
-        self.x, self.y = (part[:: len(self.order)] for part in (self._pr, self._pi))
+        self.x, self.y = (list(part[:: len(self.order)]) for part in (self._pr, self._pi))
         self.cost = state[5]
 
     def _look(self) -> None:
@@ -222,40 +265,84 @@ class SharpFit:
         xp = namespace(self.cost)
         return tuple(xp.stack(part) for part in (self.x, self.y, self.w))
 
+    def try_also(self, x: list[Array], y: list[Array], where: Array, bar: Array) -> None:
+        """Fit from other points on as well, and keep the better one, `where` that may help."""
+        xp = namespace(self.cost)
+        if not some(where):
+            return
+        other = SharpFit.at(self.data, x, y)
+        other.improve(STEPS[len(x) - 1], bar, where)
+        better = (other.cost < self.cost) & where
+        for mine, theirs in ((self.x, other.x), (self.y, other.y), (self.w, other.w)):
+            for k, plane in enumerate(theirs):
+                mine[k] = xp.where(better, plane, mine[k])
+        self.cost = xp.where(better, other.cost, self.cost)
+
     def offer(self, found: list[Array], allowed: Array) -> None:
         """Put the returns where they are the better model."""
         penalty = self.data.penalty
         offer_returns(self.returns, self.x, self.y, self.w, self.cost, penalty, allowed, found)
 
-
-def _offer_tail(data: Data, two: SharpFit, shape: int, found: list[Array]) -> None:
-    """Fit a return with a tail, from two returns on, and put it where it is the better model."""
-    order, powers, unknowns = two.order, (0,) * shape, (0,) * 4
-    mean = DELAY_RAD / shape
-    x, y, w, v, ratio, t = start_of_tail(two.x, two.y, two.w, DELAY_RAD)
-    d = ratio * mean
-    ur, ui, lag, qr, qi, rr, ri = ([d] * len(data.re) for _ in range(7))
-    tail.shape(order, powers, d, lag, qr, qi)
-    tail.turn_back(order, data.re, data.im, x, y, ur, ui)
-    tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
-    cost = sharp.chi_square(order, data.weight, rr, ri) + PRIOR * t * t
-
-    def step(state: Any) -> Any:
-        lag, qr, qi, rr, ri = (list(part) for part in state[:5])
-        x, y, w, v, d, t, cost, damping = state[5:]
-        new = tail.step(
-            order, powers, unknowns, data.re, data.im, data.weight, PRIOR,
-            x, y, w, v, d, t, lag, qr, qi, rr, ri, cost, damping, bar,
+    def join(self, found: list[Array], allowed: Array, threshold: float) -> None:
+        """Take the returns into the average over models."""
+        average.join_returns(
+            self.order, self.returns, self.unknowns, self.data.weight, self.x, self.y, self.w,
+            self.cost, self.data.penalty, threshold, allowed, found,
         )  # fmt: skip
-        return tuple(lag), tuple(qr), tuple(qi), tuple(rr), tuple(ri), *new
 
-    banks = (tuple(part) for part in (lag, qr, qi, rr, ri))
-    damping = sharp.FIRST_DAMPING + 0 * cost
-    bar = found[SCORE] - 4 * data.penalty
-    state = _times(TAIL_STEPS, step, (*banks, x, y, w, v, d, t, cost, damping), _moving)
-    x, y, w, v, d, t, cost, _ = state[5:]
-    allowed = data.numbers >= 4
-    offer_tail(PRIOR, x, y, w, v, d, t, cost, data.penalty, allowed, found)
+
+class TailFit:
+    """A fit of a return with a tail of one shape."""
+
+    cost: Array
+
+    def __init__(self, data: Data, two: SharpFit, shape: int) -> None:
+        """Begin with what two returns say of it."""
+        mean = DELAY_RAD / shape
+        x, y, w, v, ratio, t = start_of_tail(two.x, two.y, two.w, DELAY_RAD)
+        self.data, self._shape, self.state = data, shape, (x, y, w, v, ratio * mean, t)
+
+    @classmethod
+    def again(cls, data: Data, state: tuple[Array, ...], before: int, shape: int) -> "TailFit":
+        """Begin with a tail of another shape, of the same mean delay."""
+        self = cls.__new__(cls)
+        x, y, w, v, d, t = state
+        self.data, self._shape, self.state = data, shape, (x, y, w, v, d * (before / shape), t)
+        return self
+
+    def improve(self, steps: int, found: list[Array]) -> None:
+        """Take at most so many steps to a lower chi-square with the prior."""
+        data, x, y, w, v, d, t = self.data, *self.state
+        order, power, unknowns = (0,) * (len(data.re) - 1), self._shape, (0,) * 4
+        ur, ui, lag, qr, qi, rr, ri = ([d] * len(data.re) for _ in range(7))
+        tail.shape(order, power, d, lag, qr, qi)
+        tail.turn_back(order, data.re, data.im, x, y, ur, ui)
+        w, v = tail.weigh(order, data.weight, ur, ui, qr, qi)
+        tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
+        cost = sharp.chi_square(order, data.weight, rr, ri) + PRIOR * t * t
+
+        def step(state: Any) -> Any:
+            lag, qr, qi, rr, ri = (list(part) for part in state[:5])
+            x, y, w, v, d, t, cost, damping = state[5:]
+            new = tail.step(
+                order, power, unknowns, data.re, data.im, data.weight, PRIOR,
+                x, y, w, v, d, t, lag, qr, qi, rr, ri, cost, damping, bar,
+            )  # fmt: skip
+            return tuple(lag), tuple(qr), tuple(qi), tuple(rr), tuple(ri), *new
+
+        banks = (tuple(part) for part in (lag, qr, qi, rr, ri))
+        damping = sharp.FIRST_DAMPING + 0 * cost
+        bar = average.bar_of_tail(data.penalty, found)
+        state = _times(steps, step, (*banks, x, y, w, v, d, t, cost, damping), _moving)
+        self.state, self.cost = state[5:11], state[11]
+
+    def offer(self, found: list[Array], shapes: int) -> None:
+        """Put it where it is the better model, and take it into the average over models."""
+        data, allowed = self.data, self.data.numbers >= 4
+        given = (*self.state, self.cost, data.penalty, allowed, found)
+        offer_tail(self._shape, PRIOR, *given)
+        order = (0,) * (len(data.re) - 1)
+        average.join_tail(order, self._shape, (0,) * 4, data.weight, PRIOR, shapes, *given)
 
 
 def _moving(state: Any) -> bool:

@@ -310,7 +310,8 @@ def test_no_step_raises_chi_square(monkeypatch: pytest.MonkeyPatch) -> None:
 
     tm.likelihood(b, equal_noise(b, 0.003))
 
-    assert len(costs) == sum(choice.STEPS) + choice.TAIL_STEPS
+    again = sum(choice.STEPS[1:]) + choice.MORE_TAIL_STEPS * (len(choice.TAIL_SHAPES) - 1)
+    assert len(costs) == sum(choice.STEPS) + choice.TAIL_STEPS + again
     assert all((after <= before).all() for before, after in costs)
 
 
