@@ -36,14 +36,15 @@ from transientcam_moments._kernels.stages import (
     take_three,
 )
 from transientcam_moments.arrays import Length
-from transientcam_moments.likelihood import MOST_RETURNS, TAIL_SHAPES, choice
+from transientcam_moments.likelihood import MOST_RETURNS, choice
 from transientcam_moments.moment_problem import half_turns
 
 
 @njit(nogil=True, error_model="numpy")
 def fit_returns(
     order: Length, slots: Length, turns: RealPlanes, half_turns: RealPlane, b: ComplexPlanes,
-    variance: RealPlanes, error: float, threshold: float, planes: RealPlanes, free: Counts, count: Counts, start: int, stop: int,
+    variance: RealPlanes, error: float, threshold: float, planes: RealPlanes, free: Counts,
+    count: Counts, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; each model where simpler ones leave enough."""
     size = rows_of(order) * ROW
@@ -87,7 +88,7 @@ def likelihood_kernel(m: int, precision: str) -> Callable[..., Any]:
         *,
         spread: Spread = at_once,
     ) -> tuple[Any, ...] | None:
-        if (returns, shapes) != (MOST_RETURNS, TAIL_SHAPES):
+        if (returns, shapes) != (MOST_RETURNS, choice.TAIL_SHAPES):
             return None
         pixels, size = b.shape[1], len(slots)
         moments, noise = np.ascontiguousarray(b), np.ascontiguousarray(variance)

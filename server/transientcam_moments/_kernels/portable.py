@@ -54,7 +54,7 @@ from transientcam_moments.arrays import (
     square_bank,
     tiny,
 )
-from transientcam_moments.likelihood import average, choice, linear, pair_fit, sharp, start, tail
+from transientcam_moments.likelihood import choice, linear, pair_fit, sharp, start, tail
 from transientcam_moments.moment_problem import (
     circle,
     eigenvalue,
@@ -255,7 +255,7 @@ def _compile_statements(module: ModuleType, *, inline: bool) -> None:
 
 
 extending.register_jitable(error_model="numpy")(logarithm)
-for _module in (average, choice, linear, pair_fit, sharp, start, tail):
+for _module in (choice, linear, pair_fit, sharp, start, tail):
     _compile_statements(_module, inline=False)
 for _module in (
     toeplitz,

@@ -14,36 +14,20 @@ from transientcam_moments._kernels.fits import (
     fit_one,
     start_tail,
     step_tail,
-    vary,
     write,
 )
 from transientcam_moments._kernels.packing import ROW, pack, put, take, unpack
 from transientcam_moments._kernels.portable import bank, infinity, product_bank, select, some
 from transientcam_moments.arrays import Bank, Length, Mask, Plane
-from transientcam_moments.likelihood import (
-    CHI_SQUARE,
-    FITTED,
-    MORE_TAIL_STEPS,
-    PLANES,
-    PRIOR,
-    SCORE,
-    SPLIT,
-    STEPS,
-    TAIL_SHAPES,
-    TAIL_STEPS,
-    average,
-    choice,
-    sharp,
-    start,
-)
+from transientcam_moments.likelihood import choice, sharp, start
 
-TAIL_ROUNDS: Final = (3, 3, TAIL_STEPS - 6)
+TAIL_ROUNDS: Final = (3, 3, choice.TAIL_STEPS - 6)
 """Steps of a tail after each of which the pixels are packed that go on."""
-_FOUND: Final = (0,) * FITTED
+_FOUND: Final = (0,) * choice.PLANES
 _STATE: Final = (0,) * 8
 # Rows of a room: what was found, the state of the tail, points and weights of two returns, what an
 # unknown has to gain (0 behind the last pixel), three more numbers of a pixel, and then the data.
-_TAIL: Final = FITTED
+_TAIL: Final = choice.PLANES
 _POINTS: Final = _TAIL + 8
 _PENALTY: Final = _POINTS + 6
 _NUMBERS, _SCALE, _USABLE = _PENALTY + 1, _PENALTY + 2, _PENALTY + 3
@@ -110,11 +94,7 @@ def fit_first(
     for left in range(first, last, step):
         scale, numbers, usable, penalty = fit_one(
             order, turns, b, variance, error, min(left, end - step), one, data_r, data_i, weight, x,
-            y, w, pr, pi, rr, ri, found,
-        )  # fmt: skip
-        average.join_returns(
-            order, (0,), (0, 0), weight, x, y, w, found[CHI_SQUARE], penalty, threshold, usable,
-            found,
+            y, w, pr, pi, rr, ri, threshold, found,
         )  # fmt: skip
         at = left - first
         put(found, _FOUND, all_rooms, 0, at)
@@ -123,7 +103,7 @@ def fit_first(
         simd.store(all_rooms, _NUMBERS * ROW + at, numbers)
         simd.store(all_rooms, _PENALTY * ROW + at, penalty)
         simd.store(all_rooms, _USABLE * ROW + at, select(usable, one, 0.0))
-        more = found[SCORE] > 4.0 * penalty
+        more = found[choice.SCORE] > 4.0 * penalty
         if some(more):
             points[0], points[1], points[2] = x[0], y[0], w[0]
             pack(more, points, (0, 0, 0), rooms, _POINTS, count)
@@ -148,7 +128,7 @@ def fit_second(
     points, state = bank(one, (), 6), bank(one, (), 8)
     x, y, w = bank(one, (), 2), bank(one, (), 2), bank(one, (), 2)
     from_x, from_y = bank(one, (), 2), bank(one, (), 2)
-    cosine, sine = math.cos(SPLIT / len(order)), math.sin(SPLIT / len(order))
+    cosine, sine = math.cos(choice.SPLIT / len(order)), math.sin(choice.SPLIT / len(order))
     moving = 0
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
@@ -159,19 +139,18 @@ def fit_second(
         active = penalty > 0.0
         x[0], y[0], w[0] = points[0], points[1], points[2]
         cost = fit(
-            order, (0, 0), (0, 0, 0, 0), STEPS[1], turns, data_r, data_i, weight, x, y, w, pr, pi,
-            rr, ri, active, infinity(one),
+            order, (0, 0), (0, 0, 0, 0), choice.STEPS[1], turns, data_r, data_i, weight, x, y, w,
+            pr, pi, rr, ri, active, infinity(one),
         )  # fmt: skip
         missed = active & choice.missed(cost, numbers)
         if some(missed):
             choice.split(points[0], points[1], cosine, sine, from_x, from_y)
             cost = fit_again(
-                order, (0, 0), (0, 0, 0, 0), STEPS[1], data_r, data_i, weight, from_x, from_y, x, y,
-                w, cost, missed, infinity(one),
+                order, (0, 0), (0, 0, 0, 0), choice.STEPS[1], data_r, data_i, weight, from_x,
+                from_y, x, y, w, cost, missed, infinity(one),
             )  # fmt: skip
         allowed = active & (numbers >= 4.0)
-        choice.offer_returns((0, 0), x, y, w, cost, penalty, allowed, found)
-        average.join_returns(
+        choice.offer_returns(
             order, (0, 0), (0, 0, 0, 0), weight, x, y, w, cost, penalty, threshold, allowed, found
         )
         put(found, _FOUND, rooms, 0, at)
@@ -179,9 +158,17 @@ def fit_second(
             points[3 * k], points[3 * k + 1], points[3 * k + 2] = x[k], y[k], w[k]
         put(points, (0, 0, 0, 0, 0, 0), rooms, _POINTS, at)
         start_tail(x, y, w, allowed, state)
-        bar = average.bar_of_tail(penalty, found)
+        bar = choice.bar_of_tail(penalty, found)
         step_tail(
-            order, TAIL_SHAPES[0], (0, 0, 0, 0), TAIL_ROUNDS[0], data_r, data_i, weight, state, bar
+            order,
+            choice.TAIL_SHAPES[0],
+            (0, 0, 0, 0),
+            TAIL_ROUNDS[0],
+            data_r,
+            data_i,
+            weight,
+            state,
+            bar,
         )
         put(state, _STATE, rooms, _TAIL, at)
         moving += _pack_moving(order, one, data_r, data_i, weight, state, bar, late, moving)
@@ -214,7 +201,9 @@ def step_late(order: Length, steps: int, rooms: Reals, count: int, late: Reals) 
         take(state, _STATE, one, rooms, _TAIL, at)
         _take_data(order, one, data_r, data_i, weight, rooms, at)
         bar = simd.load(one, rooms, _PENALTY * ROW + at)
-        step_tail(order, TAIL_SHAPES[0], (0, 0, 0, 0), steps, data_r, data_i, weight, state, bar)
+        step_tail(
+            order, choice.TAIL_SHAPES[0], (0, 0, 0, 0), steps, data_r, data_i, weight, state, bar
+        )
         put(state, _STATE, rooms, _TAIL, at)
         moving += _pack_moving(order, one, data_r, data_i, weight, state, bar, late, moving)
     simd.store(late, (_TAIL + DAMPING) * ROW + moving, sharp.SETTLED * one)
@@ -250,7 +239,7 @@ def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
         numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
         allowed = (penalty > 0.0) & (numbers >= 4.0)
         _take_data(order, one, data_r, data_i, weight, rooms, at)
-        _offer_tail(order, TAIL_SHAPES[0], weight, state, penalty, allowed, found)
+        _offer_tail(order, choice.TAIL_SHAPES[0], weight, state, penalty, allowed, found)
         put(found, _FOUND, rooms, 0, at)
         more = _needs_three(found, penalty, numbers)
         if len(order) >= 3 and some(more):
@@ -268,12 +257,9 @@ def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
 def _offer_tail(
     order: Length, power: int, weight: Bank, state: Bank, penalty: Plane, allowed: Mask, found: Bank
 ) -> None:
-    """Choose a tail where it is better, and take it into the average."""
-    x, y, w, v, d, t, cost = state[0], state[1], state[2], state[3], state[4], state[5], state[7]
-    choice.offer_tail(power, PRIOR, x, y, w, v, d, t, cost, penalty, allowed, found)
-    average.join_tail(
-        order, power, (0, 0, 0, 0), weight, PRIOR, len(TAIL_SHAPES), x, y, w, v, d, t, cost,
-        penalty, allowed, found,
+    choice.offer_tail(
+        order, power, (0, 0, 0, 0), weight, choice.PRIOR, len(choice.TAIL_SHAPES), state[0],
+        state[1], state[2], state[3], state[4], state[5], state[7], penalty, allowed, found,
     )  # fmt: skip
 
 
@@ -293,15 +279,23 @@ def fit_shapes(order: Length, rooms: Reals, count: int) -> None:
         if not some(worth):
             continue
         _take_data(order, one, data_r, data_i, weight, rooms, at)
-        for k in range(1, len(TAIL_SHAPES)):
-            power = TAIL_SHAPES[k]
+        for k in range(1, len(choice.TAIL_SHAPES)):
+            power = choice.TAIL_SHAPES[k]
             for i in range(8):
                 state[i] = first[i]
-            state[4] = first[4] * (float(TAIL_SHAPES[0]) / float(power))
+            state[4] = first[4] * (float(choice.TAIL_SHAPES[0]) / float(power))
             state[DAMPING] = select(worth, sharp.FIRST_DAMPING * one, sharp.SETTLED)
-            bar = average.bar_of_tail(penalty, found)
+            bar = choice.bar_of_tail(penalty, found)
             step_tail(
-                order, power, (0, 0, 0, 0), MORE_TAIL_STEPS, data_r, data_i, weight, state, bar
+                order,
+                power,
+                (0, 0, 0, 0),
+                choice.MORE_TAIL_STEPS,
+                data_r,
+                data_i,
+                weight,
+                state,
+                bar,
             )
             _offer_tail(order, power, weight, state, penalty, worth, found)
         put(found, _FOUND, rooms, 0, at)
@@ -309,7 +303,7 @@ def fit_shapes(order: Length, rooms: Reals, count: int) -> None:
 
 @njit(forceinline=True, error_model="numpy")
 def _needs_three(found: Bank, penalty: Plane, numbers: Plane) -> Any:
-    bar = average.bar_of_returns(6, penalty, found)
+    bar = choice.bar_of_returns(6, penalty, found)
     return (penalty > 0.0) & (bar > 0.0) & (numbers >= 6.0)
 
 
@@ -335,20 +329,19 @@ def fit_third(
         for k in range(2):
             x[k], y[k], w[k] = points[3 * k], points[3 * k + 1], points[3 * k + 2]
         numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
-        bar = average.bar_of_returns(6, penalty, found)
+        bar = choice.bar_of_returns(6, penalty, found)
         cost = fit(
-            order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], turns, data_r, data_i, weight, x, y, w,
-            pr, pi, rr, ri, active, bar,
+            order, (0, 0, 0), (0, 0, 0, 0, 0, 0), choice.STEPS[2], turns, data_r, data_i, weight, x,
+            y, w, pr, pi, rr, ri, active, bar,
         )  # fmt: skip
         missed = active & choice.missed(cost, numbers - 4.0)
         if some(missed):
             start.pisarenko(order, half_turns, data_r, data_i, from_x, from_y)
             cost = fit_again(
-                order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], data_r, data_i, weight, from_x,
-                from_y, x, y, w, cost, missed, bar,
+                order, (0, 0, 0), (0, 0, 0, 0, 0, 0), choice.STEPS[2], data_r, data_i, weight,
+                from_x, from_y, x, y, w, cost, missed, bar,
             )  # fmt: skip
-        choice.offer_returns((0, 0, 0), x, y, w, cost, penalty, active, found)
-        average.join_returns(
+        choice.offer_returns(
             order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, x, y, w, cost, penalty, threshold, active,
             found,
         )  # fmt: skip
@@ -382,22 +375,16 @@ def finish(
     """
     one = simd.ones(planes, 1)
     step = simd.width(one)
-    weight, found = bank(one, order, 1), bank(one, (), 27)
-    size = len(order) + 1
+    found = bank(one, (), 27)
     done = 0
     for left in range(first, last, step):
         at = left - first
         take(found, _FOUND, one, all_rooms, 0, at)
-        for i in range(FITTED, PLANES):
-            found[i] = 0.0 * one
         penalty = simd.load(one, all_rooms, _PENALTY * ROW + at)
-        more = found[SCORE] > 4.0 * penalty
+        more = found[choice.SCORE] > 4.0 * penalty
         if len(order) >= 2 and some(more):
             unpack(more, found, _FOUND, rooms, 0, done)
             done += simd.count(more)
-        for j in range(size):
-            weight[j] = simd.load(one, all_rooms, (_DATA + 2 * size + j) * ROW + at)
-        vary(order, weight, found)
         scale = simd.load(one, all_rooms, _SCALE * ROW + at)
         numbers = simd.load(one, all_rooms, _NUMBERS * ROW + at)
         usable = simd.load(one, all_rooms, _USABLE * ROW + at) > 0.0

@@ -1,8 +1,7 @@
 """The likelihood estimate of every pixel, with what it is worth."""
 
-import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from transientcam_moments.arrays import (
     summary,
 )
 from transientcam_moments.errors import ParameterError, ShapeError
-from transientcam_moments.likelihood import _average as average, _choice as choice
+from transientcam_moments.likelihood import _choice as choice
 from transientcam_moments.likelihood._chi_square import (
     SIGNIFICANCE,
     ambiguous,
@@ -35,9 +34,10 @@ from transientcam_moments.noise import MomentNoise
 
 ASSUMED_NOISE: Final = 0.01
 """Standard deviation over the largest moment, where none is given."""
-MODEL_ERROR: Final = 4e-3
+MODEL_ERROR, CORRECTED_ERROR = 4e-3, 2e-3
 """What calibration, and light of no model, leave in the moments of a camera, over the largest: as
-large as the bias of Sec. 4.3. docs/likelihood.md has the evidence."""
+large as the bias of Sec. 4.3, and where the harmonics of the modulation were measured and taken
+out. docs/likelihood.md has the evidence."""
 
 
 class Likelihood(NamedTuple):
@@ -68,14 +68,14 @@ class Likelihood(NamedTuple):
     average_rad, average_std_rad : array, shape (...)
         Phase of the direct return and its standard deviation, averaged over models: by how well
         each explains the moments, the spread between them in the deviation. NaN without a return.
+    tail_shape : integer array, shape (...)
+        Shape p of the tail's gamma distribution; 0 without a tail.
     lead : array, shape (...)
         Of two returns by `two_returns`: by how much chi-square is larger with the best other pair
         that was found and has another direct return. Infinite where there is none, or none was
         looked for.
-    tail_shape : integer array, shape (...)
-        Shape p of the tail's gamma distribution; 0 without a tail.
     threshold : float
-        Of the direct return that was averaged; NaN where none was (`two_returns`).
+        Of the direct return that was averaged.
     """
 
     phase_rad: Array
@@ -91,8 +91,8 @@ class Likelihood(NamedTuple):
     count: Array
     average_rad: Array
     average_std_rad: Array
-    lead: Array
     tail_shape: Array
+    lead: Array
     threshold: float
 
     def __repr__(self) -> str:
@@ -150,38 +150,23 @@ class Likelihood(NamedTuple):
         ParameterError
             For a threshold outside of 0 to 1.
         """
-        direct, indirect, phase = self._of_chosen(threshold)
-        return Separation(direct, indirect, phase if self._other(threshold) else self.average_rad)
-
-    def direct_phase_std_rad(self, threshold: float | None = None) -> Array:
-        """Return the standard deviation (...) of the phase of the direct return; NaN without.
-
-        That of the phase which `separate` returns.
-        """
-        if not self._other(threshold):
-            return self.average_std_rad
-        xp = namespace(self.weight)
-        direct = self.phase_rad == self._of_chosen(threshold).phase_rad
-        std = xp.where(direct, self.phase_std_rad, 0).sum(axis=0)
-        return xp.where(direct.any(axis=0), std, np.nan).astype(self.weight.dtype)
-
-    def _other(self, threshold: float | None) -> bool:
-        """Say whether there is no average at a threshold."""
-        return self._at(threshold) != self.threshold
-
-    def _at(self, threshold: float | None) -> float:
-        if threshold is not None:
-            return threshold
-        return DIRECT_THRESHOLD if math.isnan(self.threshold) else self.threshold
-
-    def _of_chosen(self, threshold: float | None) -> Separation:
-        """Separate the light of the model that was chosen."""
         xp = namespace(self.weight)
         returns = Returns(self.phase_rad, self.weight, self.tail, self.count)
-        direct, indirect, phase = separate(returns, self._at(threshold))
+        at = self.threshold if threshold is None else threshold
+        direct, indirect, phase = separate(returns, at)
         # a tail begins at its return, which may be too faint to be seen itself
         phase = xp.where(self.has_tail, self.phase_rad[0], phase)
+        phase = self.average_rad if at == self.threshold else phase
         return Separation(direct, indirect + self.tail, phase)
+
+    def direct_phase_std_rad(self, threshold: float | None = None) -> Array:
+        """Return the standard deviation (...) of the phase that `separate` returns."""
+        if threshold in (None, self.threshold):
+            return self.average_std_rad
+        xp = namespace(self.weight)
+        direct = self.phase_rad == self.separate(threshold).phase_rad
+        std = xp.where(direct, self.phase_std_rad, 0).sum(axis=0)
+        return xp.where(direct.any(axis=0), std, np.nan).astype(self.weight.dtype)
 
 
 def likelihood(
@@ -289,10 +274,10 @@ def fitted(
     planes, variance = dense(planes, noise, harmonics, trailing)
     options = returns, shapes, float(model_error), float(threshold)
     found = _estimated(planes, variance, *options, spread=spread)
-    *shaped, shape = (part.reshape((*part.shape[:-1], *trailing)) for part in found)
+    shaped = [part.reshape((*part.shape[:-1], *trailing)) for part in found]
     xp = namespace(planes)
     lead = xp.broadcast_to(xp.asarray(np.inf, dtype=shaped[0].dtype), trailing)
-    return Likelihood._make([*shaped, lead, shape, float(threshold)])
+    return Likelihood._make([*shaped, lead, float(threshold)])
 
 
 def dense(
@@ -350,29 +335,13 @@ def assumed_noise(b: Array) -> MomentNoise:
 
 
 @accelerated("likelihood")
-def _estimated(
-    planes: Array,
-    variance: Array,
-    returns: int,
-    shapes: tuple[int, ...],
-    error: float,
-    threshold: float,
-) -> tuple[Array, ...]:
+def _estimated(planes: Array, variance: Array, *options: Any) -> tuple[Array, ...]:
     """Return the attributes of `Likelihood` of flat planes, but for `lead` and `threshold`."""
-    return by_blocks(
-        lambda b, variance: _estimate(b, variance, returns, shapes, error, threshold),
-        planes,
-        variance,
-    )
+    return by_blocks(lambda b, variance: _estimate(b, variance, *options), planes, variance)
 
 
 def _estimate(
-    b: Array,
-    variance: Array,
-    returns: int,
-    shapes: tuple[int, ...],
-    error: float,
-    threshold: float,
+    b: Array, variance: Array, returns: int, shapes: tuple[int, ...], error: float, threshold: float
 ) -> tuple[Array, ...]:
     """Planar statement of `likelihood`: all harmonics from 0 on, (m + 1, P)."""
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
@@ -447,6 +416,7 @@ def results(found: Array, data: Data, scale: Array, usable: Array, slots: int) -
     shape = found[choice.SHAPE]
     delay = shape * found[choice.LENGTH]
     unknowns = xp.where(has_tail, 4, 2 * count)
+    std = xp.sqrt(choice.average_variance(data.numbers, found))
     free = xp.where(usable, data.numbers - unknowns, 0)
     return (
         sorted_planes(phase, np.nan),
@@ -461,6 +431,6 @@ def results(found: Array, data: Data, scale: Array, usable: Array, slots: int) -
         free.astype(np.int32),
         used.sum(axis=0).astype(np.int32),
         xp.where(averaged, found[choice.MEAN], np.nan).astype(scale.dtype),
-        xp.where(averaged, xp.sqrt(average.variance(data.numbers, found)), np.nan).astype(scale.dtype),
+        xp.where(averaged, std, np.nan).astype(scale.dtype),
         xp.where(tailed, shape, 0).astype(np.int32),
     )

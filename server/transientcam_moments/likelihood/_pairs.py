@@ -18,8 +18,9 @@ from transientcam_moments.arrays import Array, by_blocks, in_range, moment_plane
 from transientcam_moments.likelihood import _pair_fit as pair_fit
 from transientcam_moments.likelihood._choice import COUNT, PLANES, SCORE, nothing
 from transientcam_moments.likelihood._estimate import Likelihood, dense, prepared, results
-from transientcam_moments.likelihood._planar import Data, SharpFit, varied, where
+from transientcam_moments.likelihood._planar import Data, SharpFit, where
 from transientcam_moments.likelihood._sharp import SETTLED
+from transientcam_moments.moment_problem import DIRECT_THRESHOLD
 from transientcam_moments.noise import MomentNoise
 
 PHASES_PER_PERIOD: Final = 8
@@ -60,6 +61,7 @@ def two_returns(
     *,
     harmonics: Sequence[int] | None = None,
     model_error: float = 0.0,
+    threshold: float = DIRECT_THRESHOLD,
     threads: int | None = None,
 ) -> Likelihood:
     """Estimate one or two returns of every pixel from moments at any frequencies.
@@ -73,7 +75,7 @@ def two_returns(
     harmonics : sequence of int, optional
         Which multiples of the base frequency they are, N different ones of 0 to 32 in any order;
         0 to N - 1 when left out. Two returns need two or more beside 0, and a test of them three.
-    model_error : float
+    model_error, threshold : float
         As of `likelihood`.
     threads : int, optional
         How many the compiled kernel uses; all cores, when left out.
@@ -100,7 +102,7 @@ def two_returns(
     a period of the highest frequency away or more, `lead` says how much worse it explains.
     In single precision a compiled kernel does the same; see `kernels`.
     """
-    return fitted_pairs(b, noise, on_threads(threads), harmonics, model_error)
+    return fitted_pairs(b, noise, on_threads(threads), harmonics, model_error, threshold)
 
 
 def fitted_pairs(
@@ -109,56 +111,51 @@ def fitted_pairs(
     spread: Spread,
     harmonics: Sequence[int] | None = None,
     model_error: float = 0.0,
+    threshold: float = DIRECT_THRESHOLD,
 ) -> Likelihood:
     """Do what `two_returns` does, with the threads of a caller."""
     planes, trailing = moment_planes(b)
     in_range("model_error", model_error, 0.0, 1.0, "0 to 1")
     xp = namespace(planes)
     filled = (np.asarray(part) for part in dense(planes, noise, harmonics, trailing))
-    found = _estimated(*filled, float(model_error), spread=spread)
-    *shaped, lead = (xp.asarray(part).reshape((*part.shape[:-1], *trailing)) for part in found)
-    none = xp.full_like(lead, np.nan)
-    shape = xp.zeros(trailing, dtype=np.int32)
-    chosen = Likelihood._make([*shaped, none, none, lead, shape, float("nan")])
-    return chosen._replace(
-        average_rad=chosen.separate().phase_rad, average_std_rad=chosen.direct_phase_std_rad()
-    )
+    found = _estimated(*filled, float(model_error), float(threshold), spread=spread)
+    shaped = (xp.asarray(part).reshape((*part.shape[:-1], *trailing)) for part in found)
+    return Likelihood._make([*shaped, float(threshold)])
 
 
 @accelerated("pairs")
-def _estimated(planes: Array, variance: Array, error: float) -> tuple[Array, ...]:
-    """Return the attributes of `Likelihood` of flat planes."""
-    return by_blocks(lambda b, variance: _estimate(b, variance, error), planes, variance)
+def _estimated(planes: Array, variance: Array, *options: float) -> tuple[Array, ...]:
+    """Return the attributes of `Likelihood` of flat planes, but for `threshold`."""
+    return by_blocks(lambda b, variance: _estimate(b, variance, *options), planes, variance)
 
 
-def _estimate(b: Array, variance: Array, error: float) -> tuple[Array, ...]:
+def _estimate(b: Array, variance: Array, error: float, threshold: float) -> tuple[Array, ...]:
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
         data, scale, usable = prepared(b, variance, error)
-        found, lead = _fit(data)
+        found, lead = _fit(data, threshold)
         slots = min(2, b.shape[0] - 1)
-        parts = results(found, data, scale, usable, slots)
-        return *parts[:-3], lead.astype(scale.dtype)
+        return *results(found, data, scale, usable, slots), lead.astype(scale.dtype)
 
 
-def _fit(data: Data) -> tuple[Array, Array]:
+def _fit(data: Data, threshold: float) -> tuple[Array, Array]:
     """Return what is found of every pixel (PLANES, P), as `choice` lays it out, and its lead."""
     found = [data.re[0]] * PLANES
     far = np.inf + 0 * data.penalty
     nothing(data.penalty, far, found)
     one = SharpFit.start(data, 1, None, far)
-    one.offer(found, data.numbers >= 0)
+    one.offer(found, data.numbers >= 0, threshold)
     planes = np.stack([*found, far])
 
     def more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
         found = list(planes[:-1])
         pair, lead = _best_pair(data)
-        pair.offer(found, data.numbers >= 4)
+        pair.offer(found, data.numbers >= 4, threshold)
         return np.stack([*found, np.where(found[COUNT] == 2, lead, np.inf)])
 
     # chi-square cannot become less than 0: no model with more unknowns is better below
     if len(data.re) > 2:
         planes = where(planes[SCORE] > 4 * data.penalty, more, data, (), planes)
-    return varied(data, planes[:-1], 2, ()), planes[-1]
+    return planes[:-1], planes[-1]
 
 
 class _Pairs:

@@ -1,14 +1,13 @@
 """The fits of all pixels: each model where the simpler ones leave something to explain."""
 
+import math
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from transientcam_moments.arrays import Array, namespace, some
 from transientcam_moments.likelihood import (
-    _average as average,
     _sharp as sharp,
     _start as start,
     _tail as tail,
@@ -20,11 +19,11 @@ from transientcam_moments.likelihood._choice import (
     PLANES,
     PRIOR,
     SCORE,
-    SHAPE,
     SPLIT,
     STEPS,
     TAIL_STEPS,
-    chosen,
+    bar_of_returns,
+    bar_of_tail,
     missed,
     nothing,
     offer_returns,
@@ -32,8 +31,6 @@ from transientcam_moments.likelihood._choice import (
     split,
     start_of_tail,
     turns_of,
-    vary_returns,
-    vary_tail,
     worth_more_shapes,
 )
 from transientcam_moments.moment_problem import half_turns
@@ -74,83 +71,55 @@ def fit(data: Data, most: int, shapes: tuple[int, ...], threshold: float) -> Arr
     far = np.inf + 0 * data.penalty
     nothing(data.penalty, far, found)
     one = SharpFit.start(data, 1, None, far)
-    one.offer(found, data.numbers >= 0)
-    one.join(found, data.numbers >= 0, threshold)
+    one.offer(found, data.numbers >= 0, threshold)
     planes = xp.stack(found)
     if most < 2 and not (shapes and m >= 2):
-        return varied(data, planes, 1, ())
+        return planes
 
     def of_two(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
         found = list(planes)
-        enough = data.numbers >= 4
-        two = SharpFit.start(data, 2, before, np.inf + 0 * data.penalty)
-        x, y = [data.re[0]] * 2, [data.re[0]] * 2
-        angle = SPLIT / m
-        split(before[0][0], before[1][0], float(np.cos(angle)), float(np.sin(angle)), x, y)
-        two.try_also(x, y, missed(two.cost, data.numbers), np.inf + 0 * data.penalty)
+        enough, far = data.numbers >= 4, np.inf + 0 * data.penalty
+        two = SharpFit.start(data, 2, before, far)
+        x, y = [far] * 2, [far] * 2
+        split(before[0][0], before[1][0], math.cos(SPLIT / m), math.sin(SPLIT / m), x, y)
+        two.try_also(x, y, missed(two.cost, data.numbers), far)
         if most >= 2:
-            two.offer(found, enough)
-            two.join(found, enough, threshold)
-        late = TailFit(data, two, shapes[0]) if shapes else None
-        if late is not None:
-            late.improve(TAIL_STEPS, found)
-            late.offer(found, len(shapes))
+            two.offer(found, enough, threshold)
+        late: tuple[Array, ...] = ()
+        if shapes:
+            x1, y1, w, v, ratio, t = start_of_tail(two.x, two.y, two.w, DELAY_RAD)
+            late = x1, y1, w, v, ratio * (DELAY_RAD / shapes[0]), t
+            late = _fit_tail(data, late, shapes[0], TAIL_STEPS, len(shapes), found)
 
         def of_three(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
             found = list(planes)
-            three = SharpFit.start(data, 3, before, average.bar_of_returns(6, data.penalty, found))
-            x, y = [data.re[0]] * 3, [data.re[0]] * 3
-            turns = namespace(planes).asarray(half_turns(m, data.re.dtype))
-            start.pisarenko((0,) * m, turns, list(data.re), list(data.im), x, y)
-            again = missed(three.cost, data.numbers - 4)
-            three.try_also(x, y, again, average.bar_of_returns(6, data.penalty, found))
-            three.offer(found, data.numbers >= 6)
-            three.join(found, data.numbers >= 6, threshold)
-            return namespace(planes).stack(found)
+            bar = bar_of_returns(6, data.penalty, found)
+            three = SharpFit.start(data, 3, before, bar)
+            x, y = [bar] * 3, [bar] * 3
+            turns = xp.asarray(half_turns(m, data.re.dtype))
+            start.pisarenko(three.order, turns, list(data.re), list(data.im), x, y)
+            three.try_also(x, y, missed(three.cost, data.numbers - 4), bar)
+            three.offer(found, data.numbers >= 6, threshold)
+            return xp.stack(found)
+
+        def of_shapes(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+            found = list(planes)
+            for shape in shapes[1:]:
+                d = before[4] * (shapes[0] / shape)
+                state = *before[:4], d, before[5]
+                _fit_tail(data, state, shape, MORE_TAIL_STEPS, len(shapes), found)
+            return xp.stack(found)
 
         done = xp.stack(found)
         if most >= MOST_RETURNS:
-            still = average.bar_of_returns(6, data.penalty, found) > 0
+            still = bar_of_returns(6, data.penalty, found) > 0
             done = where(still, of_three, data, two.state(), done)
-        if late is not None and len(shapes) > 1:
-
-            def of_shapes(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
-                found = list(planes)
-                for shape in shapes[1:]:
-                    other = TailFit.again(data, before, shapes[0], shape)
-                    other.improve(MORE_TAIL_STEPS, found)
-                    other.offer(found, len(shapes))
-                return namespace(planes).stack(found)
-
-            worth = worth_more_shapes(late.cost, done) & enough
-            done = where(worth, of_shapes, data, late.state, done)
+        if len(shapes) > 1:
+            done = where(worth_more_shapes(late[6], done) & enough, of_shapes, data, late, done)
         return done
 
     # chi-square cannot become less than 0: no model with more unknowns is better below
-    planes = where(planes[SCORE] > 4 * data.penalty, of_two, data, one.state(), planes)
-    return varied(data, planes, most, shapes)
-
-
-def varied(data: Data, planes: Array, most: int, shapes: tuple[int, ...]) -> Array:
-    """Return what was found with the variances of what was chosen."""
-    order = (0,) * (len(data.re) - 1)
-
-    def of_returns(count: int, data: Data, before: tuple[Array, ...], planes: Array) -> Array:
-        found = list(planes)
-        vary_returns(order, (0,) * count, (0,) * (2 * count), data.weight, found)
-        return namespace(planes).stack(found)
-
-    def of_tail(shape: int, data: Data, before: tuple[Array, ...], planes: Array) -> Array:
-        found = list(planes)
-        vary_tail(order, shape, (0,) * 4, data.weight, PRIOR, found)
-        return namespace(planes).stack(found)
-
-    for count in range(1, most + 1):
-        here = chosen((0,) * count, planes)
-        planes = where(here, partial(of_returns, count), data, (), planes)
-    for shape in shapes:
-        planes = where(planes[SHAPE] == shape, partial(of_tail, shape), data, (), planes)
-    return planes
+    return where(planes[SCORE] > 4 * data.penalty, of_two, data, one.state(), planes)
 
 
 def where(
@@ -278,71 +247,46 @@ class SharpFit:
                 mine[k] = xp.where(better, plane, mine[k])
         self.cost = xp.where(better, other.cost, self.cost)
 
-    def offer(self, found: list[Array], allowed: Array) -> None:
-        """Put the returns where they are the better model."""
-        penalty = self.data.penalty
-        offer_returns(self.returns, self.x, self.y, self.w, self.cost, penalty, allowed, found)
-
-    def join(self, found: list[Array], allowed: Array, threshold: float) -> None:
-        """Take the returns into the average over models."""
-        average.join_returns(
+    def offer(self, found: list[Array], allowed: Array, threshold: float) -> None:
+        """Put the returns where they are the better model, and into the average."""
+        offer_returns(
             self.order, self.returns, self.unknowns, self.data.weight, self.x, self.y, self.w,
             self.cost, self.data.penalty, threshold, allowed, found,
         )  # fmt: skip
 
 
-class TailFit:
-    """A fit of a return with a tail of one shape."""
+def _fit_tail(
+    data: Data, state: tuple[Array, ...], power: int, steps: int, shapes: int, found: list[Array]
+) -> tuple[Array, ...]:
+    """Fit a return with a tail, put it where it is the better model, and into the average.
 
-    cost: Array
+    Returns what it has become, and chi-square with the prior.
+    """
+    x, y, w, v, d, t = state
+    order, unknowns = (0,) * (len(data.re) - 1), (0,) * 4
+    ur, ui, lag, qr, qi, rr, ri = ([d] * len(data.re) for _ in range(7))
+    tail.shape(order, power, d, lag, qr, qi)
+    tail.turn_back(order, data.re, data.im, x, y, ur, ui)
+    w, v = tail.weigh(order, data.weight, ur, ui, qr, qi)
+    tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
+    cost = sharp.chi_square(order, data.weight, rr, ri) + PRIOR * t * t
 
-    def __init__(self, data: Data, two: SharpFit, shape: int) -> None:
-        """Begin with what two returns say of it."""
-        mean = DELAY_RAD / shape
-        x, y, w, v, ratio, t = start_of_tail(two.x, two.y, two.w, DELAY_RAD)
-        self.data, self._shape, self.state = data, shape, (x, y, w, v, ratio * mean, t)
+    def step(state: Any) -> Any:
+        lag, qr, qi, rr, ri = (list(part) for part in state[:5])
+        x, y, w, v, d, t, cost, damping = state[5:]
+        new = tail.step(
+            order, power, unknowns, data.re, data.im, data.weight, PRIOR,
+            x, y, w, v, d, t, lag, qr, qi, rr, ri, cost, damping, bar,
+        )  # fmt: skip
+        return tuple(lag), tuple(qr), tuple(qi), tuple(rr), tuple(ri), *new
 
-    @classmethod
-    def again(cls, data: Data, state: tuple[Array, ...], before: int, shape: int) -> "TailFit":
-        """Begin with a tail of another shape, of the same mean delay."""
-        self = cls.__new__(cls)
-        x, y, w, v, d, t = state
-        self.data, self._shape, self.state = data, shape, (x, y, w, v, d * (before / shape), t)
-        return self
-
-    def improve(self, steps: int, found: list[Array]) -> None:
-        """Take at most so many steps to a lower chi-square with the prior."""
-        data, x, y, w, v, d, t = self.data, *self.state
-        order, power, unknowns = (0,) * (len(data.re) - 1), self._shape, (0,) * 4
-        ur, ui, lag, qr, qi, rr, ri = ([d] * len(data.re) for _ in range(7))
-        tail.shape(order, power, d, lag, qr, qi)
-        tail.turn_back(order, data.re, data.im, x, y, ur, ui)
-        w, v = tail.weigh(order, data.weight, ur, ui, qr, qi)
-        tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
-        cost = sharp.chi_square(order, data.weight, rr, ri) + PRIOR * t * t
-
-        def step(state: Any) -> Any:
-            lag, qr, qi, rr, ri = (list(part) for part in state[:5])
-            x, y, w, v, d, t, cost, damping = state[5:]
-            new = tail.step(
-                order, power, unknowns, data.re, data.im, data.weight, PRIOR,
-                x, y, w, v, d, t, lag, qr, qi, rr, ri, cost, damping, bar,
-            )  # fmt: skip
-            return tuple(lag), tuple(qr), tuple(qi), tuple(rr), tuple(ri), *new
-
-        banks = (tuple(part) for part in (lag, qr, qi, rr, ri))
-        damping = sharp.FIRST_DAMPING + 0 * cost
-        bar = average.bar_of_tail(data.penalty, found)
-        state = _times(steps, step, (*banks, x, y, w, v, d, t, cost, damping), _moving)
-        self.state, self.cost = state[5:11], state[11]
-
-    def offer(self, found: list[Array], shapes: int) -> None:
-        """Put it where it is the better model, and take it into the average over models."""
-        data, allowed = self.data, self.data.numbers >= 4
-        given = (*self.state, self.cost, data.penalty, allowed, found)
-        offer_tail(self._shape, PRIOR, *given)
-        order = (0,) * (len(data.re) - 1)
-        average.join_tail(order, self._shape, (0,) * 4, data.weight, PRIOR, shapes, *given)
+    banks = (tuple(part) for part in (lag, qr, qi, rr, ri))
+    damping = sharp.FIRST_DAMPING + 0 * cost
+    bar = bar_of_tail(data.penalty, found)
+    state = _times(steps, step, (*banks, x, y, w, v, d, t, cost, damping), _moving)[5:12]
+    given = data.penalty, data.numbers >= 4, found
+    offer_tail(order, power, unknowns, data.weight, PRIOR, shapes, *state, *given)
+    return state
 
 
 def _moving(state: Any) -> bool:
