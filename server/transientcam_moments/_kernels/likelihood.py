@@ -28,7 +28,6 @@ from transientcam_moments._kernels.stages import (
     finish,
     fit_first,
     fit_second,
-    fit_shapes,
     fit_third,
     offer_tails,
     rows_of,
@@ -65,10 +64,9 @@ def fit_returns(
                     bring_back(late, moving, later)
                 bring_back(rooms, more, late)
             three = offer_tails(order, rooms, more, third)
-            if len(order) >= 3 and three > 0:
+            if three > 0:
                 fit_third(order, turns, half_turns, threshold, third, three)
                 take_three(rooms, more, third)
-            fit_shapes(order, rooms, more)
         finish(order, slots, all_rooms, rooms, first, last, stop, planes, free, count)
 
 

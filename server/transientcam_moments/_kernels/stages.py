@@ -31,6 +31,8 @@ _TAIL: Final = choice.PLANES
 _POINTS: Final = _TAIL + 8
 _PENALTY: Final = _POINTS + 6
 _NUMBERS, _SCALE, _USABLE = _PENALTY + 1, _PENALTY + 2, _PENALTY + 3
+_COST: Final = _SCALE
+"""Behind the first fit: what two returns leave."""
 _DATA: Final = _PENALTY + 4
 
 
@@ -127,8 +129,6 @@ def fit_second(
     weight, found = bank(one, order, 1), bank(one, (), 27)
     points, state = bank(one, (), 6), bank(one, (), 8)
     x, y, w = bank(one, (), 2), bank(one, (), 2), bank(one, (), 2)
-    from_x, from_y = bank(one, (), 2), bank(one, (), 2)
-    cosine, sine = math.cos(choice.SPLIT / len(order)), math.sin(choice.SPLIT / len(order))
     moving = 0
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
@@ -142,13 +142,6 @@ def fit_second(
             order, (0, 0), (0, 0, 0, 0), choice.STEPS[1], turns, data_r, data_i, weight, x, y, w,
             pr, pi, rr, ri, active, infinity(one),
         )  # fmt: skip
-        missed = active & choice.missed(cost, numbers)
-        if some(missed):
-            choice.split(points[0], points[1], cosine, sine, from_x, from_y)
-            cost = fit_again(
-                order, (0, 0), (0, 0, 0, 0), choice.STEPS[1], data_r, data_i, weight, from_x,
-                from_y, x, y, w, cost, missed, infinity(one),
-            )  # fmt: skip
         allowed = active & (numbers >= 4.0)
         choice.offer_returns(
             order, (0, 0), (0, 0, 0, 0), weight, x, y, w, cost, penalty, threshold, allowed, found
@@ -157,6 +150,7 @@ def fit_second(
         for k in range(2):
             points[3 * k], points[3 * k + 1], points[3 * k + 2] = x[k], y[k], w[k]
         put(points, (0, 0, 0, 0, 0, 0), rooms, _POINTS, at)
+        simd.store(rooms, _COST * ROW + at, cost)
         start_tail(x, y, w, allowed, state)
         bar = choice.bar_of_tail(penalty, found)
         step_tail(
@@ -226,7 +220,10 @@ def bring_back(rooms: Reals, count: int, late: Reals) -> None:
 
 @njit(error_model="numpy")
 def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
-    """Choose tails where they are better; pack and count the pixels that leave something then."""
+    """Choose tails where they are better, of further shapes where the first is not far worse.
+
+    Pack and count the pixels that leave something then.
+    """
     one = simd.ones(rooms, 1)
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
     weight, found = bank(one, order, 1), bank(one, (), 27)
@@ -240,14 +237,24 @@ def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
         allowed = (penalty > 0.0) & (numbers >= 4.0)
         _take_data(order, one, data_r, data_i, weight, rooms, at)
         _offer_tail(order, choice.TAIL_SHAPES[0], weight, state, penalty, allowed, found)
+        worth = allowed & choice.worth_more_shapes(state[7], found)
+        for k in range(1, len(choice.TAIL_SHAPES) if some(worth) else 0):
+            power = choice.TAIL_SHAPES[k]
+            state[4] = state[4] * (float(choice.TAIL_SHAPES[k - 1]) / float(power))
+            state[DAMPING] = select(worth, sharp.FIRST_DAMPING * one, sharp.SETTLED)
+            bar = choice.bar_of_tail(penalty, found)
+            steps = choice.MORE_TAIL_STEPS
+            step_tail(order, power, (0, 0, 0, 0), steps, data_r, data_i, weight, state, bar)
+            _offer_tail(order, power, weight, state, penalty, worth, found)
         put(found, _FOUND, rooms, 0, at)
-        more = _needs_three(found, penalty, numbers)
-        if len(order) >= 3 and some(more):
+        more = _needs_more(found, penalty, numbers)
+        if some(more):
             take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
             pack(more, points, (0, 0, 0, 0, 0, 0), third, _POINTS, packed)
             pack(more, found, _FOUND, third, 0, packed)
             _pack_data(order, more, data_r, data_i, weight, third, packed)
             simd.pack(third, _NUMBERS * ROW + packed, more, numbers)
+            simd.pack(third, _COST * ROW + packed, more, simd.load(one, rooms, _COST * ROW + at))
             packed += simd.pack(third, _PENALTY * ROW + packed, more, penalty)
     simd.store(third, _PENALTY * ROW + packed, 0.0 * one)
     return packed
@@ -263,55 +270,17 @@ def _offer_tail(
     )  # fmt: skip
 
 
-@njit(error_model="numpy")
-def fit_shapes(order: Length, rooms: Reals, count: int) -> None:
-    """Fit tails of further shapes where the first one is not far worse than the best model."""
-    one = simd.ones(rooms, 1)
-    data_r, data_i = bank(one, order, 1), bank(one, order, 1)
-    weight, found = bank(one, order, 1), bank(one, (), 27)
-    first, state = bank(one, (), 8), bank(one, (), 8)
-    for at in range(0, count, simd.width(one)):
-        take(found, _FOUND, one, rooms, 0, at)
-        take(first, _STATE, one, rooms, _TAIL, at)
-        penalty = simd.load(one, rooms, _PENALTY * ROW + at)
-        numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
-        worth = choice.worth_more_shapes(first[7], found) & (penalty > 0.0) & (numbers >= 4.0)
-        if not some(worth):
-            continue
-        _take_data(order, one, data_r, data_i, weight, rooms, at)
-        for k in range(1, len(choice.TAIL_SHAPES)):
-            power = choice.TAIL_SHAPES[k]
-            for i in range(8):
-                state[i] = first[i]
-            state[4] = first[4] * (float(choice.TAIL_SHAPES[0]) / float(power))
-            state[DAMPING] = select(worth, sharp.FIRST_DAMPING * one, sharp.SETTLED)
-            bar = choice.bar_of_tail(penalty, found)
-            step_tail(
-                order,
-                power,
-                (0, 0, 0, 0),
-                choice.MORE_TAIL_STEPS,
-                data_r,
-                data_i,
-                weight,
-                state,
-                bar,
-            )
-            _offer_tail(order, power, weight, state, penalty, worth, found)
-        put(found, _FOUND, rooms, 0, at)
-
-
 @njit(forceinline=True, error_model="numpy")
-def _needs_three(found: Bank, penalty: Plane, numbers: Plane) -> Any:
+def _needs_more(found: Bank, penalty: Plane, numbers: Plane) -> Any:
     bar = choice.bar_of_returns(6, penalty, found)
-    return (penalty > 0.0) & (bar > 0.0) & (numbers >= 6.0)
+    return (penalty > 0.0) & (bar > 0.0) & (numbers >= 4.0)
 
 
 @njit(error_model="numpy")
 def fit_third(
     order: Length, turns: Reals, half_turns: Reals, threshold: float, rooms: Reals, count: int
 ) -> None:
-    """Fit three returns, and choose them where they are better."""
+    """Fit two returns from another start, then three, and choose them where they are better."""
     one = simd.ones(rooms, 1)
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
     rr, ri = bank(one, order, 1), bank(one, order, 1)
@@ -320,31 +289,45 @@ def fit_third(
     points = bank(one, (), 6)
     x, y, w = bank(one, (), 3), bank(one, (), 3), bank(one, (), 3)
     from_x, from_y = bank(one, (), 3), bank(one, (), 3)
+    cosine, sine = math.cos(choice.SPLIT / len(order)), math.sin(choice.SPLIT / len(order))
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
         take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
         _take_data(order, one, data_r, data_i, weight, rooms, at)
         penalty = simd.load(one, rooms, _PENALTY * ROW + at)
+        free = simd.load(one, rooms, _NUMBERS * ROW + at) - 4.0
         active = penalty > 0.0
         for k in range(2):
             x[k], y[k], w[k] = points[3 * k], points[3 * k + 1], points[3 * k + 2]
-        numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
-        bar = choice.bar_of_returns(6, penalty, found)
-        cost = fit(
-            order, (0, 0, 0), (0, 0, 0, 0, 0, 0), choice.STEPS[2], turns, data_r, data_i, weight, x,
-            y, w, pr, pi, rr, ri, active, bar,
-        )  # fmt: skip
-        missed = active & choice.missed(cost, numbers - 4.0)
+        cost = simd.load(one, rooms, _COST * ROW + at)
+        missed = active & choice.missed(cost, free)
         if some(missed):
-            start.pisarenko(order, half_turns, data_r, data_i, from_x, from_y)
-            cost = fit_again(
-                order, (0, 0, 0), (0, 0, 0, 0, 0, 0), choice.STEPS[2], data_r, data_i, weight,
-                from_x, from_y, x, y, w, cost, missed, bar,
+            choice.split(x, y, w, cosine, sine, from_x, from_y)
+            tried = fit_again(
+                order, (0, 0), (0, 0, 0, 0), choice.STEPS[1], data_r, data_i, weight, from_x,
+                from_y, x, y, w, cost, missed, infinity(one),
             )  # fmt: skip
-        choice.offer_returns(
-            order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, x, y, w, cost, penalty, threshold, active,
-            found,
-        )  # fmt: skip
+            choice.offer_returns(
+                order, (0, 0), (0, 0, 0, 0), weight, x, y, w, tried, penalty, threshold,
+                active & (tried < cost - 1.0), found,
+            )  # fmt: skip
+        if len(order) >= 3:
+            bar = choice.bar_of_returns(6, penalty, found)
+            cost = fit(
+                order, (0, 0, 0), (0, 0, 0, 0, 0, 0), choice.STEPS[2], turns, data_r, data_i,
+                weight, x, y, w, pr, pi, rr, ri, active, bar,
+            )  # fmt: skip
+            missed = active & choice.missed(cost, free - 2.0)
+            if some(missed):
+                start.pisarenko(order, half_turns, data_r, data_i, from_x, from_y)
+                cost = fit_again(
+                    order, (0, 0, 0), (0, 0, 0, 0, 0, 0), choice.STEPS[2], data_r, data_i, weight,
+                    from_x, from_y, x, y, w, cost, missed, bar,
+                )  # fmt: skip
+            choice.offer_returns(
+                order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, x, y, w, cost, penalty, threshold,
+                active & (free >= 2.0), found,
+            )  # fmt: skip
         put(found, _FOUND, rooms, 0, at)
 
 
@@ -358,7 +341,7 @@ def take_three(rooms: Reals, count: int, third: Reals) -> None:
         take(found, _FOUND, one, rooms, 0, at)
         penalty = simd.load(one, rooms, _PENALTY * ROW + at)
         numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
-        more = _needs_three(found, penalty, numbers)
+        more = _needs_more(found, penalty, numbers)
         unpack(more, found, _FOUND, third, 0, done)
         put(found, _FOUND, rooms, 0, at)
         done += simd.count(more)

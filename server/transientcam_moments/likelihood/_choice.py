@@ -45,14 +45,14 @@ PLANES: Final = 27
 STEPS: Final = (4, 8, 10)
 """Of the fits of one, two and three returns."""
 TAIL_STEPS: Final = 10
-MORE_TAIL_STEPS: Final = 5
-"""Of the fit of each further shape, which begins with what the first one found."""
-TAIL_SHAPES: Final = (3, 1, 2, 5)
+MORE_TAIL_STEPS: Final = 3
+"""Of the fit of each further shape, which begins with what the one before found."""
+TAIL_SHAPES: Final = (3, 2, 1, 5)
 """Shapes of the gamma distribution of the tail, the first one tried first."""
-WORTH: Final = 100.0
+WORTH: Final = 3.0
 """Further shapes are tried where the first leaves less than so often what the best model does."""
 SPLIT: Final = 1.6
-"""Over m, in radians: the second start of two returns is one return split by twice this."""
+"""Over m, in radians: half of the distance of two returns in their second start."""
 DELAY_RAD: Final = 0.75
 """Mean of the prior of the tail's mean delay; its standard deviation is a factor e."""
 PRIOR: Final = 1.0
@@ -151,15 +151,17 @@ def offer_returns(
     join(phase, square, score - (count + 1.0) * MARGIN, allowed & (faintest > 0.0), found)
 
 
-def split(x: Array, y: Array, cosine: float, sine: float, xs: Bank, ys: Bank) -> None:
-    """Put two points as far before a point of the unit circle as behind it in `xs` and `ys`."""
+def split(x2: Bank, y2: Bank, w2: Bank, cosine: float, sine: float, xs: Bank, ys: Bank) -> None:
+    """Put two points in `xs` and `ys`, as far before the stronger one of two returns as behind."""
+    first = w2[0] >= w2[1]
+    x, y = select(first, x2[0], x2[1]), select(first, y2[0], y2[1])
     xs[0], ys[0] = x * cosine + y * sine, y * cosine - x * sine
     xs[1], ys[1] = x * cosine - y * sine, y * cosine + x * sine
 
 
-def missed(cost: Array, numbers: Array) -> Any:
-    """Say where the fit of two returns leaves more than noise does: another start may do better."""
-    return cost > numbers
+def missed(cost: Array, free: Array) -> Any:
+    """Say where a fit leaves more than noise does, to 1 %: another start may do better."""
+    return cost > 2.0 * free + 4.0
 
 
 def start_of_tail(x: Bank, y: Bank, w: Bank, mean: float) -> tuple[Array, ...]:

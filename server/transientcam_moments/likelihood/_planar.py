@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -78,11 +79,8 @@ def fit(data: Data, most: int, shapes: tuple[int, ...], threshold: float) -> Arr
 
     def of_two(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
         found = list(planes)
-        enough, far = data.numbers >= 4, np.inf + 0 * data.penalty
-        two = SharpFit.start(data, 2, before, far)
-        x, y = [far] * 2, [far] * 2
-        split(before[0][0], before[1][0], math.cos(SPLIT / m), math.sin(SPLIT / m), x, y)
-        two.try_also(x, y, missed(two.cost, data.numbers), far)
+        enough = data.numbers >= 4
+        two = SharpFit.start(data, 2, before, np.inf + 0 * data.penalty)
         if most >= 2:
             two.offer(found, enough, threshold)
         late: tuple[Array, ...] = ()
@@ -91,32 +89,36 @@ def fit(data: Data, most: int, shapes: tuple[int, ...], threshold: float) -> Arr
             late = x1, y1, w, v, ratio * (DELAY_RAD / shapes[0]), t
             late = _fit_tail(data, late, shapes[0], TAIL_STEPS, len(shapes), found)
 
-        def of_three(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
-            found = list(planes)
-            bar = bar_of_returns(6, data.penalty, found)
-            three = SharpFit.start(data, 3, before, bar)
-            x, y = [bar] * 3, [bar] * 3
-            turns = xp.asarray(half_turns(m, data.re.dtype))
-            start.pisarenko(three.order, turns, list(data.re), list(data.im), x, y)
-            three.try_also(x, y, missed(three.cost, data.numbers - 4), bar)
-            three.offer(found, data.numbers >= 6, threshold)
+        def of_shapes(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+            found, state = list(planes), before
+            for last, shape in pairwise(shapes):
+                state = *state[:4], state[4] * (last / shape), state[5]
+                state = _fit_tail(data, state, shape, MORE_TAIL_STEPS, len(shapes), found)
             return xp.stack(found)
 
-        def of_shapes(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
-            found = list(planes)
-            for shape in shapes[1:]:
-                d = before[4] * (shapes[0] / shape)
-                state = *before[:4], d, before[5]
-                _fit_tail(data, state, shape, MORE_TAIL_STEPS, len(shapes), found)
+        def of_more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+            found, free = list(planes), data.numbers - 4
+            two, cost = SharpFit.of(data, *before), before[3]
+            x, y = [cost] * 3, [cost] * 3
+            split(two.x, two.y, two.w, math.cos(SPLIT / m), math.sin(SPLIT / m), x, y)
+            two.try_also(x[:2], y[:2], missed(cost, free), np.inf + 0 * cost)
+            if most >= 2:
+                two.offer(found, (free >= 0) & (two.cost < cost - 1), threshold)
+            if most >= MOST_RETURNS:
+                bar = bar_of_returns(6, data.penalty, found)
+                three = SharpFit.start(data, 3, two.state(), bar)
+                turns = xp.asarray(half_turns(m, data.re.dtype))
+                start.pisarenko(three.order, turns, list(data.re), list(data.im), x, y)
+                three.try_also(x, y, missed(three.cost, free - 2), bar)
+                three.offer(found, free >= 2, threshold)
             return xp.stack(found)
 
         done = xp.stack(found)
-        if most >= MOST_RETURNS:
-            still = bar_of_returns(6, data.penalty, found) > 0
-            done = where(still, of_three, data, two.state(), done)
         if len(shapes) > 1:
-            done = where(worth_more_shapes(late[6], done) & enough, of_shapes, data, late, done)
-        return done
+            worth = worth_more_shapes(late[6], done) & enough
+            done = where(worth, of_shapes, data, late, done)
+        still = (bar_of_returns(6, data.penalty, list(done)) > 0) & enough
+        return where(still, of_more, data, two.state(), done)
 
     # chi-square cannot become less than 0: no model with more unknowns is better below
     return where(planes[SCORE] > 4 * data.penalty, of_two, data, one.state(), planes)
@@ -165,11 +167,18 @@ class SharpFit:
         cls, data: Data, count: int, before: tuple[Array, ...] | None, bar: Array
     ) -> "SharpFit":
         """Add a return to those of another fit, and fit all of them; `bar` as in `sharp.judge`."""
-        x, y, w = before or ((), (), ())
+        x, y, w = before[:3] if before else ((), (), ())
         point = cls(data, x, y, w).new_return()
         fit = cls(data, *([*old, new] for old, new in zip((x, y, w), point, strict=True)))
         fit._look()
         fit.improve(STEPS[count - 1], bar)
+        return fit
+
+    @classmethod
+    def of(cls, data: Data, *state: Array) -> "SharpFit":
+        """Return the fit that had a `state`."""
+        fit = cls(data, *state[:3])
+        fit.cost = state[3]
         return fit
 
     @classmethod
@@ -230,9 +239,9 @@ class SharpFit:
         return x, y, along / (apart * total)
 
     def state(self) -> tuple[Array, ...]:
-        """Return what a fit of one more return begins with."""
+        """Return points, weights and chi-square."""
         xp = namespace(self.cost)
-        return tuple(xp.stack(part) for part in (self.x, self.y, self.w))
+        return *(xp.stack(part) for part in (self.x, self.y, self.w)), self.cost
 
     def try_also(self, x: list[Array], y: list[Array], where: Array, bar: Array) -> None:
         """Fit from other points on as well, and keep the better one, `where` that may help."""
