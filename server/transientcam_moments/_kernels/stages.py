@@ -272,8 +272,7 @@ def _offer_tail(
 
 @njit(forceinline=True, error_model="numpy")
 def _needs_more(found: Bank, penalty: Plane, numbers: Plane) -> Any:
-    bar = choice.bar_of_returns(6, penalty, found)
-    return (penalty > 0.0) & (bar > 0.0) & (numbers >= 4.0)
+    return (penalty > 0.0) & choice.worth_more_returns(penalty, found) & (numbers >= 4.0)
 
 
 @njit(error_model="numpy")

@@ -45,7 +45,7 @@ PLANES: Final = 27
 STEPS: Final = (4, 8, 10)
 """Of the fits of one, two and three returns."""
 TAIL_STEPS: Final = 10
-MORE_TAIL_STEPS: Final = 3
+MORE_TAIL_STEPS: Final = 5
 """Of the fit of each further shape, which begins with what the one before found."""
 TAIL_SHAPES: Final = (3, 2, 1, 5)
 """Shapes of the gamma distribution of the tail, the first one tried first."""
@@ -228,6 +228,11 @@ def offer_tail(
 def bar_of_returns(unknowns: int, penalty: Array, found: Bank) -> Array:
     """Return the chi-square at which sharp returns weigh as much as the best model so far."""
     return found[LEAST_SCORE] - float(unknowns) * penalty + (0.5 * unknowns + 1.0) * MARGIN
+
+
+def worth_more_returns(penalty: Array, found: Bank) -> Any:
+    """Say where three returns may count a fifth of what the best model so far does, or more."""
+    return bar_of_returns(6, penalty, found) > -3.0
 
 
 def bar_of_tail(penalty: Array, found: Bank) -> Array:

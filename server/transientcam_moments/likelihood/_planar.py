@@ -32,6 +32,7 @@ from transientcam_moments.likelihood._choice import (
     split,
     start_of_tail,
     turns_of,
+    worth_more_returns,
     worth_more_shapes,
 )
 from transientcam_moments.moment_problem import half_turns
@@ -117,7 +118,7 @@ def fit(data: Data, most: int, shapes: tuple[int, ...], threshold: float) -> Arr
         if len(shapes) > 1:
             worth = worth_more_shapes(late[6], done) & enough
             done = where(worth, of_shapes, data, late, done)
-        still = (bar_of_returns(6, data.penalty, list(done)) > 0) & enough
+        still = worth_more_returns(data.penalty, list(done)) & enough
         return where(still, of_more, data, two.state(), done)
 
     # chi-square cannot become less than 0: no model with more unknowns is better below
