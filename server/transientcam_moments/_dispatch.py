@@ -37,7 +37,8 @@ isn't finite
 
 ``separate(weight (m, ...), phase (m, ...), threshold) -> direct, indirect, phase (...)``
 
-``likelihood(b (m+1, P), variance (m+1, P), returns, tail_shape) -> attributes of Likelihood``,
+``likelihood(b (m+1, P), variance (m+1, P), returns, shapes of tails, error, threshold) ->
+attributes of Likelihood``,
 or None for other than the usual models
 
 ``pairs(b (m+1, P), variance (m+1, P), error) -> attributes of Likelihood``, of two returns

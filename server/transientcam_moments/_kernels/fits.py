@@ -23,32 +23,13 @@ from transientcam_moments._kernels.portable import (
     tiny,
 )
 from transientcam_moments.arrays import Bank, Length, Mask, Plane
-from transientcam_moments.likelihood import (
-    CHI_SQUARE,
-    COUNT,
-    DELAY_RAD,
-    LENGTH,
-    LENGTH_VARIANCE,
-    MARGIN,
-    PHASE_VARIANCE,
-    PRIOR,
-    STEPS,
-    TAIL,
-    TAIL_SHAPE,
-    TAIL_VARIANCE,
-    WEIGHT,
-    WEIGHT_VARIANCE,
-    X,
-    Y,
-    choice,
-    sharp,
-    tail,
-)
+from transientcam_moments.likelihood import choice, sharp, tail
 from transientcam_moments.moment_problem import phase_of
 
-__all__ = ["fit", "fit_one", "portable", "vary", "write"]  # portable gives arithmetic its meaning
+# portable gives arithmetic its meaning
+__all__ = ["fit", "fit_again", "fit_one", "portable", "write"]
 
-_MEAN = DELAY_RAD / TAIL_SHAPE
+_MEAN = choice.DELAY_RAD / choice.TAIL_SHAPES[0]
 DAMPING = 6
 """Place of the damping in the state of a tail: x, y, w, v, d, t, damping, chi-square."""
 
@@ -126,8 +107,45 @@ def fit(
     active: Mask, bar: Plane,
 ) -> Any:  # fmt: skip
     """Add a return and fit all of them, until `active` pixels have settled; return chi-square."""
-    m = len(order)
     cost = _new(order, returns, turns, data_r, data_i, weight, x, y, w, pr, pi, rr, ri)
+    return _improve(
+        order, returns, unknowns, steps, data_r, data_i, weight, x, y, w, pr, pi, rr, ri, cost,
+        active, bar,
+    )  # fmt: skip
+
+
+@njit(error_model="numpy")
+def fit_again(
+    order: Length, returns: Length, unknowns: Length, steps: int, data_r: Bank, data_i: Bank,
+    weight: Bank, from_x: Bank, from_y: Bank, x: Bank, y: Bank, w: Bank, cost: Plane, active: Mask,
+    bar: Plane,
+) -> Any:  # fmt: skip
+    """Fit returns from other points on as well; keep the better ones and return chi-square."""
+    pr, pi = product_bank(cost, order, returns), product_bank(cost, order, returns)
+    rr, ri = bank(cost, order, 1), bank(cost, order, 1)
+    size = bank(cost, returns, 0)
+    for k in range(len(returns)):
+        sharp.powers(order, from_x[k], from_y[k], k, pr, pi)
+    sharp.weigh(order, returns, data_r, data_i, weight, pr, pi, size)
+    sharp.remains(order, returns, data_r, data_i, pr, pi, size, rr, ri)
+    tried = _improve(
+        order, returns, unknowns, steps, data_r, data_i, weight, from_x, from_y, size, pr, pi, rr,
+        ri, sharp.chi_square(order, weight, rr, ri), active, bar,
+    )  # fmt: skip
+    better = active & (tried < cost)
+    for k in range(len(returns)):
+        x[k], y[k] = select(better, from_x[k], x[k]), select(better, from_y[k], y[k])
+        w[k] = select(better, size[k], w[k])
+    return select(better, tried, cost)
+
+
+@njit(error_model="numpy")
+def _improve(
+    order: Length, returns: Length, unknowns: Length, steps: int, data_r: Bank, data_i: Bank,
+    weight: Bank, x: Bank, y: Bank, w: Bank, pr: Bank, pi: Bank, rr: Bank, ri: Bank, cost: Plane,
+    active: Mask, bar: Plane,
+) -> Any:  # fmt: skip
+    m = len(order)
     damping = select(active, sharp.FIRST_DAMPING + 0.0 * cost, sharp.SETTLED)
     for _ in range(steps):
         if not some(damping < sharp.SETTLED):
@@ -143,7 +161,7 @@ def fit(
 @njit(error_model="numpy")
 def start_tail(x2: Bank, y2: Bank, w2: Bank, active: Mask, state: Bank) -> None:
     """Put the state that the fit of a tail begins with in `state`, from two returns."""
-    x, y, w, v, ratio, t = choice.start_of_tail(x2, y2, w2, DELAY_RAD)
+    x, y, w, v, ratio, t = choice.start_of_tail(x2, y2, w2, choice.DELAY_RAD)
     state[0], state[1], state[2], state[3], state[4], state[5] = x, y, w, v, ratio * _MEAN, t
     state[DAMPING] = select(active, sharp.FIRST_DAMPING + 0.0 * x, sharp.SETTLED)
     state[7] = 0.0 * x
@@ -151,7 +169,7 @@ def start_tail(x2: Bank, y2: Bank, w2: Bank, active: Mask, state: Bank) -> None:
 
 @njit(error_model="numpy")
 def step_tail(
-    order: Length, powers: Length, unknowns: Length, steps: int, data_r: Bank, data_i: Bank,
+    order: Length, power: int, unknowns: Length, steps: int, data_r: Bank, data_i: Bank,
     weight: Bank, state: Bank, bar: Plane,
 ) -> None:  # fmt: skip
     """Take at most so many steps of a return with a tail, until all pixels have settled."""
@@ -161,17 +179,18 @@ def step_tail(
     qr, qi = bank(like, order, 1), bank(like, order, 1)
     rr, ri = bank(like, order, 1), bank(like, order, 1)
     lag = bank(like, order, 1)
-    tail.shape(order, powers, d, lag, qr, qi)
+    tail.shape(order, power, d, lag, qr, qi)
     tail.turn_back(order, data_r, data_i, x, y, ur, ui)
+    w, v = tail.weigh(order, weight, ur, ui, qr, qi)
     tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
-    cost = sharp.chi_square(order, weight, rr, ri) + PRIOR * t * t
+    cost = sharp.chi_square(order, weight, rr, ri) + choice.PRIOR * t * t
     damping = state[DAMPING]
     for _ in range(steps):
         if not some(damping < sharp.SETTLED):
             break
         x, y, w, v, d, t, cost, damping = tail.step(
-            order, powers, unknowns, data_r, data_i, weight, PRIOR, x, y, w, v, d, t, lag, qr, qi,
-            rr, ri, cost, damping, bar,
+            order, power, unknowns, data_r, data_i, weight, choice.PRIOR, x, y, w, v, d, t, lag, qr,
+            qi, rr, ri, cost, damping, bar,
         )  # fmt: skip
     state[0], state[1], state[2], state[3], state[4], state[5] = x, y, w, v, d, t
     state[DAMPING], state[7] = damping, cost
@@ -188,14 +207,18 @@ def write(
     size = len(slots)
     keys, values = bank(one, slots, 0), bank(one, slots, 0)
     first, second = bank(one, slots, 0), bank(one, slots, 0)
-    with_tail = found[LENGTH] > 0.0
+    with_tail = found[choice.LENGTH] > 0.0
     there = 0.0 * one
     for k in range(size):
-        used = usable & (found[COUNT] > float(k)) & ((found[WEIGHT + k] > 0.0) | with_tail)
-        keys[k] = select(used, phase_of(found[X + k], found[Y + k]), far)
-        values[k] = select(used, found[WEIGHT + k] * scale, 0.0)
-        first[k] = select(used, root(found[PHASE_VARIANCE + k]), nan)
-        second[k] = select(used, root(found[WEIGHT_VARIANCE + k]) * scale, nan)
+        used = (
+            usable
+            & (found[choice.COUNT] > float(k))
+            & ((found[choice.WEIGHT + k] > 0.0) | with_tail)
+        )
+        keys[k] = select(used, phase_of(found[choice.X + k], found[choice.Y + k]), far)
+        values[k] = select(used, found[choice.WEIGHT + k] * scale, 0.0)
+        first[k] = select(used, root(found[choice.PHASE_VARIANCE + k]), nan)
+        second[k] = select(used, root(found[choice.WEIGHT_VARIANCE + k]) * scale, nan)
         there = there + select(used, one, 0.0)
     for i in range(size - 1):
         for k in range(size - 1 - i):
@@ -222,17 +245,21 @@ def write(
         simd.store(planes[size + k], p, values[k])
         simd.store(planes[2 * size + k], p, first[k])
         simd.store(planes[3 * size + k], p, second[k])
-    tailed = usable & with_tail & (found[TAIL] > 0.0)
-    delay = float(TAIL_SHAPE) * found[LENGTH]
+    tailed = usable & with_tail & (found[choice.TAIL] > 0.0)
+    delay = found[choice.SHAPE] * found[choice.LENGTH]
     rest = 4 * size
-    simd.store(planes[rest], p, select(tailed, found[TAIL] * scale, 0.0))
-    std = root(found[TAIL_VARIANCE]) * scale
+    simd.store(planes[rest], p, select(tailed, found[choice.TAIL] * scale, 0.0))
+    std = root(found[choice.TAIL_VARIANCE]) * scale
     simd.store(planes[rest + 1], p, select(tailed, std, nan))
     simd.store(planes[rest + 2], p, select(tailed, delay, nan))
-    std = delay * root(found[LENGTH_VARIANCE])
+    std = delay * root(found[choice.LENGTH_VARIANCE])
     simd.store(planes[rest + 3], p, select(tailed, std, nan))
-    simd.store(planes[rest + 4], p, select(usable, found[CHI_SQUARE], nan))
-    unknowns = select(with_tail, 4.0 * one, 2.0 * found[COUNT])
+    simd.store(planes[rest + 4], p, select(usable, found[choice.CHI_SQUARE], nan))
+    std = root(choice.average_variance(numbers, found))
+    simd.store(planes[rest + 5], p, select(keys[0] < far, found[choice.MEAN], nan))
+    simd.store(planes[rest + 6], p, select(keys[0] < far, std, nan))
+    simd.store(planes[rest + 7], p, select(tailed, found[choice.SHAPE], 0.0))
+    unknowns = select(with_tail, 4.0 * one, 2.0 * found[choice.COUNT])
     simd.store(free, p, select(usable, numbers - unknowns, 0.0))
     simd.store(count, p, there)
 
@@ -241,29 +268,18 @@ def write(
 def fit_one(
     order: Length, turns: Reals, b: Complexes, variance: Reals, error: float, p: int, one: Plane,
     data_r: Bank, data_i: Bank, weight: Bank, x: Bank, y: Bank, w: Bank, pr: Bank, pi: Bank,
-    rr: Bank, ri: Bank, found: Bank,
+    rr: Bank, ri: Bank, threshold: float, found: Bank,
 ) -> Any:  # fmt: skip
     """Load pixels and put one return in `found`; return their scale, numbers, use and penalty."""
     far = infinity(one)
     scale, numbers, usable = _prepare(order, b, variance, error, p, one, data_r, data_i, weight)
-    penalty = logarithm(numbers) + MARGIN
+    penalty = logarithm(numbers) + choice.MARGIN
     choice.nothing(one, far, found)
     cost = fit(
-        order, (0,), (0, 0), STEPS[0], turns, data_r, data_i, weight, x, y, w, pr, pi, rr, ri,
-        usable, far,
+        order, (0,), (0, 0), choice.STEPS[0], turns, data_r, data_i, weight, x, y, w, pr, pi, rr,
+        ri, usable, far,
     )  # fmt: skip
-    choice.offer_returns((0,), x, y, w, cost, penalty, one > 0.0, found)
+    choice.offer_returns(
+        order, (0,), (0, 0), weight, x, y, w, cost, penalty, threshold, one > 0.0, found
+    )
     return scale, numbers, usable, penalty
-
-
-@njit(error_model="numpy")
-def vary(order: Length, weight: Bank, found: Bank) -> None:
-    """Put the variances of what was chosen in `found`."""
-    if some(choice.chosen((0,), found)):
-        choice.vary_returns(order, (0,), (0, 0), weight, found)
-    if some(choice.chosen((0, 0), found)):
-        choice.vary_returns(order, (0, 0), (0, 0, 0, 0), weight, found)
-    if some(choice.chosen((0, 0, 0), found)):
-        choice.vary_returns(order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, found)
-    if some(choice.has_tail(found)):
-        choice.vary_tail(order, (0, 0, 0), (0, 0, 0, 0), weight, PRIOR, found)

@@ -18,6 +18,7 @@ from transientcam_moments._kernels.arrays import (
     Complexes,
     ComplexPlanes,
     Counts,
+    RealPlane,
     RealPlanes,
     Reals,
 )
@@ -37,13 +38,15 @@ from transientcam_moments._kernels.stages import (
     take_three,
 )
 from transientcam_moments.arrays import Length
-from transientcam_moments.likelihood import MOST_RETURNS, TAIL_SHAPE, choice
+from transientcam_moments.likelihood import MOST_RETURNS, choice
+from transientcam_moments.moment_problem import half_turns
 
 
 @njit(nogil=True, error_model="numpy")
 def fit_returns(
-    m: int, slots: Length, turns: RealPlanes, b: ComplexPlanes, variance: RealPlanes, error:
-    float, planes: RealPlanes, free: Counts, count: Counts, start: int, stop: int,
+    m: int, slots: Length, turns: RealPlanes, half_turns: RealPlane, b: ComplexPlanes,
+    variance: RealPlanes, error: float, threshold: float, planes: RealPlanes, free: Counts,
+    count: Counts, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; each model where simpler ones leave enough.
 
@@ -57,9 +60,11 @@ def fit_returns(
     third = np.empty(size, planes.dtype)
     for first in range(start, stop, PIXELS_AT_ONCE):
         last = min(first + PIXELS_AT_ONCE, stop)
-        more = fit_first(order, turns, b, variance, error, first, last, stop, all_rooms, rooms)
+        more = fit_first(
+            order, turns, b, variance, error, first, last, stop, threshold, all_rooms, rooms
+        )
         if len(order) >= 2 and more > 0:
-            moving = fit_second(order, turns, rooms, more, late)
+            moving = fit_second(order, turns, threshold, rooms, more, late)
             if moving > 0:
                 still = step_late(order, TAIL_ROUNDS[1], late, moving, later)
                 if still > 0:
@@ -67,8 +72,8 @@ def fit_returns(
                     bring_back(late, moving, later)
                 bring_back(rooms, more, late)
             three = offer_tails(order, rooms, more, third)
-            if len(order) >= 3 and three > 0:
-                fit_third(order, turns, third, three)
+            if three > 0:
+                fit_third(order, turns, half_turns, threshold, third, three)
                 take_three(rooms, more, third)
         finish(order, slots, all_rooms, rooms, first, last, stop, planes, free, count)
 
@@ -77,30 +82,37 @@ def likelihood_kernel(most: int, precision: str) -> Callable[..., Any]:
     """Compile the estimate of orders up to ``most``; see the table in ``_dispatch``."""
     slots = (0,) * MOST_RETURNS
     run = entry(fit_returns, most, precision, slots=len(slots))
-    turns_of = lru_cache(lambda m: choice.turns_of(m).astype(precision))
+    tables_of = lru_cache(
+        lambda m: (choice.turns_of(m).astype(precision), half_turns(m, precision))
+    )
 
     def kernel(
         b: Complexes,
         variance: Reals,
         returns: int,
-        tail_shape: int,
+        shapes: tuple[int, ...],
         error: float,
+        threshold: float,
         *,
         spread: Spread = at_once,
     ) -> tuple[Any, ...] | None:
-        if (returns, tail_shape) != (MOST_RETURNS, TAIL_SHAPE):
+        if (returns, shapes) != (MOST_RETURNS, choice.TAIL_SHAPES):
             return None
         m, pixels, size = len(b) - 1, b.shape[1], len(slots)
-        turns = turns_of(m)
+        turns, halves = tables_of(m)
         moments, noise = np.ascontiguousarray(b), np.ascontiguousarray(variance)
-        planes = empty((4 * size + 5, pixels), precision)
+        planes = empty((4 * size + 8, pixels), precision)
         free, count = empty(pixels, np.int32), empty(pixels, np.int32)
 
         def part(start: int, stop: int) -> None:
-            run(m, slots, turns, moments, noise, error, planes, free, count, start, stop)
+            run(
+                m, slots, turns, halves, moments, noise, error, threshold, planes, free, count,
+                start, stop,
+            )  # fmt: skip
 
         spread(part, pixels)
         four = (planes[k * size :][: min(m, size)] for k in range(4))
-        return (*four, *planes[4 * size :], free, count)
+        *rest, mean, std, shape = planes[4 * size :]
+        return (*four, *rest, free, count, mean, std, shape.astype(np.int32))
 
     return kernel

@@ -17,18 +17,16 @@ from transientcam_moments._kernels.arrays import (
     Reals,
 )
 from transientcam_moments._kernels.compiled_entry import entry
-from transientcam_moments._kernels.fits import fit_one, portable, vary, write
+from transientcam_moments._kernels.fits import fit_one, portable, write
 from transientcam_moments._kernels.portable import bank, infinity, larger, select, some, square_bank
 from transientcam_moments.arrays import Bank, Length, Mask, Plane
 from transientcam_moments.likelihood import (
     COINCIDE,
-    COUNT,
     FINALISTS,
     FIRST_STEPS,
     LAST_STEPS,
     LEAST_GAIN,
     PEAKS,
-    SCORE,
     STARTS,
     choice,
     grid,
@@ -228,8 +226,8 @@ def _choose(
 @njit(nogil=True, error_model="numpy")
 def fit_pairs(
     order: Length, lists: tuple[Length, ...], places: Places, first_turns: RealPlanes, same: float,
-    turns: RealPlanes, b: ComplexPlanes, variance: RealPlanes, error: float, planes: RealPlanes,
-    free: Counts, count: Counts, start: int, stop: int,
+    turns: RealPlanes, b: ComplexPlanes, variance: RealPlanes, error: float, threshold: float,
+    planes: RealPlanes, free: Counts, count: Counts, start: int, stop: int,
 ) -> None:  # fmt: skip
     """Write the estimate of the pixels start..stop; two returns where one leaves enough.
 
@@ -241,7 +239,7 @@ def fit_pairs(
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
     rr, ri = bank(one, order, 1), bank(one, order, 1)
     pr, pi = bank(one, order, 0), bank(one, order, 0)
-    weight, found = bank(one, order, 1), bank(one, (), 22)
+    weight, found = bank(one, order, 1), bank(one, (), 27)
     kr, ki = bank(one, order, 1), bank(one, order, 1)
     kw, share = bank(one, order, 1), bank(one, order, 1)
     x, y, w = bank(one, (), 2), bank(one, (), 2), bank(one, (), 2)
@@ -263,10 +261,10 @@ def fit_pairs(
         p = min(left, stop - step)
         scale, numbers, usable, penalty = fit_one(
             order, first_turns, b, variance, error, p, one, data_r, data_i, weight, x, y, w, pr,
-            pi, rr, ri, found,
+            pi, rr, ri, threshold, found,
         )  # fmt: skip
         lead = far
-        more = (found[SCORE] > 4.0 * penalty) & (numbers >= 4.0)
+        more = (found[choice.SCORE] > 4.0 * penalty) & (numbers >= 4.0)
         if some(more):
             total = 0.0 * one
             for k in range(len(places)):
@@ -289,11 +287,13 @@ def fit_pairs(
                 places, same, kr, ki, kw, share, costs, points, x, y, w, bx, by, bw, directs, room,
                 more,
             )  # fmt: skip
-            choice.offer_returns((0, 0), bx, by, bw, cost, penalty, more, found)
-            lead = select(found[COUNT] == 2.0, lead, far)
-        vary(order, weight, found)
+            choice.offer_returns(
+                order, (0, 0), (0, 0, 0, 0), weight, bx, by, bw, cost, penalty, threshold, more,
+                found,
+            )  # fmt: skip
+            lead = select(found[choice.COUNT] == 2.0, lead, far)
         write((0, 0), found, scale, numbers, usable, p, planes, free, count)
-        simd.store(planes[13], p, lead)
+        simd.store(planes[16], p, lead)
 
 
 def pairs_kernel(m: int, precision: str) -> Callable[..., Any]:
@@ -307,18 +307,18 @@ def pairs_kernel(m: int, precision: str) -> Callable[..., Any]:
     turns = np.stack([np.cos(phase), np.sin(phase)]).astype(precision)
 
     def kernel(
-        b: Complexes, variance: Reals, error: float, *, spread: Spread = at_once
+        b: Complexes, variance: Reals, error: float, threshold: float, *, spread: Spread = at_once
     ) -> tuple[Any, ...]:
         pixels = b.shape[1]
         moments, noise = np.ascontiguousarray(b), np.ascontiguousarray(variance)
         places = np.array([j for j, plane in enumerate(noise) if plane.any()], np.int64)
-        planes = np.empty((14, pixels), precision)
+        planes = np.empty((17, pixels), precision)
         free, count = np.empty(pixels, np.int32), np.empty(pixels, np.int32)
 
         def part(start: int, stop: int) -> None:
             run(
-                order, lists, places, first_turns, same, turns, moments, noise, error, planes, free,
-                count, start, stop,
+                order, lists, places, first_turns, same, turns, moments, noise, error, threshold,
+                planes, free, count, start, stop,
             )  # fmt: skip
 
         spread(part, pixels)
@@ -327,7 +327,9 @@ def pairs_kernel(m: int, precision: str) -> Callable[..., Any]:
             *planes[8:13],
             free,
             count,
-            planes[13],
+            *planes[13:15],
+            planes[15].astype(np.int32),
+            planes[16],
         )
 
     return kernel

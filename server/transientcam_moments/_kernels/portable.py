@@ -54,7 +54,7 @@ from transientcam_moments.arrays import (
     square_bank,
     tiny,
 )
-from transientcam_moments.likelihood import choice, linear, pair_fit, sharp, tail
+from transientcam_moments.likelihood import choice, linear, pair_fit, sharp, start, tail
 from transientcam_moments.moment_problem import (
     circle,
     eigenvalue,
@@ -302,7 +302,7 @@ def _compile_statements(module: ModuleType, *, inline: bool) -> None:
 
 
 extending.register_jitable(**_CALLED_BY_KERNELS)(logarithm)
-for _module in (choice, linear, pair_fit, sharp, tail):
+for _module in (choice, linear, pair_fit, sharp, start, tail):
     _compile_statements(_module, inline=False)
 for _module in (
     toeplitz,

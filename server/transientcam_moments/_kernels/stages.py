@@ -1,5 +1,6 @@
 """Stages of the likelihood's kernel: each does a block of pixels, packed in rows (`packing`)."""
 
+import math
 from typing import Any, Final
 
 from numba import njit
@@ -9,36 +10,29 @@ from transientcam_moments._kernels.arrays import Complexes, Counts, Reals
 from transientcam_moments._kernels.fits import (
     DAMPING,
     fit,
+    fit_again,
     fit_one,
     start_tail,
     step_tail,
-    vary,
     write,
 )
 from transientcam_moments._kernels.packing import ROW, pack, put, take, unpack
 from transientcam_moments._kernels.portable import bank, infinity, product_bank, select, some
 from transientcam_moments.arrays import Bank, Length, Mask, Plane
-from transientcam_moments.likelihood import (
-    FITTED,
-    PLANES,
-    PRIOR,
-    SCORE,
-    STEPS,
-    TAIL_STEPS,
-    choice,
-    sharp,
-)
+from transientcam_moments.likelihood import choice, sharp, start
 
-TAIL_ROUNDS: Final = (3, 3, TAIL_STEPS - 6)
+TAIL_ROUNDS: Final = (3, 3, choice.TAIL_STEPS - 6)
 """Steps of a tail after each of which the pixels are packed that go on."""
-_FOUND: Final = (0,) * FITTED
+_FOUND: Final = (0,) * choice.PLANES
 _STATE: Final = (0,) * 8
 # Rows of a room: what was found, the state of the tail, points and weights of two returns, what an
 # unknown has to gain (0 behind the last pixel), three more numbers of a pixel, and then the data.
-_TAIL: Final = FITTED
+_TAIL: Final = choice.PLANES
 _POINTS: Final = _TAIL + 8
 _PENALTY: Final = _POINTS + 6
 _NUMBERS, _SCALE, _USABLE = _PENALTY + 1, _PENALTY + 2, _PENALTY + 3
+_COST: Final = _SCALE
+"""Behind the first fit: what two returns leave."""
 _DATA: Final = _PENALTY + 4
 
 
@@ -84,7 +78,7 @@ def _pack_data(
 @njit(error_model="numpy")
 def fit_first(
     order: Length, turns: Reals, b: Complexes, variance: Reals, error: float, first: int, last: int,
-    end: int, all_rooms: Reals, rooms: Reals,
+    end: int, threshold: float, all_rooms: Reals, rooms: Reals,
 ) -> int:  # fmt: skip
     """Fit one return to the pixels first..last; pack and count those that it leaves something of.
 
@@ -95,14 +89,14 @@ def fit_first(
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
     rr, ri = bank(one, order, 1), bank(one, order, 1)
     pr, pi = bank(one, order, 0), bank(one, order, 0)
-    weight, found = bank(one, order, 1), bank(one, (), 22)
+    weight, found = bank(one, order, 1), bank(one, (), 27)
     points = bank(one, (), 6)
     x, y, w = bank(one, (), 1), bank(one, (), 1), bank(one, (), 1)
     count = 0
     for left in range(first, last, step):
         scale, numbers, usable, penalty = fit_one(
             order, turns, b, variance, error, min(left, end - step), one, data_r, data_i, weight, x,
-            y, w, pr, pi, rr, ri, found,
+            y, w, pr, pi, rr, ri, threshold, found,
         )  # fmt: skip
         at = left - first
         put(found, _FOUND, all_rooms, 0, at)
@@ -111,7 +105,7 @@ def fit_first(
         simd.store(all_rooms, _NUMBERS * ROW + at, numbers)
         simd.store(all_rooms, _PENALTY * ROW + at, penalty)
         simd.store(all_rooms, _USABLE * ROW + at, select(usable, one, 0.0))
-        more = found[SCORE] > 4.0 * penalty
+        more = found[choice.SCORE] > 4.0 * penalty
         if some(more):
             points[0], points[1], points[2] = x[0], y[0], w[0]
             pack(more, points, (0, 0, 0), rooms, _POINTS, count)
@@ -124,13 +118,15 @@ def fit_first(
 
 
 @njit(error_model="numpy")
-def fit_second(order: Length, turns: Reals, rooms: Reals, count: int, late: Reals) -> int:
+def fit_second(
+    order: Length, turns: Reals, threshold: float, rooms: Reals, count: int, late: Reals
+) -> int:
     """Fit two returns, and first steps of a tail; pack and count the pixels that need more."""
     one = simd.ones(rooms, 1)
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
     rr, ri = bank(one, order, 1), bank(one, order, 1)
     pr, pi = product_bank(one, order, (0, 0)), product_bank(one, order, (0, 0))
-    weight, found = bank(one, order, 1), bank(one, (), 22)
+    weight, found = bank(one, order, 1), bank(one, (), 27)
     points, state = bank(one, (), 6), bank(one, (), 8)
     x, y, w = bank(one, (), 2), bank(one, (), 2), bank(one, (), 2)
     moving = 0
@@ -143,19 +139,30 @@ def fit_second(order: Length, turns: Reals, rooms: Reals, count: int, late: Real
         active = penalty > 0.0
         x[0], y[0], w[0] = points[0], points[1], points[2]
         cost = fit(
-            order, (0, 0), (0, 0, 0, 0), STEPS[1], turns, data_r, data_i, weight, x, y, w, pr, pi,
-            rr, ri, active, infinity(one),
+            order, (0, 0), (0, 0, 0, 0), choice.STEPS[1], turns, data_r, data_i, weight, x, y, w,
+            pr, pi, rr, ri, active, infinity(one),
         )  # fmt: skip
         allowed = active & (numbers >= 4.0)
-        choice.offer_returns((0, 0), x, y, w, cost, penalty, allowed, found)
+        choice.offer_returns(
+            order, (0, 0), (0, 0, 0, 0), weight, x, y, w, cost, penalty, threshold, allowed, found
+        )
         put(found, _FOUND, rooms, 0, at)
         for k in range(2):
             points[3 * k], points[3 * k + 1], points[3 * k + 2] = x[k], y[k], w[k]
         put(points, (0, 0, 0, 0, 0, 0), rooms, _POINTS, at)
+        simd.store(rooms, _COST * ROW + at, cost)
         start_tail(x, y, w, allowed, state)
-        bar = found[SCORE] - 4.0 * penalty
+        bar = choice.bar_of_tail(penalty, found)
         step_tail(
-            order, (0, 0, 0), (0, 0, 0, 0), TAIL_ROUNDS[0], data_r, data_i, weight, state, bar
+            order,
+            choice.TAIL_SHAPES[0],
+            (0, 0, 0, 0),
+            TAIL_ROUNDS[0],
+            data_r,
+            data_i,
+            weight,
+            state,
+            bar,
         )
         put(state, _STATE, rooms, _TAIL, at)
         moving += _pack_moving(order, one, data_r, data_i, weight, state, bar, late, moving)
@@ -188,7 +195,9 @@ def step_late(order: Length, steps: int, rooms: Reals, count: int, late: Reals) 
         take(state, _STATE, one, rooms, _TAIL, at)
         _take_data(order, one, data_r, data_i, weight, rooms, at)
         bar = simd.load(one, rooms, _PENALTY * ROW + at)
-        step_tail(order, (0, 0, 0), (0, 0, 0, 0), steps, data_r, data_i, weight, state, bar)
+        step_tail(
+            order, choice.TAIL_SHAPES[0], (0, 0, 0, 0), steps, data_r, data_i, weight, state, bar
+        )
         put(state, _STATE, rooms, _TAIL, at)
         moving += _pack_moving(order, one, data_r, data_i, weight, state, bar, late, moving)
     simd.store(late, (_TAIL + DAMPING) * ROW + moving, sharp.SETTLED * one)
@@ -211,10 +220,13 @@ def bring_back(rooms: Reals, count: int, late: Reals) -> None:
 
 @njit(error_model="numpy")
 def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
-    """Choose tails where they are better; pack and count the pixels that leave something then."""
+    """Choose tails where they are better, of further shapes where the first is not far worse.
+
+    Pack and count the pixels that leave something then.
+    """
     one = simd.ones(rooms, 1)
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
-    weight, found = bank(one, order, 1), bank(one, (), 22)
+    weight, found = bank(one, order, 1), bank(one, (), 27)
     points, state = bank(one, (), 6), bank(one, (), 8)
     packed = 0
     for at in range(0, count, simd.width(one)):
@@ -223,51 +235,98 @@ def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
         penalty = simd.load(one, rooms, _PENALTY * ROW + at)
         numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
         allowed = (penalty > 0.0) & (numbers >= 4.0)
-        choice.offer_tail(
-            PRIOR, state[0], state[1], state[2], state[3], state[4], state[5], state[7], penalty,
-            allowed, found,
-        )  # fmt: skip
+        _take_data(order, one, data_r, data_i, weight, rooms, at)
+        _offer_tail(order, choice.TAIL_SHAPES[0], weight, state, penalty, allowed, found)
+        worth = allowed & choice.worth_more_shapes(state[7], found)
+        for k in range(1, len(choice.TAIL_SHAPES) if some(worth) else 0):
+            power = choice.TAIL_SHAPES[k]
+            state[4] = state[4] * (float(choice.TAIL_SHAPES[k - 1]) / float(power))
+            state[DAMPING] = select(worth, sharp.FIRST_DAMPING * one, sharp.SETTLED)
+            bar = choice.bar_of_tail(penalty, found)
+            steps = choice.MORE_TAIL_STEPS
+            step_tail(order, power, (0, 0, 0, 0), steps, data_r, data_i, weight, state, bar)
+            _offer_tail(order, power, weight, state, penalty, worth, found)
         put(found, _FOUND, rooms, 0, at)
-        more = _needs_three(found, penalty, numbers)
-        if len(order) >= 3 and some(more):
+        more = _needs_more(found, penalty, numbers)
+        if some(more):
             take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
-            _take_data(order, one, data_r, data_i, weight, rooms, at)
             pack(more, points, (0, 0, 0, 0, 0, 0), third, _POINTS, packed)
             pack(more, found, _FOUND, third, 0, packed)
             _pack_data(order, more, data_r, data_i, weight, third, packed)
+            simd.pack(third, _NUMBERS * ROW + packed, more, numbers)
+            simd.pack(third, _COST * ROW + packed, more, simd.load(one, rooms, _COST * ROW + at))
             packed += simd.pack(third, _PENALTY * ROW + packed, more, penalty)
     simd.store(third, _PENALTY * ROW + packed, 0.0 * one)
     return packed
 
 
+@njit(error_model="numpy")
+def _offer_tail(
+    order: Length, power: int, weight: Bank, state: Bank, penalty: Plane, allowed: Mask, found: Bank
+) -> None:
+    choice.offer_tail(
+        order, power, (0, 0, 0, 0), weight, choice.PRIOR, len(choice.TAIL_SHAPES), state[0],
+        state[1], state[2], state[3], state[4], state[5], state[7], penalty, allowed, found,
+    )  # fmt: skip
+
+
 @njit(forceinline=True, error_model="numpy")
-def _needs_three(found: Bank, penalty: Plane, numbers: Plane) -> Any:
-    return (penalty > 0.0) & (found[SCORE] > 6.0 * penalty) & (numbers >= 6.0)
+def _needs_more(found: Bank, penalty: Plane, numbers: Plane) -> Any:
+    return (penalty > 0.0) & choice.worth_more_returns(penalty, found) & (numbers >= 4.0)
 
 
 @njit(error_model="numpy")
-def fit_third(order: Length, turns: Reals, rooms: Reals, count: int) -> None:
-    """Fit three returns, and choose them where they are better."""
+def fit_third(
+    order: Length, turns: Reals, half_turns: Reals, threshold: float, rooms: Reals, count: int
+) -> None:
+    """Fit two returns from another start, then three, and choose them where they are better."""
     one = simd.ones(rooms, 1)
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
     rr, ri = bank(one, order, 1), bank(one, order, 1)
     pr, pi = product_bank(one, order, (0, 0, 0)), product_bank(one, order, (0, 0, 0))
-    weight, found = bank(one, order, 1), bank(one, (), 22)
+    weight, found = bank(one, order, 1), bank(one, (), 27)
     points = bank(one, (), 6)
     x, y, w = bank(one, (), 3), bank(one, (), 3), bank(one, (), 3)
+    from_x, from_y = bank(one, (), 3), bank(one, (), 3)
+    cosine, sine = math.cos(choice.SPLIT / len(order)), math.sin(choice.SPLIT / len(order))
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
         take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
         _take_data(order, one, data_r, data_i, weight, rooms, at)
         penalty = simd.load(one, rooms, _PENALTY * ROW + at)
+        free = simd.load(one, rooms, _NUMBERS * ROW + at) - 4.0
         active = penalty > 0.0
         for k in range(2):
             x[k], y[k], w[k] = points[3 * k], points[3 * k + 1], points[3 * k + 2]
-        cost = fit(
-            order, (0, 0, 0), (0, 0, 0, 0, 0, 0), STEPS[2], turns, data_r, data_i, weight, x, y, w,
-            pr, pi, rr, ri, active, found[SCORE] - 6.0 * penalty,
-        )  # fmt: skip
-        choice.offer_returns((0, 0, 0), x, y, w, cost, penalty, active, found)
+        cost = simd.load(one, rooms, _COST * ROW + at)
+        missed = active & choice.missed(cost, free)
+        if some(missed):
+            choice.split(x, y, w, cosine, sine, from_x, from_y)
+            tried = fit_again(
+                order, (0, 0), (0, 0, 0, 0), choice.STEPS[1], data_r, data_i, weight, from_x,
+                from_y, x, y, w, cost, missed, infinity(one),
+            )  # fmt: skip
+            choice.offer_returns(
+                order, (0, 0), (0, 0, 0, 0), weight, x, y, w, tried, penalty, threshold,
+                active & (tried < cost - 1.0), found,
+            )  # fmt: skip
+        if len(order) >= 3:
+            bar = choice.bar_of_returns(6, penalty, found)
+            cost = fit(
+                order, (0, 0, 0), (0, 0, 0, 0, 0, 0), choice.STEPS[2], turns, data_r, data_i,
+                weight, x, y, w, pr, pi, rr, ri, active, bar,
+            )  # fmt: skip
+            missed = active & choice.missed(cost, free - 2.0)
+            if some(missed):
+                start.pisarenko(order, half_turns, data_r, data_i, from_x, from_y)
+                cost = fit_again(
+                    order, (0, 0, 0), (0, 0, 0, 0, 0, 0), choice.STEPS[2], data_r, data_i, weight,
+                    from_x, from_y, x, y, w, cost, missed, bar,
+                )  # fmt: skip
+            choice.offer_returns(
+                order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, x, y, w, cost, penalty, threshold,
+                active & (free >= 2.0), found,
+            )  # fmt: skip
         put(found, _FOUND, rooms, 0, at)
 
 
@@ -275,13 +334,13 @@ def fit_third(order: Length, turns: Reals, rooms: Reals, count: int) -> None:
 def take_three(rooms: Reals, count: int, third: Reals) -> None:
     """Put what was found with three returns back among all that were fitted with two."""
     one = simd.ones(rooms, 1)
-    found = bank(one, (), 22)
+    found = bank(one, (), 27)
     done = 0
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
         penalty = simd.load(one, rooms, _PENALTY * ROW + at)
         numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
-        more = _needs_three(found, penalty, numbers)
+        more = _needs_more(found, penalty, numbers)
         unpack(more, found, _FOUND, third, 0, done)
         put(found, _FOUND, rooms, 0, at)
         done += simd.count(more)
@@ -298,22 +357,16 @@ def finish(
     """
     one = simd.ones(planes, 1)
     step = simd.width(one)
-    weight, found = bank(one, order, 1), bank(one, (), 22)
-    size = len(order) + 1
+    found = bank(one, (), 27)
     done = 0
     for left in range(first, last, step):
         at = left - first
         take(found, _FOUND, one, all_rooms, 0, at)
-        for i in range(FITTED, PLANES):
-            found[i] = 0.0 * one
         penalty = simd.load(one, all_rooms, _PENALTY * ROW + at)
-        more = found[SCORE] > 4.0 * penalty
+        more = found[choice.SCORE] > 4.0 * penalty
         if len(order) >= 2 and some(more):
             unpack(more, found, _FOUND, rooms, 0, done)
             done += simd.count(more)
-        for j in range(size):
-            weight[j] = simd.load(one, all_rooms, (_DATA + 2 * size + j) * ROW + at)
-        vary(order, weight, found)
         scale = simd.load(one, all_rooms, _SCALE * ROW + at)
         numbers = simd.load(one, all_rooms, _NUMBERS * ROW + at)
         usable = simd.load(one, all_rooms, _USABLE * ROW + at) > 0.0

@@ -1,8 +1,11 @@
 """Of several models of a pixel the one that explains its moments with the fewest unknowns.
 
-What is found of a pixel is a bank of planes, in the order of `Found`. Three returns at most.
+What is found of a pixel is a bank of planes, whose places are below. Three returns at most. The
+range is an average over all models that were fitted, each of which counts exp(-s / 2): s is
+chi-square with log n for each unknown, and `MARGIN` for each component beside the first.
 """
 
+import math
 from typing import Any, Final
 
 import numpy as np
@@ -16,10 +19,12 @@ from transientcam_moments.arrays import (
     larger,
     least,
     logarithm,
+    magnitude,
     select,
     smaller,
 )
 from transientcam_moments.likelihood import _sharp as sharp, _tail as tail
+from transientcam_moments.moment_problem import phase_of
 
 MOST_RETURNS: Final = 3
 X, Y, WEIGHT = 0, 3, 6
@@ -27,18 +32,27 @@ X, Y, WEIGHT = 0, 3, 6
 TAIL, LENGTH = 9, 10
 """Light v of the tail, and d; both 0 where there is no tail."""
 CHI_SQUARE, SCORE, COUNT = 11, 12, 13
-FITTED: Final = 14
-"""So many planes the fits fill; those behind have the variances of what was chosen."""
-WEIGHT_VARIANCE, PHASE_VARIANCE = 14, 17
+SHAPE: Final = 14
+"""p of the tail; 0 where there is none."""
+MEAN, SPREAD, LEAST_SCORE, TOTAL = 15, 16, 17, 18
+"""Of the average over models: mean and variance of the direct return's phase, the least score of
+it so far, and the sum of all weights over that one's."""
+WEIGHT_VARIANCE, PHASE_VARIANCE = 19, 22
 """First plane of the variances of weights and phases of each return."""
-TAIL_VARIANCE, LENGTH_VARIANCE = 20, 21
-"""The variances of v and of log d; 0 where there is no tail."""
-PLANES: Final = 22
+TAIL_VARIANCE, LENGTH_VARIANCE = 25, 26
+"""The variances of v and of log d."""
+PLANES: Final = 27
 STEPS: Final = (4, 8, 10)
 """Of the fits of one, two and three returns."""
 TAIL_STEPS: Final = 10
-TAIL_SHAPE: Final = 3
-"""Shape of the gamma distribution of the tail; docs/likelihood.md has the evidence."""
+MORE_TAIL_STEPS: Final = 5
+"""Of the fit of each further shape, which begins with what the one before found."""
+TAIL_SHAPES: Final = (3, 2, 1, 5)
+"""Shapes of the gamma distribution of the tail, the first one tried first."""
+WORTH: Final = 3.0
+"""Further shapes are tried where the first leaves less than so often what the best model does."""
+SPLIT: Final = 1.6
+"""Over m, in radians: half of the distance of two returns in their second start."""
 DELAY_RAD: Final = 0.75
 """Mean of the prior of the tail's mean delay; its standard deviation is a factor e."""
 PRIOR: Final = 1.0
@@ -63,64 +77,91 @@ def nothing(like: Array, score: Array, found: Bank) -> None:
     """Begin with no return, at a score that every model is better than."""
     for i in range(PLANES):
         found[i] = 0.0 * like
-    found[SCORE] = score
+    found[SCORE], found[LEAST_SCORE] = score, score
+
+
+def decay(x: Array) -> Array:
+    """Return exp(-x), x >= 0, to single precision or 1e-15."""
+    t = 0.0625 * x
+    inverse = 1.0 / (1.0 + t * (1.0 + t * (0.5 + t * (1 / 6 + t * (1 / 24 + t * (1 / 120))))))
+    for _ in range(4):
+        inverse = inverse * inverse
+    return inverse
+
+
+def join(phase: Array, square: Array, score: Array, there: Array, found: Bank) -> None:
+    """Take a direct return, its phase's variance `square`, into the average where it is `there`."""
+    there = there & (square < 1e30)
+    gain = found[LEAST_SCORE] - score
+    better = gain > 0.0
+    factor = decay(0.5 * magnitude(gain))
+    total = select(better, found[TOTAL] * factor + 1.0, found[TOTAL] + factor)
+    share = select(better, 1.0 + 0.0 * factor, factor) / total
+    apart = phase - found[MEAN]
+    apart = select(apart > math.pi, apart - 2.0 * math.pi, apart)
+    apart = select(apart < -math.pi, apart + 2.0 * math.pi, apart)
+    mean = found[MEAN] + share * apart
+    mean = select(mean < 0.0, mean + 2.0 * math.pi, mean)
+    mean = select(mean >= 2.0 * math.pi, mean - 2.0 * math.pi, mean)
+    rest = 1.0 - share
+    spread = rest * found[SPREAD] + share * (square + rest * apart * apart)
+    found[SPREAD] = select(there, spread, found[SPREAD])
+    found[MEAN] = select(there, mean, found[MEAN])
+    found[TOTAL] = select(there, total, found[TOTAL])
+    found[LEAST_SCORE] = select(there & better, score, found[LEAST_SCORE])
 
 
 def offer_returns(
-    returns: Length,
-    x: Bank,
-    y: Bank,
-    w: Bank,
-    cost: Array,
-    penalty: Array,
-    allowed: Any,
-    found: Bank,
-) -> None:
-    """Put K returns in `found` wherever their score is better and they are `allowed`."""
+    order: Length, returns: Length, unknowns: Length, weight: Bank, x: Bank, y: Bank, w: Bank,
+    cost: Array, penalty: Array, threshold: float, allowed: Any, found: Bank,
+) -> None:  # fmt: skip
+    """Put K returns in `found` wherever their score is better and they are `allowed`.
+
+    They go into the average unless one of them has come to 0.
+    """
     count = len(returns)
     score = cost + (2.0 * count) * penalty
     better = (score < found[SCORE]) & allowed
     zero = 0.0 * cost
+    spread = bank(cost, unknowns, 0)
+    sharp.deviations(order, returns, unknowns, weight, x, y, spread)
+    strongest, faintest = w[0], w[0]
+    for k in range(1, count):
+        strongest, faintest = larger(strongest, w[k]), smaller(faintest, w[k])
+    phase, square = 9.0 + zero, zero
     for k in range(count):
+        size = larger(w[k], least(w[k]))
+        variance = spread[count + k] / (size * size)
+        at = phase_of(x[k], y[k])
+        first = (w[k] >= threshold * strongest) & (at < phase)
+        phase, square = select(first, at, phase), select(first, variance, square)
         found[X + k] = select(better, x[k], found[X + k])
         found[Y + k] = select(better, y[k], found[Y + k])
         found[WEIGHT + k] = select(better, w[k], found[WEIGHT + k])
+        found[WEIGHT_VARIANCE + k] = select(better, spread[k], found[WEIGHT_VARIANCE + k])
+        found[PHASE_VARIANCE + k] = select(better, variance, found[PHASE_VARIANCE + k])
     for k in range(count, MOST_RETURNS):
-        for first in (X, Y, WEIGHT):
-            found[first + k] = select(better, zero, found[first + k])
-    found[TAIL] = select(better, zero, found[TAIL])
-    found[LENGTH] = select(better, zero, found[LENGTH])
+        for plane in (X, Y, WEIGHT):
+            found[plane + k] = select(better, zero, found[plane + k])
+    for plane in (TAIL, LENGTH, SHAPE):
+        found[plane] = select(better, zero, found[plane])
     found[CHI_SQUARE] = select(better, cost, found[CHI_SQUARE])
     found[SCORE] = select(better, score, found[SCORE])
     found[COUNT] = select(better, float(count) + zero, found[COUNT])
+    join(phase, square, score - (count + 1.0) * MARGIN, allowed & (faintest > 0.0), found)
 
 
-def chosen(returns: Length, found: Bank) -> Any:
-    """Say where K returns were chosen."""
-    return (found[COUNT] == float(len(returns))) & ~has_tail(found)
+def split(x2: Bank, y2: Bank, w2: Bank, cosine: float, sine: float, xs: Bank, ys: Bank) -> None:
+    """Put two points in `xs` and `ys`, as far before the stronger one of two returns as behind."""
+    first = w2[0] >= w2[1]
+    x, y = select(first, x2[0], x2[1]), select(first, y2[0], y2[1])
+    xs[0], ys[0] = x * cosine + y * sine, y * cosine - x * sine
+    xs[1], ys[1] = x * cosine - y * sine, y * cosine + x * sine
 
 
-def has_tail(found: Bank) -> Any:
-    """Say where a return with a tail was chosen."""
-    return found[LENGTH] > 0.0
-
-
-def vary_returns(
-    order: Length, returns: Length, unknowns: Length, weight: Bank, found: Bank
-) -> None:
-    """Put the variances of K returns in `found` wherever they were chosen."""
-    count = len(returns)
-    here = chosen(returns, found)
-    spread = bank(weight[0], unknowns, 0)
-    x, y = bank(weight[0], returns, 0), bank(weight[0], returns, 0)
-    for k in range(count):
-        x[k], y[k] = found[X + k], found[Y + k]
-    sharp.deviations(order, returns, unknowns, weight, x, y, spread)
-    for k in range(count):
-        size = larger(found[WEIGHT + k], least(weight[0]))
-        found[WEIGHT_VARIANCE + k] = select(here, spread[k], found[WEIGHT_VARIANCE + k])
-        variance = spread[count + k] / (size * size)
-        found[PHASE_VARIANCE + k] = select(here, variance, found[PHASE_VARIANCE + k])
+def missed(cost: Array, free: Array) -> Any:
+    """Say where a fit leaves more than noise does, to 1 %: another start may do better."""
+    return cost > 2.0 * free + 4.0
 
 
 def start_of_tail(x: Bank, y: Bank, w: Bank, mean: float) -> tuple[Array, ...]:
@@ -146,43 +187,62 @@ def start_of_tail(x: Bank, y: Bank, w: Bank, mean: float) -> tuple[Array, ...]:
     return sx, sy, sw, sv, ratio, logarithm(ratio)
 
 
+def worth_more_shapes(cost: Array, found: Bank) -> Any:
+    """Say where a tail that leaves `cost` is near enough to the best model for other shapes."""
+    return cost < WORTH * (found[CHI_SQUARE] + 10.0)
+
+
 def offer_tail(
-    prior: float,
-    x: Array,
-    y: Array,
-    w: Array,
-    v: Array,
-    d: Array,
-    t: Array,
-    cost: Array,
-    penalty: Array,
-    allowed: Any,
+    order: Length, power: int, unknowns: Length, weight: Bank, prior: float, shapes: int, x: Array,
+    y: Array, w: Array, v: Array, d: Array, t: Array, cost: Array, penalty: Array, allowed: Any,
     found: Bank,
-) -> None:
-    """Put a return with a tail in `found` wherever its score is better and it is `allowed`."""
+) -> None:  # fmt: skip
+    """Put a return with a tail in `found` wherever its score is better and it is `allowed`.
+
+    In the average its shape is one of so many `shapes`, which share one prior.
+    """
     score = cost + 4.0 * penalty
     better = (score < found[SCORE]) & allowed
     zero = 0.0 * cost
+    spread = bank(cost, unknowns, 0)
+    tail.deviations(order, power, unknowns, weight, prior, w, v, d, spread)
     found[X], found[Y] = select(better, x, found[X]), select(better, y, found[Y])
     found[WEIGHT] = select(better, w, found[WEIGHT])
     for k in range(1, MOST_RETURNS):
-        for first in (X, Y, WEIGHT):
-            found[first + k] = select(better, zero, found[first + k])
+        for plane in (X, Y, WEIGHT):
+            found[plane + k] = select(better, zero, found[plane + k])
     found[TAIL], found[LENGTH] = select(better, v, found[TAIL]), select(better, d, found[LENGTH])
-    found[CHI_SQUARE] = select(better, larger(cost - prior * t * t, zero), found[CHI_SQUARE])
+    found[SHAPE] = select(better, float(power) + zero, found[SHAPE])
+    chi_square = larger(cost - prior * t * t, zero)
+    found[CHI_SQUARE] = select(better, chi_square, found[CHI_SQUARE])
     found[SCORE] = select(better, score, found[SCORE])
     found[COUNT] = select(better, 1.0 + zero, found[COUNT])
+    found[WEIGHT_VARIANCE] = select(better, spread[0], found[WEIGHT_VARIANCE])
+    found[TAIL_VARIANCE] = select(better, spread[1], found[TAIL_VARIANCE])
+    found[PHASE_VARIANCE] = select(better, spread[2], found[PHASE_VARIANCE])
+    found[LENGTH_VARIANCE] = select(better, spread[3], found[LENGTH_VARIANCE])
+    score = chi_square + 4.0 * penalty - (3.0 * MARGIN - 2.0 * math.log(shapes))
+    join(phase_of(x, y), spread[2], score, allowed & (v > 0.0), found)
 
 
-def vary_tail(
-    order: Length, powers: Length, unknowns: Length, weight: Bank, prior: float, found: Bank
-) -> None:
-    """Put the variances of a return with a tail in `found` wherever it was chosen."""
-    here = has_tail(found)
-    spread = bank(weight[0], unknowns, 0)
-    w, v, d = found[WEIGHT], found[TAIL], found[LENGTH]
-    tail.deviations(order, powers, unknowns, weight, prior, w, v, d, spread)
-    found[WEIGHT_VARIANCE] = select(here, spread[0], found[WEIGHT_VARIANCE])
-    found[PHASE_VARIANCE] = select(here, spread[2], found[PHASE_VARIANCE])
-    found[TAIL_VARIANCE] = select(here, spread[1], found[TAIL_VARIANCE])
-    found[LENGTH_VARIANCE] = select(here, spread[3], found[LENGTH_VARIANCE])
+def bar_of_returns(unknowns: int, penalty: Array, found: Bank) -> Array:
+    """Return the chi-square at which sharp returns weigh as much as the best model so far."""
+    return found[LEAST_SCORE] - float(unknowns) * penalty + (0.5 * unknowns + 1.0) * MARGIN
+
+
+def worth_more_returns(penalty: Array, found: Bank) -> Any:
+    """Say where three returns may count a fifth of what the best model so far does, or more."""
+    return bar_of_returns(6, penalty, found) > -3.0
+
+
+def bar_of_tail(penalty: Array, found: Bank) -> Array:
+    """Return the same of a return with a tail, but for the share of its shape."""
+    return found[LEAST_SCORE] - 4.0 * penalty + 3.0 * MARGIN
+
+
+def average_variance(numbers: Array, found: Bank) -> Array:
+    """Return the average's variance, larger where no model explains the moments.
+
+    By what the best one leaves over the numbers measured (Birge 1932).
+    """
+    return found[SPREAD] * larger(found[CHI_SQUARE] / numbers, 1.0 + 0.0 * numbers)

@@ -1,7 +1,7 @@
 """The likelihood estimate of every pixel, with what it is worth."""
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,14 +27,15 @@ from transientcam_moments.likelihood._chi_square import (
     explained,
     reduced,
 )
-from transientcam_moments.likelihood._choice import MARGIN, MOST_RETURNS, TAIL_SHAPE
+from transientcam_moments.likelihood._choice import MARGIN, MOST_RETURNS, TAIL_SHAPES
 from transientcam_moments.likelihood._planar import Data, fit
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, Returns, Separation, separate
 from transientcam_moments.noise import MomentNoise, free_of_scale
 
-MODEL_ERROR: Final = 4e-3
+MODEL_ERROR, CORRECTED_ERROR = 4e-3, 2e-3
 """What calibration, and light of no model, leave in the moments of a camera, over the largest: as
-large as the bias of Sec. 4.3. docs/likelihood.md has the evidence."""
+large as the bias of Sec. 4.3, and where the harmonics of the modulation were measured and taken
+out. docs/likelihood.md has the evidence."""
 
 
 class Likelihood(NamedTuple):
@@ -62,12 +63,17 @@ class Likelihood(NamedTuple):
         How many more real numbers were measured than the model has unknowns.
     count : integer array, shape (...)
         Number of returns; 0 where there is no light or a measured moment is not finite.
+    average_rad, average_std_rad : array, shape (...)
+        Phase of the direct return and its standard deviation, averaged over models: by how well
+        each explains the moments, the spread between them in the deviation. NaN without a return.
+    tail_shape : integer array, shape (...)
+        Shape p of the tail's gamma distribution; 0 without a tail.
     lead : array, shape (...)
         Of two returns by `two_returns`: by how much chi-square is larger with the best other pair
         that was found and has another direct return. Infinite where there is none, or none was
         looked for.
-    tail_shape : int
-        Shape p of the tail's gamma distribution, the same in all pixels.
+    threshold : float
+        Of the direct return that was averaged.
     """
 
     phase_rad: Array
@@ -81,8 +87,11 @@ class Likelihood(NamedTuple):
     chi_square: Array
     degrees_of_freedom: Array
     count: Array
+    average_rad: Array
+    average_std_rad: Array
+    tail_shape: Array
     lead: Array
-    tail_shape: int
+    threshold: float
 
     def __repr__(self) -> str:
         """State the shapes and spans of its arrays."""
@@ -123,14 +132,16 @@ class Likelihood(NamedTuple):
         """
         return explained(self.chi_square, self.degrees_of_freedom, significance)
 
-    def separate(self, threshold: float = DIRECT_THRESHOLD) -> Separation:
+    def separate(self, threshold: float | None = None) -> Separation:
         """Separate direct from indirect light.
 
         Parameters
         ----------
-        threshold : float
+        threshold : float, optional
             The direct return is the first whose weight is at least this share of the strongest
-            one's, 0 to 1. The tail is indirect, however strong it is.
+            one's, 0 to 1. The tail is indirect, however strong it is. That of the estimate, when
+            left out: its phase is the average over models. With another threshold it is that of
+            the model which was chosen.
 
         Raises
         ------
@@ -139,16 +150,19 @@ class Likelihood(NamedTuple):
         """
         xp = namespace(self.weight)
         returns = Returns(self.phase_rad, self.weight, self.tail, self.count)
-        direct, indirect, phase = separate(returns, threshold)
+        at = self.threshold if threshold is None else threshold
+        direct, indirect, phase = separate(returns, at)
         # a tail begins at its return, which may be too faint to be seen itself
         phase = xp.where(self.has_tail, self.phase_rad[0], phase)
+        phase = self.average_rad if at == self.threshold else phase
         return Separation(direct, indirect + self.tail, phase)
 
-    def direct_phase_std_rad(self, threshold: float = DIRECT_THRESHOLD) -> Array:
-        """Return the standard deviation (...) of the phase of the direct return; NaN without."""
+    def direct_phase_std_rad(self, threshold: float | None = None) -> Array:
+        """Return the standard deviation (...) of the phase that `separate` returns."""
+        if threshold in (None, self.threshold):
+            return self.average_std_rad
         xp = namespace(self.weight)
-        phase = self.separate(threshold).phase_rad
-        direct = self.phase_rad == phase
+        direct = self.phase_rad == self.separate(threshold).phase_rad
         std = xp.where(direct, self.phase_std_rad, 0).sum(axis=0)
         return xp.where(direct.any(axis=0), std, np.nan).astype(self.weight.dtype)
 
@@ -159,8 +173,9 @@ def likelihood(
     *,
     harmonics: Sequence[int] | None = None,
     returns: int = MOST_RETURNS,
-    tail_shape: int = TAIL_SHAPE,
+    tail_shape: int | Sequence[int] = TAIL_SHAPES,
     model_error: float = 0.0,
+    threshold: float = DIRECT_THRESHOLD,
     threads: int | None = None,
 ) -> Likelihood:
     """Estimate the returns of every pixel from moments whose noise is known.
@@ -179,12 +194,15 @@ def likelihood(
         0 to N - 1 when left out.
     returns : int
         Most sharp returns, 1 to 3.
-    tail_shape : int
-        Shape p of the tail's gamma distribution, 1 (exponential) to 6; 0 for no tail.
+    tail_shape : int or sequence of int
+        Shape p of the tail's gamma distribution, 1 (exponential) to 6, or several of them, of which
+        the first is tried first; 0 for no tail.
     model_error : float
         What is wrong with every part of a moment beside its noise, as calibration and the models
         leave it: a standard deviation over the pixel's largest moment, 0 to 1. It is part of all
         that is said of deviations and chi-square. `MODEL_ERROR` is a camera's.
+    threshold : float
+        Of `Likelihood.separate`, for the average over models.
     threads : int, optional
         How many the compiled kernel uses; all cores, when left out.
 
@@ -199,27 +217,36 @@ def likelihood(
     ShapeError
         When `b` is not 2 to 33 planes of numbers, or noise or harmonics don't fit it.
     ParameterError
-        For other numbers of returns, shapes of tails, harmonics or model errors, and for less
-        than one thread.
+        For other numbers of returns, shapes of tails, harmonics, model errors or thresholds, and
+        for less than one thread.
 
     Notes
     -----
-    Two models are fitted by weighted least squares, with all weights >= 0:
+    Two kinds of models are fitted by weighted least squares, with all weights >= 0:
     b_j = sum_k w_k exp(i j phi_k) with K = 1 to 3 returns, and
     b_j = exp(i j phi) (w + v / (1 - i j d)^p), a return w with a tail v whose density is that of a
     gamma distribution, of mean delay p d; log(p d) has a normal prior with mean log 0.75 and
-    standard deviation 1. The one with the least chi^2 + n_unknowns (log n_numbers + 6) is taken:
+    standard deviation 1. The one with the least chi^2 + n_unknowns (log n_numbers + 6) is shown:
     the Bayesian information criterion with a margin (see `MARGIN`).
 
-    A fit begins with the returns of the one before and the best of 4 m + 6 phases for one more,
-    the tail with two returns; it takes at most 4, 8, 10 and 10 of Levenberg and Marquardt's steps,
+    The phase of the direct return is the mean over all of them, with the weights exp(-s / 2):
+    s = chi^2 + n_unknowns log n_numbers, and 6 more for each component beside the first; tails of
+    several shapes share one prior. Its variance is the mean of theirs and what their phases spread.
+    More than one return is tried where one leaves enough to explain, and shapes of tails beside the
+    first one where that is not far worse than the best model.
+
+    A fit begins with the returns of the one before and the best of 4 m + 6 phases for one more, the
+    tail with two returns, further shapes with the first one. Where noise does not explain what they
+    leave, two returns begin once more with one that is split, and three with the brightest of
+    Pisarenko's. Each takes at most 4, 8, 10 and 10 of Levenberg and Marquardt's steps,
     none of which raises chi^2, with the weights eliminated (Golub and Pereyra 1973, Kaufman 1975),
     and no more where one changes chi^2 by too little to matter (`sharp.judge`). Noise
     smaller than the rounding of the moments' precision counts as that large.
 
     With b_0 measured, all light comes from returns and tail: a uniform part is not in the model.
     """
-    return fitted(b, noise, on_threads(threads), harmonics, returns, tail_shape, model_error)
+    spread = on_threads(threads)
+    return fitted(b, noise, spread, harmonics, returns, tail_shape, model_error, threshold)
 
 
 @free_of_scale
@@ -229,22 +256,27 @@ def fitted(
     spread: Spread,
     harmonics: Sequence[int] | None = None,
     returns: int = MOST_RETURNS,
-    tail_shape: int = TAIL_SHAPE,
+    tail_shape: int | Sequence[int] = TAIL_SHAPES,
     model_error: float = 0.0,
+    threshold: float = DIRECT_THRESHOLD,
 ) -> Likelihood:
     """Do what `likelihood` does, with the threads of a caller."""
     planes, trailing = moment_planes(b)
     if not 1 <= returns <= MOST_RETURNS:
         raise ParameterError("returns", returns, f"1 to {MOST_RETURNS}")
-    if not 0 <= tail_shape <= 6:
-        raise ParameterError("tail_shape", tail_shape, "0 to 6")
+    shapes = (tail_shape,) if isinstance(tail_shape, int) else tuple(tail_shape)
+    if not all(0 <= shape <= 6 for shape in shapes) or len(set(shapes)) != len(shapes):
+        raise ParameterError("tail_shape", tail_shape, "0 to 6, each once")
+    shapes = tuple(shape for shape in shapes if shape)
     in_range("model_error", model_error, 0.0, 1.0, "0 to 1")
+    in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
     planes, variance = dense(planes, noise, harmonics, trailing)
-    found = _estimated(planes, variance, returns, tail_shape, float(model_error), spread=spread)
+    options = returns, shapes, float(model_error), float(threshold)
+    found = _estimated(planes, variance, *options, spread=spread)
     shaped = [part.reshape((*part.shape[:-1], *trailing)) for part in found]
     xp = namespace(planes)
     lead = xp.broadcast_to(xp.asarray(np.inf, dtype=shaped[0].dtype), trailing)
-    return Likelihood._make([*shaped, lead, tail_shape])
+    return Likelihood._make([*shaped, lead, float(threshold)])
 
 
 def dense(
@@ -293,23 +325,19 @@ def variance_of(noise: MomentNoise, planes: Array, trailing: tuple[int, ...]) ->
 
 
 @accelerated("likelihood")
-def _estimated(
-    planes: Array, variance: Array, returns: int, tail_shape: int, error: float
-) -> tuple[Array, ...]:
-    """Return the attributes of `Likelihood` of flat planes."""
-    return by_blocks(
-        lambda b, variance: _estimate(b, variance, returns, tail_shape, error), planes, variance
-    )
+def _estimated(planes: Array, variance: Array, *options: Any) -> tuple[Array, ...]:
+    """Return the attributes of `Likelihood` of flat planes, but for `lead` and `threshold`."""
+    return by_blocks(lambda b, variance: _estimate(b, variance, *options), planes, variance)
 
 
 def _estimate(
-    b: Array, variance: Array, returns: int, tail_shape: int, error: float
+    b: Array, variance: Array, returns: int, shapes: tuple[int, ...], error: float, threshold: float
 ) -> tuple[Array, ...]:
     """Planar statement of `likelihood`: all harmonics from 0 on, (m + 1, P)."""
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
         data, scale, usable = prepared(b, variance, error)
-        found = fit(data, returns, tail_shape)
-        return results(found, data, scale, usable, min(returns, b.shape[0] - 1), tail_shape)
+        found = fit(data, returns, shapes, threshold)
+        return results(found, data, scale, usable, min(returns, b.shape[0] - 1))
 
 
 def prepared(b: Array, variance: Array, error: float) -> tuple[Data, Array, Array]:
@@ -348,10 +376,8 @@ def prepared(b: Array, variance: Array, error: float) -> tuple[Data, Array, Arra
     return data, scale, usable
 
 
-def results(
-    found: Array, data: Data, scale: Array, usable: Array, slots: int, tail_shape: int
-) -> tuple[Array, ...]:
-    """Return the attributes of `Likelihood` of what was found."""
+def results(found: Array, data: Data, scale: Array, usable: Array, slots: int) -> tuple[Array, ...]:
+    """Return the attributes of `Likelihood` of what was found, but for `lead` and `threshold`."""
     xp = namespace(found)
 
     def three(first: int) -> Array:
@@ -371,13 +397,16 @@ def results(
         planes = xp.where(used, planes, unused).astype(scale.dtype)
         return xp.take_along_axis(planes, order, axis=0)
 
+    averaged = used.any(axis=0)
     tailed = usable & has_tail & (found[choice.TAIL] > 0)
 
     def where_tail(plane: Array, otherwise: float) -> Array:
         return xp.where(tailed, plane, otherwise).astype(scale.dtype)
 
-    delay = tail_shape * found[choice.LENGTH]
+    shape = found[choice.SHAPE]
+    delay = shape * found[choice.LENGTH]
     unknowns = xp.where(has_tail, 4, 2 * count)
+    std = xp.sqrt(choice.average_variance(data.numbers, found))
     free = xp.where(usable, data.numbers - unknowns, 0)
     return (
         sorted_planes(phase, np.nan),
@@ -391,4 +420,7 @@ def results(
         xp.where(usable, found[choice.CHI_SQUARE], np.nan).astype(scale.dtype),
         free.astype(np.int32),
         used.sum(axis=0).astype(np.int32),
+        xp.where(averaged, found[choice.MEAN], np.nan).astype(scale.dtype),
+        xp.where(averaged, std, np.nan).astype(scale.dtype),
+        xp.where(tailed, shape, 0).astype(np.int32),
     )

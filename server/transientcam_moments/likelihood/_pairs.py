@@ -19,8 +19,9 @@ from transientcam_moments.errors import ParameterError
 from transientcam_moments.likelihood import _pair_fit as pair_fit
 from transientcam_moments.likelihood._choice import COUNT, PLANES, SCORE, nothing
 from transientcam_moments.likelihood._estimate import Likelihood, dense, prepared, results
-from transientcam_moments.likelihood._planar import Data, SharpFit, varied, where
+from transientcam_moments.likelihood._planar import Data, SharpFit, where
 from transientcam_moments.likelihood._sharp import SETTLED
+from transientcam_moments.moment_problem import DIRECT_THRESHOLD
 from transientcam_moments.noise import MomentNoise, free_of_scale
 
 PHASES_PER_PERIOD: Final = 8
@@ -61,6 +62,7 @@ def two_returns(
     *,
     harmonics: Sequence[int] | None = None,
     model_error: float = 0.0,
+    threshold: float = DIRECT_THRESHOLD,
     threads: int | None = None,
 ) -> Likelihood:
     """Estimate one or two returns of every pixel from moments at any frequencies.
@@ -74,7 +76,7 @@ def two_returns(
     harmonics : sequence of int, optional
         Which multiples of the base frequency they are, N different ones of 0 to 32 in any order;
         0 to N - 1 when left out. Two returns need two or more beside 0, and a test of them three.
-    model_error : float
+    model_error, threshold : float
         As of `likelihood`.
     threads : int, optional
         How many the compiled kernel uses; all cores, when left out.
@@ -102,7 +104,7 @@ def two_returns(
     a period of the highest frequency away or more, `lead` says how much worse it explains.
     In single precision a compiled kernel does the same; see `kernels`.
     """
-    return fitted_pairs(b, noise, on_threads(threads), harmonics, model_error)
+    return fitted_pairs(b, noise, on_threads(threads), harmonics, model_error, threshold)
 
 
 @free_of_scale
@@ -112,6 +114,7 @@ def fitted_pairs(
     spread: Spread,
     harmonics: Sequence[int] | None = None,
     model_error: float = 0.0,
+    threshold: float = DIRECT_THRESHOLD,
 ) -> Likelihood:
     """Do what `two_returns` does, with the threads of a caller."""
     planes, trailing = moment_planes(b)
@@ -122,44 +125,44 @@ def fitted_pairs(
     except TypeError as error:  # JAX's, of an array that has no values yet
         limit = "an array with values: pairs are chosen by these, outside of jax.jit and jax.grad"
         raise ParameterError("b", type(planes).__name__, limit) from error
-    found = _estimated(*filled, float(model_error), spread=spread)
+    found = _estimated(*filled, float(model_error), float(threshold), spread=spread)
     shaped = (xp.asarray(part).reshape((*part.shape[:-1], *trailing)) for part in found)
-    return Likelihood._make([*shaped, 0])
+    return Likelihood._make([*shaped, float(threshold)])
 
 
 @accelerated("pairs")
-def _estimated(planes: Array, variance: Array, error: float) -> tuple[Array, ...]:
-    """Return the attributes of `Likelihood` of flat planes."""
-    return by_blocks(lambda b, variance: _estimate(b, variance, error), planes, variance)
+def _estimated(planes: Array, variance: Array, *options: float) -> tuple[Array, ...]:
+    """Return the attributes of `Likelihood` of flat planes, but for `threshold`."""
+    return by_blocks(lambda b, variance: _estimate(b, variance, *options), planes, variance)
 
 
-def _estimate(b: Array, variance: Array, error: float) -> tuple[Array, ...]:
+def _estimate(b: Array, variance: Array, error: float, threshold: float) -> tuple[Array, ...]:
     with np.errstate(all="ignore"):  # invalid pixels are computed along and stay by themselves
         data, scale, usable = prepared(b, variance, error)
-        found, lead = _fit(data)
+        found, lead = _fit(data, threshold)
         slots = min(2, b.shape[0] - 1)
-        return *results(found, data, scale, usable, slots, 0), lead.astype(scale.dtype)
+        return *results(found, data, scale, usable, slots), lead.astype(scale.dtype)
 
 
-def _fit(data: Data) -> tuple[Array, Array]:
+def _fit(data: Data, threshold: float) -> tuple[Array, Array]:
     """Return what is found of every pixel (PLANES, P), as `choice` lays it out, and its lead."""
     found = [data.re[0]] * PLANES
     far = np.inf + 0 * data.penalty
     nothing(data.penalty, far, found)
     one = SharpFit.start(data, 1, None, far)
-    one.offer(found, data.numbers >= 0)
+    one.offer(found, data.numbers >= 0, threshold)
     planes = np.stack([*found, far])
 
     def more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
         found = list(planes[:-1])
         pair, lead = _best_pair(data)
-        pair.offer(found, data.numbers >= 4)
+        pair.offer(found, data.numbers >= 4, threshold)
         return np.stack([*found, np.where(found[COUNT] == 2, lead, np.inf)])
 
     # chi-square cannot become less than 0: no model with more unknowns is better below
     if len(data.re) > 2:
         planes = where(planes[SCORE] > 4 * data.penalty, more, data, (), planes)
-    return varied(data, planes[:-1], 2, 0), planes[-1]
+    return planes[:-1], planes[-1]
 
 
 class _Pairs:

@@ -1,31 +1,41 @@
 """The fits of all pixels: each model where the simpler ones leave something to explain."""
 
+import math
 from collections.abc import Callable, Sequence
-from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from transientcam_moments.arrays import Array, namespace
-from transientcam_moments.likelihood import _sharp as sharp, _tail as tail
+from transientcam_moments.arrays import Array, namespace, some
+from transientcam_moments.likelihood import (
+    _sharp as sharp,
+    _start as start,
+    _tail as tail,
+)
 from transientcam_moments.likelihood._choice import (
     DELAY_RAD,
+    MORE_TAIL_STEPS,
     MOST_RETURNS,
     PLANES,
     PRIOR,
     SCORE,
+    SPLIT,
     STEPS,
     TAIL_STEPS,
-    chosen,
-    has_tail,
+    bar_of_returns,
+    bar_of_tail,
+    missed,
     nothing,
     offer_returns,
     offer_tail,
+    split,
     start_of_tail,
     turns_of,
-    vary_returns,
-    vary_tail,
+    worth_more_returns,
+    worth_more_shapes,
 )
+from transientcam_moments.moment_problem import half_turns
 
 
 class Data(NamedTuple):
@@ -50,10 +60,11 @@ class Data(NamedTuple):
     numbers: Array
 
 
-def fit(data: Data, most: int, shape: int) -> Array:
+def fit(data: Data, most: int, shapes: tuple[int, ...], threshold: float) -> Array:
     """Return what is found of every pixel (PLANES, P), as `choice` lays it out.
 
-    `most` is the largest number of sharp returns, 1 to 3; `shape` that of the tail, 0 for none.
+    `most` is the largest number of sharp returns, 1 to 3; `shapes` are those of the tail, the first
+    one tried first; `threshold` is that of the direct return.
     """
     xp = namespace(data.re)
     m = data.re.shape[0] - 1
@@ -62,54 +73,56 @@ def fit(data: Data, most: int, shape: int) -> Array:
     far = np.inf + 0 * data.penalty
     nothing(data.penalty, far, found)
     one = SharpFit.start(data, 1, None, far)
-    one.offer(found, data.numbers >= 0)
+    one.offer(found, data.numbers >= 0, threshold)
     planes = xp.stack(found)
-    if most < 2 and not (shape and m >= 2):
-        return varied(data, planes, 1, 0)
+    if most < 2 and not (shapes and m >= 2):
+        return planes
 
-    def more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+    def of_two(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
         found = list(planes)
+        enough = data.numbers >= 4
         two = SharpFit.start(data, 2, before, np.inf + 0 * data.penalty)
         if most >= 2:
-            two.offer(found, data.numbers >= 4)
-        if shape:
-            _offer_tail(data, two, shape, found)
+            two.offer(found, enough, threshold)
+        late: tuple[Array, ...] = ()
+        if shapes:
+            x1, y1, w, v, ratio, t = start_of_tail(two.x, two.y, two.w, DELAY_RAD)
+            late = x1, y1, w, v, ratio * (DELAY_RAD / shapes[0]), t
+            late = _fit_tail(data, late, shapes[0], TAIL_STEPS, len(shapes), found)
+
+        def of_shapes(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+            found, state = list(planes), before
+            for last, shape in pairwise(shapes):
+                state = *state[:4], state[4] * (last / shape), state[5]
+                state = _fit_tail(data, state, shape, MORE_TAIL_STEPS, len(shapes), found)
+            return xp.stack(found)
+
+        def of_more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
+            found, free = list(planes), data.numbers - 4
+            two, cost = SharpFit.of(data, *before), before[3]
+            x, y = [cost] * 3, [cost] * 3
+            split(two.x, two.y, two.w, math.cos(SPLIT / m), math.sin(SPLIT / m), x, y)
+            two.try_also(x[:2], y[:2], missed(cost, free), np.inf + 0 * cost)
+            if most >= 2:
+                two.offer(found, (free >= 0) & (two.cost < cost - 1), threshold)
+            if most >= MOST_RETURNS:
+                bar = bar_of_returns(6, data.penalty, found)
+                three = SharpFit.start(data, 3, two.state(), bar)
+                turns = xp.asarray(half_turns(m, data.re.dtype))
+                start.pisarenko(three.order, turns, list(data.re), list(data.im), x, y)
+                three.try_also(x, y, missed(three.cost, free - 2), bar)
+                three.offer(found, free >= 2, threshold)
+            return xp.stack(found)
+
         done = xp.stack(found)
-        if most < MOST_RETURNS:
-            return done
-
-        def most_of_all(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
-            found = list(planes)
-            bar = found[SCORE] - 6 * data.penalty
-            SharpFit.start(data, 3, before, bar).offer(found, data.numbers >= 6)
-            return namespace(planes).stack(found)
-
-        still = done[SCORE] > 6 * data.penalty
-        return where(still, most_of_all, data, two.state(), done)
+        if len(shapes) > 1:
+            worth = worth_more_shapes(late[6], done) & enough
+            done = where(worth, of_shapes, data, late, done)
+        still = worth_more_returns(data.penalty, list(done)) & enough
+        return where(still, of_more, data, two.state(), done)
 
     # chi-square cannot become less than 0: no model with more unknowns is better below
-    planes = where(planes[SCORE] > 4 * data.penalty, more, data, one.state(), planes)
-    return varied(data, planes, most, shape)
-
-
-def varied(data: Data, planes: Array, most: int, shape: int) -> Array:
-    """Return what was found with the variances of what was chosen."""
-    order = (0,) * (len(data.re) - 1)
-
-    def of_returns(count: int, data: Data, before: tuple[Array, ...], planes: Array) -> Array:
-        found = list(planes)
-        vary_returns(order, (0,) * count, (0,) * (2 * count), data.weight, found)
-        return namespace(planes).stack(found)
-
-    def of_tail(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
-        found = list(planes)
-        vary_tail(order, (0,) * shape, (0,) * 4, data.weight, PRIOR, found)
-        return namespace(planes).stack(found)
-
-    for count in range(1, most + 1):
-        here = chosen((0,) * count, planes)
-        planes = where(here, partial(of_returns, count), data, (), planes)
-    return where(has_tail(planes), of_tail, data, (), planes) if shape else planes
+    return where(planes[SCORE] > 4 * data.penalty, of_two, data, one.state(), planes)
 
 
 def where(
@@ -155,11 +168,18 @@ class SharpFit:
         cls, data: Data, count: int, before: tuple[Array, ...] | None, bar: Array
     ) -> "SharpFit":
         """Add a return to those of another fit, and fit all of them; `bar` as in `sharp.judge`."""
-        x, y, w = before or ((), (), ())
+        x, y, w = before[:3] if before else ((), (), ())
         point = cls(data, x, y, w).new_return()
         fit = cls(data, *([*old, new] for old, new in zip((x, y, w), point, strict=True)))
         fit._look()
         fit.improve(STEPS[count - 1], bar)
+        return fit
+
+    @classmethod
+    def of(cls, data: Data, *state: Array) -> "SharpFit":
+        """Return the fit that had a `state`."""
+        fit = cls(data, *state[:3])
+        fit.cost = state[3]
         return fit
 
     @classmethod
@@ -171,8 +191,8 @@ class SharpFit:
         fit._look()
         return fit
 
-    def improve(self, steps: int, bar: Array) -> None:
-        """Take at most so many steps to a lower chi-square."""
+    def improve(self, steps: int, bar: Array, active: Array | None = None) -> None:
+        """Take at most so many steps to a lower chi-square, of the pixels that are `active`."""
         data = self.data
 
         def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
@@ -185,9 +205,11 @@ class SharpFit:
 
         banks = (tuple(part) for part in (self._pr, self._pi, self.w, self._rr, self._ri))
         damping = sharp.FIRST_DAMPING + 0 * self.cost
+        if active is not None:
+            damping = namespace(damping).where(active, damping, sharp.SETTLED + 0 * damping)
         state = _times(steps, step, (*banks, self.cost, damping), _moving)
         self._pr, self._pi, self.w, self._rr, self._ri = (list(part) for part in state[:5])
-        self.x, self.y = (part[:: len(self.order)] for part in (self._pr, self._pi))
+        self.x, self.y = (list(part[:: len(self.order)]) for part in (self._pr, self._pi))
         self.cost = state[5]
 
     def _look(self) -> None:
@@ -218,25 +240,44 @@ class SharpFit:
         return x, y, along / (apart * total)
 
     def state(self) -> tuple[Array, ...]:
-        """Return what a fit of one more return begins with."""
+        """Return points, weights and chi-square."""
         xp = namespace(self.cost)
-        return tuple(xp.stack(part) for part in (self.x, self.y, self.w))
+        return *(xp.stack(part) for part in (self.x, self.y, self.w)), self.cost
 
-    def offer(self, found: list[Array], allowed: Array) -> None:
-        """Put the returns where they are the better model."""
-        penalty = self.data.penalty
-        offer_returns(self.returns, self.x, self.y, self.w, self.cost, penalty, allowed, found)
+    def try_also(self, x: list[Array], y: list[Array], where: Array, bar: Array) -> None:
+        """Fit from other points on as well, and keep the better one, `where` that may help."""
+        xp = namespace(self.cost)
+        if not some(where):
+            return
+        other = SharpFit.at(self.data, x, y)
+        other.improve(STEPS[len(x) - 1], bar, where)
+        better = (other.cost < self.cost) & where
+        for mine, theirs in ((self.x, other.x), (self.y, other.y), (self.w, other.w)):
+            for k, plane in enumerate(theirs):
+                mine[k] = xp.where(better, plane, mine[k])
+        self.cost = xp.where(better, other.cost, self.cost)
+
+    def offer(self, found: list[Array], allowed: Array, threshold: float) -> None:
+        """Put the returns where they are the better model, and into the average."""
+        offer_returns(
+            self.order, self.returns, self.unknowns, self.data.weight, self.x, self.y, self.w,
+            self.cost, self.data.penalty, threshold, allowed, found,
+        )  # fmt: skip
 
 
-def _offer_tail(data: Data, two: SharpFit, shape: int, found: list[Array]) -> None:
-    """Fit a return with a tail, from two returns on, and put it where it is the better model."""
-    order, powers, unknowns = two.order, (0,) * shape, (0,) * 4
-    mean = DELAY_RAD / shape
-    x, y, w, v, ratio, t = start_of_tail(two.x, two.y, two.w, DELAY_RAD)
-    d = ratio * mean
+def _fit_tail(
+    data: Data, state: tuple[Array, ...], power: int, steps: int, shapes: int, found: list[Array]
+) -> tuple[Array, ...]:
+    """Fit a return with a tail, put it where it is the better model, and into the average.
+
+    Returns what it has become, and chi-square with the prior.
+    """
+    x, y, w, v, d, t = state
+    order, unknowns = (0,) * (len(data.re) - 1), (0,) * 4
     ur, ui, lag, qr, qi, rr, ri = ([d] * len(data.re) for _ in range(7))
-    tail.shape(order, powers, d, lag, qr, qi)
+    tail.shape(order, power, d, lag, qr, qi)
     tail.turn_back(order, data.re, data.im, x, y, ur, ui)
+    w, v = tail.weigh(order, data.weight, ur, ui, qr, qi)
     tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
     cost = sharp.chi_square(order, data.weight, rr, ri) + PRIOR * t * t
 
@@ -244,18 +285,18 @@ def _offer_tail(data: Data, two: SharpFit, shape: int, found: list[Array]) -> No
         lag, qr, qi, rr, ri = (list(part) for part in state[:5])
         x, y, w, v, d, t, cost, damping = state[5:]
         new = tail.step(
-            order, powers, unknowns, data.re, data.im, data.weight, PRIOR,
+            order, power, unknowns, data.re, data.im, data.weight, PRIOR,
             x, y, w, v, d, t, lag, qr, qi, rr, ri, cost, damping, bar,
         )  # fmt: skip
         return tuple(lag), tuple(qr), tuple(qi), tuple(rr), tuple(ri), *new
 
     banks = (tuple(part) for part in (lag, qr, qi, rr, ri))
     damping = sharp.FIRST_DAMPING + 0 * cost
-    bar = found[SCORE] - 4 * data.penalty
-    state = _times(TAIL_STEPS, step, (*banks, x, y, w, v, d, t, cost, damping), _moving)
-    x, y, w, v, d, t, cost, _ = state[5:]
-    allowed = data.numbers >= 4
-    offer_tail(PRIOR, x, y, w, v, d, t, cost, data.penalty, allowed, found)
+    bar = bar_of_tail(data.penalty, found)
+    state = _times(steps, step, (*banks, x, y, w, v, d, t, cost, damping), _moving)[5:12]
+    given = data.penalty, data.numbers >= 4, found
+    offer_tail(order, power, unknowns, data.weight, PRIOR, shapes, *state, *given)
+    return state
 
 
 def _moving(state: Any) -> bool:

@@ -4,7 +4,7 @@ b_j = exp(i j phi) (w + v / (1 - i j d)^p): light w at phase phi and light v tha
 the density of a gamma distribution of shape p and mean delay p d. A normal prior on log d ties d
 down where there is no tail to measure it by.
 
-Names as in `sharp`; ``powers`` is a tuple of length p. The unknowns are w, v, phi and log d, and
+Names as in `sharp`; ``power`` is p. The unknowns are w, v, phi and log d, and
 ``t`` is log(d) less its mean in the prior, kept beside d. The data are turned back by
 exp(-i j phi), in ``ur`` and ``ui``, which changes no weighted sum of squares; the moments of the
 tail are then in ``qr`` and ``qi``, and 1 / (1 + (j d)^2) in ``lag``.
@@ -30,14 +30,14 @@ SHORTEST, LONGEST = -3.2, 2.4
 """Limits of t: d within the prior's mean times their exponentials."""
 
 
-def shape(order: Length, powers: Length, d: Array, lag: Bank, qr: Bank, qi: Bank) -> None:
+def shape(order: Length, power: int, d: Array, lag: Bank, qr: Bank, qi: Bank) -> None:
     """Put the moments of a tail that begins at phase 0 in `qr` and `qi`."""
     qr[0], qi[0], lag[0] = 1.0 + 0.0 * d, 0.0 * d, 1.0 + 0.0 * d
     for j in range(1, len(order) + 1):
         lag[j] = 1.0 / (1.0 + (float(j) * j) * d * d)
         a, b = lag[j], float(j) * d * lag[j]  # 1 / (1 - i j d)
         p, q = a, b
-        for _ in range(len(powers) - 1):
+        for _ in range(power - 1):
             p, q = p * a - q * b, p * b + q * a
         qr[j], qi[j] = p, q
 
@@ -86,7 +86,7 @@ def remains(
 
 def information(
     order: Length,
-    powers: Length,
+    power: int,
     weight: Bank,
     w: Array,
     v: Array,
@@ -111,7 +111,7 @@ def information(
         tr, ti = qr[j], qi[j]
         fr, fi = -float(j) * (v * ti), float(j) * (w + v * tr)  # i j (w + v q)
         # v p q i j d / (1 - i j d)
-        size = (len(powers) * float(j)) * (d * v) * lag[j]
+        size = (float(power) * float(j)) * (d * v) * lag[j]
         c, s = -(float(j) * d) * size, size  # i / (1 - i j d) = (i - j d) / (1 + (j d)^2)
         lr, li = tr * c - ti * s, tr * s + ti * c
         # each derivative times the weight: of v, phi and log d
@@ -136,7 +136,7 @@ def information(
 
 def step(
     order: Length,
-    powers: Length,
+    power: int,
     unknowns: Length,
     data_r: Bank,
     data_i: Bank,
@@ -163,7 +163,7 @@ def step(
     """
     m = len(order)
     a, g = square_bank(cost, unknowns, 0), bank(cost, unknowns, 0)
-    information(order, powers, weight, w, v, d, lag, qr, qi, rr, ri, a, g)
+    information(order, power, weight, w, v, d, lag, qr, qi, rr, ri, a, g)
     a[15] = a[15] + prior
     g[3] = g[3] - prior * t
     for i in range(4):
@@ -184,7 +184,7 @@ def step(
     ur, ui, late = bank(cost, order, 1), bank(cost, order, 1), bank(cost, order, 1)
     sr, si = bank(cost, order, 1), bank(cost, order, 1)
     tr, ti = bank(cost, order, 1), bank(cost, order, 1)
-    shape(order, powers, td, late, sr, si)
+    shape(order, power, td, late, sr, si)
     turn_back(order, data_r, data_i, tx, ty, ur, ui)
     tw, tv = weigh(order, weight, ur, ui, sr, si)
     remains(order, ur, ui, tw, tv, sr, si, tr, ti)
@@ -208,7 +208,7 @@ def step(
 
 def deviations(
     order: Length,
-    powers: Length,
+    power: int,
     unknowns: Length,
     weight: Bank,
     prior: float,
@@ -219,10 +219,10 @@ def deviations(
 ) -> None:
     """Put the variances of w, v, phi and log d in `out`."""
     lag, qr, qi = bank(d, order, 1), bank(d, order, 1), bank(d, order, 1)
-    shape(order, powers, d, lag, qr, qi)
+    shape(order, power, d, lag, qr, qi)
     a, g = square_bank(d, unknowns, 0), bank(d, unknowns, 0)
     # the gradient, of what the tail itself would leave, is not asked for
-    information(order, powers, weight, w, v, d, lag, qr, qi, qr, qi, a, g)
+    information(order, power, weight, w, v, d, lag, qr, qi, qr, qi, a, g)
     a[15] = a[15] + prior
     decompose(unknowns, a)
     variances(unknowns, a, out)

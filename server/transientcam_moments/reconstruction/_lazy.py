@@ -12,6 +12,7 @@ from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
 from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.images import HarmonicCorrection, Repair, smooth
 from transientcam_moments.likelihood import (
+    CORRECTED_ERROR,
     MODEL_ERROR,
     MOST_RETURNS,
     Likelihood,
@@ -366,13 +367,17 @@ class Reconstruction:
         most = MOST_RETURNS
         if harmonics is not None:
             most = min(most, sum(j > 0 for j in harmonics))
-        return fitted(moments, noise, self._spread, harmonics, most, model_error=error)
+        at = self.settings.threshold
+        return fitted(
+            moments, noise, self._spread, harmonics, most, model_error=error, threshold=at
+        )
 
     @cached_property
     def two_returns(self) -> Likelihood:
         """One or two returns, as many as the noise justifies, with what they are worth."""
         moments, noise, harmonics, error = self._evidence
-        return fitted_pairs(moments, noise, self._spread, harmonics, error)
+        at = self.settings.threshold
+        return fitted_pairs(moments, noise, self._spread, harmonics, error, at)
 
     @cached_property
     def unwrapped(self) -> Unwrapped:
@@ -390,7 +395,9 @@ class Reconstruction:
     @property
     def _evidence(self) -> tuple[Array, MomentNoise | None, tuple[int, ...] | None, float]:
         """Moments as measured, their noise and multiples, and what is wrong with them beside it."""
-        error = 0.0 if self.noise is None else MODEL_ERROR  # which assumed noise is large beside
+        error = MODEL_ERROR if self._correction is None else CORRECTED_ERROR
+        if self.noise is None:  # assumed noise is large beside it
+            error = 0.0
         return self.smoothed, self.noise, None, error
 
     @cached_property

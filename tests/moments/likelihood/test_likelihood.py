@@ -277,6 +277,52 @@ def test_a_brighter_scene_with_as_much_more_noise_has_the_same_returns(factor: f
     assert np.allclose(after.weight_std / factor, before.weight_std, rtol=1e-4, equal_nan=True)
 
 
+def test_models_count_by_their_scores_also_around_the_turn() -> None:
+    random = np.random.default_rng(4)
+    phase = np.remainder(random.normal(0, 0.2, (4, 500)), 2 * np.pi)
+    square, score = random.uniform(0.01, 0.2, (2, 4, 500))
+    score *= 100
+    found = [np.zeros(500)] * choice.PLANES
+    choice.nothing(phase[0], np.full(500, np.inf), found)
+
+    for each in zip(phase, square, score, strict=True):
+        choice.join(*each, np.full(500, fill_value=True), found)
+
+    weight = np.exp(-(score - score.min(axis=0)) / 2)
+    weight /= weight.sum(axis=0)
+    off = np.remainder(phase + np.pi, 2 * np.pi) - np.pi
+    mean = (weight * off).sum(axis=0)
+    variance = (weight * (square + (off - mean) ** 2)).sum(axis=0)
+    around = np.remainder(found[choice.MEAN] - mean + np.pi, 2 * np.pi) - np.pi
+    assert np.abs(around).max() < 1e-5
+    assert found[choice.SPREAD] == pytest.approx(variance, abs=1e-5)
+
+
+def test_the_average_is_that_of_the_threshold_and_others_are_of_the_chosen_model() -> None:
+    b = some_moments(pixels=200)
+    noise = equal_noise(b, 0.01)
+    found = tm.likelihood(b, noise, threshold=0.4)
+
+    assert np.array_equal(found.separate().phase_rad, found.average_rad, equal_nan=True)
+    assert np.array_equal(found.direct_phase_std_rad(0.4), found.average_std_rad, equal_nan=True)
+    chosen, by_default = found.separate(0.1), tm.likelihood(b, noise).separate(0.1)
+    lone = (found.count == 1) & ~found.has_tail
+    assert np.isin(chosen.phase_rad, found.phase_rad).all()
+    assert np.allclose(chosen.phase_rad[lone], by_default.phase_rad[lone], atol=1e-2)
+    assert not np.allclose(found.average_rad, by_default.phase_rad)
+
+
+def test_moments_of_no_model_have_a_deviation_as_large_as_their_misfit() -> None:
+    b = some_moments(pixels=400)
+    found = tm.likelihood(b, equal_noise(b, 1e-4), returns=1, tail_shape=0)
+
+    misfit = np.sqrt(found.chi_square / (2 * len(b) - 1))
+    assert (misfit > 10).mean() > 0.5
+    assert found.average_std_rad == pytest.approx(
+        found.phase_std_rad[0] * np.maximum(misfit, 1), rel=1e-4
+    )
+
+
 @pytest.mark.parametrize("m", [1, 2, 5, 8])
 def test_starts_are_tried_at_phases_all_around_the_turn(m: int) -> None:
     turns = choice.turns_of(m)
@@ -309,7 +355,8 @@ def test_no_step_raises_chi_square(monkeypatch: pytest.MonkeyPatch) -> None:
 
     tm.likelihood(b, equal_noise(b, 0.003))
 
-    assert len(costs) == sum(choice.STEPS) + choice.TAIL_STEPS
+    again = sum(choice.STEPS[1:]) + choice.MORE_TAIL_STEPS * (len(choice.TAIL_SHAPES) - 1)
+    assert len(costs) == sum(choice.STEPS) + choice.TAIL_STEPS + again
     assert all((after <= before).all() for before, after in costs)
 
 
