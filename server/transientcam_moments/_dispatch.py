@@ -68,6 +68,7 @@ MOST_ROOTS: Final = 8
 """The largest m with kernels for eigenvalues and returns."""
 _SINGLE_ONLY: Final = (
     "smooth",
+    "neighbours",
     "measure",
     "separate",
     "reconstruct",
@@ -77,6 +78,7 @@ _SINGLE_ONLY: Final = (
 )
 _DOUBLE_ONLY: Final = ("covariance", "direct_noise")
 _FEW_ROOTS: Final = (
+    "neighbours",
     "pisarenko",
     "smallest_eigenvalue",
     "reconstruct",

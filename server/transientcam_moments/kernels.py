@@ -74,6 +74,7 @@ LANES = (
     "pisarenko",
     "smallest_eigenvalue",
     "smooth",
+    "neighbours",
     "measure",
     "separate",
     "levinson",
@@ -86,7 +87,7 @@ LANES = (
     "covariance",
     "direct_noise",
 )
-WHEN_NEEDED = ("likelihood", "pairs", "harmonics", "peaks")
+WHEN_NEEDED = ("likelihood", "pairs", "harmonics", "peaks", "neighbours")
 """Those that `compile_in_background` leaves out, but for one of them of its first order."""
 Progress = Callable[[int, int, str], None]
 """Takes kernels done, kernels in all, and the name of the next one ("" after the last)."""
@@ -204,7 +205,7 @@ def compile_in_background(
 ) -> threading.Thread:
     """Start compiling on a thread and return it; arguments and errors as in `compile`.
 
-    Leaves out "harmonics", "pairs" and "peaks", which few cameras need, and "likelihood", which
+    Leaves out "harmonics", "pairs", "peaks" and "neighbours", which few cameras need, and "likelihood", which
     takes long to compile: they are prepared by themselves when they are first needed. ``also``
     names one of them that is compiled for the first order all the same; "pairs" before all others,
     since a camera whose frequencies have gaps needs little else.

@@ -15,6 +15,7 @@ through the estimator itself. ::
 from transientcam_moments.noise import (
     _first_order as first_order,
     _interpolation as interpolation,
+    _neighbours as neighbours,
 )
 from transientcam_moments.noise._ambient import ambient_light
 from transientcam_moments.noise._cramer_rao import CramerRao, cramer_rao
@@ -29,17 +30,20 @@ from transientcam_moments.noise._moments import (
     smoothed_of,
     smoothing_factor,
 )
+from transientcam_moments.noise._neighbours import Averaged, average_neighbours
 from transientcam_moments.noise._returns import ReturnNoise, direct_phase_noise, return_noise
 from transientcam_moments.noise._scatter import scatter
 from transientcam_moments.noise._sensor import Sensor
 
 __all__ = [
+    "Averaged",
     "CramerRao",
     "DensityNoise",
     "MomentNoise",
     "ReturnNoise",
     "Sensor",
     "ambient_light",
+    "average_neighbours",
     "cramer_rao",
     "density_noise",
     "density_std",
@@ -48,6 +52,7 @@ __all__ = [
     "first_order",
     "interpolation",
     "moment_noise",
+    "neighbours",
     "own_share",
     "return_noise",
     "scatter",

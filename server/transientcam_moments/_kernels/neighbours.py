@@ -1,0 +1,213 @@
+"""Averaging moments over neighbours that agree, see `noise.average_neighbours`."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from transientcam_compiled import Spread, at_once
+from transientcam_moments._dispatch import LEAST_PIXELS
+from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import (
+    Booleans,
+    Complexes,
+    Places,
+    RealPlane,
+    RealPlanes,
+    Reals,
+    Table,
+)
+from transientcam_moments._kernels.compiled_entry import entry
+from transientcam_moments._kernels.portable import bank, larger, select, smaller, tiny
+from transientcam_moments.arrays import Length, Plane
+from transientcam_moments.noise import neighbours
+
+_ROWS = 8  # of a part at least
+
+
+@njit(forceinline=True, error_model="numpy")
+def _agreement(place: float, there: Plane, doubt: Plane) -> Any:
+    return place * there * smaller(larger(2.0 - doubt, 0.0 * doubt), 0.0 * doubt + 1.0)
+
+
+@njit(nogil=True, error_model="numpy")
+def _round(
+    order: Length, multiples: RealPlane, raw: RealPlanes, current: RealPlanes, weight: RealPlanes,
+    present: RealPlane, share: RealPlane, ahead: Places, places: RealPlane, misfit: float, shift:
+    float, following: RealPlanes, left: RealPlane, start: int, stop: int,
+) -> None:  # fmt: skip
+    """Write averages over one neighbourhood, and what they leave of the variance.
+
+    Pictures lie flat with a margin between rows; planes of moments hold real and imaginary parts.
+    """
+    one = simd.ones(present, 1)
+    size = len(order) + 1
+    er, ei, w = bank(one, order, 1), bank(one, order, 1), bank(one, order, 1)
+    tr, ti = bank(one, order, 1), bank(one, order, 1)
+    mr, mi = bank(one, order, 1), bank(one, order, 1)
+    for p in range(start, stop, simd.width(one)):
+        norm = 0.0 * one
+        for j in range(size):
+            er[j], ei[j] = simd.load(one, current[2 * j], p), simd.load(one, current[2 * j + 1], p)
+            mr[j], mi[j] = simd.load(one, raw[2 * j], p), simd.load(one, raw[2 * j + 1], p)
+            w[j] = simd.load(one, weight[j], p)
+            tr[j], ti[j] = multiples[j] * w[j] * er[j], multiples[j] * w[j] * ei[j]
+            norm = norm + multiples[j] * (tr[j] * er[j] + ti[j] * ei[j])
+        there = simd.load(one, present, p)
+        total, square = there, there
+        worth = 1.0 / simd.load(one, share, p)
+        of_shift, of_misfit = shift * worth / larger(norm, tiny(one)), misfit * worth
+        for k in range(len(ahead)):
+            a, c = p + ahead[k], p - ahead[k]
+            uu, vv, uv = 0.0 * one, 0.0 * one, 0.0 * one
+            tu, tv = 0.0 * one, 0.0 * one
+            for j in range(size):
+                ur = er[j] - simd.load(one, current[2 * j], a)
+                ui = ei[j] - simd.load(one, current[2 * j + 1], a)
+                vr = er[j] - simd.load(one, current[2 * j], c)
+                vi = ei[j] - simd.load(one, current[2 * j + 1], c)
+                wr, wi = w[j] * ur, w[j] * ui
+                uu = uu + wr * ur + wi * ui
+                uv = uv + wr * vr + wi * vi
+                vv = vv + w[j] * (vr * vr + vi * vi)
+                tu = tu + (tr[j] * ui - ti[j] * ur)
+                tv = tv + (tr[j] * vi - ti[j] * vr)
+            by_a, by_c = simd.load(one, present, a), simd.load(one, present, c)
+            both, mirrored = 0.25 * (uu + vv) + 0.5 * uv, 0.25 * (tu + tv) * (tu + tv)
+            tu, tv = tu * tu, tv * tv
+            of_a = select(by_c > 0.0, both, uu) + neighbours.MISFIT_OF_ONE * uu
+            of_c = select(by_a > 0.0, both, vv) + neighbours.MISFIT_OF_ONE * vv
+            late_a = select(by_c > 0.0, mirrored, tu) + neighbours.SHIFT_OF_ONE * tu
+            late_c = select(by_a > 0.0, mirrored, tv) + neighbours.SHIFT_OF_ONE * tv
+            wa = _agreement(places[k], by_a, larger(of_misfit * of_a, of_shift * late_a))
+            wc = _agreement(places[k], by_c, larger(of_misfit * of_c, of_shift * late_c))
+            for j in range(size):
+                mr[j] = (
+                    mr[j] + wa * simd.load(one, raw[2 * j], a) + wc * simd.load(one, raw[2 * j], c)
+                )
+                mi[j] = (
+                    mi[j]
+                    + wa * simd.load(one, raw[2 * j + 1], a)
+                    + wc * simd.load(one, raw[2 * j + 1], c)
+                )
+            total = total + (wa + wc)
+            square = square + (wa * wa + wc * wc)
+        inverse = 1.0 / larger(total, tiny(one))
+        for j in range(size):
+            simd.store(following[2 * j], p, mr[j] * inverse)
+            simd.store(following[2 * j + 1], p, mi[j] * inverse)
+        simd.store(left, p, select(there > 0.0, square * inverse * inverse, one))
+
+
+@njit(nogil=True, error_model="numpy")
+def _residuals(
+    order: Length, multiples: RealPlane, raw: RealPlanes, current: RealPlanes, weight: RealPlanes,
+    present: RealPlane, late: RealPlane, known: RealPlane, start: int, stop: int,
+) -> None:  # fmt: skip
+    """Write how much later the light of pixels is than averaged, weighted, and that weight."""
+    one = simd.ones(present, 1)
+    for p in range(start, stop, simd.width(one)):
+        shift, norm = 0.0 * one, 0.0 * one
+        for j in range(len(order) + 1):
+            er, ei = simd.load(one, current[2 * j], p), simd.load(one, current[2 * j + 1], p)
+            rr, ri = simd.load(one, raw[2 * j], p) - er, simd.load(one, raw[2 * j + 1], p) - ei
+            w = multiples[j] * simd.load(one, weight[j], p)
+            shift = shift + w * (er * ri - ei * rr)
+            norm = norm + multiples[j] * w * (er * er + ei * ei)
+        there = simd.load(one, present, p)
+        simd.store(late, p, there * shift)
+        simd.store(known, p, there * norm)
+
+
+@njit(nogil=True, error_model="numpy")
+def _add_flattened(
+    lines: Table, late: RealPlane, known: RealPlane, present: RealPlane, share: RealPlane,
+    out: RealPlane, start: int, stop: int,
+) -> None:  # fmt: skip
+    """Add what averaging has flattened along lines to the share of the variance."""
+    one = simd.ones(present, 1)
+    for p in range(start, stop, simd.width(one)):
+        best, of_line = 0.0 * one, one
+        for i in range(lines.shape[0]):
+            shift, norm = 0.0 * one, 0.0 * one
+            for k in range(lines.shape[1]):
+                shift = shift + simd.load(one, late, p + lines[i, k])
+                norm = norm + simd.load(one, known, p + lines[i, k])
+            found = shift * shift / larger(norm, tiny(one))
+            better = found > best
+            best, of_line = select(better, found, best), select(better, norm, of_line)
+        beyond = larger(best - neighbours.EXPECTED, 0.0 * one)
+        flattened = beyond * simd.load(one, known, p) / larger(of_line, tiny(one))
+        left = smaller(simd.load(one, share, p) + flattened, one)
+        simd.store(out, p, select(simd.load(one, present, p) > 0.0, left, one))
+
+
+def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
+    """Compile averaging over neighbours of order m; see the table in ``_kernels``."""
+    order = (0,) * m
+    average, residuals = entry(_round, m, precision), entry(_residuals, m, precision)
+    add_flattened = entry(_add_flattened, m, precision)
+
+    def kernel(
+        raw: Complexes,
+        weight: Reals,
+        present: Booleans,
+        multiples: tuple[int, ...],
+        numbers: float,
+        *,
+        spread: Spread = at_once,
+    ) -> Any:
+        height, width = raw.shape[1:]
+        row = width + neighbours.REACH  # a margin between rows serves both of them
+        first = neighbours.REACH * (row + 1)
+        length = 2 * first + height * row + LEAST_PIXELS
+
+        def room(planes: int, fill: float = 0.0) -> tuple[Any, Any]:
+            """Return flat planes, and the view of them that is the picture."""
+            flat = np.full((planes, length), fill, np.float32)
+            view = flat[:, first : first + height * row].reshape(planes, height, row)
+            return flat, view[..., :width]
+
+        given, view = room(2 * len(raw))
+        view[0::2], view[1::2] = raw.real, raw.imag
+        weights, view = room(len(raw))
+        view[...] = weight
+        there, view = room(1)
+        view[0] = present
+        current, (other, _), (share, _), (left, shown) = (
+            given, room(2 * len(raw)), room(1, 1.0), room(1, 1.0),
+        )  # fmt: skip
+        spare = np.zeros_like(given)
+        orders = np.array(multiples, np.float32)
+
+        def by_rows(run: Callable[[int, int], None]) -> None:
+            spread(lambda top, end: run(first + top * row, first + end * row), height, _ROWS)
+
+        for radius_px in neighbours.RADII_PX:
+            near = neighbours.neighbourhood(radius_px)
+            by_rows(
+                partial(
+                    average, order, orders, given, current, weights, there[0], share[0],
+                    np.array([dy * row + dx for dy, dx, _ in near]),
+                    np.array([place for *_, place in near], np.float32),
+                    1 / (neighbours.MOST_MISFIT * float(numbers)), 2 / neighbours.MOST_SHIFT,
+                    other, left[0],
+                )  # fmt: skip
+            )
+            current, other = other, spare if current is given else current
+            share, left = left, share
+        late, known = np.zeros((2, length), np.float32)
+        by_rows(
+            partial(residuals, order, orders, given, current, weights, there[0], late, known)
+        )
+        lines = np.array([[dy * row + dx for dy, dx in line] for line in neighbours.lines()])
+        by_rows(partial(add_flattened, lines, late, known, there[0], share[0], left[0]))
+        moments = np.empty(raw.shape, np.complex64)
+        view = current[:, first : first + height * row].reshape(-1, height, row)[..., :width]
+        moments.real, moments.imag = view[0::2], view[1::2]
+        final = left[0, first : first + height * row].reshape(height, row)[:, :width]
+        return moments, np.ascontiguousarray(final)
+
+    return kernel

@@ -1,0 +1,203 @@
+"""Averaging moments over neighbouring pixels, but not across edges: adaptive weights."""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from transientcam_compiled import Spread, at_once
+from transientcam_moments._dispatch import accelerated
+from transientcam_moments.arrays import Array, as_array, namespace, squared, summary
+from transientcam_moments.errors import ShapeError
+from transientcam_moments.noise._moments import MomentNoise
+
+RADII_PX: Final = (1.5, 2.2, 3.2, 4.5)
+"""Of the neighbourhoods, one a round."""
+REACH: Final = 4
+"""Rows and columns beside a pixel that the largest neighbourhood reaches."""
+MOST_MISFIT: Final = 4.0
+"""Reduced chi-square of two pixels from which they are not averaged; half of it still is fully."""
+MOST_SHIFT: Final = 8.5
+"""The same for a common shift of all light in time, 1.5 times the chi-square of one number."""
+MISFIT_OF_ONE: Final = 0.02
+SHIFT_OF_ONE: Final = 0.001
+"""Weights of a neighbour alone beside those of its mean with its mirror image."""
+EXPECTED: Final = 4.0
+"""Chi-square of the clearest line of residuals that noise explains."""
+
+
+class Averaged(NamedTuple):
+    """Moments averaged over neighbours.
+
+    Attributes
+    ----------
+    moments : array, shape (m + 1, H, W)
+    noise : MomentNoise
+        What is left in each pixel by itself; pixels nearer than 9 px share noise.
+    share : array, shape (H, W)
+        Of a pixel's own variance that is left: one over the number of pixels averaged, and more
+        where averaging may have flattened something.
+    """
+
+    moments: Array
+    noise: MomentNoise
+    share: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
+
+
+def average_neighbours(
+    moments: Array,
+    noise: MomentNoise,
+    *,
+    multiples: tuple[int, ...] | None = None,
+    left_out: Array | None = None,
+    spread: Spread = at_once,
+) -> Averaged:
+    """Average each pixel with those neighbours whose moments differ by no more than noise.
+
+    Parameters
+    ----------
+    moments : array, shape (m + 1, H, W)
+        Calibrated, of each pixel by itself: not smoothed.
+    noise : MomentNoise
+        Theirs, (m + 1, H, W) or what broadcasts to it; 0 in planes that were not measured.
+    multiples : tuple of int, optional
+        Of the base frequency, one a plane: (0, 1, ..., m), when left out.
+    left_out : boolean array, shape (H, W), optional
+        Pixels, such as saturated ones, that stay as they are and count as nothing for the others;
+        so do those with a moment that isn't finite, or without noise.
+    spread : callable
+        How the compiled kernel uses several threads, as `kernels.over` returns it.
+
+    Returns
+    -------
+    Averaged
+
+    Raises
+    ------
+    ShapeError
+        When the moments are no image, or something else has another shape.
+
+    Notes
+    -----
+    Propagation-separation (Polzehl and Spokoiny, 2006): in rounds of growing radius a neighbour's
+    weight falls with its distance, and to 0 with the misfit of the estimates of the round before,
+    over their noise. Raw moments are averaged each time: an error isn't smoothed twice. Two things
+    are particular. The mean of a neighbour and its mirror image is held against the pixel, so that
+    slanted surfaces pass; and beside the misfit of all moments, that in the direction in which all
+    light comes later, d b_j = i j b_j: one number of 2 m + 1, so that small steps in range show.
+
+    What is flattened all the same, such as a ridge a few deviations high, leaves residuals of one
+    sign along a line. The square of the clearest shift along lines of 9 pixels, less what noise
+    explains, counts as noise.
+    """
+    moments = as_array(moments)
+    if moments.ndim != 3:
+        raise ShapeError("moments", f"of shape {tuple(moments.shape)}", "(m + 1, H, W)")
+    order = tuple(range(len(moments))) if multiples is None else tuple(multiples)
+    if len(order) != len(moments):
+        raise ShapeError("multiples", f"{len(order)} numbers", f"{len(moments)}, one a plane")
+    xp = namespace(moments)
+    shape = tuple(moments.shape[1:])
+    if left_out is not None and tuple(left_out.shape) != shape:
+        raise ShapeError("left_out", f"of shape {tuple(left_out.shape)}", f"{shape}")
+    try:
+        variance = xp.broadcast_to(xp.asarray(noise.variance), moments.shape)
+    except ValueError:
+        limit = f"to fit {tuple(moments.shape)}"
+        raise ShapeError("noise", f"of shape {tuple(noise.variance.shape)}", limit) from None
+    present = xp.isfinite(moments).all(axis=0) & xp.isfinite(variance).all(axis=0)
+    present = present & (variance > 0).any(axis=0)
+    if left_out is not None:
+        present = present & ~xp.asarray(left_out)
+    raw = xp.where(present, moments, 0)
+    # powers of two round nothing, and no square leaves the numbers there are
+    size = 2.0 ** xp.ceil(xp.log2(xp.maximum(abs(raw).max(), np.finfo(raw.real.dtype).tiny)))
+    known = present & (variance > 0)
+    std = xp.sqrt(xp.where(known, variance, 1)).astype(raw.real.dtype)
+    weight = xp.where(known, (size / std) ** 2, 0).astype(raw.real.dtype)
+    measured = (weight > 0).reshape((len(raw), -1)).any(axis=1)
+    numbers = xp.maximum((measured * np.array([2 if j else 1 for j in order])).sum(), 1)
+    scaled = (raw / size).astype(moments.dtype)
+    found, share = _averaged(scaled, weight, present, order, numbers, spread=spread)
+    averaged = xp.where(present, found * size, moments).astype(moments.dtype)
+    return Averaged(averaged, MomentNoise((variance * share).astype(share.dtype)), share)
+
+
+def neighbourhood(radius_px: float) -> list[tuple[int, int, float]]:
+    """Return row, column and weight of the neighbours within a radius, one of each mirrored two."""
+    reach = range(-REACH, REACH + 1)
+    pairs = [(row, column) for row in reach for column in reach if (row, column) > (0, 0)]
+    weights = (1 - (row**2 + column**2) / (radius_px + 0.5) ** 2 for row, column in pairs)
+    return [(*pair, weight) for pair, weight in zip(pairs, weights, strict=True) if weight > 0]
+
+
+def lines() -> list[list[tuple[int, int]]]:
+    """Return the lines of 9 pixels through a pixel, in 12 directions, as rows and columns."""
+    along = range(-REACH, REACH + 1)
+    steps = [[0 for _ in along], list(along), [i // 2 for i in along], [-(-i // 2) for i in along]]
+    steep = [list(zip(along, each, strict=True)) for each in steps]
+    steep += [[(row, -column) for row, column in line] for line in steep[1:]]
+    flat = [[(column, row) for row, column in line] for line in steep]
+    return [*steep, *(line for line in flat if abs(line[0][0]) < REACH)]
+
+
+@accelerated("neighbours", of="F")
+def _averaged(
+    raw: Array, weight: Array, present: Array, multiples: tuple[int, ...], numbers: Array
+) -> tuple[Array, Array]:
+    """Planar statement: averages of moments about 1 in size, and the share of variance left.
+
+    ``weight`` is one over the variances, ``numbers`` how many were measured in a pixel.
+    """
+    xp = namespace(raw)
+    least = np.finfo(weight.dtype).tiny
+    order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
+    there = present.astype(weight.dtype)
+    current, share = raw, xp.ones_like(there)
+    for radius_px in RADII_PX:
+        tangent = order * weight * current
+        shift = 2 / MOST_SHIFT / xp.maximum((order * (tangent.conj() * current).real).sum(0), least)
+        misfit = 1 / (MOST_MISFIT * numbers)
+        total, square, mean = there, there, raw
+        for row, column, place in neighbourhood(radius_px):
+            ahead, behind = ((row, column), (-row, -column))
+            by = [_shifted(there, *offset) for offset in (ahead, behind)]
+            off = [current - _shifted(current, *offset) for offset in (ahead, behind)]
+            alone = [(weight * squared(each)).sum(0) for each in off]
+            later = [(tangent.conj() * each).imag.sum(0) for each in off]
+            product = (weight * (off[0] * off[1].conj()).real).sum(0)
+            both = (alone[0] + alone[1]) / 4 + product / 2
+            mirrored = ((later[0] + later[1]) / 2) ** 2
+            for i, offset in enumerate((ahead, behind)):
+                single = later[i] ** 2
+                one = xp.where(by[1 - i] > 0, both, alone[i]) + MISFIT_OF_ONE * alone[i]
+                two = xp.where(by[1 - i] > 0, mirrored, single) + SHIFT_OF_ONE * single
+                doubt = xp.maximum(misfit * one, shift * two) / share
+                agreement = place * by[i] * xp.clip(2 - doubt, 0, 1)
+                mean = mean + agreement * _shifted(raw, *offset)
+                total, square = total + agreement, square + agreement**2
+        total = xp.maximum(total, least)
+        current, share = mean / total, xp.where(present, square / total**2, 1)
+    late = there * (order * weight * (current.conj() * (raw - current)).imag).sum(0)
+    known = there * (order**2 * weight * squared(current)).sum(0)
+    best, of_line = xp.zeros_like(there), xp.ones_like(there)
+    for line in lines():
+        together = sum(_shifted(known, *offset) for offset in line)
+        found = sum(_shifted(late, *offset) for offset in line) ** 2 / xp.maximum(together, least)
+        of_line = xp.where(found > best, together, of_line)
+        best = xp.maximum(found, best)
+    flattened = xp.maximum(best - EXPECTED, 0) * known / xp.maximum(of_line, least)
+    share = xp.where(present, xp.minimum(share + flattened, 1), 1)
+    return current.astype(raw.dtype), share.astype(weight.dtype)
+
+
+def _shifted(planes: Array, row: int, column: int) -> Array:
+    """Return what lies so many rows and columns further; 0 beyond the border."""
+    xp = namespace(planes)
+    height, width = planes.shape[-2:]
+    margin = [(0, 0)] * (planes.ndim - 2) + [(REACH, REACH)] * 2
+    padded = xp.pad(planes, margin)
+    return padded[..., REACH + row :, REACH + column :][..., :height, :width]
