@@ -176,10 +176,9 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
         view[...] = weight
         there, view = room(1)
         view[0] = present
-        current, (other, _), (share, _), (left, shown) = (
-            given, room(2 * len(raw)), room(1, 1.0), room(1, 1.0),
-        )  # fmt: skip
-        spare = np.zeros_like(given)
+        (other, _), (spare, _) = room(2 * len(raw)), room(2 * len(raw))
+        (share, _), (left, _) = room(1, 1.0), room(1, 1.0)
+        current = given
         orders = np.array(multiples, np.float32)
 
         def by_rows(run: Callable[[int, int], None]) -> None:
@@ -189,19 +188,26 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
             near = neighbours.neighbourhood(radius_px)
             by_rows(
                 partial(
-                    average, order, orders, given, current, weights, there[0], share[0],
+                    average,
+                    order,
+                    orders,
+                    given,
+                    current,
+                    weights,
+                    there[0],
+                    share[0],
                     np.array([dy * row + dx for dy, dx, _ in near]),
                     np.array([place for *_, place in near], np.float32),
-                    1 / (neighbours.MOST_MISFIT * float(numbers)), 2 / neighbours.MOST_SHIFT,
-                    other, left[0],
+                    1 / (neighbours.MOST_MISFIT * float(numbers)),
+                    2 / neighbours.MOST_SHIFT,
+                    other,
+                    left[0],
                 )  # fmt: skip
             )
             current, other = other, spare if current is given else current
             share, left = left, share
         late, known = np.zeros((2, length), np.float32)
-        by_rows(
-            partial(residuals, order, orders, given, current, weights, there[0], late, known)
-        )
+        by_rows(partial(residuals, order, orders, given, current, weights, there[0], late, known))
         lines = np.array([[dy * row + dx for dy, dx in line] for line in neighbours.lines()])
         by_rows(partial(add_flattened, lines, late, known, there[0], share[0], left[0]))
         moments = np.empty(raw.shape, np.complex64)

@@ -6,7 +6,7 @@ import numpy as np
 
 from transientcam_compiled import Spread, at_once
 from transientcam_moments._dispatch import accelerated
-from transientcam_moments.arrays import Array, as_array, namespace, squared, summary
+from transientcam_moments.arrays import Array, as_array, namespace, real_type, squared, summary
 from transientcam_moments.errors import ShapeError
 from transientcam_moments.noise._moments import MomentNoise
 
@@ -112,17 +112,17 @@ def average_neighbours(
     present = present & (variance > 0).any(axis=0)
     if left_out is not None:
         present = present & ~xp.asarray(left_out)
-    raw = xp.where(present, moments, 0)
-    # powers of two round nothing, and no square leaves the numbers there are
-    size = 2.0 ** xp.ceil(xp.log2(xp.maximum(abs(raw).max(), np.finfo(raw.real.dtype).tiny)))
     known = present & (variance > 0)
-    std = xp.sqrt(xp.where(known, variance, 1)).astype(raw.real.dtype)
-    weight = xp.where(known, (size / std) ** 2, 0).astype(raw.real.dtype)
-    measured = (weight > 0).reshape((len(raw), -1)).any(axis=1)
+    real = real_type(moments)
+    # by a power of two, which rounds nothing: no square leaves the numbers there are
+    greatest = xp.maximum(xp.where(known, variance, 0).max(), np.finfo(real).tiny)
+    size = (2.0 ** xp.ceil(xp.log2(greatest) / 2)).astype(real)
+    weight = xp.where(known, size**2 / xp.where(known, variance, 1), 0).astype(real)
+    measured = (weight > 0).reshape((len(order), -1)).any(axis=1)
     numbers = xp.maximum((measured * np.array([2 if j else 1 for j in order])).sum(), 1)
-    scaled = (raw / size).astype(moments.dtype)
-    found, share = _averaged(scaled, weight, present, order, numbers, spread=spread)
-    averaged = xp.where(present, found * size, moments).astype(moments.dtype)
+    raw = xp.where(present, moments, 0) / size
+    found, share = _averaged(raw, weight, present, order, numbers, spread=spread)
+    averaged = xp.where(present, found * size, moments)
     return Averaged(averaged, MomentNoise((variance * share).astype(share.dtype)), share)
 
 
@@ -148,7 +148,7 @@ def lines() -> list[list[tuple[int, int]]]:
 def _averaged(
     raw: Array, weight: Array, present: Array, multiples: tuple[int, ...], numbers: Array
 ) -> tuple[Array, Array]:
-    """Planar statement: averages of moments about 1 in size, and the share of variance left.
+    """Planar statement: averages of moments with noise about 1, and the share of variance left.
 
     ``weight`` is one over the variances, ``numbers`` how many were measured in a pixel.
     """

@@ -42,6 +42,7 @@ def undetected_pixels(
     sensor: Sensor,
     calibration: Array | None,
     ambient: Array | None,
+    share: Array | None = None,
 ) -> Array | None:
     """Return what `undetected` does of smoothed moments, quickly where most pixels are lit.
 
@@ -57,6 +58,8 @@ def undetected_pixels(
         Gains that the moments were divided by; 1, when left out.
     ambient : array, shape (...), optional
         Light in DN an image that is not the camera's.
+    share : array, shape (...), optional
+        Of a pixel's own variance that averaging has left, where that was no Gaussian.
 
     Returns
     -------
@@ -92,13 +95,15 @@ def undetected_pixels(
         doubtful = np.flatnonzero(~(squared(moments[1]) * size[1] >= most))
     if not doubtful.size:
         return None
-    if moments.ndim == 3 and settings.smoothing_sigma_px > 0:
+    if moments.ndim == 3 and settings.gaussian_px > 0:
         noise = smoothed_at(
-            noise_of, brightness, doubtful, settings.smoothing_sigma_px, ambient=ambient
+            noise_of, brightness, doubtful, settings.gaussian_px, ambient=ambient
         ).variance
     else:
         light = brightness.reshape(-1)[doubtful]
         noise = noise_of(light, 0.0 if ambient is None else ambient.reshape(-1)[doubtful]).variance
+    if share is not None:
+        noise = noise * share.reshape(-1)[doubtful]
     size = size.reshape((planes, -1))
     size = size if size.shape[1] == 1 else size[:, doubtful]
     found = np.zeros(brightness.size, dtype=bool)

@@ -1,7 +1,7 @@
 """What follows from the moments of an image: each property computed once, when first read."""
 
 from collections.abc import Callable
-from functools import cached_property, partial
+from functools import cached_property
 from html import escape
 
 import numpy as np
@@ -10,7 +10,7 @@ from transientcam_compiled import Spread, at_once
 from transientcam_moments.arrays import Array, in_turn, map_html, namespace
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
 from transientcam_moments.errors import ParameterError, UnlabelledImages
-from transientcam_moments.images import HarmonicCorrection, Repair, smooth
+from transientcam_moments.images import HarmonicCorrection, Repair
 from transientcam_moments.likelihood import (
     MODEL_ERROR,
     MOST_RETURNS,
@@ -37,9 +37,10 @@ from transientcam_moments.moment_problem import (
     separate,
     smallest_eigenvalue,
 )
-from transientcam_moments.noise import MomentNoise, moment_noise, scatter, smoothed_of
+from transientcam_moments.noise import MomentNoise, scatter, smoothed_of
 from transientcam_moments.reconstruction._detection import undetected, undetected_pixels
 from transientcam_moments.reconstruction._flags import INVALID, Flags, flags
+from transientcam_moments.reconstruction._neighbours import over_neighbours, sensor_noise
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, OWN, Settings
 
@@ -142,11 +143,30 @@ class Reconstruction:
         return tuple((int(t), int(i)) for t, i in np.argwhere(self._repaired.filled))
 
     @cached_property
+    def _averaged(self) -> tuple[Array, Array | None]:
+        """Moments averaged over neighbours, and `variance_share`."""
+        left_out = [where for where in (self._saturated, self._bad) if where is not None]
+        return over_neighbours(
+            self.measured,
+            self.settings,
+            self._calibration,
+            left_out,
+            self._other_light,
+            self._spread,
+        )
+
+    @property
+    def variance_share(self) -> Array | None:
+        """Share (H, W) of a pixel's variance that averaging over neighbours has left.
+
+        None where that was not edge-preserving: `noise.smoothed` has it of a Gaussian.
+        """
+        return self._averaged[1]
+
+    @cached_property
     def _corrected(self) -> tuple[Array, Array | None]:
         """Smoothed moments without the known harmonics, and where these were taken out."""
-        moments = self.measured
-        if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
-            moments = smooth(moments, self.settings.smoothing_sigma_px)
+        moments = self._averaged[0]
         return (moments, None) if self._correction is None else self._correction(moments)
 
     @cached_property
@@ -245,6 +265,7 @@ class Reconstruction:
             sensor,
             self._calibration,
             self.ambient,
+            self.variance_share,
         )
 
     def add_flag(self, flag: Flags, where: Array) -> None:
@@ -292,24 +313,15 @@ class Reconstruction:
     @cached_property
     def noise(self) -> MomentNoise | None:
         """Noise of the smoothed moments (m + 1, ...) by the sensor's; None without a sensor."""
-        sensor, moments = self.settings.sensor, self.smoothed
-        zeroth, takes = self.settings.zeroth, self.settings.takes
-        if sensor is None or zeroth is None or takes is None:  # the last two go with a sensor
+        noise_of = sensor_noise(self.settings, self._calibration, len(self.smoothed))
+        if noise_of is None:
             return None
-        gains = self._calibration
-        noise_of = partial(
-            moment_noise,
-            sensor=sensor,
-            calibration=np.ones(moments.shape[0]) if gains is None else gains,
-            zeroth=zeroth,
-            takes=takes,
-            phases_rad=self.settings.sampled_rad,
-        )
-        brightness, ambient = self._least_brightness, self.ambient
-        if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
-            sigma_px = self.settings.smoothing_sigma_px
+        brightness, ambient, share = self._least_brightness, self.ambient, self.variance_share
+        if self.settings.gaussian_px > 0 and brightness.ndim == 2:
+            sigma_px = self.settings.gaussian_px
             return smoothed_of(noise_of, brightness, sigma_px, ambient=ambient)
-        return noise_of(brightness) if ambient is None else noise_of(brightness, ambient=ambient)
+        noise = noise_of(brightness) if ambient is None else noise_of(brightness, ambient=ambient)
+        return noise if share is None else MomentNoise(noise.variance * share)
 
     @cached_property
     def ambient(self) -> Array | None:

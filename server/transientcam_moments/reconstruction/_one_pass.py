@@ -38,6 +38,8 @@ class PassedReconstruction(Reconstruction):
         As of `Reconstruction`.
     other_light : callable, optional
         As of `Reconstruction`.
+    share : array, shape (H, W), optional
+        Its `variance_share`.
     """
 
     def __init__(
@@ -51,6 +53,7 @@ class PassedReconstruction(Reconstruction):
         corrected: Array | None = None,
         spread: Spread = at_once,
         other_light: Callable[[Array], Array | None] | None = None,
+        share: Array | None = None,
     ) -> None:
         super().__init__(
             None,
@@ -63,6 +66,7 @@ class PassedReconstruction(Reconstruction):
         )
         self._measure = measure
         self.smoothed = planes.smoothed
+        self._averaged = planes.smoothed, share
         self._corrected = planes.smoothed, corrected
         self.validity = planes.validity
         self._flags_of_moments = planes.flags

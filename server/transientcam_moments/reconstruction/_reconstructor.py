@@ -34,12 +34,12 @@ from transientcam_moments.images import (
     recover_saturated,
     repair,
     saturated,
-    smooth,
     takes_first,
 )
 from transientcam_moments.noise import ambient_light
 from transientcam_moments.reconstruction._labels import Labels
 from transientcam_moments.reconstruction._lazy import Reconstruction
+from transientcam_moments.reconstruction._neighbours import over_neighbours
 from transientcam_moments.reconstruction._one_pass import PassedReconstruction
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, Settings
@@ -145,7 +145,8 @@ class Reconstructor:
         if recovered is not None:
             takes = recovered.images
         # behind the smoothing, where a waveform is known: harmonics are taken out there
-        one_pass = None if self._waveform is not None else self._pass_of_images(takes, zeroth)
+        behind = self._waveform is not None or self.settings.keeps_edges
+        one_pass = None if behind else self._pass_of_images(takes, zeroth)
         if one_pass is not None:
             planes = one_pass.images(takes[0], saturated_pixels, spread)
             return PassedReconstruction(
@@ -244,9 +245,10 @@ class Reconstructor:
                 spread=spread,
                 other_light=other_light,
             )
-        smoothed = moments
-        if moments.ndim == 3:
-            smoothed = smooth(moments, self.settings.smoothing_sigma_px)
+        left_out = [where for where in (saturated_pixels, self._bad) if where is not None]
+        smoothed, share = over_neighbours(
+            moments, self.settings, self._calibration, left_out, other_light, spread
+        )
         corrected = None
         if correction is not None:
             smoothed, corrected = correction(smoothed, spread=spread)
@@ -261,6 +263,7 @@ class Reconstructor:
             corrected=corrected,
             spread=spread,
             other_light=other_light,
+            share=share,
         )
 
     def _correction(self, moments: Array) -> HarmonicCorrection | None:
@@ -274,7 +277,7 @@ class Reconstructor:
                     self._waveform,
                     self._calibration,
                     shape,
-                    smoothing_sigma_px=self.settings.smoothing_sigma_px,
+                    smoothing_sigma_px=self.settings.gaussian_px,
                     estimated=self.settings.zeroth == "estimated",
                 )
                 while len(self._corrections) > _SHAPES:
@@ -327,7 +330,7 @@ class Reconstructor:
             ambient_light,
             takes[0, first : first + len(phases_rad)],
             sensor=sensor,
-            sigma_px=self.settings.smoothing_sigma_px,
+            sigma_px=self.settings.gaussian_px,
             bad_pixels=self._bad,
         )
 
@@ -384,7 +387,7 @@ class Reconstructor:
     # -- preparing -----------------------------------------------------------------------------
 
     def _taps(self, shape: tuple[int, ...]) -> Array | None:
-        sigma_px = self.settings.smoothing_sigma_px
+        sigma_px = self.settings.gaussian_px
         return gaussian_taps(sigma_px) if sigma_px > 0 and len(shape) == 2 else None
 
     def _constants(self, m: int, shape: tuple[int, ...]) -> Constants:

@@ -1,0 +1,74 @@
+"""Averaging over neighbouring pixels as the settings have it."""
+
+from collections.abc import Callable, Sequence
+from functools import partial, reduce
+from operator import or_
+
+import numpy as np
+
+from transientcam_compiled import Spread
+from transientcam_moments.arrays import Array, namespace
+from transientcam_moments.images import smooth
+from transientcam_moments.noise import MomentNoise, average_neighbours, moment_noise
+from transientcam_moments.reconstruction._settings import Settings
+
+
+def over_neighbours(
+    moments: Array,
+    settings: Settings,
+    calibration: Array | None,
+    left_out: Sequence[Array],
+    other_light: Callable[[Array], Array | None] | None,
+    spread: Spread,
+) -> tuple[Array, Array | None]:
+    """Average calibrated moments (m + 1, ...) over neighbours.
+
+    Parameters
+    ----------
+    left_out : sequence of boolean array, shape (H, W)
+        Masks of pixels that do not count for others, but to a Gaussian.
+    other_light : callable, optional
+        As of `Reconstruction`.
+
+    Returns
+    -------
+    moments : array, shape (m + 1, ...)
+    share : array, shape (H, W), or None
+        Of each pixel's own variance that is left; None of a Gaussian, or without image axes.
+    """
+    noise_of = sensor_noise(settings, calibration, len(moments))
+    if moments.ndim != 3 or not settings.keeps_edges or noise_of is None:
+        px = settings.gaussian_px if moments.ndim == 3 else 0.0
+        return (smooth(moments, px) if px > 0 else moments), None
+    measured = settings.zeroth != "estimated"
+    brightness = moments[0].real if measured else abs(moments[1:]).max(axis=0)
+    ambient = None if other_light is None else other_light(brightness)
+    noise = noise_of(brightness) if ambient is None else noise_of(brightness, ambient=ambient)
+    xp = namespace(moments)
+    found = average_neighbours(
+        moments,
+        noise,
+        multiples=None if settings.multiples is None else (0, *settings.multiples),
+        left_out=reduce(or_, map(xp.asarray, left_out)) if left_out else None,
+        spread=spread,
+    )
+    return found.moments, found.share
+
+
+def sensor_noise(
+    settings: Settings, calibration: Array | None, planes: int
+) -> Callable[..., MomentNoise] | None:
+    """Return what tells the noise of pixels by themselves of their brightness, and of ambient light.
+
+    None without a sensor.
+    """
+    if settings.sensor is None or settings.zeroth is None or settings.takes is None:
+        return None
+    return partial(
+        moment_noise,
+        sensor=settings.sensor,
+        calibration=np.ones(planes) if calibration is None else calibration,
+        zeroth=settings.zeroth,
+        takes=settings.takes,
+        phases_rad=settings.sampled_rad,
+    )
