@@ -205,10 +205,10 @@ def compile_in_background(
 ) -> threading.Thread:
     """Start compiling on a thread and return it; arguments and errors as in `compile`.
 
-    Leaves out "harmonics", "pairs", "peaks" and "neighbours", which few cameras need, and "likelihood", which
-    takes long to compile: they are prepared by themselves when they are first needed. ``also``
-    names one of them that is compiled for the first order all the same; "pairs" before all others,
-    since a camera whose frequencies have gaps needs little else.
+    Leaves out "harmonics", "pairs", "peaks" and "neighbours", which few cameras need, and
+    "likelihood", which takes long to compile: they are prepared by themselves when they are first
+    needed. ``also`` names one of them that is compiled for the first order all the same; "pairs"
+    before all others, since a camera whose frequencies have gaps needs little else.
 
     The thread is named "transientcam-compile", and can be joined.
     """

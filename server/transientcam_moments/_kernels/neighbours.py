@@ -186,24 +186,11 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
 
         for radius_px in neighbours.RADII_PX:
             near = neighbours.neighbourhood(radius_px)
-            by_rows(
-                partial(
-                    average,
-                    order,
-                    orders,
-                    given,
-                    current,
-                    weights,
-                    there[0],
-                    share[0],
-                    np.array([dy * row + dx for dy, dx, _ in near]),
-                    np.array([place for *_, place in near], np.float32),
-                    1 / (neighbours.MOST_MISFIT * float(numbers)),
-                    2 / neighbours.MOST_SHIFT,
-                    other,
-                    left[0],
-                )  # fmt: skip
-            )
+            ahead = np.array([dy * row + dx for dy, dx, _ in near])
+            places = np.array([place for *_, place in near], np.float32)
+            limits = 1 / (neighbours.MOST_MISFIT * float(numbers)), 2 / neighbours.MOST_SHIFT
+            planes = given, current, weights, there[0], share[0], ahead, places
+            by_rows(partial(average, order, orders, *planes, *limits, other, left[0]))
             current, other = other, spare if current is given else current
             share, left = left, share
         late, known = np.zeros((2, length), np.float32)

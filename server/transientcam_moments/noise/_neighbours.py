@@ -16,7 +16,7 @@ REACH: Final = 4
 """Rows and columns beside a pixel that the largest neighbourhood reaches."""
 MOST_MISFIT: Final = 4.0
 """Reduced chi-square of two pixels from which they are not averaged; half of it still is fully."""
-MOST_SHIFT: Final = 8.5
+MOST_SHIFT: Final = 8.0
 """The same for a common shift of all light in time, 1.5 times the chi-square of one number."""
 MISFIT_OF_ONE: Final = 0.02
 SHIFT_OF_ONE: Final = 0.001

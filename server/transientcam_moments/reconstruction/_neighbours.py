@@ -58,7 +58,7 @@ def over_neighbours(
 def sensor_noise(
     settings: Settings, calibration: Array | None, planes: int
 ) -> Callable[..., MomentNoise] | None:
-    """Return what tells the noise of pixels by themselves of their brightness, and of ambient light.
+    """Return what tells the noise of pixels by themselves, of their brightness and ambient light.
 
     None without a sensor.
     """

@@ -43,12 +43,15 @@ class SettingsVersion:
     def for_live_frames(
         self, sequence: Sequence, *, ready: Callable[[str, int], bool] = tm.kernels.ready
     ) -> "SettingsVersion":
-        """Return these settings with an estimator that keeps up with a camera now.
+        """Return these settings with steps that keep up with a camera now.
 
         ``automatic`` stays where ``ready`` says that the kernel of its estimator is compiled for
         this order. Until then it is Pisarenko's returns, and the unwrapped phase of one return for
-        multiples that have gaps.
+        multiples that have gaps. So is the Gaussian until that of ``edge-preserving`` is compiled.
         """
+        keeps_edges = self.settings.neighbours == "edge-preserving"
+        if keeps_edges and not ready("neighbours", len(sequence.multiples)):
+            return self._with(neighbours="gaussian").for_live_frames(sequence, ready=ready)
         if self.settings.estimator != "automatic":
             return self
         if sequence.sampling.consecutive:
@@ -59,7 +62,10 @@ class SettingsVersion:
                 return self
         if ready(kernel, sequence.multiples[-1]):
             return self
-        return replace(self, settings=self.settings.model_copy(update={"estimator": until}))
+        return self._with(estimator=until)
+
+    def _with(self, **settings: str) -> "SettingsVersion":
+        return replace(self, settings=self.settings.model_copy(update=settings))
 
     def followed_by(self, settings: ReconstructionSettings) -> "SettingsVersion":
         """Return the next version; the same one where the settings are equal."""
