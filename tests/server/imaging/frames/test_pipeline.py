@@ -411,6 +411,15 @@ def test_frames_are_those_of_pisarenko_until_the_likelihood_is_compiled_and_say_
     with_frame(camera, raw, test, sensor=tm.noise.Sensor())
 
 
+def test_neighbours_are_averaged_by_the_gaussian_until_the_kernel_is_compiled() -> None:
+    settings = SettingsVersion(1, ReconstructionSettings(neighbours="edge-preserving"))
+
+    live = settings.for_live_frames(Sequence(), ready=lambda name, m: name != "neighbours")
+
+    assert live.settings == ReconstructionSettings(neighbours="gaussian")
+    assert settings.for_live_frames(Sequence(), ready=lambda name, m: True) == settings
+
+
 @pytest.mark.parametrize("named", ["likelihood", "maximum-entropy"])
 def test_an_estimator_that_is_named_is_used_compiled_or_not(named: str) -> None:
     settings = SettingsVersion(1, ReconstructionSettings(estimator=named))
