@@ -17,7 +17,6 @@ from transientcam_moments._kernels.arrays import (
     RealPlane,
     RealPlanes,
     Reals,
-    Table,
 )
 from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.portable import bank, larger, select, smaller, tiny
@@ -30,6 +29,11 @@ _ROWS = 8  # of a part at least
 @njit(forceinline=True, error_model="numpy")
 def _agreement(place: float, there: Plane, doubt: Plane) -> Any:
     return place * there * smaller(larger(2.0 - doubt, 0.0 * doubt), 0.0 * doubt + 1.0)
+
+
+@njit(forceinline=True, error_model="numpy")
+def _weighed(plane: RealPlane, a: int, wa: Plane, c: int, wc: Plane) -> Any:
+    return wa * simd.load(wa, plane, a) + wc * simd.load(wc, plane, c)
 
 
 @njit(nogil=True, error_model="numpy")
@@ -84,14 +88,8 @@ def _round(
             wa = _agreement(places[k], by_a, larger(of_misfit * of_a, of_shift * late_a))
             wc = _agreement(places[k], by_c, larger(of_misfit * of_c, of_shift * late_c))
             for j in range(size):
-                mr[j] = (
-                    mr[j] + wa * simd.load(one, raw[2 * j], a) + wc * simd.load(one, raw[2 * j], c)
-                )
-                mi[j] = (
-                    mi[j]
-                    + wa * simd.load(one, raw[2 * j + 1], a)
-                    + wc * simd.load(one, raw[2 * j + 1], c)
-                )
+                mr[j] = mr[j] + _weighed(raw[2 * j], a, wa, c, wc)
+                mi[j] = mi[j] + _weighed(raw[2 * j + 1], a, wa, c, wc)
             total = total + (wa + wc)
             square = square + (wa * wa + wc * wc)
         inverse = 1.0 / larger(total, tiny(one))
@@ -101,54 +99,10 @@ def _round(
         simd.store(left, p, select(there > 0.0, square * inverse * inverse, one))
 
 
-@njit(nogil=True, error_model="numpy")
-def _residuals(
-    order: Length, multiples: RealPlane, raw: RealPlanes, current: RealPlanes, weight: RealPlanes,
-    present: RealPlane, late: RealPlane, known: RealPlane, start: int, stop: int,
-) -> None:  # fmt: skip
-    """Write how much later the light of pixels is than averaged, weighted, and that weight."""
-    one = simd.ones(present, 1)
-    for p in range(start, stop, simd.width(one)):
-        shift, norm = 0.0 * one, 0.0 * one
-        for j in range(len(order) + 1):
-            er, ei = simd.load(one, current[2 * j], p), simd.load(one, current[2 * j + 1], p)
-            rr, ri = simd.load(one, raw[2 * j], p) - er, simd.load(one, raw[2 * j + 1], p) - ei
-            w = multiples[j] * simd.load(one, weight[j], p)
-            shift = shift + w * (er * ri - ei * rr)
-            norm = norm + multiples[j] * w * (er * er + ei * ei)
-        there = simd.load(one, present, p)
-        simd.store(late, p, there * shift)
-        simd.store(known, p, there * norm)
-
-
-@njit(nogil=True, error_model="numpy")
-def _add_flattened(
-    lines: Table, late: RealPlane, known: RealPlane, present: RealPlane, share: RealPlane,
-    out: RealPlane, start: int, stop: int,
-) -> None:  # fmt: skip
-    """Add what averaging has flattened along lines to the share of the variance."""
-    one = simd.ones(present, 1)
-    for p in range(start, stop, simd.width(one)):
-        best, of_line = 0.0 * one, one
-        for i in range(lines.shape[0]):
-            shift, norm = 0.0 * one, 0.0 * one
-            for k in range(lines.shape[1]):
-                shift = shift + simd.load(one, late, p + lines[i, k])
-                norm = norm + simd.load(one, known, p + lines[i, k])
-            found = shift * shift / larger(norm, tiny(one))
-            better = found > best
-            best, of_line = select(better, found, best), select(better, norm, of_line)
-        beyond = larger(best - neighbours.EXPECTED, 0.0 * one)
-        flattened = beyond * simd.load(one, known, p) / larger(of_line, tiny(one))
-        left = smaller(simd.load(one, share, p) + flattened, one)
-        simd.store(out, p, select(simd.load(one, present, p) > 0.0, left, one))
-
-
 def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile averaging over neighbours of order m; see the table in ``_kernels``."""
     order = (0,) * m
-    average, residuals = entry(_round, m, precision), entry(_residuals, m, precision)
-    add_flattened = entry(_add_flattened, m, precision)
+    average = entry(_round, m, precision)
 
     def kernel(
         raw: Complexes,
@@ -178,8 +132,7 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
         view[0] = present
         (other, _), (spare, _) = room(2 * len(raw)), room(2 * len(raw))
         (share, _), (left, _) = room(1, 1.0), room(1, 1.0)
-        current = given
-        orders = np.array(multiples, np.float32)
+        current, orders = given, np.array(multiples, np.float32)
 
         def by_rows(run: Callable[[int, int], None]) -> None:
             spread(lambda top, end: run(first + top * row, first + end * row), height, _ROWS)
@@ -193,14 +146,10 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
             by_rows(partial(average, order, orders, *planes, *limits, other, left[0]))
             current, other = other, spare if current is given else current
             share, left = left, share
-        late, known = np.zeros((2, length), np.float32)
-        by_rows(partial(residuals, order, orders, given, current, weights, there[0], late, known))
-        lines = np.array([[dy * row + dx for dy, dx in line] for line in neighbours.lines()])
-        by_rows(partial(add_flattened, lines, late, known, there[0], share[0], left[0]))
         moments = np.empty(raw.shape, np.complex64)
         view = current[:, first : first + height * row].reshape(-1, height, row)[..., :width]
         moments.real, moments.imag = view[0::2], view[1::2]
-        final = left[0, first : first + height * row].reshape(height, row)[:, :width]
+        final = share[0, first : first + height * row].reshape(height, row)[:, :width]
         return moments, np.ascontiguousarray(final)
 
     return kernel

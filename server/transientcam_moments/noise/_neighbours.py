@@ -23,6 +23,8 @@ SHIFT_OF_ONE: Final = 0.001
 """Weights of a neighbour alone beside those of its mean with its mirror image."""
 EXPECTED: Final = 4.0
 """Chi-square of the clearest line of residuals that noise explains."""
+LINES: Final = ((1, 0), (0, 1), (1, 1), (1, -1))
+"""Their directions."""
 
 
 class Averaged(NamedTuple):
@@ -83,15 +85,11 @@ def average_neighbours(
     Notes
     -----
     Propagation-separation (Polzehl and Spokoiny, 2006): in rounds of growing radius a neighbour's
-    weight falls with its distance, and to 0 with the misfit of the estimates of the round before,
-    over their noise. Raw moments are averaged each time: an error isn't smoothed twice. Two things
-    are particular. The mean of a neighbour and its mirror image is held against the pixel, so that
-    slanted surfaces pass; and beside the misfit of all moments, that in the direction in which all
-    light comes later, d b_j = i j b_j: one number of 2 m + 1, so that small steps in range show.
-
-    What is flattened all the same, such as a ridge a few deviations high, leaves residuals of one
-    sign along a line. The square of the clearest shift along lines of 9 pixels, less what noise
-    explains, counts as noise.
+    weight falls with its distance and with misfit over noise. The mean of a neighbour and its
+    mirror image is held against the pixel, so that slanted surfaces pass; a second misfit is the
+    one in the direction d b_j = i j b_j, all light later, so that small steps in range show. What
+    is flattened all the same leaves residuals of one sign along a line: their square counts as
+    noise.
     """
     moments = as_array(moments)
     if moments.ndim != 3:
@@ -122,6 +120,8 @@ def average_neighbours(
     numbers = xp.maximum((measured * np.array([2 if j else 1 for j in order])).sum(), 1)
     raw = xp.where(present, moments, 0) / size
     found, share = _averaged(raw, weight, present, order, numbers, spread=spread)
+    flattened = _flattened(xp.where(present, raw - found, 0), found, weight, order)
+    share = xp.minimum(share + flattened, 1)
     averaged = xp.where(present, found * size, moments)
     return Averaged(averaged, MomentNoise((variance * share).astype(share.dtype)), share)
 
@@ -132,16 +132,6 @@ def neighbourhood(radius_px: float) -> list[tuple[int, int, float]]:
     pairs = [(row, column) for row in reach for column in reach if (row, column) > (0, 0)]
     weights = (1 - (row**2 + column**2) / (radius_px + 0.5) ** 2 for row, column in pairs)
     return [(*pair, weight) for pair, weight in zip(pairs, weights, strict=True) if weight > 0]
-
-
-def lines() -> list[list[tuple[int, int]]]:
-    """Return the lines of 9 pixels through a pixel, in 12 directions, as rows and columns."""
-    along = range(-REACH, REACH + 1)
-    steps = [[0 for _ in along], list(along), [i // 2 for i in along], [-(-i // 2) for i in along]]
-    steep = [list(zip(along, each, strict=True)) for each in steps]
-    steep += [[(row, -column) for row, column in line] for line in steep[1:]]
-    flat = [[(column, row) for row, column in line] for line in steep]
-    return [*steep, *(line for line in flat if abs(line[0][0]) < REACH)]
 
 
 @accelerated("neighbours", of="F")
@@ -181,17 +171,25 @@ def _averaged(
                 total, square = total + agreement, square + agreement**2
         total = xp.maximum(total, least)
         current, share = mean / total, xp.where(present, square / total**2, 1)
-    late = there * (order * weight * (current.conj() * (raw - current)).imag).sum(0)
-    known = there * (order**2 * weight * squared(current)).sum(0)
-    best, of_line = xp.zeros_like(there), xp.ones_like(there)
-    for line in lines():
-        together = sum(_shifted(known, *offset) for offset in line)
-        found = sum(_shifted(late, *offset) for offset in line) ** 2 / xp.maximum(together, least)
-        of_line = xp.where(found > best, together, of_line)
-        best = xp.maximum(found, best)
-    flattened = xp.maximum(best - EXPECTED, 0) * known / xp.maximum(of_line, least)
-    share = xp.where(present, xp.minimum(share + flattened, 1), 1)
     return current.astype(raw.dtype), share.astype(weight.dtype)
+
+
+def _flattened(off: Array, current: Array, weight: Array, multiples: tuple[int, ...]) -> Array:
+    """Return the square of the clearest shift along lines of residuals, over a pixel's variance."""
+    xp = namespace(off)
+    order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
+    tangent = order * weight * current
+    late = xp.stack(
+        [(tangent.conj() * off).imag.sum(0), (order * tangent.conj() * current).real.sum(0)]
+    )
+    found = xp.zeros_like(late[0])
+    for row, column in LINES:
+        along = range(-REACH, REACH + 1)
+        shift, known = sum(_shifted(late, i * row, i * column) for i in along)
+        known = xp.maximum(known, np.finfo(weight.dtype).tiny)
+        beyond = xp.maximum(shift**2 / known - EXPECTED, 0)
+        found = xp.maximum(found, beyond * late[1] / known)
+    return found
 
 
 def _shifted(planes: Array, row: int, column: int) -> Array:

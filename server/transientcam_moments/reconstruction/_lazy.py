@@ -145,15 +145,9 @@ class Reconstruction:
     @cached_property
     def _averaged(self) -> tuple[Array, Array | None]:
         """Moments averaged over neighbours, and `variance_share`."""
-        left_out = [where for where in (self._saturated, self._bad) if where is not None]
-        return over_neighbours(
-            self.measured,
-            self.settings,
-            self._calibration,
-            left_out,
-            self._other_light,
-            self._spread,
-        )
+        left_out, gains = (self._saturated, self._bad), self._calibration
+        how = self._other_light, self._spread
+        return over_neighbours(self.measured, self.settings, gains, left_out, *how)
 
     @property
     def variance_share(self) -> Array | None:

@@ -17,24 +17,14 @@ def over_neighbours(
     moments: Array,
     settings: Settings,
     calibration: Array | None,
-    left_out: Sequence[Array],
+    left_out: Sequence[Array | None],
     other_light: Callable[[Array], Array | None] | None,
     spread: Spread,
 ) -> tuple[Array, Array | None]:
     """Average calibrated moments (m + 1, ...) over neighbours.
 
-    Parameters
-    ----------
-    left_out : sequence of boolean array, shape (H, W)
-        Masks of pixels that do not count for others, but to a Gaussian.
-    other_light : callable, optional
-        As of `Reconstruction`.
-
-    Returns
-    -------
-    moments : array, shape (m + 1, ...)
-    share : array, shape (H, W), or None
-        Of each pixel's own variance that is left; None of a Gaussian, or without image axes.
+    Pixels of the masks ``left_out`` count for no other one, but to a Gaussian. Returns the share
+    (H, W) of each pixel's own variance that is left, too; None of a Gaussian, or without images.
     """
     noise_of = sensor_noise(settings, calibration, len(moments))
     if moments.ndim != 3 or not settings.keeps_edges or noise_of is None:
@@ -44,12 +34,12 @@ def over_neighbours(
     brightness = moments[0].real if measured else abs(moments[1:]).max(axis=0)
     ambient = None if other_light is None else other_light(brightness)
     noise = noise_of(brightness) if ambient is None else noise_of(brightness, ambient=ambient)
-    xp = namespace(moments)
+    masks = [namespace(moments).asarray(each) for each in left_out if each is not None]
     found = average_neighbours(
         moments,
         noise,
         multiples=None if settings.multiples is None else (0, *settings.multiples),
-        left_out=reduce(or_, map(xp.asarray, left_out)) if left_out else None,
+        left_out=reduce(or_, masks) if masks else None,
         spread=spread,
     )
     return found.moments, found.share

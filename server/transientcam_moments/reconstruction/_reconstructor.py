@@ -245,10 +245,9 @@ class Reconstructor:
                 spread=spread,
                 other_light=other_light,
             )
-        left_out = [where for where in (saturated_pixels, self._bad) if where is not None]
-        smoothed, share = over_neighbours(
-            moments, self.settings, self._calibration, left_out, other_light, spread
-        )
+        gains, left_out = self._calibration, (saturated_pixels, self._bad)
+        how = other_light, spread
+        smoothed, share = over_neighbours(moments, self.settings, gains, left_out, *how)
         corrected = None
         if correction is not None:
             smoothed, corrected = correction(smoothed, spread=spread)

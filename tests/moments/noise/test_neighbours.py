@@ -113,21 +113,16 @@ def brute_force(b: Array, variance: Array, left_out: Array) -> tuple[Array, Arra
     share = np.ones((height, width))
     steps = [(1, 0), (0, 1), (1, 1), (1, -1)]
     lines = [[(i * y, i * x) for i in range(-4, 5)] for y, x in steps]
-    for sign, round_ in itertools.product((1, -1), (np.floor, np.ceil)):
-        halves = [int(sign * round_(i / 2)) for i in range(-4, 5)]
-        lines += [
-            list(zip(range(-4, 5), halves, strict=True)),
-            list(zip(halves, range(-4, 5), strict=True)),
-        ]
     for p in pixels:
-        best = (0.0, 1.0)
+        best = 0.0
         for line in lines:
             places = [(p[0] + y, p[1] + x) for y, x in line]
             together = sum(known.get(q, 0.0) for q in places)
             square = sum(late.get(q, 0.0) for q in places) ** 2
-            best = max(best, (square / together if together else 0.0, together))
+            if together:
+                best = max(best, max(square / together - 4, 0) * known[p] / together)
         if there[p]:
-            share[p] = min(1.0, 1 / worth[p] + max(best[0] - 4, 0) * known[p] / best[1])
+            share[p] = min(1.0, 1 / worth[p] + best)
     return np.moveaxis(moments, -1, 0), share
 
 
