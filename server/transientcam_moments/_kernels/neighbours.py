@@ -133,17 +133,16 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
         (other, _), (spare, _) = room(2 * len(raw)), room(2 * len(raw))
         (share, _), (left, _) = room(1, 1.0), room(1, 1.0)
         current, orders = given, np.array(multiples, np.float32)
-
-        def by_rows(run: Callable[[int, int], None]) -> None:
-            spread(lambda top, end: run(first + top * row, first + end * row), height, _ROWS)
-
         for radius_px in neighbours.RADII_PX:
             near = neighbours.neighbourhood(radius_px)
             ahead = np.array([dy * row + dx for dy, dx, _ in near])
             places = np.array([place for *_, place in near], np.float32)
             limits = 1 / (neighbours.MOST_MISFIT * float(numbers)), 2 / neighbours.MOST_SHIFT
             planes = given, current, weights, there[0], share[0], ahead, places
-            by_rows(partial(average, order, orders, *planes, *limits, other, left[0]))
+            run = partial(average, order, orders, *planes, *limits, other, left[0])
+            spread(
+                lambda top, end, run=run: run(first + top * row, first + end * row), height, _ROWS
+            )
             current, other = other, spare if current is given else current
             share, left = left, share
         moments = np.empty(raw.shape, np.complex64)

@@ -94,18 +94,17 @@ def average_neighbours(
     moments = as_array(moments)
     if moments.ndim != 3:
         raise ShapeError("moments", f"of shape {tuple(moments.shape)}", "(m + 1, H, W)")
-    order = tuple(range(len(moments))) if multiples is None else tuple(multiples)
+    order = tuple(range(len(moments)) if multiples is None else multiples)
     if len(order) != len(moments):
         raise ShapeError("multiples", f"{len(order)} numbers", f"{len(moments)}, one a plane")
     xp = namespace(moments)
-    shape = tuple(moments.shape[1:])
-    if left_out is not None and tuple(left_out.shape) != shape:
-        raise ShapeError("left_out", f"of shape {tuple(left_out.shape)}", f"{shape}")
+    if left_out is not None and left_out.shape != moments.shape[1:]:
+        raise ShapeError("left_out", f"of shape {tuple(left_out.shape)}", "(H, W) of the moments")
     try:
         variance = xp.broadcast_to(xp.asarray(noise.variance), moments.shape)
     except ValueError:
-        limit = f"to fit {tuple(moments.shape)}"
-        raise ShapeError("noise", f"of shape {tuple(noise.variance.shape)}", limit) from None
+        shape = tuple(noise.variance.shape)
+        raise ShapeError("noise", f"of shape {shape}", "that of the moments") from None
     present = xp.isfinite(moments).all(axis=0) & xp.isfinite(variance).all(axis=0)
     present = present & (variance > 0).any(axis=0)
     if left_out is not None:
@@ -147,15 +146,17 @@ def _averaged(
     order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
     there = present.astype(weight.dtype)
     current, share = raw, xp.ones_like(there)
+    lit, given = _padded(there), _padded(raw)
     for radius_px in RADII_PX:
+        wide = _padded(current)
         tangent = order * weight * current
         shift = 2 / MOST_SHIFT / xp.maximum((order * (tangent.conj() * current).real).sum(0), least)
         misfit = 1 / (MOST_MISFIT * numbers)
         total, square, mean = there, there, raw
         for row, column, place in neighbourhood(radius_px):
             ahead, behind = ((row, column), (-row, -column))
-            by = [_shifted(there, *offset) for offset in (ahead, behind)]
-            off = [current - _shifted(current, *offset) for offset in (ahead, behind)]
+            by = [_shifted(lit, *offset) for offset in (ahead, behind)]
+            off = [current - _shifted(wide, *offset) for offset in (ahead, behind)]
             alone = [(weight * squared(each)).sum(0) for each in off]
             later = [(tangent.conj() * each).imag.sum(0) for each in off]
             product = (weight * (off[0] * off[1].conj()).real).sum(0)
@@ -167,7 +168,7 @@ def _averaged(
                 two = xp.where(by[1 - i] > 0, mirrored, single) + SHIFT_OF_ONE * single
                 doubt = xp.maximum(misfit * one, shift * two) / share
                 agreement = place * by[i] * xp.clip(2 - doubt, 0, 1)
-                mean = mean + agreement * _shifted(raw, *offset)
+                mean = mean + agreement * _shifted(given, *offset)
                 total, square = total + agreement, square + agreement**2
         total = xp.maximum(total, least)
         current, share = mean / total, xp.where(present, square / total**2, 1)
@@ -178,24 +179,24 @@ def _flattened(off: Array, current: Array, weight: Array, multiples: tuple[int, 
     """Return the square of the clearest shift along lines of residuals, over a pixel's variance."""
     xp = namespace(off)
     order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
-    tangent = order * weight * current
-    late = xp.stack(
-        [(tangent.conj() * off).imag.sum(0), (order * tangent.conj() * current).real.sum(0)]
-    )
-    found = xp.zeros_like(late[0])
+    scaled = order * weight
+    late = (scaled * (current.real * off.imag - current.imag * off.real)).sum(0)
+    known = (order * scaled * squared(current)).sum(0)
+    found, both = xp.zeros_like(known), _padded(xp.stack([late, known]))
     for row, column in LINES:
         along = range(-REACH, REACH + 1)
-        shift, known = sum(_shifted(late, i * row, i * column) for i in along)
-        known = xp.maximum(known, np.finfo(weight.dtype).tiny)
-        beyond = xp.maximum(shift**2 / known - EXPECTED, 0)
-        found = xp.maximum(found, beyond * late[1] / known)
+        shift, together = sum(_shifted(both, i * row, i * column) for i in along)
+        together = xp.maximum(together, np.finfo(weight.dtype).tiny)
+        found = xp.maximum(found, xp.maximum(shift**2 / together - EXPECTED, 0) * known / together)
     return found
 
 
-def _shifted(planes: Array, row: int, column: int) -> Array:
-    """Return what lies so many rows and columns further; 0 beyond the border."""
-    xp = namespace(planes)
-    height, width = planes.shape[-2:]
+def _padded(planes: Array) -> Array:
     margin = [(0, 0)] * (planes.ndim - 2) + [(REACH, REACH)] * 2
-    padded = xp.pad(planes, margin)
+    return namespace(planes).pad(planes, margin)
+
+
+def _shifted(padded: Array, row: int, column: int) -> Array:
+    """Return what lies so many rows and columns further; 0 beyond the border."""
+    height, width = (length - 2 * REACH for length in padded.shape[-2:])
     return padded[..., REACH + row :, REACH + column :][..., :height, :width]
