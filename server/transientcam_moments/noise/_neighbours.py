@@ -105,22 +105,20 @@ def average_neighbours(
     except ValueError:
         shape = tuple(noise.variance.shape)
         raise ShapeError("noise", f"of shape {shape}", "that of the moments") from None
-    present = xp.isfinite(moments).all(axis=0) & xp.isfinite(variance).all(axis=0)
-    present = present & (variance > 0).any(axis=0)
+    known = (variance > 0) & (variance < np.inf)
+    present = xp.isfinite(moments).all(axis=0) & known.any(axis=0)
     if left_out is not None:
         present = present & ~xp.asarray(left_out)
-    known = present & (variance > 0)
     real = real_type(moments)
     # by a power of two, which rounds nothing: no square leaves the numbers there are
     greatest = xp.maximum(xp.where(known, variance, 0).max(), np.finfo(real).tiny)
     size = (2.0 ** xp.ceil(xp.log2(greatest) / 2)).astype(real)
-    weight = xp.where(known, size**2 / xp.where(known, variance, 1), 0).astype(real)
-    measured = (weight > 0).reshape((len(order), -1)).any(axis=1)
+    weight = (size**2 / xp.where(known & present, variance, np.inf)).astype(real)
+    measured = weight.max(axis=(1, 2)) > 0
     numbers = xp.maximum((measured * np.array([2 if j else 1 for j in order])).sum(), 1)
     raw = xp.where(present, moments, 0) / size
     found, share = _averaged(raw, weight, present, order, numbers, spread=spread)
-    flattened = _flattened(xp.where(present, raw - found, 0), found, weight, order)
-    share = xp.minimum(share + flattened, 1)
+    share = xp.minimum(share + _flattened(raw - found, found, weight, order), 1)
     averaged = xp.where(present, found * size, moments)
     return Averaged(averaged, MomentNoise((variance * share).astype(share.dtype)), share)
 

@@ -151,10 +151,7 @@ class Reconstruction:
 
     @property
     def variance_share(self) -> Array | None:
-        """Share (H, W) of a pixel's variance that averaging over neighbours has left.
-
-        None where that was not edge-preserving: `noise.smoothed` has it of a Gaussian.
-        """
+        """Share (H, W) of a pixel's variance that `average_neighbours` has left; else None."""
         return self._averaged[1]
 
     @cached_property

@@ -48,10 +48,7 @@ def over_neighbours(
 def sensor_noise(
     settings: Settings, calibration: Array | None, planes: int
 ) -> Callable[..., MomentNoise] | None:
-    """Return what tells the noise of pixels by themselves, of their brightness and ambient light.
-
-    None without a sensor.
-    """
+    """Return what tells noise of brightness and ambient light; None without a sensor."""
     if settings.sensor is None or settings.zeroth is None or settings.takes is None:
         return None
     return partial(

@@ -66,8 +66,7 @@ def reconstruct(
     neighbours: Annotated[
         Neighbours | None,
         typer.Option(
-            help="How neighbouring pixels are averaged.  "
-            "[default: gaussian; of a recording, as recorded]",
+            help="How pixels are averaged.  [default: gaussian; of a recording, as recorded]"
         ),
     ] = None,
     smoothing_px: Annotated[
@@ -111,14 +110,8 @@ def reconstruct(
     if plot is not None:
         require_suffix(plot, ".png", hint="--plot")
         pictures.require()
-    if smoothing_px is not None:
-        neighbours = neighbours or "gaussian"
-    options = {
-        "neighbours": neighbours,
-        "smoothing_px": smoothing_px,
-        "bias": bias,
-        "return_threshold": threshold,
-    }
+    options = {"smoothing_px": smoothing_px, "bias": bias, "return_threshold": threshold}
+    options["neighbours"] = neighbours or (None if smoothing_px is None else "gaussian")
     given = {name: value for name, value in options.items() if value is not None}
     clustered = workers is not None or dask is not None
     if clustered or "://" in input or _is_recording(Path(input)):
@@ -129,9 +122,7 @@ def reconstruct(
             reconstruct_recording(input, Path(output), wanted, token, as_json=as_json)
         return
     if neighbours == "edge-preserving":
-        raise typer.BadParameter(
-            "a measurement states no noise of a sensor", param_hint="--neighbours"
-        )
+        raise typer.BadParameter("needs the noise of a sensor", param_hint="--neighbours")
     require_suffix(Path(output), ".npz")
     settings = settings_of(_OF_MEASUREMENTS | given)
     measurement = offline.load_measurement(

@@ -212,9 +212,8 @@ def contradictory_share(recipe: Recipe, found: tm.Reconstruction) -> float | Non
 
 def _share(found: tm.Reconstruction) -> _Array:
     """Return what edge-preserving averaging has left of pixels' variance; 1 of the Gaussian's."""
-    if found.variance_share is None:
-        return np.broadcast_to(np.float32(1), found.flags.shape)
-    return np.asarray(found.variance_share)
+    share = found.variance_share
+    return np.ones(found.smoothed.shape[1:], np.float32) if share is None else np.asarray(share)
 
 
 def _lit(found: tm.Reconstruction) -> _Array:
