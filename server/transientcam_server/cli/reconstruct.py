@@ -110,7 +110,8 @@ def reconstruct(
     if plot is not None:
         require_suffix(plot, ".png", hint="--plot")
         pictures.require()
-    options = {"smoothing_px": smoothing_px, "bias": bias, "return_threshold": threshold}
+    options: dict[str, float | str | None] = {"smoothing_px": smoothing_px, "bias": bias}
+    options["return_threshold"] = threshold
     options["neighbours"] = neighbours or (None if smoothing_px is None else "gaussian")
     given = {name: value for name, value in options.items() if value is not None}
     clustered = workers is not None or dask is not None
