@@ -99,6 +99,10 @@ def _round(
         simd.store(left, p, select(there > 0.0, square * inverse * inverse, one))
 
 
+def _by_rows(run: Callable[..., Any], first: int, row: int, top: int, end: int) -> None:
+    run(first + top * row, first + end * row)
+
+
 def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile averaging over neighbours of order m; see the table in ``_kernels``."""
     order = (0,) * m
@@ -140,9 +144,7 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
             limits = 1 / (neighbours.MOST_MISFIT * float(numbers)), 2 / neighbours.MOST_SHIFT
             planes = given, current, weights, there[0], share[0], ahead, places
             run = partial(average, order, orders, *planes, *limits, other, left[0])
-            spread(
-                lambda top, end, run=run: run(first + top * row, first + end * row), height, _ROWS
-            )
+            spread(partial(_by_rows, run, first, row), height, _ROWS)
             current, other = other, spare if current is given else current
             share, left = left, share
         moments = np.empty(raw.shape, np.complex64)

@@ -88,8 +88,7 @@ def average_neighbours(
     weight falls with its distance and with misfit over noise. The mean of a neighbour and its
     mirror image is held against the pixel, so that slanted surfaces pass; a second misfit is the
     one in the direction d b_j = i j b_j, all light later, so that small steps in range show. What
-    is flattened all the same leaves residuals of one sign along a line: their square counts as
-    noise.
+    is flattened leaves residuals of one sign along a line: their square counts as noise.
     """
     moments = as_array(moments)
     if moments.ndim != 3:
