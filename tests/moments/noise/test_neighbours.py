@@ -17,7 +17,7 @@ STD = 0.01
 
 def wall(range_m: Array, seed: int | None = 0, m: int = 4) -> Array:
     """Moments of one return of brightness 1 a pixel, with the noise of `noise`."""
-    b = np.exp(1j * np.arange(m + 1)[:, None, None] * RAD_PER_M * range_m)
+    b: Array = np.exp(1j * np.arange(m + 1)[:, None, None] * RAD_PER_M * range_m)
     if seed is not None:
         rng = np.random.default_rng(seed)
         b = b + STD * (rng.normal(size=b.shape) + 1j * rng.normal(size=b.shape))
@@ -38,7 +38,8 @@ def range_m(b: Array) -> Array:
     j = np.arange(1, len(b))[:, None, None]
     start = np.angle(b[1])
     off = np.angle(b[1:] * np.exp(-1j * j * start))
-    return (start + (j * off).sum(0) / (j**2).sum()) / RAD_PER_M
+    found: Array = (start + (j * off).sum(0) / (j**2).sum()) / RAD_PER_M
+    return found
 
 
 def ridges(height_m: float, slant: float = 0.0) -> tuple[Array, Array]:
@@ -144,7 +145,7 @@ def test_it_is_what_a_loop_over_pixels_and_neighbours_makes() -> None:
 @pytest.mark.parametrize(("row", "column"), [(0.0, 0.0), (1e-4, -2e-4)])
 def test_constant_and_linear_fields_stay(row: float, column: float) -> None:
     rows, columns = np.mgrid[:16, :18]
-    b = (1 + row * rows + column * columns) * np.exp(1j * np.arange(4))[:, None, None]
+    b: Array = (1 + row * rows + column * columns) * np.exp(1j * np.arange(4))[:, None, None]
 
     found = averaged(b)
 
@@ -176,7 +177,7 @@ def test_what_is_not_finite_or_left_out_stays_and_is_not_spread(bad: float) -> N
 @pytest.mark.parametrize("dtype", [np.complex64, np.complex128])
 @pytest.mark.parametrize("scale", [2.0**-55, 2.0**55])
 def test_the_unit_of_the_moments_does_not_matter(scale: float, dtype: type) -> None:
-    b = wall(np.full((9, 10), 2.0)).astype(dtype)
+    b: Array = wall(np.full((9, 10), 2.0)).astype(dtype)
     std = np.full(b.shape, STD, b.real.dtype)
 
     found = tm.average_neighbours(b, tm.noise.MomentNoise(std**2))
@@ -213,7 +214,7 @@ def test_a_plane_that_was_not_measured_decides_nothing() -> None:
 @pytest.mark.parametrize("slant", [0.0, 0.5, 1.0])
 def test_ridges_one_pixel_wide_keep_their_contrast(slant: float) -> None:
     def smoothed(b: Array) -> Array:
-        return averaged(b).moments
+        return np.asarray(averaged(b).moments)
 
     assert contrast(0.02, smoothed, slant) >= 0.95
     least = contrast(0.005, tm.smooth, slant) if slant == 0.5 else 0.6
@@ -252,7 +253,7 @@ def test_the_noise_left_is_the_one_stated() -> None:
     ],
 )
 def test_other_shapes_are_refused(field: str, arguments: dict[str, Any]) -> None:
-    usual = {
+    usual: dict[str, Any] = {
         "moments": np.ones((3, 4, 5), complex),
         "noise": tm.noise.MomentNoise(np.ones((3, 4, 5))),
     }

@@ -36,9 +36,13 @@ def test_moments_are_averaged_by_the_noise_of_the_sensor(zeroth: str) -> None:
     noise = tm.noise.moment_noise(brightness, SENSOR, calibration=GAINS, zeroth=zeroth)
     expected = tm.average_neighbours(found.measured, noise)
     assert np.allclose(found.smoothed[1:], expected.moments[1:], rtol=1e-5)
+    assert found.variance_share is not None
     assert np.allclose(found.variance_share, expected.share, rtol=1e-4)
     own = replace(settings, neighbours="none")
-    ratio = found.noise.variance[1:] / reconstructed(raw, own).noise.variance[1:]
+    left, whole = found.noise, reconstructed(raw, own).noise
+    assert left is not None
+    assert whole is not None
+    ratio = left.variance[1:] / whole.variance[1:]
     assert np.allclose(ratio, expected.share, rtol=0.15)  # the brightness is known better, too
     assert np.median(found.range_std_m) < np.median(reconstructed(raw, own).range_std_m) / 2
 
