@@ -149,6 +149,7 @@ _ALL: Final = (
     Measurement("sparse", "likelihood.sparse:tables", "measured/likelihood", _MOMENTS),
     Measurement("captures", "likelihood.captures:tables", "measured/likelihood", _MOMENTS),
     Measurement("shapes", "likelihood.shapes:tables", "measured/likelihood", _MOMENTS),
+    Measurement("neighbours", "likelihood.neighbours:tables", "measured/likelihood", _MOMENTS),
     Measurement("likelihood_speed", "likelihood.speed:tables", "measured/likelihood", _MOMENTS),
     # -- simulation
     *(

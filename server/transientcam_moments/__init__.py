@@ -71,6 +71,7 @@ from transientcam_moments.moment_problem import (
     smallest_eigenvalue,
     smoothed_density,
 )
+from transientcam_moments.noise import Averaged, average_neighbours
 from transientcam_moments.reconstruction import (
     INVALID,
     SPEED_OF_LIGHT_M_S,
@@ -88,6 +89,7 @@ __all__ = [
     "INVALID",
     "SPEED_OF_LIGHT_M_S",
     "Average",
+    "Averaged",
     "Biased",
     "Coefficients",
     "Corrected",
@@ -108,6 +110,7 @@ __all__ = [
     "SweepPhasors",
     "UnlabelledImages",
     "Unwrapped",
+    "average_neighbours",
     "average_takes",
     "bias",
     "bounds",

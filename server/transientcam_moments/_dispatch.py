@@ -70,6 +70,7 @@ MOST_ROOTS: Final = 8
 """The largest m with kernels for eigenvalues and returns."""
 _SINGLE_ONLY: Final = (
     "smooth",
+    "neighbours",
     "measure",
     "separate",
     "reconstruct",
@@ -82,6 +83,7 @@ _ANY_ORDER: Final = ("likelihood",)
 _COMPILING_S: Final = {"likelihood": 10.0, "reconstruct": 8.0, "pisarenko": 8.0, "pairs": 4.0}
 _DOUBLE_ONLY: Final = ("covariance", "direct_noise")
 _FEW_ROOTS: Final = (
+    "neighbours",
     "pisarenko",
     "smallest_eigenvalue",
     "reconstruct",

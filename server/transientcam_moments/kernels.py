@@ -73,6 +73,7 @@ LANES = (
     "pisarenko",
     "smallest_eigenvalue",
     "smooth",
+    "neighbours",
     "measure",
     "separate",
     "levinson",

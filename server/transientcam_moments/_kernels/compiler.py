@@ -11,6 +11,7 @@ from transientcam_moments._kernels.frames import measure_kernel, separate_kernel
 from transientcam_moments._kernels.harmonics import harmonics_kernel
 from transientcam_moments._kernels.levinson import levinson_kernel
 from transientcam_moments._kernels.likelihood import likelihood_kernel
+from transientcam_moments._kernels.neighbours import neighbours_kernel
 from transientcam_moments._kernels.pairs import pairs_kernel
 from transientcam_moments._kernels.peaks import peaks_kernel
 from transientcam_moments._kernels.pisarenko import pisarenko_kernel
@@ -24,6 +25,7 @@ COMPILERS: dict[str, Callable[[int, str], Kernel]] = {
     "peaks": peaks_kernel,
     "measure": measure_kernel,
     "smooth": smooth_kernel,
+    "neighbours": neighbours_kernel,
     "separate": separate_kernel,
     "reconstruct": reconstruct_kernel,
     "likelihood": likelihood_kernel,

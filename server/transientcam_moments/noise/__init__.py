@@ -15,6 +15,7 @@ through the estimator itself. ::
 from transientcam_moments.noise import (
     _first_order as first_order,
     _interpolation as interpolation,
+    _neighbours as neighbours,
 )
 from transientcam_moments.noise._ambient import ambient_light
 from transientcam_moments.noise._assumed import ASSUMED_NOISE, free_of_scale
@@ -30,6 +31,7 @@ from transientcam_moments.noise._moments import (
     smoothed_of,
     smoothing_factor,
 )
+from transientcam_moments.noise._neighbours import Averaged, average_neighbours
 from transientcam_moments.noise._of_images import CapturedImages, image_noise
 from transientcam_moments.noise._returns import ReturnNoise, direct_phase_noise, return_noise
 from transientcam_moments.noise._scatter import scatter
@@ -37,6 +39,7 @@ from transientcam_moments.noise._sensor import ImageNoise, Sensor
 
 __all__ = [
     "ASSUMED_NOISE",
+    "Averaged",
     "CapturedImages",
     "CramerRao",
     "ImageNoise",
@@ -44,6 +47,7 @@ __all__ = [
     "ReturnNoise",
     "Sensor",
     "ambient_light",
+    "average_neighbours",
     "cramer_rao",
     "density_std",
     "direct_phase_noise",
@@ -53,6 +57,7 @@ __all__ = [
     "image_noise",
     "interpolation",
     "moment_noise",
+    "neighbours",
     "own_share",
     "return_noise",
     "scatter",

@@ -7,6 +7,7 @@ from transientcam_moments.reconstruction._ranging import SPEED_OF_LIGHT_M_S, ran
 from transientcam_moments.reconstruction._reconstructor import Reconstructor, reconstruct
 from transientcam_moments.reconstruction._settings import (
     ESTIMATORS,
+    NEIGHBOURS,
     OF_ANY_MULTIPLES,
     Settings,
     automatic,
@@ -16,6 +17,7 @@ from transientcam_moments.reconstruction._settings import (
 __all__ = [
     "ESTIMATORS",
     "INVALID",
+    "NEIGHBOURS",
     "OF_ANY_MULTIPLES",
     "SPEED_OF_LIGHT_M_S",
     "Flags",

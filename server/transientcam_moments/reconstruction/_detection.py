@@ -42,6 +42,7 @@ def undetected_pixels(
     sigma_px: float,
     calibration: Array | None,
     ambient: Array | None,
+    share: Array | None = None,
 ) -> Array | None:
     """Return what `undetected` does of smoothed moments, quickly where most pixels are lit.
 
@@ -59,6 +60,8 @@ def undetected_pixels(
         Gains that the moments were divided by; 1, when left out.
     ambient : array, shape (...), optional
         Light in DN an image that is not the camera's.
+    share : array, shape (...), optional
+        Of a pixel's own variance that averaging has left, where that was no Gaussian.
 
     Returns
     -------
@@ -87,6 +90,8 @@ def undetected_pixels(
         light = brightness.reshape(-1)[doubtful]
         other = 0.0 if ambient is None else ambient.reshape(-1)[doubtful]
         noise = noise_of(light, ambient=other).variance
+    if share is not None:
+        noise = noise * share.reshape(-1)[doubtful]
     size = size.reshape((planes, -1))
     size = size if size.shape[1] == 1 else size[:, doubtful]
     found = np.zeros(brightness.size, dtype=bool)

@@ -1,7 +1,7 @@
 """What follows from the moments of an image: each property computed once, when first read."""
 
 from collections.abc import Callable
-from functools import cached_property, partial
+from functools import cached_property
 from html import escape
 
 import numpy as np
@@ -10,7 +10,7 @@ from transientcam_compiled import Spread, at_once
 from transientcam_moments.arrays import Array, in_turn, map_html, namespace
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
 from transientcam_moments.errors import ParameterError, UnlabelledImages
-from transientcam_moments.images import HarmonicCorrection, Repair, smooth
+from transientcam_moments.images import HarmonicCorrection, Repair
 from transientcam_moments.likelihood import (
     CORRECTED_ERROR,
     MODEL_ERROR,
@@ -43,12 +43,12 @@ from transientcam_moments.noise import (
     MomentNoise,
     Sensor,
     image_noise,
-    moment_noise,
     scatter,
     smoothed_of,
 )
 from transientcam_moments.reconstruction._detection import undetected, undetected_pixels
 from transientcam_moments.reconstruction._flags import INVALID, Flags, flags
+from transientcam_moments.reconstruction._neighbours import over_neighbours, sensor_noise
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, OWN, Settings
 
@@ -150,11 +150,21 @@ class Reconstruction:
         return tuple((int(t), int(i)) for t, i in np.argwhere(self._repaired.filled))
 
     @cached_property
+    def _averaged(self) -> tuple[Array, Array | None]:
+        """Moments averaged over neighbours, and `variance_share`."""
+        left_out, gains = (self._saturated, self._bad), self._calibration
+        how = self._images, self._spread
+        return over_neighbours(self.measured, self.settings, gains, left_out, *how)
+
+    @property
+    def variance_share(self) -> Array | None:
+        """Share (H, W) of a pixel's variance that `average_neighbours` has left; else None."""
+        return self._averaged[1]
+
+    @cached_property
     def _corrected(self) -> tuple[Array, Array | None]:
         """Smoothed moments without the known harmonics, and where these were taken out."""
-        moments = self.measured
-        if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
-            moments = smooth(moments, self.settings.smoothing_sigma_px)
+        moments = self._averaged[0]
         return (moments, None) if self._correction is None else self._correction(moments)
 
     @cached_property
@@ -246,23 +256,15 @@ class Reconstruction:
             return None
         if not isinstance(moments, np.ndarray):
             return undetected(moments, self.noise) if self.noise is not None else None
-        sigma_px, gains = self.settings.smoothing_sigma_px, self._calibration
-        brightness = self._least_brightness
-        return undetected_pixels(moments, brightness, noise_of, sigma_px, gains, self.ambient)
+        sigma_px, gains = self.settings.gaussian_px, self._calibration
+        brightness, share = self._least_brightness, self.variance_share
+        return undetected_pixels(
+            moments, brightness, noise_of, sigma_px, gains, self.ambient, share
+        )
 
     def _noise_of(self, gains: Array | None) -> Callable[..., MomentNoise] | None:
         """Return what tells the noise of moments divided by gains, of the brightness."""
-        zeroth, takes = self.settings.zeroth, self.settings.takes
-        if self.image_noise is None or zeroth is None or takes is None:
-            return None  # the last two go with a sensor, and with images
-        return partial(
-            moment_noise,
-            sensor=self.image_noise,
-            calibration=np.ones(len(self.smoothed)) if gains is None else gains,
-            zeroth=zeroth,
-            takes=takes,
-            phases_rad=self.settings.sampled_rad,
-        )
+        return sensor_noise(self.settings, self.image_noise, gains, len(self.smoothed))
 
     def add_flag(self, flag: Flags, where: Array) -> None:
         """Add a flag to pixels, of which something is known that the moments do not show.
@@ -338,11 +340,12 @@ class Reconstruction:
         moments, noise_of = self.smoothed, self._noise_of(self._calibration)
         if noise_of is None:
             return None
-        brightness, ambient = self._least_brightness, self.ambient
-        if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
-            sigma_px = self.settings.smoothing_sigma_px
+        brightness, ambient, share = self._least_brightness, self.ambient, self.variance_share
+        if self.settings.gaussian_px > 0 and moments.ndim == 3:
+            sigma_px = self.settings.gaussian_px
             return smoothed_of(noise_of, brightness, sigma_px, ambient=ambient)
-        return noise_of(brightness) if ambient is None else noise_of(brightness, ambient=ambient)
+        noise = noise_of(brightness) if ambient is None else noise_of(brightness, ambient=ambient)
+        return noise if share is None else MomentNoise(noise.variance * share)
 
     @cached_property
     def ambient(self) -> Array | None:

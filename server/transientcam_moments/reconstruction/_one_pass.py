@@ -39,6 +39,8 @@ class PassedReconstruction(Reconstruction):
         As of `Reconstruction`.
     images : CapturedImages, optional
         As of `Reconstruction`.
+    share : array, shape (H, W), optional
+        Its `variance_share`.
     """
 
     def __init__(
@@ -52,6 +54,7 @@ class PassedReconstruction(Reconstruction):
         corrected: Array | None = None,
         spread: Spread = at_once,
         images: CapturedImages | None = None,
+        share: Array | None = None,
     ) -> None:
         super().__init__(
             None,
@@ -64,6 +67,7 @@ class PassedReconstruction(Reconstruction):
         )
         self._measure = measure
         self.smoothed = planes.smoothed
+        self._averaged = planes.smoothed, share
         self._corrected = planes.smoothed, corrected
         self.validity = planes.validity
         nothing = (planes.count == 0) & (planes.flags & int(INVALID) == 0)  # as of uniform light

@@ -33,12 +33,12 @@ from transientcam_moments.images import (
     recover_saturated,
     repair,
     saturated,
-    smooth,
     takes_first,
 )
 from transientcam_moments.noise import CapturedImages
 from transientcam_moments.reconstruction._labels import Labels
 from transientcam_moments.reconstruction._lazy import Reconstruction
+from transientcam_moments.reconstruction._neighbours import over_neighbours
 from transientcam_moments.reconstruction._one_pass import PassedReconstruction
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, Settings
@@ -144,7 +144,8 @@ class Reconstructor:
             takes = recovered.images
         images = self._images(takes, zeroth, repaired, recovered)
         # behind the smoothing, where a waveform is known: harmonics are taken out there
-        one_pass = None if self._waveform is not None else self._pass_of_images(takes, zeroth)
+        behind = self._waveform is not None or self.settings.keeps_edges
+        one_pass = None if behind else self._pass_of_images(takes, zeroth)
         if one_pass is not None:
             planes = one_pass.images(takes[0], saturated_pixels, spread)
             return PassedReconstruction(
@@ -242,9 +243,9 @@ class Reconstructor:
                 spread=spread,
                 images=images,
             )
-        smoothed = moments
-        if moments.ndim == 3:
-            smoothed = smooth(moments, self.settings.smoothing_sigma_px)
+        gains, left_out = self._calibration, (saturated_pixels, self._bad)
+        how = images, spread
+        smoothed, share = over_neighbours(moments, self.settings, gains, left_out, *how)
         corrected = None
         if correction is not None:
             smoothed, corrected = correction(smoothed, spread=spread)
@@ -259,6 +260,7 @@ class Reconstructor:
             corrected=corrected,
             spread=spread,
             images=images,
+            share=share,
         )
 
     def _correction(self, moments: Array) -> HarmonicCorrection | None:
@@ -272,7 +274,7 @@ class Reconstructor:
                     self._waveform,
                     self._calibration,
                     shape,
-                    smoothing_sigma_px=self.settings.smoothing_sigma_px,
+                    smoothing_sigma_px=self.settings.gaussian_px,
                     estimated=self.settings.zeroth == "estimated",
                 )
                 while len(self._corrections) > _SHAPES:
@@ -327,7 +329,7 @@ class Reconstructor:
             None if recovered is None else recovered.saturated,
             self._bad,
             None if repaired is None else np.logical_or.reduce(repaired[1:]),
-            self.settings.smoothing_sigma_px,
+            self.settings.gaussian_px,
         )
 
     def _measured(self, takes: Array, left_out: Array | None = None) -> tuple[Array, Array]:
@@ -383,7 +385,7 @@ class Reconstructor:
     # -- preparing -----------------------------------------------------------------------------
 
     def _taps(self, shape: tuple[int, ...]) -> Array | None:
-        sigma_px = self.settings.smoothing_sigma_px
+        sigma_px = self.settings.gaussian_px
         return gaussian_taps(sigma_px) if sigma_px > 0 and len(shape) == 2 else None
 
     def _constants(self, m: int, shape: tuple[int, ...]) -> Constants:

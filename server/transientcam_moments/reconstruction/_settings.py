@@ -11,6 +11,9 @@ from transientcam_moments.images import FOUR_PHASES_RAD, SIGMA_PX, ZEROTH_IMAGES
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, EPSILON
 from transientcam_moments.noise import Sensor
 
+NEIGHBOURS = ("edge-preserving", "gaussian", "none")
+"""How moments are averaged over neighbouring pixels; see `Settings`."""
+
 CORRUPT_IMAGES = ("keep", "repair", "fill")
 """What becomes of images that lost their synchronisation; see `Settings`."""
 
@@ -73,8 +76,12 @@ class Settings:
         Least uniform part relative to b_0 (Sec. 4.3), 0 <= epsilon < 1.
     keep : {"harmonics", "brightness"}
         What biasing leaves as it is.
+    neighbours : {"gaussian", "edge-preserving", "none"}
+        How moments are averaged over neighbouring pixels: "gaussian" is the paper's (Sec. 6),
+        "edge-preserving" is `average_neighbours`, which needs a sensor and is the Gaussian without
+        one. There is none without two image axes.
     smoothing_sigma_px : float
-        Of the Gaussian over neighbouring pixels; 0 for none, and none without two image axes.
+        Of the Gaussian; 0 for none.
     threshold : float
         The range is that of the first return, or peak, with this share of the strongest one's
         weight, or density.
@@ -105,6 +112,7 @@ class Settings:
     phases_rad: tuple[float, ...] | None = None
     epsilon: float = EPSILON
     keep: str = "harmonics"
+    neighbours: str = "gaussian"
     smoothing_sigma_px: float = SIGMA_PX
     threshold: float = DIRECT_THRESHOLD
     estimator: str = "automatic"
@@ -130,6 +138,7 @@ class Settings:
             raise ParameterError("multiples", self.multiples, "ascending, from 1 to 32")
         in_range("epsilon", self.epsilon, 0.0, float(np.nextafter(1.0, 0.0)), "0 <= epsilon < 1")
         chosen("keep", self.keep, ("harmonics", "brightness"))
+        chosen("neighbours", self.neighbours, NEIGHBOURS)
         in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
         in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
         chosen("estimator", self.estimator, ("automatic", *ESTIMATORS))
@@ -149,6 +158,16 @@ class Settings:
     def sampled_rad(self) -> tuple[float, ...]:
         """Phases of the raw images of each frequency."""
         return FOUR_PHASES_RAD if self.phases_rad is None else self.phases_rad
+
+    @property
+    def keeps_edges(self) -> bool:
+        """Whether neighbours are averaged by `average_neighbours`."""
+        return self.neighbours == "edge-preserving" and self.sensor is not None
+
+    @property
+    def gaussian_px(self) -> float:
+        """Standard deviation of the Gaussian that moments are smoothed with; 0 for none."""
+        return 0.0 if self.keeps_edges or self.neighbours == "none" else self.smoothing_sigma_px
 
     @property
     def consecutive(self) -> bool:

@@ -7,7 +7,6 @@ import numpy as np
 
 from transientcam_moments.arrays import Array, namespace
 from transientcam_moments.errors import ParameterError
-from transientcam_moments.images import smooth
 from transientcam_moments.likelihood import MODEL_ERROR, Unwrapped
 from transientcam_moments.moment_problem import Coefficients, Peaks, Returns, Separation
 from transientcam_moments.noise import MomentNoise
@@ -31,10 +30,7 @@ class GappedReconstruction(Reconstruction):
     @cached_property
     def smoothed(self) -> Array:
         """Moments (K + 1, ...) smoothed over pixels; b_0 is 0 where it was not measured."""
-        moments = self.measured
-        if self.settings.smoothing_sigma_px > 0 and moments.ndim == 3:
-            moments = smooth(moments, self.settings.smoothing_sigma_px)
-        return moments
+        return self._averaged[0]
 
     @cached_property
     def eigenvalue(self) -> Array:

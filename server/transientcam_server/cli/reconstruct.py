@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from transientcam_server.offline import Measurement, TransientCube
 
 Background = Literal["none", "median"]
+Neighbours = Literal["edge-preserving", "gaussian", "none"]
 _OF_MEASUREMENTS = {"smoothing_px": 0.0, "bias": 4e-3, "return_threshold": 0.1}
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -60,6 +61,12 @@ def reconstruct(
         typer.Option(
             help="Least uniform part of a pixel, over its brightness (Sec. 4.3).  "
             "[default: 4e-3; of a recording, as recorded]"
+        ),
+    ] = None,
+    neighbours: Annotated[
+        Neighbours | None,
+        typer.Option(
+            help="How pixels are averaged.  [default: gaussian; of a recording, as recorded]"
         ),
     ] = None,
     smoothing_px: Annotated[
@@ -103,7 +110,9 @@ def reconstruct(
     if plot is not None:
         require_suffix(plot, ".png", hint="--plot")
         pictures.require()
-    options = {"smoothing_px": smoothing_px, "bias": bias, "return_threshold": threshold}
+    options: dict[str, float | str | None] = {"smoothing_px": smoothing_px, "bias": bias}
+    options["return_threshold"] = threshold
+    options["neighbours"] = neighbours or (None if smoothing_px is None else "gaussian")
     given = {name: value for name, value in options.items() if value is not None}
     clustered = workers is not None or dask is not None
     if clustered or "://" in input or _is_recording(Path(input)):
@@ -113,6 +122,8 @@ def reconstruct(
         else:
             reconstruct_recording(input, Path(output), wanted, token, as_json=as_json)
         return
+    if neighbours == "edge-preserving":
+        raise typer.BadParameter("needs the noise of a sensor", param_hint="--neighbours")
     require_suffix(Path(output), ".npz")
     settings = settings_of(_OF_MEASUREMENTS | given)
     measurement = offline.load_measurement(

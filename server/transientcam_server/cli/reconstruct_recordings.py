@@ -25,7 +25,7 @@ class ReconstructionChoices:
     """Names of products, if any were given; settings in place of the recorded ones."""
 
     products: Sequence[str]
-    changes: Mapping[str, float]
+    changes: Mapping[str, float | str]
     bins: int
 
     def options(self, header: "Header") -> "BatchOptions":

@@ -984,6 +984,12 @@ export interface ReadinessDocument {
 
 /** How frames are computed. */
 export interface ReconstructionDocument {
+  /** How moments are averaged over neighbouring pixels. `gaussian` is the paper's.
+   * `edge-preserving` averages up to 69 pixels that differ by no more than noise, and none across
+   * an edge: the noise falls two to four times further. It needs the noise of the sensor and, in
+   * the daemon, a compiled kernel, of at most 8 harmonics; until then it is `gaussian`, as it is in
+   * plans. */
+  readonly neighbours: "edge-preserving" | "gaussian" | "none";
   /** Standard deviation of the Gaussian that smooths the moments, in pixels; 0 for none. */
   readonly smoothing_px: number;
   /** Smallest eigenvalue every pixel's moments are raised to, over its brightness (Sec. 4.3). */
@@ -1027,6 +1033,12 @@ export interface ReconstructionDocument {
 
 /** How frames should be computed; what is absent takes the paper's value. */
 export interface ReconstructionRequest {
+  /** How moments are averaged over neighbouring pixels. `gaussian` is the paper's.
+   * `edge-preserving` averages up to 69 pixels that differ by no more than noise, and none across
+   * an edge: the noise falls two to four times further. It needs the noise of the sensor and, in
+   * the daemon, a compiled kernel, of at most 8 harmonics; until then it is `gaussian`, as it is in
+   * plans. */
+  readonly neighbours?: "edge-preserving" | "gaussian" | "none";
   /** Standard deviation of the Gaussian that smooths the moments, in pixels; 0 for none. */
   readonly smoothing_px?: number;
   /** Smallest eigenvalue every pixel's moments are raised to, over its brightness (Sec. 4.3). */

@@ -26,12 +26,13 @@ _BLOCK_PIXELS: Final = 1 << 16
 
 def moment_noise(recipe: Recipe, found: tm.Reconstruction) -> tm.noise.MomentNoise:
     """Return the noise of a frame's smoothed moments (m + 1, H, W), of the recipe's sensor."""
-    return tm.noise.smoothed_of(
+    noise = tm.noise.smoothed_of(
         partial(_of_pixels, recipe),
         np.asarray(found.smoothed[0].real),
-        recipe.settings.smoothing_px,
+        found.settings.gaussian_px,
         ambient=found.ambient,
     )
+    return tm.noise.MomentNoise(noise.variance * _share(found))
 
 
 def range_noise(recipe: Recipe, found: tm.Reconstruction) -> PredictedStdDocument | None:
@@ -79,9 +80,10 @@ def _of_pisarenko(
         partial(_of_pixels, recipe),
         np.asarray(found.smoothed[0].real),
         sample,
-        recipe.settings.smoothing_px,
+        found.settings.gaussian_px,
         ambient=found.ambient,
     )
+    noise = tm.noise.MomentNoise(noise.variance * _share(found).ravel()[sample])
     std_rad, holds = direct_phase_noise(returns, noise, threshold=recipe.settings.return_threshold)
     return np.asarray(tm.range_m(std_rad, recipe.base_frequency_hz)), np.asarray(holds)
 
@@ -126,13 +128,12 @@ def contradictions(recipe: Recipe, found: tm.Reconstruction) -> _Array | None:
         """Return the variance of all moments together, which grows linearly with the light."""
         return tm.noise.MomentNoise((dark + slope * light + other * ambient)[None])
 
-    return beyond_noise(found, of_all, recipe.settings.smoothing_px)
+    return beyond_noise(found, of_all)
 
 
 def beyond_noise(
     found: tm.Reconstruction,
     noise_of: Callable[..., tm.noise.MomentNoise],
-    smoothing_px: float,
 ) -> _Array:
     """Return which lit pixels have moments that noise alone does not explain.
 
@@ -147,14 +148,12 @@ def beyond_noise(
         Returns the noise of moments with a brightness above 0 before smoothing, to which its
         variance is affine: of each moment (m + 1, ...), or of all together (1, ...). Called with
         ``ambient=`` where there is other light than the camera's.
-    smoothing_px
-        What the frame was smoothed with.
 
     Returns
     -------
     boolean array, shape (H, W)
     """
-    beyond = _beyond_own_share(found, noise_of, smoothing_px)
+    beyond = _beyond_own_share(found, noise_of)
     doubtful = np.flatnonzero(beyond)
     if not doubtful.size:
         return beyond
@@ -162,9 +161,9 @@ def beyond_noise(
     eigenvalue = np.asarray(found.validity).flat[doubtful] * brightness.flat[doubtful]
     ambient = found.ambient
     noise = tm.noise.smoothed_at(
-        noise_of, brightness, doubtful, smoothing_px, ambient=ambient
+        noise_of, brightness, doubtful, found.settings.gaussian_px, ambient=ambient
     ).variance
-    std = np.sqrt(noise.sum(axis=0))
+    std = np.sqrt(noise.sum(axis=0) * _share(found).ravel()[doubtful])
     beyond.flat[doubtful] = eigenvalue < -EXPLAINED_DEVIATIONS * std
     return beyond
 
@@ -172,7 +171,6 @@ def beyond_noise(
 def _beyond_own_share(
     found: tm.Reconstruction,
     noise_of: Callable[..., tm.noise.MomentNoise],
-    smoothing_px: float,
 ) -> _Array:
     """Return where the part of the noise that is a pixel's own does not explain its moments.
 
@@ -180,7 +178,8 @@ def _beyond_own_share(
     eigenvalue by more than the norm of its own Toeplitz matrix, and a pixel's own share of it
     settles most pixels without a look at their neighbours.
     """
-    limit = EXPLAINED_DEVIATIONS**2 * tm.noise.own_share(smoothing_px)
+    limit = EXPLAINED_DEVIATIONS**2 * tm.noise.own_share(found.settings.gaussian_px)
+    share = _share(found).reshape(-1)
     beyond = _lit(found)
     places = beyond.reshape(-1)
     light = np.asarray(found.smoothed[0].real).reshape(-1)
@@ -197,6 +196,7 @@ def _beyond_own_share(
         np.multiply(square, square, out=square)
         most *= slope
         most += dark
+        most *= share[block]
         places[block] &= square > most
         places[block] &= validity[block] < 0
     return beyond
@@ -208,6 +208,12 @@ def contradictory_share(recipe: Recipe, found: tm.Reconstruction) -> float | Non
     if contradictory is None or not lit.any():
         return None
     return float(contradictory[lit].mean())
+
+
+def _share(found: tm.Reconstruction) -> _Array:
+    """Return what edge-preserving averaging has left of pixels' variance; 1 of the Gaussian's."""
+    share = found.variance_share
+    return np.ones(found.smoothed.shape[1:], np.float32) if share is None else np.asarray(share)
 
 
 def _lit(found: tm.Reconstruction) -> _Array:

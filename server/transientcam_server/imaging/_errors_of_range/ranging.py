@@ -40,7 +40,7 @@ def ranges_m(
         phase = tm.likelihood(b, noise).separate(settings.return_threshold).phase_rad
     else:
         plain = settings.model_copy(
-            update={"smoothing_px": 0.0, "minimum_brightness_dn": 0.0, "estimator": estimator}
+            update={"neighbours": "none", "minimum_brightness_dn": 0.0, "estimator": estimator}
         )
         phase = tm.reconstruct(b, plain.for_moments(zeroth=zeroth)).phase_rad
     return np.asarray(tm.range_m(phase, base_frequency_hz), dtype=float)

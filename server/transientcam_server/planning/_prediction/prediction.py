@@ -115,7 +115,7 @@ class Predictor:
         self.sensor = sensor
         self.settings = settings
         self._seed = seed
-        self._left = tm.noise.smoothing_factor(settings.smoothing_px)
+        self._left = tm.noise.smoothing_factor(settings.gaussian_px)
         self._nominal = self.relative_noise(NOMINAL)
         self._column = lru_cache(maxsize=None)(self._drawn_column)
         self._exact = lru_cache(maxsize=None)(self._bias_without_noise)

@@ -61,7 +61,7 @@ class Resolving:
 
     def _reconstructed(self, b: _Array, base_frequency_hz: float, zeroth: str) -> tm.Reconstruction:
         plain = self._settings.model_copy(
-            update={"smoothing_px": 0.0, "minimum_brightness_dn": 0.0}
+            update={"neighbours": "none", "minimum_brightness_dn": 0.0}
         )
         settings = plain.for_moments(base_frequency_hz=base_frequency_hz, zeroth=zeroth)
         return tm.reconstruct(b.reshape((len(b), -1)), settings)

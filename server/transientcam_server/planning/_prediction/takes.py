@@ -80,7 +80,7 @@ def takes_of(
     takes
         Those that the camera cannot do are left out.
     """
-    settings = recipe.settings.model_copy(update={"smoothing_px": 0.0})
+    settings = recipe.settings.model_copy(update={"neighbours": "none"})
     found = replace(recipe, settings=settings).reconstruct(frame)
     assert found.noise is not None  # noqa: S101 - the sensor is known
     sequence, sampling = recipe.applied.sequence, recipe.applied.sequence.sampling

@@ -88,7 +88,7 @@ class FrameAverages:
             zeroth=sequence.zeroth,
             takes=sequence.takes,
         )
-        left = tm.noise.smoothing_factor(self.recipe.settings.smoothing_px)
+        left = tm.noise.smoothing_factor(self.recipe.settings.gaussian_px)
         return np.asarray(noise.variance) * left
 
 
@@ -188,7 +188,7 @@ def lit_pixels(averages: FrameAverages) -> _Array:
     """
     b = averages.single[1:]
     m = len(b)
-    left = tm.noise.smoothing_factor(averages.recipe.settings.smoothing_px)
+    left = tm.noise.smoothing_factor(averages.recipe.settings.gaussian_px)
     variance = averages.variance(averages.mean_dn)[1:] / (left * min(averages.frames, LIT_FRAMES))
     with np.errstate(invalid="ignore"):  # of pixels that are not finite
         power = (np.abs(b) ** 2 / variance).sum(axis=0)

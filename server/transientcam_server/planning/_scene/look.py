@@ -90,7 +90,7 @@ class _FrameSums:
     def add(self, raw: RawFrame, found: tm.Reconstruction | None = None) -> None:
         """Add a frame, and its reconstruction where there is one."""
         single = np.asarray((found or self._recipe.reconstruct(raw)).measured)
-        smoothing_px = self._recipe.settings.smoothing_px
+        smoothing_px = self._recipe.settings.gaussian_px
         moments = tm.smooth(single, smoothing_px) if smoothing_px else single
         images = _modulated(raw)
         if not self._frames:

@@ -44,7 +44,7 @@ def share(b: NDArray[np.complex64]) -> float | None:
     def noise_of(light: NDArray[np.float32]) -> tm.noise.MomentNoise:
         return tm.noise.MomentNoise(np.full((len(b), *light.shape), 2 * STD_DN**2))
 
-    beyond = beyond_noise(found, noise_of, 0.0)
+    beyond = beyond_noise(found, noise_of)
     assert not beyond[~lit].any()
     return float(beyond[lit].mean()) if lit.any() else None
 
@@ -103,7 +103,7 @@ def test_pixels_settled_without_their_neighbours_are_those_of_the_smoothed_noise
     def noise_of(light: NDArray[np.float32]) -> tm.noise.MomentNoise:
         return tm.noise.MomentNoise(np.stack([1.0 + 0.01 * light] * len(b)))
 
-    beyond = beyond_noise(found, noise_of, smoothing_px)
+    beyond = beyond_noise(found, noise_of)
 
     of_pixels = noise_of(np.maximum(brightness, 0))
     std = np.sqrt(tm.noise.smoothed(of_pixels, smoothing_px).variance.sum(axis=0))

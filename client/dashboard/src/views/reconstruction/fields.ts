@@ -55,6 +55,7 @@ function limitsOf(parameter: ParameterDocument): string {
 }
 
 const LABELS: Readonly<Record<string, string | undefined>> = {
+  neighbours: "Neighbours",
   smoothing_px: "Smoothing",
   bias: "Bias",
   return_threshold: "Threshold of a return",

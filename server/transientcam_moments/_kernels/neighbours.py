@@ -1,0 +1,156 @@
+"""Averaging moments over neighbours that agree, see `noise.average_neighbours`."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from transientcam_compiled import Spread, at_once
+from transientcam_moments._dispatch import LEAST_PIXELS
+from transientcam_moments._kernels import simd
+from transientcam_moments._kernels.arrays import (
+    Booleans,
+    Complexes,
+    Places,
+    RealPlane,
+    RealPlanes,
+    Reals,
+)
+from transientcam_moments._kernels.compiled_entry import entry
+from transientcam_moments._kernels.portable import bank, larger, select, smaller, tiny
+from transientcam_moments.arrays import Length, Plane
+from transientcam_moments.noise import neighbours
+
+_ROWS = 8  # of a part at least
+
+
+@njit(forceinline=True, error_model="numpy")
+def _agreement(place: float, there: Plane, doubt: Plane) -> Any:
+    return place * there * smaller(larger(2.0 - doubt, 0.0 * doubt), 0.0 * doubt + 1.0)
+
+
+@njit(forceinline=True, error_model="numpy")
+def _weighed(plane: RealPlane, a: int, wa: Plane, c: int, wc: Plane) -> Any:
+    return wa * simd.load(wa, plane, a) + wc * simd.load(wc, plane, c)
+
+
+@njit(nogil=True, error_model="numpy")
+def _round(
+    order: Length, multiples: RealPlane, raw: RealPlanes, current: RealPlanes, weight: RealPlanes,
+    present: RealPlane, share: RealPlane, ahead: Places, places: RealPlane, misfit: float, shift:
+    float, following: RealPlanes, left: RealPlane, start: int, stop: int,
+) -> None:  # fmt: skip
+    """Write averages over one neighbourhood, and what they leave of the variance.
+
+    Pictures lie flat with a margin between rows; planes of moments hold real and imaginary parts.
+    """
+    one = simd.ones(present, 1)
+    size = len(order) + 1
+    er, ei, w = bank(one, order, 1), bank(one, order, 1), bank(one, order, 1)
+    tr, ti = bank(one, order, 1), bank(one, order, 1)
+    mr, mi = bank(one, order, 1), bank(one, order, 1)
+    for p in range(start, stop, simd.width(one)):
+        norm = 0.0 * one
+        for j in range(size):
+            er[j], ei[j] = simd.load(one, current[2 * j], p), simd.load(one, current[2 * j + 1], p)
+            mr[j], mi[j] = simd.load(one, raw[2 * j], p), simd.load(one, raw[2 * j + 1], p)
+            w[j] = simd.load(one, weight[j], p)
+            tr[j], ti[j] = multiples[j] * w[j] * er[j], multiples[j] * w[j] * ei[j]
+            norm = norm + multiples[j] * (tr[j] * er[j] + ti[j] * ei[j])
+        there = simd.load(one, present, p)
+        total, square = there, there
+        worth = 1.0 / simd.load(one, share, p)
+        of_shift, of_misfit = shift * worth / larger(norm, tiny(one)), misfit * worth
+        for k in range(len(ahead)):
+            a, c = p + ahead[k], p - ahead[k]
+            uu, vv, uv = 0.0 * one, 0.0 * one, 0.0 * one
+            tu, tv = 0.0 * one, 0.0 * one
+            for j in range(size):
+                ur = er[j] - simd.load(one, current[2 * j], a)
+                ui = ei[j] - simd.load(one, current[2 * j + 1], a)
+                vr = er[j] - simd.load(one, current[2 * j], c)
+                vi = ei[j] - simd.load(one, current[2 * j + 1], c)
+                wr, wi = w[j] * ur, w[j] * ui
+                uu = uu + wr * ur + wi * ui
+                uv = uv + wr * vr + wi * vi
+                vv = vv + w[j] * (vr * vr + vi * vi)
+                tu = tu + (tr[j] * ui - ti[j] * ur)
+                tv = tv + (tr[j] * vi - ti[j] * vr)
+            by_a, by_c = simd.load(one, present, a), simd.load(one, present, c)
+            both, mirrored = 0.25 * (uu + vv) + 0.5 * uv, 0.25 * (tu + tv) * (tu + tv)
+            tu, tv = tu * tu, tv * tv
+            of_a = select(by_c > 0.0, both, uu) + neighbours.MISFIT_OF_ONE * uu
+            of_c = select(by_a > 0.0, both, vv) + neighbours.MISFIT_OF_ONE * vv
+            late_a = select(by_c > 0.0, mirrored, tu) + neighbours.SHIFT_OF_ONE * tu
+            late_c = select(by_a > 0.0, mirrored, tv) + neighbours.SHIFT_OF_ONE * tv
+            wa = _agreement(places[k], by_a, larger(of_misfit * of_a, of_shift * late_a))
+            wc = _agreement(places[k], by_c, larger(of_misfit * of_c, of_shift * late_c))
+            for j in range(size):
+                mr[j] = mr[j] + _weighed(raw[2 * j], a, wa, c, wc)
+                mi[j] = mi[j] + _weighed(raw[2 * j + 1], a, wa, c, wc)
+            total = total + (wa + wc)
+            square = square + (wa * wa + wc * wc)
+        inverse = 1.0 / larger(total, tiny(one))
+        for j in range(size):
+            simd.store(following[2 * j], p, mr[j] * inverse)
+            simd.store(following[2 * j + 1], p, mi[j] * inverse)
+        simd.store(left, p, select(there > 0.0, square * inverse * inverse, one))
+
+
+def _by_rows(run: Callable[..., Any], first: int, row: int, top: int, end: int) -> None:
+    run(first + top * row, first + end * row)
+
+
+def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
+    """Compile averaging over neighbours of order m; see the table in ``_kernels``."""
+    order = (0,) * m
+    average = entry(_round, m, precision)
+
+    def kernel(
+        raw: Complexes,
+        weight: Reals,
+        present: Booleans,
+        multiples: tuple[int, ...],
+        numbers: float,
+        *,
+        spread: Spread = at_once,
+    ) -> Any:
+        height, width = raw.shape[1:]
+        row = width + neighbours.REACH  # a margin between rows serves both of them
+        first = neighbours.REACH * (row + 1)
+        length = 2 * first + height * row + LEAST_PIXELS
+
+        def room(planes: int, fill: float = 0.0) -> tuple[Any, Any]:
+            """Return flat planes, and the view of them that is the picture."""
+            flat = np.full((planes, length), fill, np.float32)
+            view = flat[:, first : first + height * row].reshape(planes, height, row)
+            return flat, view[..., :width]
+
+        given, view = room(2 * len(raw))
+        view[0::2], view[1::2] = raw.real, raw.imag
+        weights, view = room(len(raw))
+        view[...] = weight
+        there, view = room(1)
+        view[0] = present
+        (other, _), (spare, _) = room(2 * len(raw)), room(2 * len(raw))
+        (share, _), (left, _) = room(1, 1.0), room(1, 1.0)
+        current, orders = given, np.array(multiples, np.float32)
+        for radius_px in neighbours.RADII_PX:
+            near = neighbours.neighbourhood(radius_px)
+            ahead = np.array([dy * row + dx for dy, dx, _ in near])
+            places = np.array([place for *_, place in near], np.float32)
+            limits = 1 / (neighbours.MOST_MISFIT * float(numbers)), 2 / neighbours.MOST_SHIFT
+            planes = given, current, weights, there[0], share[0], ahead, places
+            run = partial(average, order, orders, *planes, *limits, other, left[0])
+            spread(partial(_by_rows, run, first, row), height, _ROWS)
+            current, other = other, spare if current is given else current
+            share, left = left, share
+        moments = np.empty(raw.shape, np.complex64)
+        view = current[:, first : first + height * row].reshape(-1, height, row)[..., :width]
+        moments.real, moments.imag = view[0::2], view[1::2]
+        final = share[0, first : first + height * row].reshape(height, row)[:, :width]
+        return moments, np.ascontiguousarray(final)
+
+    return kernel

@@ -1,0 +1,199 @@
+"""Averaging moments over neighbouring pixels, but not across edges: adaptive weights."""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from transientcam_compiled import Spread, at_once
+from transientcam_moments._dispatch import accelerated
+from transientcam_moments.arrays import Array, as_array, namespace, real_type, squared, summary
+from transientcam_moments.errors import ShapeError
+from transientcam_moments.noise._moments import MomentNoise
+
+RADII_PX: Final = (1.5, 2.2, 3.2, 4.5)
+"""Of the neighbourhoods, one a round."""
+REACH: Final = 4
+"""Rows and columns beside a pixel that the largest neighbourhood reaches."""
+MOST_MISFIT: Final = 4.0
+"""Reduced chi-square of two pixels from which they are not averaged; half of it still is fully."""
+MOST_SHIFT: Final = 8.0
+"""The same for a common shift of all light in time, 1.5 times the chi-square of one number."""
+MISFIT_OF_ONE: Final = 0.02
+SHIFT_OF_ONE: Final = 0.001
+"""Weights of a neighbour alone beside those of its mean with its mirror image."""
+EXPECTED: Final = 4.0
+"""Chi-square of the clearest line of residuals that noise explains."""
+LINES: Final = ((1, 0), (0, 1), (1, 1), (1, -1))
+"""Their directions."""
+
+
+class Averaged(NamedTuple):
+    """Moments averaged over neighbours.
+
+    Attributes
+    ----------
+    moments : array, shape (m + 1, H, W)
+    noise : MomentNoise
+        What is left in each pixel by itself; pixels nearer than 9 px share noise.
+    share : array, shape (H, W)
+        Of a pixel's own variance that is left: one over the number of pixels averaged, and more
+        where averaging may have flattened something.
+    """
+
+    moments: Array
+    noise: MomentNoise
+    share: Array
+
+    def __repr__(self) -> str:
+        """State the shapes and spans of its arrays."""
+        return summary(self)
+
+
+def average_neighbours(
+    moments: Array,
+    noise: MomentNoise,
+    *,
+    multiples: tuple[int, ...] | None = None,
+    left_out: Array | None = None,
+    spread: Spread = at_once,
+) -> Averaged:
+    """Average each pixel with those neighbours whose moments differ by no more than noise.
+
+    Parameters
+    ----------
+    moments : array, shape (m + 1, H, W)
+        Calibrated, of each pixel by itself: not smoothed.
+    noise : MomentNoise
+        Theirs, (m + 1, H, W) or what broadcasts to it; 0 in planes that were not measured.
+    multiples : tuple of int, optional
+        Of the base frequency, one a plane: (0, 1, ..., m), when left out.
+    left_out : boolean array, shape (H, W), optional
+        Pixels, such as saturated ones, that stay as they are and count as nothing for the others;
+        so do those with a moment that isn't finite, or without noise.
+    spread : callable
+        How the compiled kernel uses several threads, as `kernels.over` returns it.
+
+    Returns
+    -------
+    Averaged
+
+    Raises
+    ------
+    ShapeError
+        When the moments are no image, or something else has another shape.
+
+    Notes
+    -----
+    Propagation-separation (Polzehl and Spokoiny, 2006): in rounds of growing radius a neighbour's
+    weight falls with its distance and with misfit over noise. The mean of a neighbour and its
+    mirror image is held against the pixel, so that slanted surfaces pass; a second misfit is the
+    one in the direction d b_j = i j b_j, all light later, so that small steps in range show. What
+    is flattened leaves residuals of one sign along a line: their square counts as noise.
+    """
+    moments = as_array(moments)
+    if moments.ndim != 3:
+        raise ShapeError("moments", f"of shape {tuple(moments.shape)}", "(m + 1, H, W)")
+    order = tuple(range(len(moments)) if multiples is None else multiples)
+    if len(order) != len(moments):
+        raise ShapeError("multiples", f"{len(order)} numbers", f"{len(moments)}, one a plane")
+    xp = namespace(moments)
+    if left_out is not None and left_out.shape != moments.shape[1:]:
+        raise ShapeError("left_out", f"of shape {tuple(left_out.shape)}", "(H, W) of the moments")
+    try:
+        variance = xp.broadcast_to(xp.asarray(noise.variance), moments.shape)
+    except ValueError:
+        shape = tuple(noise.variance.shape)
+        raise ShapeError("noise", f"of shape {shape}", "that of the moments") from None
+    known = (variance > 0) & (variance < np.inf)
+    present = xp.isfinite(moments).all(axis=0) & known.any(axis=0)
+    if left_out is not None:
+        present = present & ~xp.asarray(left_out)
+    real = real_type(moments)
+    # by a power of two, which rounds nothing: no square leaves the numbers there are
+    greatest = xp.maximum(xp.where(known, variance, 0).max(), np.finfo(real).tiny)
+    size = (2.0 ** xp.ceil(xp.log2(greatest) / 2)).astype(real)
+    weight = (size**2 / xp.where(known & present, variance, np.inf)).astype(real)
+    measured = weight.max(axis=(1, 2)) > 0
+    numbers = xp.maximum((measured * np.array([2 if j else 1 for j in order])).sum(), 1)
+    raw = xp.where(present, moments, 0) / size
+    found, share = _averaged(raw, weight, present, order, numbers, spread=spread)
+    share = xp.minimum(share + _flattened(raw - found, found, weight, order), 1)
+    averaged = xp.where(present, found * size, moments)
+    return Averaged(averaged, MomentNoise((variance * share).astype(share.dtype)), share)
+
+
+def neighbourhood(radius_px: float) -> list[tuple[int, int, float]]:
+    """Return row, column and weight of the neighbours within a radius, one of each mirrored two."""
+    reach = range(-REACH, REACH + 1)
+    pairs = [(row, column) for row in reach for column in reach if (row, column) > (0, 0)]
+    weights = (1 - (row**2 + column**2) / (radius_px + 0.5) ** 2 for row, column in pairs)
+    return [(*pair, weight) for pair, weight in zip(pairs, weights, strict=True) if weight > 0]
+
+
+@accelerated("neighbours", of="F")
+def _averaged(
+    raw: Array, weight: Array, present: Array, multiples: tuple[int, ...], numbers: Array
+) -> tuple[Array, Array]:
+    """Planar statement: averages of moments with noise about 1, and the share of variance left.
+
+    ``weight`` is one over the variances, ``numbers`` how many were measured in a pixel.
+    """
+    xp = namespace(raw)
+    least = np.finfo(weight.dtype).tiny
+    order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
+    there = present.astype(weight.dtype)
+    current, share = raw, xp.ones_like(there)
+    lit, given = _padded(there), _padded(raw)
+    for radius_px in RADII_PX:
+        wide = _padded(current)
+        tangent = order * weight * current
+        shift = 2 / MOST_SHIFT / xp.maximum((order * (tangent.conj() * current).real).sum(0), least)
+        misfit = 1 / (MOST_MISFIT * numbers)
+        total, square, mean = there, there, raw
+        for row, column, place in neighbourhood(radius_px):
+            ahead, behind = ((row, column), (-row, -column))
+            by = [_shifted(lit, *offset) for offset in (ahead, behind)]
+            off = [current - _shifted(wide, *offset) for offset in (ahead, behind)]
+            alone = [(weight * squared(each)).sum(0) for each in off]
+            later = [(tangent.conj() * each).imag.sum(0) for each in off]
+            product = (weight * (off[0] * off[1].conj()).real).sum(0)
+            both = (alone[0] + alone[1]) / 4 + product / 2
+            mirrored = ((later[0] + later[1]) / 2) ** 2
+            for i, offset in enumerate((ahead, behind)):
+                single = later[i] ** 2
+                one = xp.where(by[1 - i] > 0, both, alone[i]) + MISFIT_OF_ONE * alone[i]
+                two = xp.where(by[1 - i] > 0, mirrored, single) + SHIFT_OF_ONE * single
+                doubt = xp.maximum(misfit * one, shift * two) / share
+                agreement = place * by[i] * xp.clip(2 - doubt, 0, 1)
+                mean = mean + agreement * _shifted(given, *offset)
+                total, square = total + agreement, square + agreement**2
+        total = xp.maximum(total, least)
+        current, share = mean / total, xp.where(present, square / total**2, 1)
+    return current.astype(raw.dtype), share.astype(weight.dtype)
+
+
+def _flattened(off: Array, current: Array, weight: Array, multiples: tuple[int, ...]) -> Array:
+    """Return the square of the clearest shift along lines of residuals, over a pixel's variance."""
+    xp = namespace(off)
+    order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
+    scaled = order * weight
+    late = (scaled * (current.real * off.imag - current.imag * off.real)).sum(0)
+    known = (order * scaled * squared(current)).sum(0)
+    found, both = xp.zeros_like(known), _padded(xp.stack([late, known]))
+    for row, column in LINES:
+        along = range(-REACH, REACH + 1)
+        shift, together = sum(_shifted(both, i * row, i * column) for i in along)
+        together = xp.maximum(together, np.finfo(weight.dtype).tiny)
+        found = xp.maximum(found, xp.maximum(shift**2 / together - EXPECTED, 0) * known / together)
+    return found
+
+
+def _padded(planes: Array) -> Array:
+    margin = [(0, 0)] * (planes.ndim - 2) + [(REACH, REACH)] * 2
+    return namespace(planes).pad(planes, margin)
+
+
+def _shifted(padded: Array, row: int, column: int) -> Array:
+    """Return what lies so many rows and columns further; 0 beyond the border."""
+    height, width = (length - 2 * REACH for length in padded.shape[-2:])
+    return padded[..., REACH + row :, REACH + column :][..., :height, :width]

@@ -1,0 +1,90 @@
+"""Averaging over neighbours as the settings have it, from raw images on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import transientcam_moments as tm
+from tests.moments.reconstruction.test_detection import SENSOR, captured, halves
+
+SETTINGS = tm.Settings(
+    neighbours="edge-preserving",
+    estimator="likelihood",
+    zeroth="low-frequency",
+    takes=1,
+    base_frequency_hz=23e6,
+    sensor=SENSOR,
+)
+GAINS = np.ones(5)
+
+
+def reconstructed(raw: np.ndarray, settings: tm.Settings = SETTINGS) -> tm.Reconstruction:
+    return tm.reconstruct(raw, settings, calibration=GAINS)
+
+
+@pytest.mark.parametrize("zeroth", ["low-frequency", "on-off", "estimated"])
+def test_moments_are_averaged_by_the_noise_of_the_sensor(zeroth: str) -> None:
+    raw = captured(halves(900.0, 700.0), zeroth)
+    settings = replace(SETTINGS, zeroth=zeroth)
+
+    found = reconstructed(raw, settings)
+
+    brightness = found.measured[0].real
+    if zeroth == "estimated":
+        brightness = abs(found.measured[1:]).max(axis=0)
+    noise = tm.noise.moment_noise(brightness, SENSOR, calibration=GAINS, zeroth=zeroth)
+    expected = tm.average_neighbours(found.measured, noise)
+    assert np.allclose(found.smoothed[1:], expected.moments[1:], rtol=1e-5)
+    assert found.variance_share is not None
+    assert np.allclose(found.variance_share, expected.share, rtol=1e-4)
+    own = replace(settings, neighbours="none")
+    left, whole = found.noise, reconstructed(raw, own).noise
+    assert left is not None
+    assert whole is not None
+    ratio = left.variance[1:] / whole.variance[1:]
+    assert np.allclose(ratio, expected.share, rtol=0.15)  # the brightness is known better, too
+    assert np.median(found.range_std_m) < np.median(reconstructed(raw, own).range_std_m) / 2
+
+
+def test_without_a_sensor_it_is_the_gaussian() -> None:
+    raw = captured(halves(900.0, 700.0), "low-frequency")
+
+    found = reconstructed(raw, replace(SETTINGS, sensor=None))
+
+    assert np.array_equal(found.smoothed, tm.smooth(found.measured))
+    assert found.variance_share is None
+
+
+def test_none_leaves_moments_as_they_are_whatever_the_gaussian() -> None:
+    raw = captured(halves(900.0, 700.0), "low-frequency")
+
+    found = reconstructed(raw, replace(SETTINGS, neighbours="none", smoothing_sigma_px=2.0))
+
+    assert np.array_equal(found.smoothed, found.measured)
+
+
+def test_a_saturated_pixel_is_not_spread() -> None:
+    raw = captured(halves(900.0, 700.0), "low-frequency")
+    spoilt = raw.copy()
+    spoilt[:, 20, 20] = 4095
+
+    found, clean = reconstructed(spoilt), reconstructed(raw)
+
+    near = np.hypot(*(np.mgrid[:48, :64] - 20)) <= 4
+    near[20, 20] = False
+    moved = abs(found.smoothed - clean.smoothed)[:, near]
+    assert moved.max() < 0.02 * abs(clean.smoothed[0]).max()
+    assert found.flags[20, 20] & tm.Flags.SATURATED
+
+
+def test_pixels_without_light_have_no_range() -> None:
+    found = reconstructed(captured(halves(0.0, 400.0), "low-frequency"))
+
+    assert np.isfinite(found.range_m[:, :28]).mean() < 0.03
+    assert np.isfinite(found.range_m[:, 36:]).mean() > 0.99
+
+
+def test_another_way_is_refused() -> None:
+    with pytest.raises(tm.ParameterError, match="neighbours"):
+        tm.Settings(neighbours="bilateral")
