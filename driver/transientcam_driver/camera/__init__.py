@@ -24,6 +24,7 @@ from transientcam_driver.camera._simulation import (
     Explanation,
     Response,
     Simulation,
+    SurfaceSeen,
     Truth,
 )
 from transientcam_driver.camera._status import DeviceState, Status, StatusFlag
@@ -51,6 +52,7 @@ __all__ = [
     "Simulation",
     "Status",
     "StatusFlag",
+    "SurfaceSeen",
     "Truth",
     "check_camera",
     "has_light",
