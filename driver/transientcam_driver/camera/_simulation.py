@@ -11,6 +11,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.camera._lamp import Lamp
 from transientcam_driver.camera._sensor import Sensor
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S, Sequence
 
@@ -185,6 +186,11 @@ class Simulation(Protocol):
     @property
     def field_of_view_deg(self) -> float | None:
         """Horizontal, of the scene's camera; None where the scene has no camera."""
+        ...
+
+    @property
+    def lamp(self) -> Lamp | None:
+        """Of the scene; None where the scene has no camera, or behind the diffuser."""
         ...
 
     @property
