@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any, Final, cast
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
@@ -21,6 +20,7 @@ from transientcam.wire import Trust
 from transientcam_driver import RawFrame
 from transientcam_moments.reconstruction import least_harmonics
 from transientcam_server.imaging._errors_of_range.deviation import typical_deviation
+from transientcam_server.imaging._errors_of_range.neighbours import median_around
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.imaging._errors_of_range.ranging import ranges_m
 from transientcam_server.imaging._errors_of_range.trust import judged
@@ -29,8 +29,6 @@ from transientcam_server.imaging._recipe.recipe import Recipe
 _Array = NDArray[Any]
 WITHIN: Final = 0.9
 """Share of the trusted pixels that the metadata's interval is of."""
-NEIGHBOURS_PX: Final = 5
-"""Side of the square of pixels whose median separates bias from noise."""
 DRAWS: Final = 4
 """Noisy copies of a frame."""
 SPARSE_PX: Final = 4
@@ -204,25 +202,6 @@ class _Frame:
             self.recipe.settings,
             zeroth=sequence.zeroth,
         )
-
-
-def median_around(plane: _Array) -> _Array:
-    """Return the median (H, W) of the finite values around each pixel; 0 where there is none.
-
-    Parameters
-    ----------
-    plane
-        (H, W), NaN where nothing is known.
-    """
-    reach = NEIGHBOURS_PX // 2
-    known = np.where(np.isfinite(plane), plane, np.nan).astype(np.float32)
-    padded = np.pad(known, reach, constant_values=np.nan)
-    windows = sliding_window_view(padded, (NEIGHBOURS_PX, NEIGHBOURS_PX))
-    ranked = np.sort(windows.reshape((*plane.shape, -1)), axis=-1)  # what is not known comes last
-    count = np.isfinite(ranked).sum(axis=-1)
-    middle = np.maximum(count - 1, 0) // 2
-    found: _Array = np.take_along_axis(ranked, middle[..., None], axis=-1)[..., 0]
-    return np.nan_to_num(found)
 
 
 def _placed(values: _Array, seen: _Array) -> _Array:

@@ -1,0 +1,134 @@
+"""What a frame shows against the ranges of its pixels: motion, shadow, edges, too much light."""
+
+import math
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam_driver import ImageLabel, RawFrame
+from transientcam_driver.camera import Lamp
+from transientcam_server.imaging._errors_of_range.neighbours import around, median_around, spread
+from transientcam_server.imaging._recipe.lens import Intrinsics
+
+_Array = NDArray[Any]
+BRIGHTER_THAN_WHITE: Final = 1.5
+"""Times a white surface that faces the lamp, above which light did not come directly."""
+_GLOSS_PX: Final = 9
+"""Side of the square of pixels that a highlight hardly fills."""
+_MOVED_DEVIATIONS: Final = 6.0
+_MOVED_SHARE: Final = 0.02
+"""Least change of a pixel's light that is motion: what no rounding or imperfect phase explains."""
+_STEP: Final = 0.05
+"""Of the range, above which neighbours are not of one surface."""
+_STEP_DEVIATIONS: Final = 8.0
+_DIM: Final = 0.5
+"""Times the brightest around, below which a pixel beside a step may have its light from there."""
+SHADOW: Final = 0.02
+"""Of the range, by which something has to be nearer to throw a shadow."""
+_STEPS: Final = 32
+"""Points on the way to the lamp at which the range map is asked."""
+
+
+def brighter_than_white(
+    lamp: Lamp, points_m: _Array, brightness_dn: _Array, exposure_s: float
+) -> _Array:
+    """Return where no surface at these points (3, H, W) can be this bright by the lamp itself.
+
+    Direct light gives ``b_0 = s albedo cos beam / r^2``, so that the albedo that brightness, range
+    and beam imply is at most 1. A highlight is as bright, but small.
+    """
+    with np.errstate(all="ignore"):
+        albedo = brightness_dn / (lamp.white_dn_per_s(points_m) * exposure_s)
+    bright = np.nan_to_num(albedo, nan=0.0, posinf=np.inf) > BRIGHTER_THAN_WHITE
+    return np.asarray(bright & (np.nanmean(around(bright, _GLOSS_PX), axis=-1) > 0.5))
+
+
+def shadowed(lamp: Lamp, lens: Intrinsics, range_m: _Array, margin_m: _Array) -> _Array:
+    """Return the points of a range map (H, W) between which and the lamp it has something.
+
+    The way from a point to the lamp begins in front of the map, or on it. Where it gets behind the
+    map, and then through it, something is in between.
+
+    Parameters
+    ----------
+    margin_m
+        (H, W) how far behind the map the way has to be.
+    """
+    height, width = range_m.shape
+    points = lens.points(range_m).astype(np.float64)
+    lamp_m = np.reshape(lamp.position_m, (3, 1, 1))
+    behind_before = np.zeros(range_m.shape, dtype=bool)
+    map_before = range_m
+    found = np.zeros(range_m.shape, dtype=bool)
+    for step in range(1, _STEPS):
+        x, y, z = points + step / _STEPS * (lamp_m - points)
+        with np.errstate(all="ignore"):
+            column, row = lens.fx * x / z + lens.cx, lens.fy * y / z + lens.cy
+            inside = (z > 0) & (column > -0.5) & (column < width - 0.5)
+            inside &= (row > -0.5) & (row < height - 0.5)
+        at = np.where(inside, np.rint(row), 0).astype(int), np.where(inside, np.rint(column), 0)
+        there = at[0], at[1].astype(int)
+        map_m, far_m = range_m[there], np.sqrt(x * x + y * y + z * z)
+        limit_m = np.maximum(margin_m, margin_m[there])
+        behind = inside & (far_m > map_m + limit_m)
+        # through the map, and not past the edge of something nearer
+        through = behind_before & inside & (far_m < map_m)
+        found |= through & (np.abs(map_m - map_before) < limit_m)
+        behind_before, map_before = behind, map_m
+    return found
+
+
+def edges_and_strays(
+    range_m: _Array, std_m: _Array, brightness_dn: _Array
+) -> tuple[_Array, _Array]:
+    """Return the pixels (H, W) where near and far meet, and those unlike all around them.
+
+    Near and far meet where the median range has a step, and in dim pixels beside a step, or beside
+    pixels without a range: what is bright there shines into them, by the lens and by smoothing.
+    """
+    step_m = np.maximum(_STEP * range_m, _STEP_DEVIATIONS * median_around(std_m))
+    known = np.isfinite(range_m)
+    typical_m = np.where(known, median_around(range_m), np.nan)
+    light = around(np.where(known, brightness_dn, np.nan))
+    dim = brightness_dn < _DIM * np.fmax.reduce(light, axis=-1)
+    beside = (spread(around(range_m)) > step_m) | np.isnan(light).any(axis=-1)
+    edge = (spread(around(typical_m, 3)) > step_m) | (dim & beside)
+    stray = np.abs(range_m - typical_m) > step_m
+    return np.asarray(known & edge), np.asarray(known & stray)
+
+
+def moved(raw: RawFrame, sensor: tm.noise.Sensor) -> _Array | None:
+    """Return where light changed during a capture, by images at opposite phases; None if unknown.
+
+    Two images of one frequency at opposite phases have all light in their sum, whatever its time
+    of flight, so that all such sums are equal. A pair that differs in most pixels is out of step,
+    or has other light, and shows no motion.
+    """
+    pairs = _opposite(raw.labels) if len(raw.images) else []
+    if len(pairs) < 3:
+        return None
+    sums = np.stack([raw.images[one].astype(np.float32) + raw.images[two] for one, two in pairs])
+    middle = np.median(sums, axis=0)
+    light = np.maximum(middle - 2 * sensor.dark_dn, 1.0)
+    variance = light / sensor.gain_e_per_dn + 2 * (sensor.read_noise_e / sensor.gain_e_per_dn) ** 2
+    off = np.abs(sums - middle)
+    beyond = off > np.maximum(_MOVED_DEVIATIONS * np.sqrt(variance), _MOVED_SHARE * light)
+    beyond &= (beyond.mean(axis=(1, 2)) < 0.5)[:, None, None]
+    return np.asarray(beyond.any(axis=0))
+
+
+def _opposite(labels: tuple[ImageLabel, ...]) -> list[tuple[int, int]]:
+    """Return pairs of modulated images of a take and frequency whose phases are opposite."""
+    pairs = []
+    at: dict[tuple[int, int, int], int] = {}
+    for index, label in enumerate(labels):
+        if label.kind != "modulated" or label.harmonic < 1:
+            continue
+        turn = round(math.degrees(label.phase_rad)) % 360
+        other = at.get((label.take, label.harmonic, (turn + 180) % 360))
+        at[label.take, label.harmonic, turn] = index
+        if other is not None:
+            pairs.append((other, index))
+    return pairs
