@@ -4,7 +4,7 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from transientcam_simulation.scene import load_scene
 _Array = NDArray[Any]
 _WRONG = 3.0
 """Times its `range_error`, beyond which a range is wrong."""
-BUILT_IN = "wall,corner-left"
+BUILT_IN: Final = ("wall", "corner-left")
 
 
 class Judged(NamedTuple):
@@ -40,7 +40,7 @@ class Judged(NamedTuple):
 
 
 def tables(
-    *, scenes: int = 8, seed: int = 9, directory: str = "", names: str = BUILT_IN
+    *, scenes: int = 8, seed: int = 9, directory: str = "", names: tuple[str, ...] = BUILT_IN
 ) -> Iterator[Table]:
     """Judge random scenes of a seed, those of a directory, and built-in ones by their names."""
     table = Table(
@@ -61,7 +61,7 @@ def tables(
         paths = [*worlds.write(Path(folder), scenes, seed=seed)]
         paths += [str(each) for each in sorted(Path(directory).glob("*.toml")) if directory]
         found = []
-        for path in (*paths, *filter(None, names.split(","))):
+        for path in (*paths, *names):
             found.append(judged(path))
             table.rows.append((Path(path).stem, *_figures(found[-1])))
     together = Judged(*(np.concatenate(parts) for parts in zip(*found, strict=True)))

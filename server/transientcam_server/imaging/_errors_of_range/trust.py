@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam.wire import Trust
 from transientcam_driver import RawFrame
+from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_server.imaging._errors_of_range.evidence import (
     SHADOW,
     brighter_than_white,
@@ -23,6 +24,8 @@ NOISE: Final = 1.645
 """Half width of the interval that holds 90 % of a normal variable, in standard deviations."""
 BIAS: Final = 3.0
 """Times the disagreement of the estimators that later light moves a range."""
+NOISE_IN_BIAS: Final = 0.5
+"""Of the noise, what is left of it in that disagreement."""
 LEAST_BIAS: Final = 0.01
 """Of the length `_length_m`, by which later light that nothing shows may move a range."""
 LATER_BIAS: Final = 0.12
@@ -58,12 +61,11 @@ def judged(
     brightness_dn = np.asarray(found.brightness, dtype=np.float64)
     known = np.isfinite(range_m)
     length_m = _length_m(recipe)
-    kept = np.abs(np.asarray(found.smoothed[-1])) / np.where(known, found.smoothed[0].real, np.nan)
-    loss = np.maximum(median_around(1.0 - kept), 0.0)
+    loss = _loss(recipe, found, range_m)
     warmer_c = warmer_than_calibrated_c(recipe, raw) or 0.0
     parts_m = (
         NOISE * std_m,
-        BIAS * bias_m,
+        BIAS * np.sqrt(np.maximum(bias_m**2 - (NOISE_IN_BIAS * std_m) ** 2, 0.0)),
         LEAST_BIAS * length_m,
         LATER_BIAS * loss / (loss + HALF_LOSS) * length_m,
         DRIFT_M_PER_C * warmer_c,
@@ -97,6 +99,28 @@ def judged(
     }
     trust = np.select(list(reasons.values()), list(reasons), Trust.TRUSTED).astype(np.uint8)
     return np.where(known, error_m, np.nan).astype(np.float32), trust
+
+
+def _loss(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Array:
+    """Return which part (H, W) of its modulation light near the first return has lost.
+
+    At the highest frequency, without noise, as far as the lowest of several tells. Returns that
+    are resolved are taken out: those whose phase there is over half a turn from the first.
+    """
+    m = recipe.applied.sequence.multiples[-1]
+    if m == 1:
+        return np.zeros_like(range_m)
+    phase, weight = np.asarray(found.returns.phase_rad), np.asarray(found.returns.weight)
+    first = 4.0 * np.pi * recipe.base_frequency_hz / SPEED_OF_LIGHT_M_S * range_m
+    apart = np.abs(np.remainder(phase - first + np.pi, 2.0 * np.pi) - np.pi)
+    far = np.where((m * apart > np.pi) & (weight > 0), weight, 0.0)
+    turn = np.exp(1j * np.nan_to_num(phase))
+    lowest, highest = (
+        np.abs(found.smoothed[at] - (far * turn**k).sum(axis=0)) for at, k in ((1, 1), (-1, m))
+    )
+    with np.errstate(all="ignore"):
+        lost = (1.0 - highest / lowest) * m**2 / (m**2 - 1)
+    return np.clip(median_around(np.where(lowest > 0, lost, np.nan)), 0.0, 1.0)
 
 
 def _length_m(recipe: Recipe) -> float:
