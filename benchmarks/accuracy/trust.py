@@ -74,7 +74,7 @@ def judged(scene: str) -> Judged:
     """Capture a frame of a scene with the default sequence."""
     with camera_before(scene, seed=CAPTURE_SEED) as camera:
         simulation = camera.simulation
-        assert simulation is not None  # noqa: S101 - all scenes are simulated
+        assert simulation is not None
         recipe = _recipe(camera, simulation.field_of_view_deg or 45.0)
         recipe = replace(recipe, lamp=simulation.lamp)
         (frame,) = capture(camera, 1, middle=True)
@@ -99,7 +99,7 @@ def _mirrors(scene: str, shape: tuple[int, int]) -> _Array:
     if not scene.endswith(".toml"):
         return np.zeros(shape, dtype=bool)
     loaded = load_scene(Path(scene))
-    assert loaded.camera is not None  # noqa: S101 - a scene of surfaces has one
+    assert loaded.camera is not None
     rays = camera_rays(loaded.camera, width=shape[1], height=shape[0])
     start = np.broadcast_to(loaded.camera.position_m, rays.shape)
     _, which = first_hit(loaded, start, rays)

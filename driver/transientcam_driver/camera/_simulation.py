@@ -87,6 +87,15 @@ class Truth:
         return self.surface.direct_share
 
     @property
+    def lit(self) -> NDArray[np.bool_]:
+        """(H, W): where the surface has direct light, so that its range can be seen.
+
+        Of responses from files, which do not know that, where any light comes back.
+        """
+        lit = np.isfinite(self.range_m) & (self.brightness > 0)
+        return lit if self.surface is None else lit & (self.surface.direct_share > 0)
+
+    @property
     def direct(self) -> NDArray[np.float64]:
         """(H, W): weight of the first return, in DN."""
         direct: NDArray[np.float64] = self.weight[0]

@@ -54,9 +54,7 @@ def meets(surface: dict[str, Any], start: Array, way: Array) -> tuple[float, Arr
         reach = float((centre - start) @ normal) / slope
         place = start + reach * way - centre
         half = np.array(surface["size_m"], dtype=float) / 2
-        inside = all(
-            abs(place @ a) <= h for a, h in zip(rectangle_axes(normal), half, strict=True)
-        )
+        inside = all(abs(place @ a) <= h for a, h in zip(rectangle_axes(normal), half, strict=True))
         return (reach, normal) if reach > NEAREST_M and inside else None
     radii = np.array(surface.get("radii_m", [surface.get("radius_m", 0.0)] * 3), dtype=float)
     seen, along = (start - centre) / radii, way / radii

@@ -951,6 +951,8 @@ export interface RangeAccuracyDocument {
 export interface RangeErrorDocument {
   readonly median: number;
   readonly rms: number;
+  /** Of all pixels, those with a range and without direct light: no error counts them. */
+  readonly no_direct_light_share: number;
 }
 
 /** Frames can be had. */
@@ -1333,7 +1335,11 @@ export interface TrustCountsDocument {
 /** What the simulated scene really holds at a pixel. */
 export interface TruthDocument {
   readonly kind: string;
+  /** That of the surface which is seen, lit or not. */
   readonly range_m: number | null;
+  /** Of the light, what came straight from the lamp by that surface: 0 where there is none. */
+  readonly direct_share: number | null;
+  /** The first return. */
   readonly direct: number;
   readonly brightness: number;
   /** At most the 16 strongest. */

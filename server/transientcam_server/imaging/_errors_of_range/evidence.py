@@ -18,6 +18,8 @@ BRIGHTER_THAN_WHITE: Final = 1.5
 _GLOSS_PX: Final = 9
 """Side of the square of pixels that a highlight hardly fills."""
 _MOVED_DEVIATIONS: Final = 6.0
+_STILL_DEVIATIONS: Final = 2.0
+"""Of the typical pixel: more in a pair of images is not motion."""
 _MOVED_SHARE: Final = 0.02
 """Least change of a pixel's light that is motion: what no rounding or imperfect phase explains."""
 _STEP: Final = 0.05
@@ -103,8 +105,8 @@ def moved(raw: RawFrame, sensor: tm.noise.Sensor) -> _Array | None:
     """Return where light changed during a capture, by images at opposite phases; None if unknown.
 
     Two images of one frequency at opposite phases have all light in their sum, whatever its time
-    of flight, so that all such sums are equal. A pair that differs in most pixels is out of step,
-    or has other light, and shows no motion.
+    of flight, so that all such sums are equal. A pair that differs in the typical pixel is out of
+    step, or has other light, and shows no motion.
     """
     pairs = _opposite(raw.labels) if len(raw.images) else []
     if len(pairs) < 3:
@@ -113,10 +115,10 @@ def moved(raw: RawFrame, sensor: tm.noise.Sensor) -> _Array | None:
     middle = np.median(sums, axis=0)
     light = np.maximum(middle - 2 * sensor.dark_dn, 1.0)
     variance = light / sensor.gain_e_per_dn + 2 * (sensor.read_noise_e / sensor.gain_e_per_dn) ** 2
-    off = np.abs(sums - middle)
-    beyond = off > np.maximum(_MOVED_DEVIATIONS * np.sqrt(variance), _MOVED_SHARE * light)
-    beyond &= (beyond.mean(axis=(1, 2)) < 0.5)[:, None, None]
-    return np.asarray(beyond.any(axis=0))
+    off, std = np.abs(sums - middle), np.sqrt(variance)
+    beyond = off > np.maximum(_MOVED_DEVIATIONS * std, _MOVED_SHARE * light)
+    in_step = np.median(off / std, axis=(1, 2)) < _STILL_DEVIATIONS
+    return np.asarray(beyond[in_step].any(axis=0))
 
 
 def _opposite(labels: tuple[ImageLabel, ...]) -> list[tuple[int, int]]:

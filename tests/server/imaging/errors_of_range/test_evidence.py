@@ -74,7 +74,7 @@ def test_a_wall_beside_the_beam_is_too_bright_and_one_in_it_is_not() -> None:
     assert not brighter_than_white(narrow, points_m, direct_dn, exposure_s).any()
     truly = around_dn > 2 * direct_dn
     assert found[truly].mean() > 0.95
-    assert not found[cosine > 0.97].any()
+    assert not found[cosine > 0.99].any()
 
 
 def test_a_highlight_is_bright_and_not_too_bright() -> None:
