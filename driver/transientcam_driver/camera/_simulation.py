@@ -26,12 +26,10 @@ class SurfaceSeen:
     Attributes
     ----------
     range_m
-        (H, W) half the way from the lamp over its point to the camera, whether light goes that way
-        or not. NaN where the ray meets nothing, the back of a surface, or a stencil's mask. In a
-        mirror it is the mirror's own.
+        (H, W) half the way lamp - surface - camera, lit or not; a mirror's own in a mirror. NaN
+        where the ray meets nothing, the back of a surface, or a stencil's mask.
     direct_share
-        (H, W) share of the pixel's light that came that way: 0 in shadow, behind the beam and in a
-        mirror, which itself sends none.
+        (H, W) share of the pixel's light that came that way: 0 in shadow and in a mirror.
     """
 
     range_m: NDArray[np.float64]
@@ -52,7 +50,7 @@ class Truth:
         "sparse": the returns are all there is. "dense": they sum up continuous responses, each
         by its first peak and its mass.
     surface
-        What the pixels see of the scene's geometry; None of responses from files, which have none.
+        What the pixels see; None of responses from files.
     """
 
     delay_s: NDArray[np.float64]
@@ -64,10 +62,7 @@ class Truth:
 
     @property
     def range_m(self) -> NDArray[np.float64]:
-        """(H, W): that of the surface which is seen, lit or not; see `SurfaceSeen.range_m`.
-
-        Of responses from files it is `first_return_m`.
-        """
+        """(H, W): of the surface seen, lit or not; of responses from files the first return's."""
         return self.first_return_m if self.surface is None else self.surface.range_m
 
     @property
@@ -78,20 +73,14 @@ class Truth:
 
     @property
     def direct_share(self) -> NDArray[np.float64]:
-        """(H, W): share of the light that came straight from the lamp by the surface seen.
-
-        0 where there is no direct light; NaN where that is not known.
-        """
+        """(H, W): of the light, what came straight by that surface; NaN if unknown."""
         if self.surface is None:
             return np.full(self.delay_s.shape[1:], np.nan)
         return self.surface.direct_share
 
     @property
     def lit(self) -> NDArray[np.bool_]:
-        """(H, W): where the surface has direct light, so that its range can be seen.
-
-        Of responses from files, which do not know that, where any light comes back.
-        """
+        """(H, W): where the surface has direct light; of responses from files, any light."""
         lit = np.isfinite(self.range_m) & (self.brightness > 0)
         return lit if self.surface is None else lit & (self.surface.direct_share > 0)
 

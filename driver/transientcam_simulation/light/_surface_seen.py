@@ -18,16 +18,8 @@ def surface_seen(
 ) -> SurfaceSeen:
     """Return the first surface of each pixel, and the direct light's share.
 
-    Parameters
-    ----------
-    scene
-        At one moment.
-    directions
-        (H W, 3) through the pixels' centres.
-    lit, fine
-        The light of these rays, and of several in some of the pixels.
-    brightness
-        (H, W) all light of each pixel.
+    Of a scene at one moment: ``directions`` (H W, 3) go through the pixels' centres, ``lit`` and
+    ``fine`` are the light of these and further rays, ``brightness`` (H, W) is all light.
     """
     assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
     eye = scene.camera.position_m

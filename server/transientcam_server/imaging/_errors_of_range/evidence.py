@@ -38,8 +38,7 @@ def brighter_than_white(
 ) -> _Array:
     """Return where no surface at these points (3, H, W) can be this bright by the lamp itself.
 
-    Direct light gives ``b_0 = s albedo cos beam / r^2``, so that the albedo that brightness, range
-    and beam imply is at most 1. A highlight is as bright, but small.
+    The albedo that brightness, range and beam imply is at most 1. Highlights are small.
     """
     with np.errstate(all="ignore"):
         albedo = brightness_dn / (lamp.white_dn_per_s(points_m) * exposure_s)
@@ -58,27 +57,23 @@ def shadowed(lamp: Lamp, lens: Intrinsics, range_m: _Array, margin_m: _Array) ->
     margin_m
         (H, W) how far behind the map the way has to be.
     """
-    height, width = range_m.shape
     points = lens.points(range_m).astype(np.float64)
     lamp_m = np.reshape(lamp.position_m, (3, 1, 1))
-    behind_before = np.zeros(range_m.shape, dtype=bool)
-    map_before = range_m
-    found = np.zeros(range_m.shape, dtype=bool)
+    behind_before, map_before = np.zeros(range_m.shape, dtype=bool), range_m
+    found = behind_before
     for step in range(1, _STEPS):
         x, y, z = points + step / _STEPS * (lamp_m - points)
         with np.errstate(all="ignore"):
-            column, row = lens.fx * x / z + lens.cx, lens.fy * y / z + lens.cy
-            inside = (z > 0) & (column > -0.5) & (column < width - 0.5)
-            inside &= (row > -0.5) & (row < height - 0.5)
-        at = np.where(inside, np.rint(row), 0).astype(int), np.where(inside, np.rint(column), 0)
-        there = at[0], at[1].astype(int)
+            row, column = np.rint(lens.fy * y / z + lens.cy), np.rint(lens.fx * x / z + lens.cx)
+        inside = (z > 0) & (row >= 0) & (row < len(range_m))
+        inside &= (column >= 0) & (column < range_m.shape[1])
+        there = tuple(np.where(inside, at, 0).astype(int) for at in (row, column))
         map_m, far_m = range_m[there], np.sqrt(x * x + y * y + z * z)
         limit_m = np.maximum(margin_m, margin_m[there])
-        behind = inside & (far_m > map_m + limit_m)
         # through the map, and not past the edge of something nearer
         through = behind_before & inside & (far_m < map_m)
-        found |= through & (np.abs(map_m - map_before) < limit_m)
-        behind_before, map_before = behind, map_m
+        found = found | through & (np.abs(map_m - map_before) < limit_m)
+        behind_before, map_before = inside & (far_m > map_m + limit_m), map_m
     return found
 
 
@@ -101,8 +96,8 @@ def edges_and_strays(
     return np.asarray(known & edge), np.asarray(known & stray)
 
 
-def moved(raw: RawFrame, sensor: tm.noise.Sensor) -> _Array | None:
-    """Return where light changed during a capture, by images at opposite phases; None if unknown.
+def moved(raw: RawFrame, sensor: tm.noise.Sensor) -> _Array:
+    """Return where light changed during a capture, by images at opposite phases; False if unknown.
 
     Two images of one frequency at opposite phases have all light in their sum, whatever its time
     of flight, so that all such sums are equal. A pair that differs in the typical pixel is out of
@@ -110,7 +105,7 @@ def moved(raw: RawFrame, sensor: tm.noise.Sensor) -> _Array | None:
     """
     pairs = _opposite(raw.labels) if len(raw.images) else []
     if len(pairs) < 3:
-        return None
+        return np.zeros(raw.images.shape[-2:], dtype=bool)
     sums = np.stack([raw.images[one].astype(np.float32) + raw.images[two] for one, two in pairs])
     middle = np.median(sums, axis=0)
     light = np.maximum(middle - 2 * sensor.dark_dn, 1.0)

@@ -34,7 +34,5 @@ def median_around(plane: _Array) -> _Array:
 
 
 def spread(values: _Array) -> _Array:
-    """Return how far the finite ones of values (H, W, N) are apart; 0 where there are none."""
-    low = np.where(np.isnan(values), np.inf, values).min(axis=-1)
-    high = np.where(np.isnan(values), -np.inf, values).max(axis=-1)
-    return np.asarray(np.maximum(high - low, 0.0))
+    """Return how far the known ones of values (H, W, N) are apart; NaN where there are none."""
+    return np.asarray(np.fmax.reduce(values, axis=-1) - np.fmin.reduce(values, axis=-1))

@@ -23,21 +23,19 @@ _Array = NDArray[Any]
 NOISE: Final = 1.645
 """Half width of the interval that holds 90 % of a normal variable, in standard deviations."""
 BIAS: Final = 3.0
-"""Times the disagreement of the estimators that later light moves a range."""
 NOISE_IN_BIAS: Final = 0.5
-"""Of the noise, what is left of it in that disagreement."""
-LEAST_BIAS: Final = 0.01
-"""Of the length `_length_m`, by which later light that nothing shows may move a range."""
+"""Times the estimators' disagreement that later light moves a range; what of that is noise."""
+LEAST_BIAS: Final = 0.02
 LATER_BIAS: Final = 0.12
-"""Of it, by which light may that the highest frequency shows to be spread, but does not resolve."""
 HALF_LOSS: Final = 0.02
-"""Part of the modulation whose loss at the highest frequency shows half of that."""
+"""Of the range of a radian at the highest frequency, by which later light may move a range that
+nothing shows, and such as is seen to be spread; the lost modulation that shows half of that."""
 DRIFT_M_PER_C: Final = 0.6e-3
-"""By how much the range drifts for each degree, where nothing else is known: 4 ps of delay."""
+"""Drift of the range for each degree, where nothing else is known: 4 ps of delay."""
 FAR_FROM_CALIBRATION_C: Final = 10.0
 """Warmer or colder by more than this, a camera is not the one that was calibrated."""
 _UNRESOLVED: Final = 0.5
-"""Of that length: where estimators disagree by more, later light is not told from the first."""
+"""Of that radian: estimators that disagree by more do not tell later light from the first."""
 _LATER: Final = 0.1
 """Share of the light in later returns that are resolved."""
 _OPEN: Final = 0.05
@@ -60,7 +58,7 @@ def judged(
     range_m = np.where(found.has_range, found.range_m, np.nan).astype(np.float64)
     brightness_dn = np.asarray(found.brightness, dtype=np.float64)
     known = np.isfinite(range_m)
-    length_m = _length_m(recipe)
+    length_m = float(tm.range_m(1.0, recipe.base_frequency_hz * sequence.multiples[-1]))
     loss = _loss(recipe, found, range_m)
     warmer_c = warmer_than_calibrated_c(recipe, raw) or 0.0
     parts_m = (
@@ -77,8 +75,9 @@ def judged(
     disagree = np.isnan(bias_m) | (bias_m > np.maximum(_UNRESOLVED * length_m, NOISE * std_m))
     later = np.asarray(found.indirect) > _LATER * brightness_dn
     nowhere = np.zeros(known.shape, dtype=bool)
-    motion = None if raw is None or recipe.sensor is None else moved(raw, recipe.sensor)
-    shadow, bright = nowhere, nowhere
+    motion = shadow = bright = nowhere
+    if raw is not None and recipe.sensor is not None:
+        motion = moved(raw, recipe.sensor)
     if recipe.lamp is not None:
         lens = recipe.lens(*known.shape)
         points_m = lens.points(range_m)
@@ -87,7 +86,7 @@ def judged(
     reasons = {
         Trust.NO_RANGE: ~known,
         Trust.CORRUPT_IMAGE: nowhere | bool(found.unrepaired_images),
-        Trust.MOTION: nowhere if motion is None else motion,
+        Trust.MOTION: motion,
         Trust.NO_DIRECT_LIGHT: bright,
         Trust.SHADOW: shadow,
         Trust.EDGE: edge,
@@ -104,8 +103,7 @@ def judged(
 def _loss(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Array:
     """Return which part (H, W) of its modulation light near the first return has lost.
 
-    At the highest frequency, without noise, as far as the lowest of several tells. Returns that
-    are resolved are taken out: those whose phase there is over half a turn from the first.
+    Returns whose phase at the highest frequency is over half a turn away are taken out.
     """
     m = recipe.applied.sequence.multiples[-1]
     if m == 1:
@@ -121,12 +119,6 @@ def _loss(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Array:
     with np.errstate(all="ignore"):
         lost = (1.0 - highest / lowest) * m**2 / (m**2 - 1)
     return np.clip(median_around(np.where(lowest > 0, lost, np.nan)), 0.0, 1.0)
-
-
-def _length_m(recipe: Recipe) -> float:
-    """Return the range in m of one radian at the highest frequency: what it resolves."""
-    highest_hz = recipe.base_frequency_hz * recipe.applied.sequence.multiples[-1]
-    return float(tm.range_m(1.0, highest_hz))
 
 
 def warmer_than_calibrated_c(recipe: Recipe, raw: RawFrame | None) -> float | None:
