@@ -59,8 +59,7 @@ from transientcam.wire._parsing import (
     parse_frame,
     parse_server_message,
 )
-from transientcam.wire._products import PRODUCTS, Product
-from transientcam.wire._trust import Trust
+from transientcam.wire._products import PRODUCTS, Product, Trust
 
 __all__ = [
     "ALIGNMENT",

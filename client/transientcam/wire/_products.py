@@ -1,6 +1,7 @@
 """The table of products: what a frame can be asked for, and what travels of it."""
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Final
 
 from transientcam.wire._contract import F32
@@ -34,6 +35,26 @@ class Product:
         """Names of the encodings that it can be sent in."""
         fitting = (each.name for each in ENCODINGS.values() if each.fits(self.axes, self.dtype))
         return F32, *fitting
+
+
+class Trust(IntEnum):
+    """Why the range of a pixel is not to be trusted; 0 where it is.
+
+    Of several reasons a pixel has the first. The fields of `TrustCounts` count them by these names,
+    and say what each means.
+    """
+
+    TRUSTED = 0
+    NO_RANGE = 1
+    CORRUPT_IMAGE = 2
+    MOTION = 3
+    NO_DIRECT_LIGHT = 4
+    SHADOW = 5
+    EDGE = 6
+    LATER_LIGHT_UNRESOLVED = 7
+    LATER_LIGHT = 8
+    DRIFT = 9
+    NOISE = 10
 
 
 PRODUCTS: Final[dict[str, Product]] = {
@@ -123,20 +144,8 @@ PRODUCTS: Final[dict[str, Product]] = {
             "<f4",
             "x (right), y (down), z (forward) of the first return; NaN without one",
         ),
-        Product(
-            "truth",
-            "m",
-            _IMAGE,
-            "<f4",
-            "range of the simulated surface, lit or not; NaN without one",
-        ),
-        Product(
-            "direct_share",
-            "1",
-            _IMAGE,
-            "<f4",
-            "share of the light that came straight from the lamp by the simulated surface",
-        ),
+        Product("truth", "m", _IMAGE, "<f4", "range of the simulated surface, lit or not"),
+        Product("direct_share", "1", _IMAGE, "<f4", "share of light straight from the lamp"),
     )
 }
 """Every product by name: an entry here and one of the server's registry make a product."""

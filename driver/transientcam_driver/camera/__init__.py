@@ -11,11 +11,10 @@ from transientcam_driver.camera._capabilities import (
     AppliedSequence,
     Capabilities,
 )
-from transientcam_driver.camera._factory import FactoryCalibration, Lens
+from transientcam_driver.camera._factory import FactoryCalibration, Lamp, Lens
 from transientcam_driver.camera._frame import Counters, RawFrame
 from transientcam_driver.camera._hop import Hop
 from transientcam_driver.camera._host_camera import HostCamera
-from transientcam_driver.camera._lamp import Lamp
 from transientcam_driver.camera._light import has_light, light_warning
 from transientcam_driver.camera._opening import check_camera, kinds, open_camera, plugin_of
 from transientcam_driver.camera._plugin import CameraName, CameraPlugin, FoundCamera

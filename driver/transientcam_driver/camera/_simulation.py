@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.camera._lamp import Lamp
+from transientcam_driver.camera._factory import Lamp
 from transientcam_driver.camera._sensor import Sensor
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S, Sequence
 

@@ -96,15 +96,11 @@ class SimulationHandle:
         camera, light = self._scene.camera, self._scene.light
         if camera is None or self._diffuser:
             return None
-        axes = camera.axes()
-        aim = light.aim_at_m - light.position_m
-        position, axis = axes @ (light.position_m - camera.position_m), axes @ aim
-        return Lamp(
-            tuple(position.tolist()),
-            tuple((axis / np.linalg.norm(axis)).tolist()),
-            light.beam_exponent,
-            light.electrons_per_s / self.sensor.gain_e_per_dn,
-        )
+        position = camera.axes() @ (light.position_m - camera.position_m)
+        axis = camera.axes() @ (light.aim_at_m - light.position_m)
+        axis = axis / np.linalg.norm(axis)
+        white = light.electrons_per_s / self.sensor.gain_e_per_dn
+        return Lamp(tuple(position), tuple(axis), light.beam_exponent, white)
 
     @property
     def effects(self) -> dict[str, str]:

@@ -20,7 +20,7 @@ from transientcam.wire import Trust
 from transientcam_driver import RawFrame
 from transientcam_moments.reconstruction import least_harmonics
 from transientcam_server.imaging._errors_of_range.deviation import typical_deviation
-from transientcam_server.imaging._errors_of_range.neighbours import median_around
+from transientcam_server.imaging._errors_of_range.evidence import median_around
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.imaging._errors_of_range.ranging import ranges_m
 from transientcam_server.imaging._errors_of_range.trust import judged

@@ -1,22 +1,26 @@
 """What a frame shows against the ranges of its pixels: motion, shadow, edges, too much light."""
 
+import itertools
 import math
 from typing import Any, Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_driver import ImageLabel, RawFrame
+from transientcam_driver import RawFrame
 from transientcam_driver.camera import Lamp
-from transientcam_server.imaging._errors_of_range.neighbours import around, median_around, spread
 from transientcam_server.imaging._recipe.lens import Intrinsics
 
 _Array = NDArray[Any]
+NEIGHBOURS_PX: Final = 5
+"""Side of the square of pixels whose median separates bias from noise."""
 BRIGHTER_THAN_WHITE: Final = 1.5
 """Times a white surface that faces the lamp, above which light did not come directly."""
 _GLOSS_PX: Final = 9
 """Side of the square of pixels that a highlight hardly fills."""
+_OPPOSITE: Final = -0.999
 _MOVED_DEVIATIONS: Final = 6.0
 _STILL_DEVIATIONS: Final = 2.0
 """Of the typical pixel: more in a pair of images is not motion."""
@@ -31,6 +35,33 @@ SHADOW: Final = 0.02
 """Of the range, by which something has to be nearer to throw a shadow."""
 _STEPS: Final = 32
 """Points on the way to the lamp at which the range map is asked."""
+
+
+def around(plane: _Array, side_px: int = NEIGHBOURS_PX) -> _Array:
+    """Return the values (H, W, side^2) around each pixel and its own; NaN where nothing is known.
+
+    Parameters
+    ----------
+    plane
+        (H, W), not finite where nothing is known.
+    """
+    known = np.where(np.isfinite(plane), plane, np.nan).astype(np.float32)
+    padded = np.pad(known, side_px // 2, constant_values=np.nan)
+    return sliding_window_view(padded, (side_px, side_px)).reshape((*plane.shape, -1))
+
+
+def median_around(plane: _Array) -> _Array:
+    """Return the median (H, W) of the finite values around each pixel; 0 where there is none."""
+    ranked = np.sort(around(plane), axis=-1)  # what is not known comes last
+    count = np.isfinite(ranked).sum(axis=-1)
+    middle = np.maximum(count - 1, 0) // 2
+    found: _Array = np.take_along_axis(ranked, middle[..., None], axis=-1)[..., 0]
+    return np.nan_to_num(found)
+
+
+def spread(values: _Array) -> _Array:
+    """Return how far the known ones of values (H, W, N) are apart; NaN where there are none."""
+    return np.asarray(np.fmax.reduce(values, axis=-1) - np.fmin.reduce(values, axis=-1))
 
 
 def brighter_than_white(
@@ -103,7 +134,13 @@ def moved(raw: RawFrame, sensor: tm.noise.Sensor) -> _Array:
     of flight, so that all such sums are equal. A pair that differs in the typical pixel is out of
     step, or has other light, and shows no motion.
     """
-    pairs = _opposite(raw.labels) if len(raw.images) else []
+    lit = [each for each in raw.labels if each.kind == "modulated" and each.harmonic > 0]
+    pairs = [
+        (one.index, other.index)
+        for one, other in itertools.combinations(lit if len(raw.images) else (), 2)
+        if (one.take, one.harmonic) == (other.take, other.harmonic)
+        and math.cos(one.phase_rad - other.phase_rad) < _OPPOSITE
+    ]
     if len(pairs) < 3:
         return np.zeros(raw.images.shape[-2:], dtype=bool)
     sums = np.stack([raw.images[one].astype(np.float32) + raw.images[two] for one, two in pairs])
@@ -114,18 +151,3 @@ def moved(raw: RawFrame, sensor: tm.noise.Sensor) -> _Array:
     beyond = off > np.maximum(_MOVED_DEVIATIONS * std, _MOVED_SHARE * light)
     in_step = np.median(off / std, axis=(1, 2)) < _STILL_DEVIATIONS
     return np.asarray(beyond[in_step].any(axis=0))
-
-
-def _opposite(labels: tuple[ImageLabel, ...]) -> list[tuple[int, int]]:
-    """Return pairs of modulated images of a take and frequency whose phases are opposite."""
-    pairs = []
-    at: dict[tuple[int, int, int], int] = {}
-    for index, label in enumerate(labels):
-        if label.kind != "modulated" or label.harmonic < 1:
-            continue
-        turn = round(math.degrees(label.phase_rad)) % 360
-        other = at.get((label.take, label.harmonic, (turn + 180) % 360))
-        at[label.take, label.harmonic, turn] = index
-        if other is not None:
-            pairs.append((other, index))
-    return pairs

@@ -13,10 +13,10 @@ from transientcam_server.imaging._errors_of_range.evidence import (
     SHADOW,
     brighter_than_white,
     edges_and_strays,
+    median_around,
     moved,
     shadowed,
 )
-from transientcam_server.imaging._errors_of_range.neighbours import median_around
 from transientcam_server.imaging._recipe.recipe import Recipe
 
 _Array = NDArray[Any]
@@ -60,7 +60,9 @@ def judged(
     known = np.isfinite(range_m)
     length_m = float(tm.range_m(1.0, recipe.base_frequency_hz * sequence.multiples[-1]))
     loss = _loss(recipe, found, range_m)
-    warmer_c = warmer_than_calibrated_c(recipe, raw) or 0.0
+    then_c = None if recipe.gains is None else recipe.gains.temperature_c
+    now_c = None if raw is None else raw.temperature_c
+    warmer_c = 0.0 if then_c is None or now_c is None else now_c - then_c  # else not known
     parts_m = (
         NOISE * std_m,
         BIAS * np.sqrt(np.maximum(bias_m**2 - (NOISE_IN_BIAS * std_m) ** 2, 0.0)),
@@ -119,10 +121,3 @@ def _loss(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Array:
     with np.errstate(all="ignore"):
         lost = (1.0 - highest / lowest) * m**2 / (m**2 - 1)
     return np.clip(median_around(np.where(lowest > 0, lost, np.nan)), 0.0, 1.0)
-
-
-def warmer_than_calibrated_c(recipe: Recipe, raw: RawFrame | None) -> float | None:
-    """Return how much warmer the camera is than at its calibration; None where that is unknown."""
-    calibrated_c = None if recipe.gains is None else recipe.gains.temperature_c
-    now_c = None if raw is None else raw.temperature_c
-    return None if calibrated_c is None or now_c is None else now_c - calibrated_c

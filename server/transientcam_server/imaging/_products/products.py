@@ -294,13 +294,7 @@ PRODUCTS: Final[dict[str, Product]] = {
                 ("range_error", "error_m"),
             )
         ),
-        Product(
-            _WIRE["trust"],
-            "accuracy",
-            _property("trust"),
-            of_noise=True,
-            of_toeplitz=True,
-        ),
+        Product(_WIRE["trust"], "accuracy", _property("trust"), of_noise=True, of_toeplitz=True),
         Product(
             _WIRE["reduced_chi_square"],
             "misfit",
