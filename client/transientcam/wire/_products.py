@@ -38,11 +38,7 @@ class Product:
 
 
 class Trust(IntEnum):
-    """Why the range of a pixel is not to be trusted; 0 where it is.
-
-    Of several reasons a pixel has the first. The fields of `TrustCounts` count them by these names,
-    and say what each means.
-    """
+    """Why not to trust a pixel's range, the first reason of several: see `TrustCounts`."""
 
     TRUSTED = 0
     NO_RANGE = 1

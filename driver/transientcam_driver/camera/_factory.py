@@ -91,14 +91,9 @@ class Lens:
 class Lamp:
     """A small lamp, in the coordinates of the camera: x right, y down, z forward.
 
-    Attributes
-    ----------
-    position_m, axis
-        Where it stands, and the unit vector along which its beam is brightest.
-    beam_exponent
-        Its intensity falls with this power of the cosine to the axis.
-    dn_per_s
-        Brightness, for each second of exposure, of a white matt surface that faces it at 1 m.
+    Its intensity falls with the ``beam_exponent``-th power of the cosine to its ``axis``, a unit
+    vector; ``dn_per_s`` is how bright, for each second of exposure, a white matt surface is that
+    faces it on the axis at 1 m.
     """
 
     position_m: tuple[float, float, float]

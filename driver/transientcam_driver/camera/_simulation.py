@@ -23,13 +23,9 @@ Response = tuple[NDArray[np.float64], NDArray[np.float64]]
 class SurfaceSeen:
     """The surface that a ray through each pixel's centre meets first.
 
-    Attributes
-    ----------
-    range_m
-        (H, W) half the way lamp - surface - camera, lit or not; a mirror's own in a mirror. NaN
-        where the ray meets nothing, the back of a surface, or a stencil's mask.
-    direct_share
-        (H, W) share of the pixel's light that came that way: 0 in shadow and in a mirror.
+    ``range_m`` (H, W) is half the way lamp - surface - camera, lit or not, and a mirror's own in a
+    mirror; NaN where the ray meets nothing, the back of a surface, or a stencil's mask.
+    ``direct_share`` (H, W) of the pixel's light came that way: 0 in shadow and in a mirror.
     """
 
     range_m: NDArray[np.float64]

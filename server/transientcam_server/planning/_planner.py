@@ -131,10 +131,7 @@ class Planner:
 
 
 def range_error(found: tm.Reconstruction, truth: Truth) -> dict[str, float] | None:
-    """Return how far a frame's range is off the simulated truth, in m; None without any range.
-
-    Of the pixels with direct light, beside the share of those with a range and without such light.
-    """
+    """Return how far lit pixels' range is off the simulated truth, in m; None without any range."""
     error_m = np.abs(np.asarray(found.range_m) - truth.range_m)
     unlit = np.isfinite(error_m) & ~truth.lit
     error_m = error_m[np.isfinite(error_m) & truth.lit]

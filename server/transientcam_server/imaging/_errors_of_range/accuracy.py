@@ -72,9 +72,7 @@ class RangeAccuracy:
         return {
             "trusted_share": counts[Trust.TRUSTED] / self.trust.size,
             "within_m": float(np.quantile(trusted_m, WITHIN)) if trusted_m.size else None,
-            "trust": cast(
-                "TrustCountsDocument", {each.name.lower(): counts[each] for each in Trust}
-            ),
+            "trust": cast("TrustCountsDocument", {t.name.lower(): counts[t] for t in Trust}),
             "range_error_m": _median(self.error_m),
             "range_std_m": _median(self.std_m),
             "range_bias_m": _median(self.bias_m),
@@ -102,10 +100,7 @@ def spacing_px(recipe: Recipe, *, ready: Callable[[str, int], bool] = tm.kernels
 
 
 def range_accuracy(
-    recipe: Recipe,
-    found: tm.Reconstruction,
-    every_px: int = 1,
-    raw: RawFrame | None = None,
+    recipe: Recipe, found: tm.Reconstruction, every_px: int = 1, raw: RawFrame | None = None
 ) -> RangeAccuracy:
     """Predict noise and bias of a frame's range, and judge each pixel.
 

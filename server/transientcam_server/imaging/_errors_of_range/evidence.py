@@ -38,13 +38,7 @@ _STEPS: Final = 32
 
 
 def around(plane: _Array, side_px: int = NEIGHBOURS_PX) -> _Array:
-    """Return the values (H, W, side^2) around each pixel and its own; NaN where nothing is known.
-
-    Parameters
-    ----------
-    plane
-        (H, W), not finite where nothing is known.
-    """
+    """Return the values (H, W, side^2) around each pixel and its own; NaN where none is finite."""
     known = np.where(np.isfinite(plane), plane, np.nan).astype(np.float32)
     padded = np.pad(known, side_px // 2, constant_values=np.nan)
     return sliding_window_view(padded, (side_px, side_px)).reshape((*plane.shape, -1))
@@ -80,13 +74,8 @@ def brighter_than_white(
 def shadowed(lamp: Lamp, lens: Intrinsics, range_m: _Array, margin_m: _Array) -> _Array:
     """Return the points of a range map (H, W) between which and the lamp it has something.
 
-    The way from a point to the lamp begins in front of the map, or on it. Where it gets behind the
-    map, and then through it, something is in between.
-
-    Parameters
-    ----------
-    margin_m
-        (H, W) how far behind the map the way has to be.
+    On the way to the lamp a point gets behind the map, by more than a margin (H, W), and then
+    through it.
     """
     points = lens.points(range_m).astype(np.float64)
     lamp_m = np.reshape(lamp.position_m, (3, 1, 1))
@@ -113,8 +102,8 @@ def edges_and_strays(
 ) -> tuple[_Array, _Array]:
     """Return the pixels (H, W) where near and far meet, and those unlike all around them.
 
-    Near and far meet where the median range has a step, and in dim pixels beside a step, or beside
-    pixels without a range: what is bright there shines into them, by the lens and by smoothing.
+    Near and far meet where the median range has a step, and in dim pixels beside a step or pixels
+    without a range: what is bright there shines into them.
     """
     step_m = np.maximum(_STEP * range_m, _STEP_DEVIATIONS * median_around(std_m))
     known = np.isfinite(range_m)
@@ -150,4 +139,5 @@ def moved(raw: RawFrame, sensor: tm.noise.Sensor) -> _Array:
     off, std = np.abs(sums - middle), np.sqrt(variance)
     beyond = off > np.maximum(_MOVED_DEVIATIONS * std, _MOVED_SHARE * light)
     in_step = np.median(off / std, axis=(1, 2)) < _STILL_DEVIATIONS
-    return np.asarray(beyond[in_step].any(axis=0))
+    clipped = raw.images.max(axis=0) >= sensor.highest_dn  # which takes from a sum, too
+    return np.asarray(beyond[in_step].any(axis=0) & ~clipped)

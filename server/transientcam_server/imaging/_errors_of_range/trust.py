@@ -43,11 +43,7 @@ _OPEN: Final = 0.05
 
 
 def judged(
-    recipe: Recipe,
-    found: tm.Reconstruction,
-    std_m: _Array,
-    bias_m: _Array,
-    raw: RawFrame | None,
+    recipe: Recipe, found: tm.Reconstruction, std_m: _Array, bias_m: _Array, raw: RawFrame | None
 ) -> tuple[_Array, _Array]:
     """Return the half width of each pixel's 90 % interval in m, and its `Trust`, (H, W).
 
