@@ -246,14 +246,9 @@ class World:
         responses, surface = plan.views.exact(time_s).responses, plan.views.surface
         scale_dn = self._electrons_per_s * plan.sequence.exposure_s / self._sensor.gain_e_per_dn
         delay_s, weight = responses.returns()
-        return Truth(
-            delay_s,
-            weight * scale_dn,
-            responses.kind,
-            responses.of_pixel,
-            scale_dn,
-            None if surface is None else surface(time_s),
-        )
+        weight = weight * scale_dn
+        seen = None if surface is None else surface(time_s)
+        return Truth(delay_s, weight, responses.kind, responses.of_pixel, scale_dn, seen)
 
     def _mean_e(self, plan: _Plan, label: ImageLabel, shot: Shot) -> NDArray[np.float32]:
         time_s = shot.device_time_s

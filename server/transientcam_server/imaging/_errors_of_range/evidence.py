@@ -20,7 +20,6 @@ BRIGHTER_THAN_WHITE: Final = 1.5
 """Times a white surface that faces the lamp, above which light did not come directly."""
 _GLOSS_PX: Final = 9
 """Side of the square of pixels that a highlight hardly fills."""
-_OPPOSITE: Final = -0.999
 _MOVED_DEVIATIONS: Final = 6.0
 _STILL_DEVIATIONS: Final = 2.0
 """Of the typical pixel: more in a pair of images is not motion."""
@@ -128,7 +127,7 @@ def moved(raw: RawFrame, sensor: tm.noise.Sensor) -> _Array:
         (one.index, other.index)
         for one, other in itertools.combinations(lit if len(raw.images) else (), 2)
         if (one.take, one.harmonic) == (other.take, other.harmonic)
-        and math.cos(one.phase_rad - other.phase_rad) < _OPPOSITE
+        and math.cos(one.phase_rad - other.phase_rad) < -0.999
     ]
     if len(pairs) < 3:
         return np.zeros(raw.images.shape[-2:], dtype=bool)

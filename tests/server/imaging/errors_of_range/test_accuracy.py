@@ -83,7 +83,8 @@ def test_the_noise_of_one_frame_is_that_of_many_and_intervals_hold_the_truth(
     trusted = (accuracy.trust == Trust.TRUSTED) & known
     if trusted.any():
         assert (off_m <= accuracy.error_m)[trusted].mean() > 0.9
-        assert np.median(accuracy.error_m[trusted]) < 7 * np.median(off_m[trusted])
+        # with what later light may hide in any frame
+        assert np.median(accuracy.error_m[trusted]) < 6e-3 + 4 * np.median(off_m[trusted])
     wrong = known & (off_m > 3 * accuracy.error_m)
     assert wrong.mean() < 0.01
 
