@@ -96,8 +96,8 @@ class Lamp:
     faces it on the axis at 1 m.
     """
 
-    position_m: tuple[float, float, float]
-    axis: tuple[float, float, float]
+    position_m: tuple[float, ...]
+    axis: tuple[float, ...]
     beam_exponent: float
     dn_per_s: float
 

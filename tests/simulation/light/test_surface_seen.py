@@ -185,7 +185,13 @@ motion = "nearer"
 
 
 def test_responses_from_files_have_no_surface() -> None:
-    truth = Truth(np.full((1, 2, 3), 1e-8), np.ones((1, 2, 3)), "dense", lambda x, y: (x, y), 1.0)
+    truth = Truth(
+        np.full((1, 2, 3), 1e-8),
+        np.ones((1, 2, 3)),
+        "dense",
+        lambda x, y: (np.zeros(1), np.zeros(1)),
+        1.0,
+    )
 
     assert np.isnan(truth.direct_share).all()
     np.testing.assert_array_equal(truth.range_m, truth.first_return_m)
