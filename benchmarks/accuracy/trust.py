@@ -88,8 +88,8 @@ def judged(scene: str) -> Judged:
 
 def _recipe(camera: Camera, field_deg: float) -> Recipe:
     applied, sensor = camera.configure(Sequence()), sensor_of(camera, SensorSettings())
-    size = {"width": camera.capabilities.width, "height": camera.capabilities.height}
-    lens = Intrinsics.of_field(field_deg, **size)
+    width, height = camera.capabilities.width, camera.capabilities.height
+    lens = Intrinsics.of_field(field_deg, width=width, height=height)
     highest = float(sensor.highest_dn)
     return Recipe(applied, SETTINGS, highest, sensor=sensor, intrinsics=lens)
 

@@ -70,7 +70,11 @@ def meets(surface: dict[str, Any], start: Array, way: Array) -> tuple[float, Arr
 def cast(text: str) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """Range of what each pixel's centre sees, whether the lamp sees it, and whether it mirrors."""
     scene = tomllib.loads(text)
-    camera = {"position_m": [0, 0, 0], "look_at_m": [0, 1, 0], "field_of_view_deg": 45.0}
+    camera: dict[str, Any] = {
+        "position_m": [0, 0, 0],
+        "look_at_m": [0, 1, 0],
+        "field_of_view_deg": 45.0,
+    }
     camera |= scene["camera"]
     eye = np.array(camera["position_m"], dtype=float)
     lamp = np.array(scene["light"]["position_m"], dtype=float)

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 def plane_m(depth_m: float) -> Array:
     """Ranges of a plane across the line of sight."""
     x, y = np.meshgrid(*((np.arange(n) - (n - 1) / 2) / LENS.fx for n in (WIDTH, HEIGHT)))
-    return depth_m * np.sqrt(1 + x * x + y * y)
+    return np.asarray(depth_m * np.sqrt(1 + x * x + y * y), dtype=np.float64)
 
 
 def lamp(x_m: float, exponent: float = 0.0) -> Lamp:
