@@ -171,6 +171,7 @@ _ALL: Final = (
     Measurement("prices", "accuracy.prices:tables", "measured/accuracy", _PLANNED),
     Measurement("tradeoffs", "accuracy.tradeoffs:tables", "measured/accuracy", _TRADED),
     Measurement("noise", "accuracy.noise:tables", "measured/accuracy", _TRADED),
+    Measurement("trust", "accuracy.trust:tables", "measured/accuracy", _IMAGING, by_hand=True),
     Measurement("promises", "accuracy.promises:tables", "measured/plans", _PLANNED),
     Measurement("calibrating", "accuracy.calibrating:tables", "measured/plans", _PLANNED),
     Measurement(

@@ -71,7 +71,7 @@ def measured(
             truth, device_s = each.truth, each.raw.capture_s
             if pixels is None:
                 least = max(dimmest * applied.sequence.exposure_s, _NO_LIGHT)
-                lit = np.flatnonzero(np.isfinite(truth.range_m) & (truth.brightness >= least))
+                lit = np.flatnonzero(truth.lit & (truth.brightness >= least))
                 random = np.random.default_rng(1)
                 pixels = np.sort(random.choice(lit, min(PIXELS, lit.size), replace=False))
                 brightest = each.raw.images.max(axis=0).ravel()[lit]

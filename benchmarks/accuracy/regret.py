@@ -145,8 +145,7 @@ def true_ranges_m(scene: str) -> NDArray[Any]:
     with camera_before(scene, seed=LOOK_SEED) as camera:
         assert camera.simulation is not None
         truth = camera.simulation.truth()
-    lit = np.isfinite(truth.range_m) & (truth.brightness > 0)
-    return np.asarray(truth.range_m[lit], dtype=float)
+    return np.asarray(truth.range_m[truth.lit], dtype=float)
 
 
 def _row(each: Regret) -> tuple[Cell, ...]:

@@ -1,6 +1,7 @@
 """The table of products: what a frame can be asked for, and what travels of it."""
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Final
 
 from transientcam.wire._contract import F32
@@ -36,6 +37,22 @@ class Product:
         return F32, *fitting
 
 
+class Trust(IntEnum):
+    """Why not to trust a pixel's range, the first reason of several: see `TrustCounts`."""
+
+    TRUSTED = 0
+    NO_RANGE = 1
+    CORRUPT_IMAGE = 2
+    MOTION = 3
+    NO_DIRECT_LIGHT = 4
+    SHADOW = 5
+    EDGE = 6
+    LATER_LIGHT_UNRESOLVED = 7
+    LATER_LIGHT = 8
+    DRIFT = 9
+    NOISE = 10
+
+
 PRODUCTS: Final[dict[str, Product]] = {
     product.name: product
     for product in (
@@ -64,8 +81,9 @@ PRODUCTS: Final[dict[str, Product]] = {
             "m",
             _IMAGE,
             "<f4",
-            "noise and bias of the range together: root sum of squares; NaN if m = 1",
+            "half width of the 90 % interval of this pixel's range; NaN if m = 1",
         ),
+        Product("trust", "1", _IMAGE, "|u1", "why not to trust a range; 0 where it is trusted"),
         Product(
             "reduced_chi_square",
             "1",
@@ -122,7 +140,8 @@ PRODUCTS: Final[dict[str, Product]] = {
             "<f4",
             "x (right), y (down), z (forward) of the first return; NaN without one",
         ),
-        Product("truth", "m", _IMAGE, "<f4", "the simulated scene's range; NaN without light"),
+        Product("truth", "m", _IMAGE, "<f4", "range of the simulated surface, lit or not"),
+        Product("direct_share", "1", _IMAGE, "<f4", "share of light straight from the lamp"),
     )
 }
 """Every product by name: an entry here and one of the server's registry make a product."""

@@ -11,7 +11,7 @@ from transientcam_driver.camera._capabilities import (
     AppliedSequence,
     Capabilities,
 )
-from transientcam_driver.camera._factory import FactoryCalibration, Lens
+from transientcam_driver.camera._factory import FactoryCalibration, Lamp, Lens
 from transientcam_driver.camera._frame import Counters, RawFrame
 from transientcam_driver.camera._hop import Hop
 from transientcam_driver.camera._host_camera import HostCamera
@@ -24,6 +24,7 @@ from transientcam_driver.camera._simulation import (
     Explanation,
     Response,
     Simulation,
+    SurfaceSeen,
     Truth,
 )
 from transientcam_driver.camera._status import DeviceState, Status, StatusFlag
@@ -44,6 +45,7 @@ __all__ = [
     "FoundCamera",
     "Hop",
     "HostCamera",
+    "Lamp",
     "Lens",
     "RawFrame",
     "Response",
@@ -51,6 +53,7 @@ __all__ = [
     "Simulation",
     "Status",
     "StatusFlag",
+    "SurfaceSeen",
     "Truth",
     "check_camera",
     "has_light",

@@ -1,4 +1,4 @@
-"""What a camera reports about itself: gains of its pixels, and its lens."""
+"""What a camera reports about itself: gains of its pixels, its lens, its lamp."""
 
 import math
 from dataclasses import dataclass
@@ -85,6 +85,30 @@ class Lens:
         xx = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
         yy = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
         return (xd, yd), (xx, cross, cross, yy)
+
+
+@dataclass(frozen=True, slots=True)
+class Lamp:
+    """A small lamp, in the coordinates of the camera: x right, y down, z forward.
+
+    Its intensity falls with the ``beam_exponent``-th power of the cosine to its ``axis``, a unit
+    vector; ``dn_per_s`` is how bright, for each second of exposure, a white matt surface is that
+    faces it on the axis at 1 m.
+    """
+
+    position_m: tuple[float, ...]
+    axis: tuple[float, ...]
+    beam_exponent: float
+    dn_per_s: float
+
+    def white_dn_per_s(self, points_m: NDArray[Any]) -> NDArray[np.float64]:
+        """Return the brightness (...) of white surfaces at points (3, ...) that face the lamp."""
+        way = np.moveaxis(np.asarray(points_m, dtype=np.float64), 0, -1) - self.position_m
+        square = np.einsum("...c,...c->...", way, way)
+        with np.errstate(divide="ignore", invalid="ignore"):  # at the lamp itself, and nowhere
+            cosine = np.maximum(way @ self.axis / np.sqrt(square), 0.0)
+            white: NDArray[np.float64] = self.dn_per_s * cosine**self.beam_exponent / square
+        return white
 
 
 @dataclass(frozen=True, slots=True, eq=False)

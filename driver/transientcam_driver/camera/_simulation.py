@@ -11,11 +11,25 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.camera._factory import Lamp
 from transientcam_driver.camera._sensor import Sensor
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S, Sequence
 
 Response = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Times in s, and at each a weight (sparse) or a density per s (dense)."""
+
+
+@dataclass(frozen=True)
+class SurfaceSeen:
+    """The surface that a ray through each pixel's centre meets first.
+
+    ``range_m`` (H, W) is half the way lamp - surface - camera, lit or not, and a mirror's own in a
+    mirror; NaN where the ray meets nothing, the back of a surface, or a stencil's mask.
+    ``direct_share`` (H, W) of the pixel's light came that way: 0 in shadow and in a mirror.
+    """
+
+    range_m: NDArray[np.float64]
+    direct_share: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -31,6 +45,8 @@ class Truth:
     kind
         "sparse": the returns are all there is. "dense": they sum up continuous responses, each
         by its first peak and its mass.
+    surface
+        What the pixels see; None of responses from files.
     """
 
     delay_s: NDArray[np.float64]
@@ -38,12 +54,31 @@ class Truth:
     kind: Literal["sparse", "dense"]
     _of_pixel: Callable[[int, int], Response]
     _scale_dn: float
+    surface: SurfaceSeen | None = None
 
     @property
     def range_m(self) -> NDArray[np.float64]:
-        """(H, W): half the way of the first return; NaN where no light comes back."""
+        """(H, W): of the surface seen, lit or not; of responses from files the first return's."""
+        return self.first_return_m if self.surface is None else self.surface.range_m
+
+    @property
+    def first_return_m(self) -> NDArray[np.float64]:
+        """(H, W): half the way of the first light, whatever its way; NaN where none comes back."""
         range_m: NDArray[np.float64] = SPEED_OF_LIGHT_M_S * self.delay_s[0] / 2
         return range_m
+
+    @property
+    def direct_share(self) -> NDArray[np.float64]:
+        """(H, W): of the light, what came straight by that surface; NaN if unknown."""
+        if self.surface is None:
+            return np.full(self.delay_s.shape[1:], np.nan)
+        return self.surface.direct_share
+
+    @property
+    def lit(self) -> NDArray[np.bool_]:
+        """(H, W): where the surface has direct light; of responses from files, any light."""
+        lit = np.isfinite(self.range_m) & (self.brightness > 0)
+        return lit if self.surface is None else lit & (self.surface.direct_share > 0)
 
     @property
     def direct(self) -> NDArray[np.float64]:
@@ -145,6 +180,11 @@ class Simulation(Protocol):
     @property
     def field_of_view_deg(self) -> float | None:
         """Horizontal, of the scene's camera; None where the scene has no camera."""
+        ...
+
+    @property
+    def lamp(self) -> Lamp | None:
+        """Of the scene; None where the scene has no camera, or behind the diffuser."""
         ...
 
     @property

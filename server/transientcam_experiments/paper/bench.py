@@ -7,7 +7,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
@@ -58,8 +57,8 @@ class ReconstructedShot:
 
     @property
     def lit(self) -> _Array:
-        """Pixels (H, W) that light comes back to."""
-        return np.isfinite(self.truth.range_m) & (self.truth.brightness > 0)
+        """Pixels (H, W) whose surface has direct light."""
+        return self.truth.lit
 
 
 class Bench:

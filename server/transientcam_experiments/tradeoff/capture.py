@@ -124,7 +124,7 @@ def _of_frame(
     found: tm.Reconstruction = recipe.reconstruct(frame.raw)
     truth = frame.truth
     f_hz = recipe.base_frequency_hz
-    lit = np.isfinite(truth.range_m) & (truth.brightness > 0)
+    lit = truth.lit
     seen = lit & np.asarray(found.has_range)
     range_m = np.where(lit, found.range_m, np.nan)
     single = np.remainder(np.angle(found.moments[1]), 2 * np.pi)

@@ -131,9 +131,14 @@ class Planner:
 
 
 def range_error(found: tm.Reconstruction, truth: Truth) -> dict[str, float] | None:
-    """Return how far a frame's range is off the simulated truth, in m; None without any range."""
+    """Return how far lit pixels' range is off the simulated truth, in m; None without any range."""
     error_m = np.abs(np.asarray(found.range_m) - truth.range_m)
-    error_m = error_m[np.isfinite(error_m)]
+    unlit = np.isfinite(error_m) & ~truth.lit
+    error_m = error_m[np.isfinite(error_m) & truth.lit]
     if not error_m.size:
         return None
-    return {"median": float(np.median(error_m)), "rms": float(np.sqrt(np.mean(error_m**2)))}
+    return {
+        "median": float(np.median(error_m)),
+        "rms": float(np.sqrt(np.mean(error_m**2))),
+        "no_direct_light_share": float(unlit.mean()),
+    }

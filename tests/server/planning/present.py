@@ -78,7 +78,7 @@ def frame(number: int, capabilities: Capabilities, *, epoch: int = 1, version: i
         return SimpleNamespace(range_m=np.array([1.5, 2.5, np.nan]))
 
     async def truth() -> object:
-        return SimpleNamespace(range_m=np.array([1.0, 2.5, 3.0]))
+        return SimpleNamespace(range_m=np.array([1.0, 2.5, 3.0]), lit=np.ones(3, dtype=bool))
 
     recipe = SimpleNamespace(applied=capabilities.apply(BASE), settings_version=version)
     made = SimpleNamespace(

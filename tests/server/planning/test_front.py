@@ -96,7 +96,13 @@ def test_the_frames_own_place_has_its_error_where_the_truth_is_known(
             "frame_rate_hz": applied.frame_rate_hz,
             # of the two pixels with a range, 0.5 m and nothing off
             "range_error_m": (
-                {"median": 0.25, "rms": pytest.approx(0.5 / np.sqrt(2))} if simulated else None
+                {
+                    "median": 0.25,
+                    "rms": pytest.approx(0.5 / np.sqrt(2)),
+                    "no_direct_light_share": 0.0,
+                }
+                if simulated
+                else None
             ),
         }
 

@@ -24,7 +24,11 @@ class TruthDocument(Document):
 
     kind: str
     range_m: float | None = None
+    """That of the surface which is seen, lit or not."""
+    direct_share: float | None = None
+    """Of the light, what came straight from the lamp by that surface: 0 where there is none."""
     direct: float
+    """The first return."""
     brightness: float
     returns: list[ReturnDocument]
     """At most the 16 strongest."""

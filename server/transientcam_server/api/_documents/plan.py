@@ -194,6 +194,8 @@ class RangeErrorDocument(Document):
 
     median: float
     rms: float
+    no_direct_light_share: float
+    """Of all pixels, those with a range and without direct light: no error counts them."""
 
 
 class CurrentDocument(Document):

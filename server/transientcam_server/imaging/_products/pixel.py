@@ -115,6 +115,7 @@ def _describe_truth(truth: Truth, x: int, y: int) -> dict[str, Any]:
     return {
         "kind": truth.kind,
         "range_m": _number(truth.range_m[y, x]),
+        "direct_share": _number(truth.direct_share[y, x]),
         "direct": _number(truth.direct[y, x]) or 0.0,
         "brightness": _number(truth.brightness[y, x]) or 0.0,
         "returns": [

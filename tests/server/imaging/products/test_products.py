@@ -88,7 +88,7 @@ def test_range_is_that_of_the_first_true_return(served: Served, still: httpx.Cli
 
     error_m = np.abs(npy(still, "range") - truth.range_m)
 
-    lit = truth.brightness > 0.1 * np.median(truth.brightness)
+    lit = truth.lit & (truth.brightness > 0.1 * np.median(truth.brightness))
     assert np.median(error_m[lit]) < 0.05
 
 
@@ -110,7 +110,9 @@ def test_direct_indirect_and_uniform_add_up_to_brightness(still: httpx.Client) -
 
 
 def test_truth_is_the_scenes_own_range(served: Served, still: httpx.Client) -> None:
-    np.testing.assert_allclose(npy(still, "truth"), truth_of(served).range_m, rtol=1e-6)
+    truth = truth_of(served)
+    np.testing.assert_allclose(npy(still, "truth"), truth.range_m, rtol=1e-6)
+    np.testing.assert_allclose(npy(still, "direct_share"), truth.direct_share, atol=1e-6)
 
 
 def test_coefficients_solve_the_toeplitz_system_of_their_moments(still: httpx.Client) -> None:

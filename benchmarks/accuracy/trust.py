@@ -1,0 +1,138 @@
+"""Whether pixels say what they are worth: ranges, intervals and `trust` against the surface."""
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.accuracy import worlds
+from benchmarks.accuracy.capturing import CAPTURE_SEED, SETTINGS
+from benchmarks.common.tables import Table, heads
+from transientcam.wire import Trust
+from transientcam_driver import Camera, Sequence
+from transientcam_experiments.tradeoff import camera_before
+from transientcam_experiments.tradeoff.capture import capture
+from transientcam_server.camera import sensor_of
+from transientcam_server.imaging import Intrinsics, Recipe
+from transientcam_server.imaging._errors_of_range.accuracy import RangeAccuracy, range_accuracy
+from transientcam_server.settings import SensorSettings
+from transientcam_simulation.light._paths import first_hit
+from transientcam_simulation.light._rays import camera_rays
+from transientcam_simulation.scene import load_scene
+
+_Array = NDArray[Any]
+_WRONG = 3.0
+"""Times its `range_error`, beyond which a range is wrong."""
+BUILT_IN: Final = ("wall", "corner-left")
+
+
+class Judged(NamedTuple):
+    """Pixels (P) of a scene that have a range, and no mirror in their centre."""
+
+    error_m: _Array
+    accuracy_m: _Array
+    trust: _Array
+    direct_share: _Array
+
+
+def tables(
+    *, scenes: int = 8, seed: int = 9, directory: str = "", names: tuple[str, ...] = BUILT_IN
+) -> Iterator[Table]:
+    """Judge random scenes of a seed, those of a directory, and built-in ones by their names."""
+    table = Table(
+        "What pixels say of themselves",
+        heads(
+            "scene | no direct light:.1% | median error, mm:.1f | trusted:.1% | median interval, mm"
+            ":.1f | in their interval:.1% | of the trusted:.1% | wrong:.1% | of these marked:.1%"
+            " | of the right marked:.1%"
+        ),
+        notes=[
+            "A pixel is wrong where it is off the surface that it sees by more than "
+            f"{_WRONG:g} times its `range_error`, right within its interval. Bars: 80 % of the "
+            "wrong ones marked, 5 % of the right ones, 85 to 95 % in their interval, whose median "
+            "is at most 3 times the median error. Mirrors are left out.",
+        ],
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [*worlds.write(Path(folder), scenes, seed=seed)]
+        paths += [str(each) for each in sorted(Path(directory).glob("*.toml")) if directory]
+        found = []
+        for path in (*paths, *names):
+            found.append(judged(path))
+            table.rows.append((Path(path).stem, *_figures(found[-1])))
+    together = Judged(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+    table.rows.append(("all", *_figures(together)))
+    yield table
+    yield _of_reasons(together)
+
+
+def judged(scene: str) -> Judged:
+    """Capture a frame of a scene with the default sequence."""
+    with camera_before(scene, seed=CAPTURE_SEED) as camera:
+        simulation = camera.simulation
+        assert simulation is not None
+        recipe = _recipe(camera, simulation.field_of_view_deg or 45.0)
+        recipe = replace(recipe, lamp=simulation.lamp)
+        (frame,) = capture(camera, 1, middle=True)
+        found = recipe.reconstruct(frame.raw)
+        accuracy: RangeAccuracy = range_accuracy(recipe, found, 1, frame.raw)
+        error_m = np.abs(np.asarray(found.range_m) - frame.truth.range_m)
+        kept = np.isfinite(error_m) & ~_mirrors(scene, error_m.shape)
+        planes = error_m, accuracy.error_m, accuracy.trust, frame.truth.direct_share
+        return Judged(*(plane[kept] for plane in planes))
+
+
+def _recipe(camera: Camera, field_deg: float) -> Recipe:
+    applied, sensor = camera.configure(Sequence()), sensor_of(camera, SensorSettings())
+    width, height = camera.capabilities.width, camera.capabilities.height
+    lens = Intrinsics.of_field(field_deg, width=width, height=height)
+    highest = float(sensor.highest_dn)
+    return Recipe(applied, SETTINGS, highest, sensor=sensor, intrinsics=lens)
+
+
+def _mirrors(scene: str, shape: tuple[int, int]) -> _Array:
+    """Return the pixels in whose centre is a mirror: what they show is elsewhere."""
+    if not scene.endswith(".toml"):
+        return np.zeros(shape, dtype=bool)
+    loaded = load_scene(Path(scene))
+    assert loaded.camera is not None
+    rays = camera_rays(loaded.camera, width=shape[1], height=shape[0])
+    start = np.broadcast_to(loaded.camera.position_m, rays.shape)
+    _, which = first_hit(loaded, start, rays)
+    kinds = np.array([each.kind == "mirror" for each in loaded.surfaces] + [False])
+    return np.asarray(kinds[which].reshape(shape))
+
+
+def _figures(of: Judged) -> tuple[float | None, ...]:
+    trusted, held = of.trust == Trust.TRUSTED, of.error_m <= of.accuracy_m
+    wrong = of.error_m > _WRONG * of.accuracy_m
+
+    def share(of_them: _Array, among: _Array) -> float | None:
+        return float(of_them[among].mean()) if among.any() else None
+
+    return (
+        float((of.direct_share == 0).mean()),
+        1e3 * float(np.median(of.error_m)),
+        float(trusted.mean()),
+        1e3 * float(np.median(of.accuracy_m)),
+        float(held.mean()),
+        share(held, trusted),
+        float(wrong.mean()),
+        share(~trusted, wrong),
+        share(~trusted, held),
+    )
+
+
+def _of_reasons(of: Judged) -> Table:
+    table = Table("", heads("reason | pixels:.2% | in their interval:.1% | wrong:.1%"))
+    for reason in Trust:
+        own = of.trust == reason
+        if own.any():
+            error_m, within_m = of.error_m[own], of.accuracy_m[own]
+            held, wrong = error_m <= within_m, error_m > _WRONG * within_m
+            table.rows.append((reason.name.lower(), own.mean(), held.mean(), wrong.mean()))
+    return table

@@ -1,0 +1,150 @@
+"""Which reason a pixel has, on moments whose returns are given."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from transientcam.documents import TrustCountsDocument
+from transientcam.wire import Trust
+from transientcam_driver import AppliedSequence, RawFrame, Sequence, open_camera
+from transientcam_driver.camera import Lamp
+from transientcam_driver.clock import VirtualClock
+from transientcam_server.imaging import Gains, Recipe
+from transientcam_server.imaging._errors_of_range.trust import DRIFT_M_PER_C, judged
+from transientcam_server.settings import ReconstructionSettings
+
+F_HZ, M = 23e6, 4
+SHAPE = 24, 30
+METRES = 4 * np.pi * F_HZ / 299_792_458.0
+"""Phase in rad of a range in m."""
+Array = NDArray[np.float64]
+
+
+def applied() -> AppliedSequence:
+    with open_camera("sim:wall", clock=VirtualClock()) as camera:
+        sequence = Sequence(base_frequency_hz=F_HZ, harmonics=M, exposure_s=1e-3)
+        return camera.capabilities.apply(sequence)
+
+
+APPLIED = applied()
+RECIPE = Recipe(
+    APPLIED,
+    ReconstructionSettings(estimator="pisarenko"),
+    4095.0,
+    sensor=tm.noise.Sensor(),
+)
+
+
+def found(
+    range_m: Array, light_dn: Array, later: tuple[float, float] = (0.0, 0.0)
+) -> tm.Reconstruction:
+    """The reconstruction of a return at a range, and of a later one: its share, and how far."""
+    share, after_m = later
+    j = np.arange(M + 1).reshape(-1, 1, 1)
+    even = 0.01
+    b = (1 - share - even) * np.exp(1j * j * METRES * range_m)
+    b = b + share * np.exp(1j * j * METRES * (range_m + after_m)) + even * (j == 0)
+    return RECIPE._reconstructor.of_measured((light_dn * b).astype(np.complex64))
+
+
+def trust_of(
+    recipe: Recipe,
+    image: tm.Reconstruction,
+    raw: RawFrame | None = None,
+    bias_m: float = 1e-4,
+) -> tuple[Array, Array]:
+    std_m, off_m = np.full(SHAPE, 1e-3), np.full(SHAPE, bias_m)
+    return judged(recipe, image, std_m, off_m, raw)
+
+
+def test_a_wall_by_its_own_light_is_trusted_within_a_few_millimetres() -> None:
+    error_m, trust = trust_of(RECIPE, found(np.full(SHAPE, 2.0), np.full(SHAPE, 500.0)))
+
+    assert (trust == Trust.TRUSTED).all()
+    assert (error_m > 1.6e-3).all()
+    assert (error_m < 6e-3).all()
+
+
+def test_light_that_no_surface_can_send_directly_is_not_trusted() -> None:
+    lamp = Lamp((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.0, 1e6)
+    image = found(np.full(SHAPE, 2.0), np.full(SHAPE, 500.0))  # white would be 250 DN
+
+    assert (trust_of(replace(RECIPE, lamp=lamp), image)[1] == Trust.NO_DIRECT_LIGHT).all()
+    brighter = replace(RECIPE, lamp=replace(lamp, dn_per_s=4e6))
+    assert (trust_of(brighter, image)[1] == Trust.TRUSTED).all()
+
+
+def test_pixels_without_light_have_no_range_and_those_beside_a_step_are_edges() -> None:
+    range_m, light_dn = np.full(SHAPE, 2.0), np.full(SHAPE, 500.0)
+    range_m[:, 15:] = 1.0
+    light_dn[:3] = 0.0
+
+    error_m, trust = trust_of(RECIPE, found(range_m, light_dn))
+
+    assert (trust[:2] == Trust.NO_RANGE).all()
+    assert np.isnan(error_m[:2]).all()
+    assert (trust[8:, 13:17] == Trust.EDGE).any(axis=1).all()
+    assert (trust[8:, :11] == Trust.TRUSTED).all()
+
+
+@pytest.mark.parametrize(("after_m", "most_m"), [(0.3, 0.05), (2.5, 6e-3)])
+def test_later_light_widens_the_interval_where_it_is_near_and_not_where_it_is_resolved(
+    after_m: float, most_m: float
+) -> None:
+    image = found(np.full(SHAPE, 1.5), np.full(SHAPE, 500.0), later=(0.15, after_m))
+
+    error_m, trust = trust_of(RECIPE, image)
+
+    assert (trust == Trust.TRUSTED).all()
+    assert np.median(error_m) < most_m
+    if after_m < 1:
+        assert np.median(error_m) > 10e-3
+
+
+@pytest.mark.parametrize(
+    ("later", "reason"),
+    [((0.0, 0.0), Trust.LATER_LIGHT_UNRESOLVED), ((0.3, 2.5), Trust.LATER_LIGHT)],
+)
+def test_estimators_that_disagree_by_much_leave_later_light_open(
+    later: tuple[float, float], reason: Trust
+) -> None:
+    image = found(np.full(SHAPE, 1.5), np.full(SHAPE, 500.0), later=later)
+
+    error_m, trust = trust_of(RECIPE, image, bias_m=0.2)
+
+    assert (trust == reason).all()
+    assert (error_m > 0.5).all()
+
+
+def capture(temperature_c: float) -> RawFrame:
+    images = np.zeros((0, *SHAPE), np.uint16)
+    return RawFrame(1, 1, images, APPLIED.sequence.labels, 0.0, 0.0, 0.1, temperature_c, 0)
+
+
+def test_a_camera_far_from_its_calibrations_temperature_is_not_trusted() -> None:
+    planes = np.ones((M + 1, *SHAPE), np.complex64)
+    recipe = replace(RECIPE, gains=Gains("then", planes, None, temperature_c=25.0))
+    image = found(np.full(SHAPE, 2.0), np.full(SHAPE, 500.0))
+    as_then_m, _ = trust_of(recipe, image, capture(25.0))
+
+    for now_c, reason in ((31.0, Trust.TRUSTED), (38.0, Trust.DRIFT), (12.0, Trust.DRIFT)):
+        error_m, trust = trust_of(recipe, image, capture(now_c))
+        assert (trust == reason).all()
+        drift_m = DRIFT_M_PER_C * abs(now_c - 25.0)
+        np.testing.assert_allclose(error_m, np.hypot(as_then_m, drift_m), rtol=1e-5)
+
+
+def test_a_temperature_that_is_not_known_is_no_drift() -> None:
+    gains = Gains("then", np.ones((M + 1, *SHAPE), np.complex64), None)
+    image = found(np.full(SHAPE, 2.0), np.full(SHAPE, 500.0))
+
+    for recipe in (RECIPE, replace(RECIPE, gains=gains)):
+        assert (trust_of(recipe, image, capture(60.0))[1] == Trust.TRUSTED).all()
+
+
+def test_metadata_count_the_codes_in_their_order() -> None:
+    assert [each.name.lower() for each in Trust] == list(TrustCountsDocument.__annotations__)
+    assert list(Trust) == list(range(len(Trust)))
