@@ -9,12 +9,17 @@ const PNG_SCALE = 2;
 /** What a figure is made of, but for its picture, which is a canvas of the sensor's size. */
 export type FigureParts = Omit<Figure, "picture" | "columns" | "rows">;
 
-/** Hands a figure of a canvas out. Of WebGL only in the task that drew it. */
+/**
+ * Hands a figure of a canvas out, as canvas and words are when this is called: the light plays on while it is drawn.
+ *
+ * Of WebGL only in the task that drew it.
+ */
 export async function saveFigure(name: string, canvas: HTMLCanvasElement | null, parts: FigureParts, kind: "png" | "svg"): Promise<void> {
   if (canvas === null) return;
-  const [columns, rows] = [canvas.width, canvas.height];
+  const picture = copyOf(canvas);
+  const { width: columns, height: rows } = picture;
   const layout = figureLayout(columns, rows, FIGURE_PX);
-  const svg = figureSvg({ ...parts, columns, rows, picture: canvas.toDataURL("image/png") }, layout);
+  const svg = figureSvg({ ...parts, columns, rows, picture: picture.toDataURL("image/png") }, layout);
   if (kind === "svg") {
     save(`${name}.svg`, new Blob([svg], { type: "image/svg+xml" }));
     return;
@@ -26,7 +31,7 @@ export async function saveFigure(name: string, canvas: HTMLCanvasElement | null,
   // The picture again, pixel by pixel: a browser may smooth what is within an SVG.
   context.imageSmoothingEnabled = false;
   context.drawImage(
-    canvas,
+    picture,
     PNG_SCALE * layout.left,
     PNG_SCALE * layout.top,
     PNG_SCALE * layout.pictureWidth,
@@ -34,6 +39,13 @@ export async function saveFigure(name: string, canvas: HTMLCanvasElement | null,
   );
   const content = await new Promise<Blob | null>((done) => drawn.toBlob(done, "image/png"));
   if (content !== null) save(`${name}.png`, content);
+}
+
+function copyOf(canvas: HTMLCanvasElement): HTMLCanvasElement {
+  const copy = document.createElement("canvas");
+  [copy.width, copy.height] = [canvas.width, canvas.height];
+  (copy.getContext("2d") as CanvasRenderingContext2D).drawImage(canvas, 0, 0);
+  return copy;
 }
 
 /** An SVG as an image that can be drawn. */

@@ -144,7 +144,7 @@ function MapPicture({ look, canvas }: MapProps) {
   return (
     <>
       <div class="picture">
-        <Stage width={width} height={height} label={`${shown.name} map`}>
+        <Stage width={width} height={height} frame={frame} label={`${shown.name} map`}>
           <canvas ref={canvas} />
           {waiting.value && <FirstFrame />}
         </Stage>

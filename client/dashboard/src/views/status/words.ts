@@ -1,6 +1,7 @@
 /** Words of the header. */
 
 import { fixed } from "../../scales/format";
+import { THINNED } from "../../store/frames";
 import type { Decision } from "../../stream/connection";
 
 /** What less is asked for, as a sign and as sentences; `zoomed` where only a part of the picture is in sight. */
@@ -9,7 +10,7 @@ export function demandWords(
   zoomed: boolean,
 ): { readonly short: string; readonly long: string } {
   const rate = fixed(maxRate_hz, (maxRate_hz ?? 0) < 1 ? 2 : 1, "Hz");
-  const cut = !part ? [] : [zoomed ? "the part in sight" : "every 2nd pixel"];
+  const cut = !part ? [] : [zoomed ? "the part in sight" : THINNED];
   const codes = coded ? ["16 bits"] : [];
   const link =
     carried_bytes_s === null

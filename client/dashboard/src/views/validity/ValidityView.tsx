@@ -45,7 +45,7 @@ export function ValidityView() {
         { text: "Flags (NPY)", run: () => saveNumbers(store.api, frame.peek()) },
       ]}
     >
-      <Stage width={width} height={height} label="Validity map">
+      <Stage width={width} height={height} frame={frame} label="Validity map">
         <canvas ref={canvas} data-product="flags" />
         {empty.value && <FirstFrame />}
       </Stage>
