@@ -2,14 +2,14 @@
 
 import { fixed } from "../../scales/format";
 import { THINNED } from "../../store/frames";
-import type { Decision } from "../../stream/connection";
+import type { Decision } from "../../stream/demand";
 
 /** What less is asked for, as a sign and as sentences; `zoomed` where only a part of the picture is in sight. */
 export function demandWords(
   { demand: { maxRate_hz, coded, part }, carried_bytes_s, pictures_hz }: Decision,
   zoomed: boolean,
 ): { readonly short: string; readonly long: string } {
-  const rate = fixed(maxRate_hz, (maxRate_hz ?? 0) < 1 ? 2 : 1, "Hz");
+  const rate = maxRate_hz === null ? [] : [fixed(maxRate_hz, maxRate_hz < 1 ? 2 : 1, "Hz")];
   const cut = !part ? [] : [zoomed ? "the part in sight" : THINNED];
   const codes = coded ? ["16 bits"] : [];
   const link =
@@ -19,10 +19,14 @@ export function demandWords(
   const page =
     pictures_hz === null
       ? []
-      : [`With all frames this browser drew ${fixed(pictures_hz, 0, "")} pictures of the light a second, which do not flow.`];
-  const asked = [`at most ${rate}`, ...codes.map((each) => `numbers in ${each}`), ...cut.map((each) => `${each} only`)].join(", ");
+      : [`Before, this browser drew ${fixed(pictures_hz, 0, "")} pictures of the light a second, which do not flow.`];
+  const asked = [
+    ...rate.map((each) => `at most ${each}`),
+    ...codes.map((each) => `numbers in ${each}`),
+    ...cut.map((each) => `${each} only`),
+  ].join(", ");
   return {
-    short: [`${link.length > 0 ? "Thin link" : "Slow browser"}: ${rate}`, ...codes, ...cut].join(", "),
+    short: `${link.length > 0 ? "Thin link" : "Slow browser"}: ${[...rate, ...codes, ...cut].join(", ")}`,
     long: [
       ...link,
       ...page,
