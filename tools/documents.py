@@ -36,6 +36,7 @@ _WRITTEN = "`python tools/documents.py --write` writes this file"
 _OF_A_FRAME = (
     "PixelCountsDocument",
     "PredictedStdDocument",
+    "TrustCountsDocument",
     "RangeAccuracyDocument",
     "HopDocument",
     "FrameDocument",

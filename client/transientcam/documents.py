@@ -37,18 +37,46 @@ class PredictedStdDocument(TypedDict):
     """Share of the pixels where the noise model holds; that of the others is a rough figure."""
 
 
-class RangeAccuracyDocument(TypedDict):
-    """Predicted errors of a frame's range: those in m of the median pixel that has one."""
+class TrustCountsDocument(TypedDict):
+    """How many pixels the product `trust` has under each code, in the order of the codes from 0."""
 
+    trusted: int
+    no_range: int
+    """There is none: too little light, or too much, as the flags say."""
+    corrupt_image: int
+    """An image of the frame was lost or out of step, and could not be rebuilt."""
+    motion: int
+    """The light of the pixel changed while the frame was captured."""
+    no_direct_light: int
+    """No surface at this range can be this bright by the lamp's own light: it came around."""
+    shadow: int
+    """What is nearer stands between the lamp and this point."""
+    edge: int
+    """Near and far meet within the pixel or beside it."""
+    later_light_unresolved: int
+    """Later light is merged with the first: estimators disagree by much."""
+    later_light: int
+    """A return found close behind the first one may have moved it by much."""
+    drift: int
+    """The camera is much warmer or colder than at its calibration."""
+    noise: int
+    """The noise leaves the range open."""
+
+
+class RangeAccuracyDocument(TypedDict):
+    """Predicted errors of a frame's range: shares, and in m those of the median pixel with one."""
+
+    trusted_share: float
+    """Share of all pixels whose range is trusted."""
+    within_m: float | None
+    """Half width of the 90 % interval that 9 of 10 trusted pixels have, or less; null without."""
+    trust: TrustCountsDocument
     range_error_m: float | None
-    """Noise and bias together, root sum of squares; null where one frequency knows no bias."""
+    """Half width of the 90 % interval; null where one frequency knows no bias."""
     range_std_m: float | None
     """Standard deviation that the noise of the sensor gives."""
     range_bias_m: float | None
     """How far it is off for good, as far as the frame shows it; more takes do not reduce it."""
-    outlier_share: float | None
-    """Share of the ranges that are off by more than five times `range_error_m`; a bias that none
-    of the frame's frequencies shows is not in it."""
     every_px: int
     """The errors are those of one pixel in so many rows and columns: more than 1 where not all
     that predicts them is compiled."""
@@ -115,7 +143,7 @@ class FrameDocument(TypedDict):
     predicted_range_std_m: PredictedStdDocument | None
     """Null until the range was computed."""
     accuracy: RangeAccuracyDocument | None
-    """Null until one of the products range_std, range_bias and range_error was computed."""
+    """Null until one of the products range_std, range_bias, range_error, trust was computed."""
 
 
 class FrameMeta(FrameDocument):

@@ -4,6 +4,7 @@ from transientcam.documents import (
     FrameMeta,
     PixelCountsDocument as PixelCounts,
     PredictedStdDocument as PredictedStd,
+    TrustCountsDocument as TrustCounts,
 )
 from transientcam.frame import Frame
 from transientcam.wire import _fields as fields
@@ -59,6 +60,7 @@ from transientcam.wire._parsing import (
     parse_server_message,
 )
 from transientcam.wire._products import PRODUCTS, Product
+from transientcam.wire._trust import Trust
 
 __all__ = [
     "ALIGNMENT",
@@ -99,6 +101,8 @@ __all__ = [
     "ServerMessage",
     "Subscribe",
     "Subscription",
+    "Trust",
+    "TrustCounts",
     "array_document",
     "array_head",
     "decode_reflection16",

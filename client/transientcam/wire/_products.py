@@ -64,8 +64,9 @@ PRODUCTS: Final[dict[str, Product]] = {
             "m",
             _IMAGE,
             "<f4",
-            "noise and bias of the range together: root sum of squares; NaN if m = 1",
+            "half width of the 90 % interval of this pixel's range; NaN if m = 1",
         ),
+        Product("trust", "1", _IMAGE, "|u1", "why not to trust a range; 0 where it is trusted"),
         Product(
             "reduced_chi_square",
             "1",
@@ -122,7 +123,20 @@ PRODUCTS: Final[dict[str, Product]] = {
             "<f4",
             "x (right), y (down), z (forward) of the first return; NaN without one",
         ),
-        Product("truth", "m", _IMAGE, "<f4", "the simulated scene's range; NaN without light"),
+        Product(
+            "truth",
+            "m",
+            _IMAGE,
+            "<f4",
+            "range of the simulated surface, lit or not; NaN without one",
+        ),
+        Product(
+            "direct_share",
+            "1",
+            _IMAGE,
+            "<f4",
+            "share of the light that came straight from the lamp by the simulated surface",
+        ),
     )
 }
 """Every product by name: an entry here and one of the server's registry make a product."""

@@ -15,6 +15,7 @@ from transientcam_driver.camera._factory import FactoryCalibration, Lens
 from transientcam_driver.camera._frame import Counters, RawFrame
 from transientcam_driver.camera._hop import Hop
 from transientcam_driver.camera._host_camera import HostCamera
+from transientcam_driver.camera._lamp import Lamp
 from transientcam_driver.camera._light import has_light, light_warning
 from transientcam_driver.camera._opening import check_camera, kinds, open_camera, plugin_of
 from transientcam_driver.camera._plugin import CameraName, CameraPlugin, FoundCamera
@@ -24,6 +25,7 @@ from transientcam_driver.camera._simulation import (
     Explanation,
     Response,
     Simulation,
+    SurfaceSeen,
     Truth,
 )
 from transientcam_driver.camera._status import DeviceState, Status, StatusFlag
@@ -44,6 +46,7 @@ __all__ = [
     "FoundCamera",
     "Hop",
     "HostCamera",
+    "Lamp",
     "Lens",
     "RawFrame",
     "Response",
@@ -51,6 +54,7 @@ __all__ = [
     "Simulation",
     "Status",
     "StatusFlag",
+    "SurfaceSeen",
     "Truth",
     "check_camera",
     "has_light",

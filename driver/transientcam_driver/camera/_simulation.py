@@ -11,11 +11,31 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.camera._lamp import Lamp
 from transientcam_driver.camera._sensor import Sensor
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S, Sequence
 
 Response = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Times in s, and at each a weight (sparse) or a density per s (dense)."""
+
+
+@dataclass(frozen=True)
+class SurfaceSeen:
+    """The surface that a ray through each pixel's centre meets first.
+
+    Attributes
+    ----------
+    range_m
+        (H, W) half the way from the lamp over its point to the camera, whether light goes that way
+        or not. NaN where the ray meets nothing, the back of a surface, or a stencil's mask. In a
+        mirror it is the mirror's own.
+    direct_share
+        (H, W) share of the pixel's light that came that way: 0 in shadow, behind the beam and in a
+        mirror, which itself sends none.
+    """
+
+    range_m: NDArray[np.float64]
+    direct_share: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -31,6 +51,8 @@ class Truth:
     kind
         "sparse": the returns are all there is. "dense": they sum up continuous responses, each
         by its first peak and its mass.
+    surface
+        What the pixels see of the scene's geometry; None of responses from files, which have none.
     """
 
     delay_s: NDArray[np.float64]
@@ -38,12 +60,31 @@ class Truth:
     kind: Literal["sparse", "dense"]
     _of_pixel: Callable[[int, int], Response]
     _scale_dn: float
+    surface: SurfaceSeen | None = None
 
     @property
     def range_m(self) -> NDArray[np.float64]:
-        """(H, W): half the way of the first return; NaN where no light comes back."""
+        """(H, W): that of the surface which is seen, lit or not; see `SurfaceSeen.range_m`.
+
+        Of responses from files it is `first_return_m`.
+        """
+        return self.first_return_m if self.surface is None else self.surface.range_m
+
+    @property
+    def first_return_m(self) -> NDArray[np.float64]:
+        """(H, W): half the way of the first light, whatever its way; NaN where none comes back."""
         range_m: NDArray[np.float64] = SPEED_OF_LIGHT_M_S * self.delay_s[0] / 2
         return range_m
+
+    @property
+    def direct_share(self) -> NDArray[np.float64]:
+        """(H, W): share of the light that came straight from the lamp by the surface seen.
+
+        0 where there is no direct light; NaN where that is not known.
+        """
+        if self.surface is None:
+            return np.full(self.delay_s.shape[1:], np.nan)
+        return self.surface.direct_share
 
     @property
     def direct(self) -> NDArray[np.float64]:
@@ -145,6 +186,11 @@ class Simulation(Protocol):
     @property
     def field_of_view_deg(self) -> float | None:
         """Horizontal, of the scene's camera; None where the scene has no camera."""
+        ...
+
+    @property
+    def lamp(self) -> Lamp | None:
+        """Of the scene; None where the scene has no camera, or behind the diffuser."""
         ...
 
     @property

@@ -4,7 +4,9 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Protocol
 
-from transientcam_driver.camera import Explanation, Sensor, Truth
+import numpy as np
+
+from transientcam_driver.camera import Explanation, Lamp, Sensor, Truth
 from transientcam_driver.errors import CameraError
 from transientcam_driver.sequence import Sequence
 from transientcam_simulation.base import giving_up_by
@@ -87,6 +89,22 @@ class SimulationHandle:
     def field_of_view_deg(self) -> float | None:
         """Horizontal; None where the scene has no camera."""
         return None if self._scene.camera is None else self._scene.camera.field_of_view_deg
+
+    @property
+    def lamp(self) -> Lamp | None:
+        """Of the scene; None where the scene has no camera, or behind the diffuser."""
+        camera, light = self._scene.camera, self._scene.light
+        if camera is None or self._diffuser:
+            return None
+        axes = camera.axes()
+        aim = light.aim_at_m - light.position_m
+        position, axis = axes @ (light.position_m - camera.position_m), axes @ aim
+        return Lamp(
+            tuple(position.tolist()),
+            tuple((axis / np.linalg.norm(axis)).tolist()),
+            light.beam_exponent,
+            light.electrons_per_s / self.sensor.gain_e_per_dn,
+        )
 
     @property
     def effects(self) -> dict[str, str]:

@@ -243,10 +243,17 @@ class World:
         """Ground truth, in DN at the exposure set; of the image that was made last."""
         plan = self._configured()
         time_s = plan.time_s if device_time_s is None else device_time_s
-        responses = plan.views.exact(time_s).responses
+        responses, surface = plan.views.exact(time_s).responses, plan.views.surface
         scale_dn = self._electrons_per_s * plan.sequence.exposure_s / self._sensor.gain_e_per_dn
         delay_s, weight = responses.returns()
-        return Truth(delay_s, weight * scale_dn, responses.kind, responses.of_pixel, scale_dn)
+        return Truth(
+            delay_s,
+            weight * scale_dn,
+            responses.kind,
+            responses.of_pixel,
+            scale_dn,
+            None if surface is None else surface(time_s),
+        )
 
     def _mean_e(self, plan: _Plan, label: ImageLabel, shot: Shot) -> NDArray[np.float32]:
         time_s = shot.device_time_s

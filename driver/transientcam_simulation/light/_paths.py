@@ -227,13 +227,7 @@ def first_scattering(scene: Scene, eye: Points, direction: Points) -> RayEnds:
     scatters = np.array([surface.scatters for surface in scene.surfaces] + [False])
     reflects = np.array([surface.kind == "mirror" for surface in scene.surfaces] + [False])
     for _bounce in range(scene.mirror_bounces + 1):
-        nearest = np.full(len(ray), np.inf)
-        which = np.full(len(ray), -1)
-        for index, surface in enumerate(scene.surfaces):
-            at = hit(surface, start, start + FAR_M * direction)
-            closer = at < nearest
-            nearest[closer], which[closer] = at[closer], index
-        length_m = np.where(which < 0, 0.0, nearest) * FAR_M
+        length_m, which = first_hit(scene, start, direction)
         point = start + length_m[:, None] * direction
         distance_m = distance_m + length_m
         normal = normals_at(scene, point, which)
@@ -252,6 +246,18 @@ def first_scattering(scene: Scene, eye: Points, direction: Points) -> RayEnds:
             direction[mine] = surface.mirror.mirrored_direction(direction[mine])
             throughput[mine] *= surface.reflectivity
     return RayEnds(*(np.concatenate(parts) for parts in zip(*ended, strict=True)))
+
+
+def first_hit(
+    scene: Scene, start: Points, direction: Points
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return how far rays go, in m, and the index of the surface they meet; 0 and -1 for none."""
+    nearest, which = np.full(len(direction), np.inf), np.full(len(direction), -1)
+    for index, surface in enumerate(scene.surfaces):
+        at = hit(surface, start, start + FAR_M * direction)
+        closer = at < nearest
+        nearest[closer], which[closer] = at[closer], index
+    return np.where(which < 0, 0.0, nearest) * FAR_M, which
 
 
 def image_lights(scene: Scene) -> Iterator[ImageLight]:

@@ -55,11 +55,7 @@ def rays_through(
     height: int,
 ) -> Points:
     """Return unit vectors through places on the sensor; whole numbers are pixels' centres."""
-    forward = view.look_at_m - view.position_m
-    forward = forward / np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
+    right, down, forward = view.axes()
     half = np.tan(np.radians(view.field_of_view_deg) / 2)
     x = half * (2 * (column + 0.5) / width - 1)
     y = half * (height / width) * (1 - 2 * (row + 0.5) / height)
@@ -67,7 +63,7 @@ def rays_through(
         x, y = _straightened(
             view.lens, x - 2 * half * view.lens.centre[0], y + 2 * half * view.lens.centre[1]
         )
-    rays = forward + x[:, None] * right + y[:, None] * up
+    rays = forward + x[:, None] * right - y[:, None] * down
     directions: Points = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
     return directions
 

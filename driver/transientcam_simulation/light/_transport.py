@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.camera import SurfaceSeen
 from transientcam_simulation.base import PINHOLE, Lens, Moments, Responses
 from transientcam_simulation.effects import (
     CALLED_ABOVE,
@@ -25,10 +26,12 @@ from transientcam_simulation.light._bundle import Region
 from transientcam_simulation.light._compiler import load_compiled
 from transientcam_simulation.light._facts import SceneFacts, cosine_to_axis
 from transientcam_simulation.light._followed import FollowedRays
+from transientcam_simulation.light._paths import light_rays
 from transientcam_simulation.light._radiosity import Interreflection, WithInterreflection
 from transientcam_simulation.light._rays import camera_rays
 from transientcam_simulation.light._recent import Recent
 from transientcam_simulation.light._still import StillLight
+from transientcam_simulation.light._surface_seen import surface_seen
 from transientcam_simulation.light._variants import (
     still_scene,
     without_gloss,
@@ -92,12 +95,13 @@ class Views:
     """The view at a time of the device; the same object as long as nothing changes.
 
     ``exact`` takes no account of the time it takes. ``background`` is the view without what moves,
-    of which views are regions.
+    of which views are regions. ``surface`` is what the pixels see at a time; None without geometry.
     """
 
     at: Callable[[float], View]
     exact: Callable[[float], View]
     background: View | None = None
+    surface: Callable[[float], SurfaceSeen] | None = None
 
 
 class Latest:
@@ -262,19 +266,29 @@ class SurfaceScenery:
         further = DiffuseInterreflection.name in effects
         if not self.moves:
             view = self._still_view(still, followed, tolerance if further else None)
-            return Views(lambda _time_s: view, lambda _time_s: view)
+
+            def seen(_time_s: float) -> SurfaceSeen:
+                brightness = view.responses.moments(0.0).real
+                return surface_seen(still.scene, still.rays, still.lit, still.fine, brightness)
+
+            return Views(lambda _time_s: view, lambda _time_s: view, surface=seen)
         load_compiled()
         from transientcam_simulation.light._moving import MovingLight
         from transientcam_simulation.light._time_interpolation import Steps
 
         moving = MovingLight(scene, still, soft=MixedPixels.name in effects)
+
+        def seen_then(time_s: float) -> SurfaceSeen:
+            now, brightness = scene.at(time_s), exact(time_s).responses.moments(0.0).real
+            return surface_seen(now, still.rays, light_rays(now, still.rays), (), brightness)
+
         if further:
-            at = Latest(lambda time_s: self._lit_view(moving.at(time_s), tolerance))
-            return Views(at, at)
+            exact = Latest(lambda time_s: self._lit_view(moving.at(time_s), tolerance))
+            return Views(exact, exact, surface=seen_then)
         exact = Latest(lambda time_s: _view_of(moving.at(time_s)))
         steps = Steps(scene, moving.at, pixel_rad=still.pixel_rad, every_s=wanted.image_period_s)
         between = Latest(lambda time_s: _view_of(steps.at(time_s)))
-        return Views(between, exact, self._still_view(still, followed, None))
+        return Views(between, exact, self._still_view(still, followed, None), seen_then)
 
     def _lit_view(self, now: "MovingResponses", tolerance: float) -> View:
         """View of a moving scene with light over several surfaces, computed anew."""

@@ -29,6 +29,14 @@ class Viewpoint:
     field_of_view_deg: float
     lens: Lens = PINHOLE
 
+    def axes(self) -> Points:
+        """Return unit vectors (3, 3) to the right, downwards, and where the camera looks."""
+        forward = self.look_at_m - self.position_m
+        forward = forward / np.linalg.norm(forward)
+        right = np.cross(forward, [0.0, 0.0, 1.0])
+        right /= np.linalg.norm(right)
+        return np.stack([right, np.cross(forward, right), forward])
+
 
 @dataclass(frozen=True, slots=True)
 class Light:

@@ -16,7 +16,6 @@ from transientcam_server.imaging._encodings.encoding import (
     TIFF,
     Encoding,
 )
-from transientcam_server.imaging._errors_of_range.accuracy import OUTLIER_DEVIATIONS
 from transientcam_server.imaging._errors_of_range.deviation import (
     MEDIAN_OF_NORMAL,
     typical_deviation,
@@ -79,7 +78,6 @@ __all__ = [
     "MSGPACK",
     "NOMINAL_ID",
     "OF_IMAGES",
-    "OUTLIER_DEVIATIONS",
     "PNG",
     "PRODUCTS",
     "STREAMED_BYTES",

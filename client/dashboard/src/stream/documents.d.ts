@@ -445,7 +445,7 @@ export interface FrameDocument {
   readonly ambient_dn: number | null;
   /** Null until the range was computed. */
   readonly predicted_range_std_m: PredictedStdDocument | null;
-  /** Null until one of the products range_std, range_bias and range_error was computed. */
+  /** Null until one of the products range_std, range_bias, range_error, trust was computed. */
   readonly accuracy: RangeAccuracyDocument | null;
 }
 
@@ -929,17 +929,19 @@ export interface ProductStoresDocument {
   readonly stores: readonly ProductStoreDocument[];
 }
 
-/** Predicted errors of a frame's range: those in m of the median pixel that has one. */
+/** Predicted errors of a frame's range: shares, and in m those of the median pixel with one. */
 export interface RangeAccuracyDocument {
-  /** Noise and bias together, root sum of squares; null where one frequency knows no bias. */
+  /** Share of all pixels whose range is trusted. */
+  readonly trusted_share: number;
+  /** Half width of the 90 % interval that 9 of 10 trusted pixels have, or less; null without. */
+  readonly within_m: number | null;
+  readonly trust: TrustCountsDocument;
+  /** Half width of the 90 % interval; null where one frequency knows no bias. */
   readonly range_error_m: number | null;
   /** Standard deviation that the noise of the sensor gives. */
   readonly range_std_m: number | null;
   /** How far it is off for good, as far as the frame shows it; more takes do not reduce it. */
   readonly range_bias_m: number | null;
-  /** Share of the ranges that are off by more than five times `range_error_m`; a bias that none
-   * of the frame's frequencies shows is not in it. */
-  readonly outlier_share: number | null;
   /** The errors are those of one pixel in so many rows and columns: more than 1 where not all
    * that predicts them is compiled. */
   readonly every_px: number;
@@ -1301,6 +1303,31 @@ export interface TradeoffDocument {
 export interface TradeoffRequest {
   /** The accuracy that capture time is held against. */
   readonly by?: "range_error_m" | "range_std_m" | "bound_width";
+}
+
+/** How many pixels the product `trust` has under each code, in the order of the codes from 0. */
+export interface TrustCountsDocument {
+  readonly trusted: number;
+  /** There is none: too little light, or too much, as the flags say. */
+  readonly no_range: number;
+  /** An image of the frame was lost or out of step, and could not be rebuilt. */
+  readonly corrupt_image: number;
+  /** The light of the pixel changed while the frame was captured. */
+  readonly motion: number;
+  /** No surface at this range can be this bright by the lamp's own light: it came around. */
+  readonly no_direct_light: number;
+  /** What is nearer stands between the lamp and this point. */
+  readonly shadow: number;
+  /** Near and far meet within the pixel or beside it. */
+  readonly edge: number;
+  /** Later light is merged with the first: estimators disagree by much. */
+  readonly later_light_unresolved: number;
+  /** A return found close behind the first one may have moved it by much. */
+  readonly later_light: number;
+  /** The camera is much warmer or colder than at its calibration. */
+  readonly drift: number;
+  /** The noise leaves the range open. */
+  readonly noise: number;
 }
 
 /** What the simulated scene really holds at a pixel. */

@@ -9,24 +9,26 @@ is taken. It is a figure of the frame alone; a plan rests on a look at more freq
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam.documents import RangeAccuracyDocument
+from transientcam.documents import RangeAccuracyDocument, TrustCountsDocument
+from transientcam.wire import Trust
+from transientcam_driver import RawFrame
 from transientcam_moments.reconstruction import least_harmonics
 from transientcam_server.imaging._errors_of_range.deviation import typical_deviation
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.imaging._errors_of_range.ranging import ranges_m
+from transientcam_server.imaging._errors_of_range.trust import judged
 from transientcam_server.imaging._recipe.recipe import Recipe
 
 _Array = NDArray[Any]
-OUTLIER_DEVIATIONS: Final = 5.0
-"""A range further off than so many times the error of the median pixel is an outlier."""
+WITHIN: Final = 0.9
+"""Share of the trusted pixels that the metadata's interval is of."""
 NEIGHBOURS_PX: Final = 5
 """Side of the square of pixels whose median separates bias from noise."""
 DRAWS: Final = 4
@@ -50,31 +52,34 @@ class RangeAccuracy:
     bias_m
         (H, W) how far the range is off for good, without sign, as far as the frame shows it; NaN
         without a range, and where there is one frequency alone.
-    outlier_share
-        Share of the ranges that noise throws off by more than `OUTLIER_DEVIATIONS` times the
-        median error, or that are biased by as much; None where no error is known. A bias that none
-        of the frame's frequencies shows is not in it.
+    error_m
+        (H, W) half width of the interval that holds the range of this pixel with 90 % probability;
+        NaN where the bias is.
+    trust
+        (H, W) `Trust`: why a range is not to be trusted, 0 where it is.
     every_px
         The errors are of one pixel in so many rows and columns, and stand for those around it.
     """
 
     std_m: _Array
     bias_m: _Array
-    outlier_share: float | None
+    error_m: _Array
+    trust: _Array
     every_px: int = 1
 
-    @cached_property
-    def error_m(self) -> _Array:
-        """(H, W) root sum of squares of noise and bias."""
-        return np.hypot(self.std_m, self.bias_m)
-
     def to_document(self) -> RangeAccuracyDocument:
-        """Return the errors of the median pixel with a range as a frame's metadata have them."""
+        """Return shares, and errors of the median pixel with a range, as a frame's metadata do."""
+        counts = np.bincount(self.trust.ravel(), minlength=len(Trust)).tolist()
+        trusted_m = self.error_m[(self.trust == Trust.TRUSTED) & np.isfinite(self.error_m)]
         return {
+            "trusted_share": counts[Trust.TRUSTED] / self.trust.size,
+            "within_m": float(np.quantile(trusted_m, WITHIN)) if trusted_m.size else None,
+            "trust": cast(
+                "TrustCountsDocument", {each.name.lower(): counts[each] for each in Trust}
+            ),
             "range_error_m": _median(self.error_m),
             "range_std_m": _median(self.std_m),
             "range_bias_m": _median(self.bias_m),
-            "outlier_share": self.outlier_share,
             "every_px": self.every_px,
         }
 
@@ -98,8 +103,13 @@ def spacing_px(recipe: Recipe, *, ready: Callable[[str, int], bool] = tm.kernels
     return 1 if own in _QUICK and all(compiled) else SPARSE_PX
 
 
-def range_accuracy(recipe: Recipe, found: tm.Reconstruction, every_px: int = 1) -> RangeAccuracy:
-    """Predict noise, bias and outliers of a frame's range.
+def range_accuracy(
+    recipe: Recipe,
+    found: tm.Reconstruction,
+    every_px: int = 1,
+    raw: RawFrame | None = None,
+) -> RangeAccuracy:
+    """Predict noise and bias of a frame's range, and judge each pixel.
 
     Parameters
     ----------
@@ -109,6 +119,8 @@ def range_accuracy(recipe: Recipe, found: tm.Reconstruction, every_px: int = 1) 
         (H, W) pixels.
     every_px
         One pixel in so many rows and columns is predicted, and stands for those around it.
+    raw
+        The capture, for its temperature and what its images show of motion; None leaves these out.
     """
     if not recipe.applied.sequence.sampling.consecutive:
         return _of_gaps(found)
@@ -127,9 +139,8 @@ def range_accuracy(recipe: Recipe, found: tm.Reconstruction, every_px: int = 1) 
     unknown = np.full(seen.shape, np.nan, dtype=np.float32)
     bias_m = np.max([np.abs(median_around(each)) for each in shifts_m], axis=0, initial=0.0)
     bias_m = np.where(np.isfinite(range_m), bias_m, np.nan) if shifts_m else unknown
-    outlier_share = _outliers(drawn_m - range_m[seen], std_m, bias_m, seen)
     std_m, bias_m = (_around(each, has_range, every_px) for each in (std_m, bias_m))
-    return RangeAccuracy(std_m, bias_m, outlier_share, every_px)
+    return RangeAccuracy(std_m, bias_m, *judged(recipe, found, std_m, bias_m, raw), every_px)
 
 
 def _around(plane: _Array, has_range: _Array, every_px: int) -> _Array:
@@ -147,7 +158,9 @@ def _of_gaps(found: tm.Reconstruction) -> RangeAccuracy:
     """Return what an estimate of any multiples says of itself; nothing disagrees with it."""
     shape = np.shape(found.range_m)
     std_m = np.asarray(found.range_scatter_m(), dtype=np.float32).reshape(shape)
-    return RangeAccuracy(std_m, np.full_like(std_m, np.nan), None)
+    unknown_m = np.full_like(std_m, np.nan)
+    trust = np.where(found.has_range, Trust.TRUSTED, Trust.NO_RANGE).astype(np.uint8)
+    return RangeAccuracy(std_m, unknown_m, unknown_m, trust)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,15 +230,6 @@ def _placed(values: _Array, seen: _Array) -> _Array:
     plane = np.full(seen.shape, np.nan, dtype=np.float32)
     plane[seen] = values
     return plane
-
-
-def _outliers(off_m: _Array, std_m: _Array, bias_m: _Array, seen: _Array) -> float | None:
-    """Return the share of drawn ranges (D, P) that are off by too much, or missing."""
-    middle_m = _median(np.hypot(std_m, bias_m))
-    if middle_m is None:
-        return None
-    near = np.hypot(off_m, bias_m[seen]) <= OUTLIER_DEVIATIONS * middle_m
-    return 1.0 - float(near.mean())
 
 
 def _median(plane: _Array) -> float | None:

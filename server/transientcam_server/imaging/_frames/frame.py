@@ -224,7 +224,9 @@ class Frame:
         found = await self.reconstruction("returns")
         # a live frame is late with what takes seconds, and so is all that is sent with it
         every_px = 1 if self.past else spacing_px(self.recipe)
-        accuracy, _ = await self._workers.run_long(range_accuracy, self.recipe, found, every_px)
+        accuracy, _ = await self._workers.run_long(
+            range_accuracy, self.recipe, found, every_px, self.raw
+        )
         self._accuracy = accuracy
         return accuracy
 

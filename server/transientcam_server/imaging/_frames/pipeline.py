@@ -81,6 +81,7 @@ class Pipeline:
         self._capabilities = camera.capabilities
         self._full_scale = 2.0**camera.capabilities.bits - 1.0
         self._factory = factory_gains(camera.factory)
+        self._simulation = camera.simulation
         self._truth = _truth_of(camera.simulation)
         self._frames = 0
         self._last: RawFrame | None = None
@@ -107,6 +108,7 @@ class Pipeline:
             version.id,
             None if self._intrinsics is None else self._intrinsics(),
             self._sensor,
+            None if self._simulation is None else self._simulation.lamp,
         )
         if self._recipe is None or recipe != self._recipe:
             self._recipe = recipe  # else the same one: it holds what was prepared for it

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam import wire
-from transientcam_driver import AppliedSequence, RawFrame, Truth
-from transientcam_server.imaging._errors_of_range.accuracy import RangeAccuracy
+from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.imaging._products.labelling import (
     image_columns,
@@ -213,21 +212,11 @@ def _return_planes(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Arr
     return planes
 
 
-def _property(name: str) -> Callable[[Recipe, tm.Reconstruction, View], _Array]:
-    """Return a computation that reads a property of the reconstruction."""
+def _property(name: str) -> Callable[[Recipe, object, View], _Array]:
+    """Return a computation that reads a property of the input."""
 
-    def read(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
+    def read(recipe: Recipe, found: object, view: View) -> _Array:
         array: _Array = getattr(found, name)
-        return array
-
-    return read
-
-
-def _error(name: str) -> Callable[[Recipe, RangeAccuracy, View], _Array]:
-    """Return a computation that reads one of the errors of the range."""
-
-    def read(recipe: Recipe, accuracy: RangeAccuracy, view: View) -> _Array:
-        array: _Array = getattr(accuracy, name)
         return array
 
     return read
@@ -235,10 +224,6 @@ def _error(name: str) -> Callable[[Recipe, RangeAccuracy, View], _Array]:
 
 def _images(recipe: Recipe, raw: RawFrame, view: View) -> _Array:
     return raw.images
-
-
-def _true_range(recipe: Recipe, truth: Truth, view: View) -> _Array:
-    return truth.range_m
 
 
 def _labels(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
@@ -298,7 +283,7 @@ PRODUCTS: Final[dict[str, Product]] = {
             Product(
                 _WIRE[name],
                 "accuracy",
-                _error(part),
+                _property(part),
                 of_noise=True,
                 of_toeplitz=name != "range_std",
                 steps=_MILLIMETRES,
@@ -308,6 +293,13 @@ PRODUCTS: Final[dict[str, Product]] = {
                 ("range_bias", "bias_m"),
                 ("range_error", "error_m"),
             )
+        ),
+        Product(
+            _WIRE["trust"],
+            "accuracy",
+            _property("trust"),
+            of_noise=True,
+            of_toeplitz=True,
         ),
         Product(
             _WIRE["reduced_chi_square"],
@@ -374,7 +366,10 @@ PRODUCTS: Final[dict[str, Product]] = {
         ),
         Product(_WIRE["returns"], "returns", _return_planes, of_view=True),
         Product(_WIRE["pointcloud"], "returns", _pointcloud, fields=_intrinsics),
-        Product(_WIRE["truth"], "truth", _true_range, steps=_MILLIMETRES),
+        Product(_WIRE["truth"], "truth", _property("range_m"), steps=_MILLIMETRES),
+        Product(
+            _WIRE["direct_share"], "truth", _property("direct_share"), steps=Steps(1e4, "1e-4")
+        ),
     )
 }
 """Every product by name: an entry here and one in `transientcam.wire.PRODUCTS` make a product."""

@@ -34,12 +34,15 @@ class Gains:
     waveform : array, shape (m, K), complex128
         Odd harmonics of the modulation that are taken out of the moments; None where none are
         known.
+    temperature_c
+        Of the camera when they were measured; None where that is not known.
     """
 
     id: str
     planes: _Array
     bad: _Array | None
     waveform: _Array | None = None
+    temperature_c: float | None = None
 
     @property
     def bad_pixels(self) -> int:
@@ -88,7 +91,9 @@ def evaluate(capture: CalibrationCapture) -> Calibration:
     measured[0] = _brightness(measured, nominal)
     # a brightness stays in digital numbers, as with nominal gains
     gains = tm.calibration_of(measured) * np.complex64(nominal[0])
-    return Calibration(capture, Gains(capture.id, gains, bad, usable(capture.waveform)))
+    return Calibration(
+        capture, Gains(capture.id, gains, bad, usable(capture.waveform), capture.temperature_c)
+    )
 
 
 def factory_gains(reported: FactoryCalibration | None) -> Gains | None:

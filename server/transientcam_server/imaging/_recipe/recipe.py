@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import AppliedSequence, RawFrame, Sampling, Sequence
+from transientcam_driver.camera import Lamp
 from transientcam_moments.reconstruction import OF_ANY_MULTIPLES
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging._recipe.calibration import FACTORY_ID, Gains, nominal_gains
@@ -153,6 +154,8 @@ class Recipe:
         Where the pixels look; None for a usual field of view.
     sensor
         Whose noise the images have; None where that is not known.
+    lamp
+        Its place and brightness; None where they are not known.
     """
 
     applied: AppliedSequence
@@ -162,6 +165,7 @@ class Recipe:
     settings_version: int = 1
     intrinsics: Intrinsics | None = None
     sensor: tm.noise.Sensor | None = None
+    lamp: Lamp | None = None
 
     @property
     def technique(self) -> str:

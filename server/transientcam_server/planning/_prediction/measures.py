@@ -6,9 +6,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_server.imaging import OUTLIER_DEVIATIONS, typical_deviation
+from transientcam_server.imaging import typical_deviation
 
 _Array = NDArray[Any]
+OUTLIER_DEVIATIONS: Final = 5.0
+"""A range further off than so many times the error of the median pixel is an outlier."""
 _LEAST_ERROR_M: Final = 1e-6
 
 
