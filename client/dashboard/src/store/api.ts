@@ -44,6 +44,11 @@ export class RequestError extends Error {
   get kind(): string {
     return kindOf(this.problem);
   }
+
+  /** It is about a frame that the service kept for some seconds, or never had: it was started anew. */
+  get isGone(): boolean {
+    return this.kind === "frame-gone" || this.kind === "unknown-frame";
+  }
 }
 
 /** A problem as a sentence for the person at the screen. */

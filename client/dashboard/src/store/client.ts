@@ -254,6 +254,7 @@ export class StreamClient {
         this.#store.frames.sceneSince_s = status.serviceTime_s(this.#now_s());
         this.#store.accuracy.sceneChanged();
         this.#store.rangeErrors.sceneChanged();
+        this.#store.details.forget();
         if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
         break;
       case "recording-started":

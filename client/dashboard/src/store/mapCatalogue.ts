@@ -57,9 +57,9 @@ export const MAP_PRODUCTS: readonly MapProduct[] = [
     signed: true,
   },
   {
-    product: "range_std",
-    name: "Deviation",
-    hint: "Standard deviation of the range that the noise of the sensor predicts, by the likelihood estimate",
+    product: "range_error",
+    name: "Error",
+    hint: "Half of the 90 % interval of each pixel's range, of noise and bias",
     unit: "m",
     colours: "cividis",
     scale: "logarithmic",

@@ -140,7 +140,7 @@ export class Store {
     this.sequencing = new Sequencing(api, this.events, this.sequence);
     this.accuracy = new Accuracy(api);
     this.replay = new Replay(api, this.frames, this.status);
-    this.rangeErrors = new RangeErrors(this.frames, this.status, this.replay.active);
+    this.rangeErrors = new RangeErrors(this.frames, this.status, this.replay.active, this.held);
     this.trends = new Trends(this.status, this.rangeErrors);
     api.onRefusal = (problem) => {
       this.lease.refused(kindOf(problem));

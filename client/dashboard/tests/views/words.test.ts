@@ -22,9 +22,7 @@ test("a problem of another kind keeps its own words", () => {
 test("what is asked for over a thin link, or by a slow browser, is said with its reason", () => {
   const slow = demandWords({ demand: { ...EVERYTHING, maxRate_hz: 8 }, carried_bytes_s: null, pictures_hz: 19.4 }, false);
   expect(plain(slow.short)).toBe("Slow browser: 8.0 Hz");
-  expect(plain(slow.long)).toMatch(
-    /^Before, this browser drew 19 pictures of the light a second.* asks for at most 8.0 Hz, and for more/,
-  );
+  expect(plain(slow.long)).toMatch(/^Before, this browser drew 19 pictures of the light a second.* asks for at most 8.0 Hz, and for more/);
   const both = demandWords({ demand: { maxRate_hz: 3, coded: true, part: true }, carried_bytes_s: 2e6, pictures_hz: 19.4 }, true);
   expect(plain(both.short)).toBe("Thin link: 3.0 Hz, 16 bits, the part in sight");
   expect(plain(both.long)).toMatch(/carried 2.00 MB\/s.* drew 19 pictures.* numbers in 16 bits, the part in sight only/);

@@ -17,7 +17,7 @@ import { useDrawing, useProducts } from "../../ui/hooks";
 import { LimitFields } from "../../ui/LimitFields";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
-import { paint } from "../../ui/paint";
+import { hatch, paint } from "../../ui/paint";
 import { Stage } from "../../ui/Stage";
 import { Measured } from "./Measured";
 import { Readout, valueAtPixel } from "./Readout";
@@ -146,6 +146,7 @@ function MapPicture({ look, canvas }: MapProps) {
       <div class="picture">
         <Stage width={width} height={height} frame={frame} label={`${shown.name} map`}>
           <canvas ref={canvas} />
+          {shown.unit === "m" && shown.scatterOf === undefined && <Hatch />}
           {waiting.value && <FirstFrame />}
         </Stage>
         {waiting.value ? (
@@ -167,6 +168,28 @@ function MapPicture({ look, canvas }: MapProps) {
       </footer>
     </>
   );
+}
+
+/** Screen pixels of the hatch to each of the sensor's. */
+const HATCH = 4;
+
+/** Hatches the pixels whose ranges are not trusted. */
+function Hatch() {
+  const trust = useStore().rangeErrors.of("trust");
+  const canvas = useRef<HTMLCanvasElement>(null);
+  useDrawing(() => {
+    const [frame, target] = [trust.value, canvas.current];
+    const context = target?.getContext("2d");
+    if (target === null || !context) return;
+    const [rows, columns] = frame?.shape ?? [0, 0];
+    [target.width, target.height] = [HATCH * columns, HATCH * rows]; // which clears it
+    if (frame === null) return;
+    const image = context.createImageData(target.width, target.height);
+    hatch(frame.values, columns, HATCH, new Uint32Array(image.data.buffer));
+    context.putImageData(image, 0, 0);
+    target.dataset.frame = String(frame.meta.frame);
+  }, [trust]);
+  return <canvas ref={canvas} class="stage-hatch" title="Hatched: the range is not trusted" />;
 }
 
 function signalsOf({ frame }: Look, looked: ReadonlySignal<{ x: number; y: number } | null>) {

@@ -1,11 +1,13 @@
 import { useComputed } from "@preact/signals";
 import { useMemo } from "preact/hooks";
-import { deviation, fixed, NOTHING } from "../../scales/format";
+import { deviation, engineering, fixed, NOTHING } from "../../scales/format";
 import type { Frame } from "../../store/frames";
 import type { Look } from "../../store/looks";
 import { WINDOW } from "../../store/noise";
 import type { Pixel } from "../../store/pixel";
+import type { RangeErrors } from "../../store/rangeErrors";
 import { useStore } from "../../store/store";
+import { DISTRUST } from "../../ui/flags";
 import "./Readout.css";
 
 /** Value of a frame at a pixel; NaN without a frame, a pixel or a value. */
@@ -13,6 +15,18 @@ export function valueAtPixel(frame: Frame | null, pixel: Pixel | null): number {
   if (frame === null || pixel === null) return NaN;
   const [height, width] = frame.shape;
   return pixel.x < width && pixel.y < height ? frame.values[pixel.y * width + pixel.x] : NaN;
+}
+
+/** What the range of a pixel is worth: its error, and what that is made of or why not to trust it. */
+function rangeWorth(errors: RangeErrors, pixel: Pixel): { readonly error: string; readonly words: string } {
+  const reason = DISTRUST.find(({ bit }) => bit === errors.at("trust", pixel));
+  const [noise, bias] = [errors.at("range_std", pixel), errors.at("range_bias", pixel)];
+  const parts = [
+    Number.isFinite(noise) ? `noise ${engineering(noise, "m", 2)}` : "",
+    Number.isFinite(bias) ? `bias ${engineering(bias, "m", 2)}` : "",
+    reason === undefined ? "" : `not trusted: ${reason.words}`,
+  ];
+  return { error: deviation(errors.at("range_error", pixel), "m"), words: parts.filter((part) => part !== "").join(", ") };
 }
 
 /** The value under the pointer, how much it scatters, and how much light it rests on. */
@@ -31,6 +45,9 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
   const lightScatter = useComputed(() =>
     lightNoise.frames.value === 0 ? "" : deviation(lightNoise.std(at(amplitude.value?.shape[1])), amplitude.value?.unit ?? ""),
   );
+  const worth = useComputed(() =>
+    shown.product === "range" && looked.value !== null ? rangeWorth(store.rangeErrors, looked.value) : null,
+  );
   const number = useComputed(() => frame.value?.meta.frame ?? "");
   if (place.value === "") return <p class="readout quiet">Point at the picture to read it.</p>;
   return (
@@ -38,14 +55,28 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
       <span>
         <output class="readout-value" data-field="value">
           {value}
+          {value.value !== NOTHING && worth.value !== null && (
+            <span data-field="error" title="Half of the 90 % interval of this pixel's range, of noise and bias">
+              {" "}
+              {worth.value.error}
+            </span>
+          )}
         </output>{" "}
-        <span
-          class="quiet readout-scatter"
-          data-field="scatter"
-          title={`Standard deviation (1 σ) over the last ${WINDOW} frames, as measured at this pixel`}
-        >
-          {value.value === NOTHING ? "no value" : scatter}
-        </span>
+        {value.value === NOTHING ? (
+          <span class="quiet">no value</span>
+        ) : worth.value === null ? (
+          <span
+            class="quiet readout-scatter"
+            data-field="scatter"
+            title={`Standard deviation (1 σ) over the last ${WINDOW} frames, as measured at this pixel`}
+          >
+            {scatter}
+          </span>
+        ) : (
+          <span class="quiet" data-field="worth">
+            {worth.value.words}
+          </span>
+        )}
       </span>
       {shown.product !== ofLight && (
         <span>

@@ -1,4 +1,4 @@
-import { engineering } from "../../scales/format";
+import { deviation, engineering, fixed } from "../../scales/format";
 import { plainWords } from "../../store/api";
 import type { RangeErrorFigure } from "../../store/rangeErrors";
 import type { Problem, TakeOrder, Zeroth } from "../../stream/protocol";
@@ -62,5 +62,19 @@ export const TAKE_ORDER_NAMES: Readonly<Record<TakeOrder, string>> = {
 /** What an error of the range holds. */
 export function errorWords(error: RangeErrorFigure | null): string {
   if (error === null) return "not known yet";
-  return error.of === "noise" ? "noise alone (1 σ), as its bias is not known" : "noise (1 σ) and bias together";
+  return error.of === "noise" ? "noise alone (1 σ), as its bias is not known" : "half of the 90 % interval, of noise and bias together";
+}
+
+/** What the ranges of a picture are worth: as shares of it where these are known. */
+export function shareWords(error: RangeErrorFigure | null): { readonly short: string; readonly long: string } {
+  const [share, within] = [error?.trusted_share ?? null, deviation(error?.within_m, "m")];
+  if (share === null) {
+    const short = `${deviation(error?.error_m, "m")}${error?.of === "noise" ? " noise" : ""}`;
+    return { short, long: `the error of the range in the median pixel is ${errorWords(error)}` };
+  }
+  const trusted = fixed(100 * share, 0, "%");
+  return {
+    short: within === "" ? `${trusted} trusted` : `${trusted} ${within}`,
+    long: `${trusted} of the picture ${within === "" ? "is trusted" : `${within} or better (90 % intervals)`}, ${fixed(100 * (1 - share), 0, "%")} not trusted`,
+  };
 }

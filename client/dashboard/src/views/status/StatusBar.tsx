@@ -1,10 +1,10 @@
 import { useComputed } from "@preact/signals";
-import { deviation, fixed } from "../../scales/format";
+import { fixed } from "../../scales/format";
 import { flowTrouble } from "../../store/status";
 import { useStore } from "../../store/store";
 import { useNow } from "../../ui/hooks";
 import { LightOffButton } from "../../ui/LightOffButton";
-import { errorWords } from "../sequence/words";
+import { shareWords } from "../sequence/words";
 import { Figures } from "./Figures";
 import { Steering } from "./Steering";
 import { Toasts } from "./Toasts";
@@ -100,22 +100,16 @@ function LessAsked() {
 function Performance() {
   const { status, alone, accuracy, rangeErrors } = useStore();
   const rate = useComputed(() => fixed(status.rate_hz.value, 1, "Hz"));
-  const error = rangeErrors.now.value;
+  const { short, long } = shareWords(rangeErrors.now.value);
   const open = (): void => {
     alone.value = alone.peek() === "sequence" ? null : "sequence";
     if (alone.peek() !== null && accuracy.tradeoff.peek() === null && status.newest.peek() !== null) void accuracy.predict();
   };
   return (
-    <button
-      type="button"
-      class="performance"
-      title={`Frames drawn a second, and the error of the range in the median pixel: ${errorWords(error)}. Shows what accuracy costs`}
-      onClick={open}
-    >
+    <button type="button" class="performance" title={`Frames drawn a second; ${long}. Shows what accuracy costs`} onClick={open}>
       <span data-field="rate">{rate}</span>
       <span class="quiet" data-field="deviation">
-        {deviation(error?.error_m, "m")}
-        {error?.of === "noise" && " noise"}
+        {short}
       </span>
     </button>
   );
