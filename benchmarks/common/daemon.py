@@ -57,7 +57,7 @@ class Process:
         """Wait until it compiles nothing any more."""
         end_s = time.monotonic() + within_s
         with httpx.Client(base_url=self.url, timeout=60.0, verify=False) as client:
-            while client.get("/api/v1/info").raise_for_status().json()["kernels"]["compiling"]:
+            while client.get("/api/v1/info").raise_for_status().json()["kernels"]:
                 if time.monotonic() > end_s:
                     raise TimeoutError("the kernels are still being compiled")
                 time.sleep(_LOOK_EVERY_S)

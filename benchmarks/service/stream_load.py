@@ -175,9 +175,7 @@ def _settled_viewer(process: Process) -> Viewer:
     with transientcam.Camera(process.url) as camera:
         camera.configure(**VIDEO)
         viewer = Viewer(process.stream_url, subscribe())
-        kernels: object = None
-        # between two of them the compiler seems to be done
-        while kernels != (kernels := camera.info["kernels"]) or camera.info["kernels"]["compiling"]:
+        while camera.info["kernels"]:
             watch([viewer], duration_s=SETTLE_S)
     return viewer
 

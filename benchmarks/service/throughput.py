@@ -9,7 +9,7 @@ import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -104,17 +104,8 @@ def daemon_of(daemon: Daemon, camera: str) -> Iterator[Process]:
         "TRANSIENTCAM_RECONSTRUCTION__ESTIMATOR": daemon.estimator,
     }
     with running(command, environment) as process:
-        end_s = time.monotonic() + _COMPILED_WITHIN_S
-        while _kernels(process)["compiling"] is not None or not _kernels(process)["compiled"]:
-            if time.monotonic() > end_s:
-                raise TimeoutError("the kernels are still being compiled")
-            time.sleep(0.5)
+        process.settle(_COMPILED_WITHIN_S)
         yield process
-
-
-def _kernels(process: Process) -> Mapping[str, object]:
-    kernels: Mapping[str, object] = httpx.get(f"{process.url}/api/v1/info").json()["kernels"]
-    return kernels
 
 
 def _subscribe(*products: str, computed: tuple[str, ...] = ()) -> dict[str, object]:

@@ -1,8 +1,10 @@
 """Kernels that a call does not find: made ready in the background, which no call waits for."""
 
+import bisect
 import logging
 import threading
-from collections.abc import Callable, Hashable, Iterable, Mapping
+import time
+from collections.abc import Callable, Container, Hashable, Iterable, Mapping
 from contextlib import suppress
 from typing import Any, Final, Generic, TypeVar
 
@@ -47,8 +49,11 @@ class Kernels(Generic[Key]):
         look them up.
     added : callable, optional
         Called with each kernel that has become ready, and its key before it.
-    takes_long : callable, optional
-        Whether a kernel takes many times as long to compile as others, which then go first.
+    expected_s : callable, optional
+        About how long it takes to compile a kernel on an idle processor; what takes less goes
+        first.
+    clock : callable, optional
+        Returns the present time in s.
 
     Attributes
     ----------
@@ -71,7 +76,8 @@ class Kernels(Generic[Key]):
         load: Callable[[Key], Any] | None = None,
         *,
         added: Callable[[Key, Any], object] = lambda key, kernel: None,
-        takes_long: Callable[[Key], bool] = lambda key: False,
+        expected_s: Callable[[Key], float] = lambda key: 1.0,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         setting = environ.get("TRANSIENTCAM_KERNELS", "on").strip().lower()
         self.enabled = setting not in ("off", "0", "no", "false")
@@ -84,10 +90,12 @@ class Kernels(Generic[Key]):
             self.load = load
         self._cache = cache
         self._added = added
-        self._takes_long = takes_long
+        self._expected_s, self._clock = expected_s, clock
+        self._begun_s, self._slowness = 0.0, 1.0
         self._making = threading.Lock()
         self._queueing = threading.Lock()
         self._seen: set[Key] = set()
+        self._urgent: list[Key] = []
         self._waiting: list[Key] = []
         self._results_bytes: dict[Key, list[int]] = {}
         self._may_load = threading.Event()
@@ -118,9 +126,7 @@ class Kernels(Generic[Key]):
                 self._may_load.set()
             self._seen.add(key)
             # what is ready soon goes before what takes long
-            late = enumerate(self._waiting) if not self._takes_long(key) else ()
-            place = next((k for k, each in late if self._takes_long(each)), len(self._waiting))
-            self._waiting.insert(place, key)
+            bisect.insort(self._waiting, key, key=self._expected_s)
             if self.noting:
                 return
             if not self._said:
@@ -150,12 +156,40 @@ class Kernels(Generic[Key]):
                 self._may_load.set()
                 self._work()
 
-    def make_ready_in_background(self, keys: Iterable[Key]) -> threading.Thread:
-        """Make these ready in the background, in this order; return the thread, which ends then."""
+    def prefer(self, keys: Iterable[Key]) -> threading.Thread | None:
+        """Make these ready in the background, in this order, and before all others.
+
+        What calls wanted so far, and what they want until then, is dropped: with these kernels they
+        may do without, and else they want it again. Returns the thread, or None where calls have
+        nothing made ready.
+        """
+        if not self.automatic:
+            return None
         with self._queueing:
             self._may_load.set()
-            self._waiting.extend(keys)
+            self._drop(self._urgent)
+            self._drop(self._waiting)
+            known = (*self.compiled, *self.failed, self.compiling)
+            self._urgent += [key for key in keys if key not in known]
+            self._seen.update(self._urgent)
             return self._work()
+
+    def left(self, keys: Container[Key]) -> tuple[list[Key], float]:
+        """Return which of these wait or are made ready now, and about how long that takes in s."""
+        with self._queueing:
+            now = self.compiling
+            queue = [*self._urgent, *self._waiting]
+        taking_s = [self._expected_s(key) * self._slowness for key in queue]
+        if now is not None:
+            queue.insert(0, now)
+            expected_s = self._expected_s(now) * self._slowness
+            taking_s.insert(0, max(1.0, expected_s - (self._clock() - self._begun_s)))
+        found = [k for k, key in enumerate(queue) if key in keys]
+        return [queue[k] for k in found], sum(taking_s[: found[-1] + 1]) if found else 0.0
+
+    def _drop(self, keys: list[Key]) -> None:
+        self._seen.difference_update(keys)
+        keys.clear()
 
     def _work(self) -> threading.Thread:
         """Start the thread, unless it works; under the lock of the queue."""
@@ -175,11 +209,16 @@ class Kernels(Generic[Key]):
             while True:
                 self._may_load.wait(LATEST_S)
                 with self._queueing:
-                    if not (self._waiting and self.enabled and main.is_alive()):
+                    queue = self._urgent or self._waiting
+                    if not (queue and self.enabled and main.is_alive()):
                         self._thread = None
                         return
-                    key = self._waiting.pop(0)
+                    urgent, key = queue is self._urgent, queue.pop(0)
+                    self.compiling, self._begun_s = key, self._clock()
                 self.make_ready(key, elsewhere=True)
+                with self._queueing:
+                    if urgent and not self._urgent:
+                        self._drop(self._waiting)
         finally:
             if child is not None:
                 child.end()
@@ -195,6 +234,7 @@ class Kernels(Generic[Key]):
             return
         with self._making:
             if key in self.compiled or key in self.failed:
+                self.compiling = None
                 return
             self.compiling = key
             try:
@@ -218,6 +258,7 @@ class Kernels(Generic[Key]):
                 return self.load(key)
             try:
                 self._child.call(_fill_cache, self.load, key, ask=_go_on)
+                self._slowness = (self._clock() - self._begun_s) / self._expected_s(key)
             except _ProgramEnds:
                 raise
             except Exception as error:

@@ -1,7 +1,7 @@
 """Kernels beside the planar algorithms: the same results, chosen when they are ready.
 
-A *kernel* is one algorithm compiled for one order m and one precision, which takes as many pixels
-at a time as a vector register holds. A planar function names the kernel that may stand in for it::
+A *kernel* is one algorithm compiled for one order m (that of the likelihood for all up to 8) and
+one precision, which takes as many pixels at a time as a vector register holds. A planar function names the kernel that may stand in for it::
 
     @accelerated("levinson")
     def _coefficients(b): ...
@@ -75,6 +75,8 @@ _SINGLE_ONLY: Final = (
     "pairs",
     "harmonics",
 )
+_ANY_ORDER: Final = ("likelihood",)
+"""Kernels that take m when they are called, up to `MOST_ROOTS`: compiled once."""
 _DOUBLE_ONLY: Final = ("covariance", "direct_noise")
 _FEW_ROOTS: Final = (
     "pisarenko",
@@ -97,9 +99,16 @@ class Key(NamedTuple):
     precision: str
 
     def __str__(self) -> str:
-        """As in "levinson m=4 float32"."""
+        """As in "levinson m=4 float32", or "likelihood m<=8 float32"."""
         precision = {code: name for name, code in PRECISION_NAMES.items()}[self.precision]
-        return f"{self.name} m={self.harmonics} {precision}"
+        order = "m<" if self.name in _ANY_ORDER else "m"
+        return f"{self.name} {order}={self.harmonics} {precision}"
+
+    @classmethod
+    def of(cls, name: str, harmonics: int, precision: str) -> "Key":
+        """Return the key of the kernel for an order, which may serve others, too."""
+        any_order = name in _ANY_ORDER and 1 <= harmonics <= MOST_ROOTS
+        return cls(name, MOST_ROOTS if any_order else harmonics, precision)
 
     @property
     def is_offered(self) -> bool:
@@ -114,9 +123,11 @@ class Key(NamedTuple):
         return self.harmonics <= MOST_ROOTS or self.name not in _FEW_ROOTS
 
     @property
-    def takes_long(self) -> bool:
-        """Whether it takes many times as long to compile as the others."""
-        return self.name in ("reconstruct", "likelihood")
+    def compiling_s(self) -> float:
+        """About how long it takes to compile on an idle processor."""
+        return {"likelihood": 14.0, "reconstruct": 6.0, "pairs": 6.0, "density": 3.0}.get(
+            self.name, 1.0
+        )
 
 
 CACHE: Final = Cache(
@@ -130,7 +141,7 @@ CACHE: Final = Cache(
 )
 """Kernels are compiled of functions of these."""
 # The one place that reads the environment; a process has one set of machine code.
-KERNELS: Final = Kernels[Key](os.environ, CACHE, takes_long=lambda key: key.takes_long)
+KERNELS: Final = Kernels[Key](os.environ, CACHE, expected_s=lambda key: key.compiling_s)
 
 
 def _planes_less_one(planes: Any, *_: Any) -> int:
@@ -161,7 +172,7 @@ def accelerated(
             if isinstance(planes, np.ndarray) and planes.ndim:
                 precision = PRECISIONS.get(planes.dtype.char) if of is None else "f"
                 if precision is not None and of in (None, planes.dtype.char):
-                    key = Key(name, order(planes, *rest), precision)
+                    key = Key.of(name, order(planes, *rest), precision)
                     kernel = _of(key, planes[0].size, computing=True)
             how = {} if spread is None else {"spread": spread}
             found = None if kernel is None else kernel(planes, *rest, **how)
@@ -183,7 +194,7 @@ def lookup(name: str, m: int, pixels: int, precision: str = "f") -> Kernel | Non
     kernels are off, or there are fewer than 64 pixels. A call with many pixels that does not find
     it has it made ready in the background.
     """
-    return _of(Key(name, m, precision), pixels)
+    return _of(Key.of(name, m, precision), pixels)
 
 
 def _of(key: Key, pixels: int, *, computing: bool = False) -> Kernel | None:

@@ -9,8 +9,7 @@ them.
 
 A process that ends meanwhile waits for no kernel, or at most for the one that is being compiled by
 its thread. The environment variable ``TRANSIENTCAM_KERNELS=off`` leaves everything to NumPy,
-``TRANSIENTCAM_KERNELS=manual`` compiles only what `compile` and `compile_in_background` are called
-for. Compiled code is kept for the next process in ``NUMBA_CACHE_DIR``, else in
+``TRANSIENTCAM_KERNELS=manual`` compiles only what `compile` is called for. Compiled code is kept for the next process in ``NUMBA_CACHE_DIR``, else in
 ``transientcam/kernels`` below ``XDG_CACHE_HOME`` or ``~/.cache``, else (nothing there can be
 written to) not at all.
 
@@ -51,18 +50,18 @@ __all__ = [
     "LANES",
     "MOST_ROOTS",
     "THREAD",
-    "WHEN_NEEDED",
     "Progress",
     "Spread",
     "State",
     "at_once",
     "cache_directory",
     "compile",
-    "compile_in_background",
     "make_ready",
     "only_note",
     "over",
     "over_all_cores",
+    "prepare",
+    "preparing",
     "ready",
     "settled",
     "state",
@@ -86,8 +85,6 @@ LANES = (
     "covariance",
     "direct_noise",
 )
-WHEN_NEEDED = ("likelihood", "pairs", "harmonics", "peaks")
-"""Those that `compile_in_background` leaves out, but for one of them of its first order."""
 Progress = Callable[[int, int, str], None]
 """Takes kernels done, kernels in all, and the name of the next one ("" after the last)."""
 
@@ -144,7 +141,7 @@ def ready(name: str, harmonics: int) -> bool:
     """
     chosen("name", name, LANES)
     _require_order(harmonics)
-    key = Key(name, harmonics, "f")
+    key = Key.of(name, harmonics, "f")
     if key in KERNELS.compiled:
         return True
     if KERNELS.compiling is None and key.is_offered:
@@ -196,29 +193,31 @@ def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the buil
     report(len(keys), len(keys), "")
 
 
-def compile_in_background(
-    harmonics: Sequence[int] = (3, 4, 8),
-    precisions: Sequence[str] = ("float32", "float64"),
-    *,
-    also: str = "likelihood",
-) -> threading.Thread:
-    """Start compiling on a thread and return it; arguments and errors as in `compile`.
+def prepare(names: Sequence[str], harmonics: int) -> threading.Thread | None:
+    """Make kernels for single precision ready in the background, before all others.
 
-    Leaves out "harmonics", "pairs" and "peaks", which few cameras need, and "likelihood", which
-    takes long to compile: they are prepared by themselves when they are first needed. ``also``
-    names one of them that is compiled for the first order all the same; "pairs" before all others,
-    since a camera whose frequencies have gaps needs little else.
+    What calls wanted before is dropped until they want it again.
 
-    The thread is named "transientcam-compile", and can be joined.
+    Parameters
+    ----------
+    names : sequence of str
+        Which of `LANES`, the most urgent first; those that are not offered for this order do not
+        count.
+    harmonics : int
+        The order m, 1 to 32.
+
+    Returns
+    -------
+    threading.Thread or None
+        Named "transientcam-compile"; it ends when nothing is left to do. None where
+        ``TRANSIENTCAM_KERNELS`` is "off" or "manual".
+
+    Raises
+    ------
+    ParameterError
+        For another order or kernel.
     """
-    chosen("also", also, WHEN_NEEDED)
-    keys = [
-        key
-        for key in _keys(harmonics, precisions)
-        if key.name not in WHEN_NEEDED or (key.name == also and key.harmonics == harmonics[0])
-    ]
-    keys.sort(key=lambda key: key.name != "pairs")
-    return KERNELS.make_ready_in_background(keys)
+    return KERNELS.prefer(_named(names, harmonics))
 
 
 @contextmanager
@@ -256,12 +255,40 @@ def settled(names: Sequence[str], harmonics: int) -> bool:
     ParameterError
         For another order or kernel.
     """
+    return not KERNELS.automatic or all(
+        lookup(key.name, key.harmonics, LEAST_PIXELS) or key in KERNELS.failed
+        for key in _named(names, harmonics)
+    )
+
+
+def _named(names: Sequence[str], harmonics: int) -> list[Key]:
+    """Return the keys of kernels for single precision, in the order of the names."""
     for name in names:
         chosen("names", name, LANES)
-    keys = [key for key in _keys([harmonics], ["float32"]) if key.name in names]
-    return not KERNELS.automatic or all(
-        lookup(key.name, key.harmonics, LEAST_PIXELS) or key in KERNELS.failed for key in keys
-    )
+    _require_order(harmonics)
+    return [key for name in names if (key := Key.of(name, harmonics, "f")).is_offered]
+
+
+def preparing(names: Sequence[str], harmonics: int) -> tuple[list[str], float]:
+    """Return which kernels for single precision are being made ready, the next one first.
+
+    And about how long it takes until the last of them is, in s: as long as on an idle processor of
+    3 GHz, or in proportion to what others have taken here.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Which of `LANES`.
+    harmonics : int
+        The order m, 1 to 32.
+
+    Raises
+    ------
+    ParameterError
+        For another order or kernel.
+    """
+    found, left_s = KERNELS.left(_named(names, harmonics))
+    return [str(key) for key in found], left_s
 
 
 def _require_order(harmonics: int) -> None:
@@ -276,12 +303,12 @@ def _keys(harmonics: Sequence[int], precisions: Sequence[str]) -> list[Key]:
         if precision not in PRECISION_NAMES:
             raise ParameterError("precisions", precision, "float32 or float64")
     keys = (
-        Key(name, m, PRECISION_NAMES[precision])
+        Key.of(name, m, PRECISION_NAMES[precision])
         for m in dict.fromkeys(harmonics)
         for precision in precisions
         for name in LANES
     )
-    return [key for key in keys if key.is_offered]
+    return [key for key in dict.fromkeys(keys) if key.is_offered]
 
 
 def _load(key: Key) -> Kernel:

@@ -68,11 +68,11 @@ class ReconstructionSettings(_Group):
     estimator: Estimator = "automatic"
     """What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
     least over the scenes of docs/likelihood.md together, and `pisarenko` where the noise of the
-    sensor is not known, and in the daemon until the kernel is compiled; each frame names its
-    `estimator`. The paper's are `pisarenko` and
+    sensor is not known; each frame names its `estimator`. The paper's are `pisarenko` and
     `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
     frequencies; for those with gaps `automatic` is `two-returns`, or `unwrapped-phase` where there
-    are but two and until the kernel is compiled. The others are there for comparison."""
+    are but two. The others are there for comparison. Until its kernel is compiled the same
+    estimator runs in NumPy, more slowly."""
     minimum_brightness_dn: _Finite = Field(default=0.0, ge=0.0)
     """Pixels with no more light than this have no range."""
     spoilt_images: CorruptImages = "repair"

@@ -15,7 +15,7 @@ CACHE = Path(__file__).resolve().parents[2] / ".pytest_cache" / "kernels"
 FEW = tuple(
     name
     for name in tm.kernels.LANES
-    if name not in (*tm.kernels.WHEN_NEEDED, "covariance", "direct_noise")
+    if name not in ("likelihood", "pairs", "harmonics", "peaks", "covariance", "direct_noise")
 )
 """All but those that few tests need, some of which take longer to compile than all others."""
 

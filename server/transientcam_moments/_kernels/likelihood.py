@@ -6,12 +6,14 @@ has not settled after a few steps. What a pixel gets does not depend on how it i
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numba import njit
 
 from transientcam_compiled import Spread, at_once, empty
+from transientcam_moments._dispatch import MOST_ROOTS
 from transientcam_moments._kernels.arrays import (
     Complexes,
     ComplexPlanes,
@@ -21,6 +23,7 @@ from transientcam_moments._kernels.arrays import (
 )
 from transientcam_moments._kernels.compiled_entry import entry
 from transientcam_moments._kernels.packing import PIXELS_AT_ONCE, ROW
+from transientcam_moments._kernels.portable import length_up_to
 from transientcam_moments._kernels.stages import (
     TAIL_ROUNDS,
     bring_back,
@@ -39,10 +42,15 @@ from transientcam_moments.likelihood import MOST_RETURNS, TAIL_SHAPE, choice
 
 @njit(nogil=True, error_model="numpy")
 def fit_returns(
-    order: Length, slots: Length, turns: RealPlanes, b: ComplexPlanes, variance: RealPlanes, error:
+    m: int, slots: Length, turns: RealPlanes, b: ComplexPlanes, variance: RealPlanes, error:
     float, planes: RealPlanes, free: Counts, count: Counts, start: int, stop: int,
 ) -> None:  # fmt: skip
-    """Write the estimate of the pixels start..stop; each model where simpler ones leave enough."""
+    """Write the estimate of the pixels start..stop; each model where simpler ones leave enough.
+
+    The order m is known only now: loops over it cost a twentieth of the time, while compiling for
+    each order would take a quarter of a minute each.
+    """
+    order = length_up_to(m, MOST_ROOTS)
     size = rows_of(order) * ROW
     all_rooms, rooms = np.empty(size, planes.dtype), np.empty(size, planes.dtype)
     late, later = np.empty(size, planes.dtype), np.empty(size, planes.dtype)
@@ -65,11 +73,11 @@ def fit_returns(
         finish(order, slots, all_rooms, rooms, first, last, stop, planes, free, count)
 
 
-def likelihood_kernel(m: int, precision: str) -> Callable[..., Any]:
-    """Compile the estimate of order m; see the table in ``_kernels``."""
-    order, slots = (0,) * m, (0,) * min(MOST_RETURNS, m)
-    run = entry(fit_returns, m, precision, slots=len(slots))
-    turns = choice.turns_of(m).astype(precision)
+def likelihood_kernel(most: int, precision: str) -> Callable[..., Any]:
+    """Compile the estimate of orders up to ``most``; see the table in ``_dispatch``."""
+    slots = (0,) * MOST_RETURNS
+    run = entry(fit_returns, most, precision, slots=len(slots))
+    turns_of = lru_cache(lambda m: choice.turns_of(m).astype(precision))
 
     def kernel(
         b: Complexes,
@@ -82,16 +90,17 @@ def likelihood_kernel(m: int, precision: str) -> Callable[..., Any]:
     ) -> tuple[Any, ...] | None:
         if (returns, tail_shape) != (MOST_RETURNS, TAIL_SHAPE):
             return None
-        pixels, size = b.shape[1], len(slots)
+        m, pixels, size = len(b) - 1, b.shape[1], len(slots)
+        turns = turns_of(m)
         moments, noise = np.ascontiguousarray(b), np.ascontiguousarray(variance)
         planes = empty((4 * size + 5, pixels), precision)
         free, count = empty(pixels, np.int32), empty(pixels, np.int32)
 
         def part(start: int, stop: int) -> None:
-            run(order, slots, turns, moments, noise, error, planes, free, count, start, stop)
+            run(m, slots, turns, moments, noise, error, planes, free, count, start, stop)
 
         spread(part, pixels)
-        four = (planes[k * size : (k + 1) * size] for k in range(4))
+        four = (planes[k * size :][: min(m, size)] for k in range(4))
         return (*four, *planes[4 * size :], free, count)
 
     return kernel

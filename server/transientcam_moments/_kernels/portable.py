@@ -77,6 +77,7 @@ __all__ = [
     "larger",
     "largest",
     "least",
+    "length_up_to",
     "logarithm",
     "lost_by_squaring",
     "magnitude",
@@ -126,6 +127,44 @@ def _squared(length: int, number: Any) -> int | None:
 _room(bank, _more)
 _room(square_bank, _squared)
 _room(product_bank, lambda length, other: length * len(other))
+
+
+class _LengthUpTo(types.Type):  # type: ignore[misc]  # numba is untyped
+    """A `Length` that is known when a kernel is called; rooms are made for the most it can be."""
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        super().__init__(name=f"LengthUpTo({most})")
+
+    def __len__(self) -> int:
+        return self.most
+
+
+@extending.register_model(_LengthUpTo)
+class _LengthModel(extending.models.PrimitiveModel):  # type: ignore[misc]  # numba is untyped
+    def __init__(self, dmm: Any, fe_type: _LengthUpTo) -> None:
+        super().__init__(dmm, fe_type, ir.IntType(64))
+
+
+@extending.intrinsic
+def length_up_to(context: Any, length: Any, most: Any) -> Any:
+    """Return what has a length, which is no more than ``most``."""
+    if not isinstance(most, types.IntegerLiteral):
+        return None
+    made = _LengthUpTo(most.literal_value)(length, most)
+    return made, lambda context, builder, sig, args: args[0]
+
+
+@templates.infer_global(len)
+class _Len(templates.AbstractTemplate):  # type: ignore[misc]  # numba is untyped
+    def generic(self, args: Any, kws: Any) -> Any:
+        known = not isinstance(args[0], _LengthUpTo)
+        return None if known else templates.signature(types.intp, *args)
+
+
+@extending.lower_builtin(len, _LengthUpTo)
+def _lower_len(context: Any, builder: ir.IRBuilder, sig: Any, args: Operands) -> Any:
+    return args[0]
 
 
 def _limits(x: ir.Value) -> Any:

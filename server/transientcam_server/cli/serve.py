@@ -78,7 +78,6 @@ def serve(
         return
     settings = load_settings(command_line, file=config, environment=os.environ)
 
-    import transientcam_moments as tm
     from transientcam_driver import open_camera
     from transientcam_server.api import build_app
     from transientcam_server.camera import start_with
@@ -94,24 +93,19 @@ def serve(
     configure_logging(settings)
     # the address first: if another daemon has it, the camera stays untouched
     with (
-        exit_without_joining() as leave,
+        exit_without_joining(),
         listen(settings.host, settings.port) as listener,
     ):
         url = address(listener, tls=settings.tls_certificate is not None)
         with open_camera(settings.camera) as opened:
             start_with(opened, settings.sequence)
-            # NumPy serves until the compiled kernels are ready
-            sequence = opened.applied.sequence
-            orders = tuple(dict.fromkeys((sequence.multiples[-1], 3, 4, 8)))
-            also = "likelihood" if sequence.sampling.consecutive else "pairs"
-            compiling = tm.kernels.compile_in_background(orders, also=also)
-            leave(compiling)
             app = build_app(opened, settings)
-            freeze_startup_objects(compiling)
+            service = app.state.service
+            freeze_startup_objects(service.pipeline.prepare_kernels(service.applied))
 
             def listening() -> None:
                 _announce(url, settings.camera, as_json=as_json)
-                app.state.service.planning.prepare()
+                service.planning.prepare()
 
             serve_app(app, settings, listener, on_listening=listening)
 

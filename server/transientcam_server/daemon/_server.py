@@ -228,7 +228,7 @@ def serve_app(
         raise KeyboardInterrupt
 
 
-def freeze_startup_objects(compiling: threading.Thread) -> threading.Thread:
+def freeze_startup_objects(compiling: threading.Thread | None) -> threading.Thread:
     """Exempt what exists now from garbage collection, and again once ``compiling`` has ended.
 
     Returns the thread that waits for it.
@@ -236,8 +236,9 @@ def freeze_startup_objects(compiling: threading.Thread) -> threading.Thread:
     _freeze()
 
     def wait() -> None:
-        compiling.join()
-        _freeze()
+        if compiling is not None:
+            compiling.join()
+            _freeze()
 
     waiting = threading.Thread(target=wait, name=FREEZING_THREAD, daemon=True)
     waiting.start()
@@ -250,26 +251,21 @@ def _freeze() -> None:
 
 
 @contextmanager
-def exit_without_joining() -> Iterator[Callable[[threading.Thread], None]]:
-    """Do not wait, at the end of the block and of the process, for what is handed to its value.
+def exit_without_joining() -> Iterator[None]:
+    """Do not wait, at the end of the block and of the process, for what no client waits for.
 
     A compiler that is at work cannot be interrupted, and takes longer for one kernel than a
     service manager waits for the process to end. What it has finished is on the disk; what it has
     not is lost in any case. Where nothing is at work the process ends as any other.
     """
-    at_work: list[threading.Thread] = []
-
-    def working() -> bool:
-        return any(each.is_alive() for each in (*at_work, *_left_behind()))
-
     code = 0
     try:
-        yield at_work.append
+        yield
     except KeyboardInterrupt:
-        if not working():
+        if not _left_behind():
             raise
         code = INTERRUPTED
-    if working():
+    if _left_behind():
         logging.shutdown()
         for stream in (sys.stdout, sys.stderr):
             stream.flush()

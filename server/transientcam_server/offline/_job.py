@@ -22,7 +22,8 @@ BLOCK_FRAMES: Final = 64
 """Of a task: less, and a cluster of 100 workers would wait for its scheduler."""
 _PACKAGES: Final = ("transientcam", "numpy", "numba", "h5py", "isal")
 """Those that the values depend on."""
-_KERNELS_OF: Final = {"likelihood": "likelihood", "two-returns": "pairs"}
+_SELDOM: Final = ("likelihood", "pairs", "harmonics", "peaks")
+"""Kernels that recipes name where they need them."""
 _opening: Final = threading.Lock()
 
 
@@ -134,13 +135,9 @@ def load_kernels(recipe: Recipe) -> None:
     """Make the compiled kernels ready: values of NumPy differ from theirs in the last digits."""
     if not tm.kernels.state()["enabled"]:
         return
-    needed = [name for name in tm.kernels.LANES if name not in tm.kernels.WHEN_NEEDED]
-    if recipe.technique in _KERNELS_OF:
-        needed.append(_KERNELS_OF[recipe.technique])
-    if recipe.waveform is not None:
-        needed.append("harmonics")
+    needed = {*tm.kernels.LANES} - {*_SELDOM} | {*recipe.kernels}
     order = recipe.applied.sequence.multiples[-1]
-    tm.kernels.compile(harmonics=[order], precisions=["float32"], names=needed)
+    tm.kernels.compile(harmonics=[order], precisions=["float32"], names=[*needed])
 
 
 def _worker() -> str:

@@ -68,7 +68,7 @@ class RecordedFrames:
         self._disk = disk
         self._header = header
         self._lens = lens
-        self._frames: OrderedDict[tuple[int, int, str], asyncio.Task[Frame]] = OrderedDict()
+        self._frames: OrderedDict[tuple[int, int], asyncio.Task[Frame]] = OrderedDict()
 
     async def frame(self, name: str, settings: SettingsChoice = "recorded") -> Frame:
         """Return a frame by its number, or the last one that was written.
@@ -79,10 +79,8 @@ class RecordedFrames:
             ``unknown-frame``, ``recording-damaged``.
         """
         number = len(await self.host_time_s()) if name == LATEST else int(name)
-        reconstruction = self._reconstruction(settings).for_live_frames(
-            self._header.applied.sequence
-        )
-        key = number, reconstruction.id, reconstruction.settings.estimator
+        reconstruction = self._reconstruction(settings)
+        key = number, reconstruction.id
         task = self._frames.get(key)
         if task is None or _failed(task):  # a frame not yet written may exist next time
             task = self.pipeline.workers.start(self._read(number, reconstruction))

@@ -536,8 +536,9 @@ export interface InfoDocument {
   readonly history: HistoryDocument;
   /** Streams open now. */
   readonly clients: number;
-  /** Which compiled kernels are ready; the others are computed with NumPy meanwhile. */
-  readonly kernels: Readonly<Record<string, unknown>>;
+  /** What frames are computed without until it is compiled: more slowly, with the same results;
+   * null where nothing is being prepared. */
+  readonly kernels: KernelsDocument | null;
   /** Settings of the reconstruction. */
   readonly reconstruction: Readonly<Record<string, number | string>>;
 }
@@ -583,6 +584,14 @@ export interface JobDocument {
 export interface JobsDocument {
   /** The newest first. */
   readonly jobs: readonly JobDocument[];
+}
+
+/** Compiled code for the present sequence and estimator that is still being prepared. */
+export interface KernelsDocument {
+  /** kernels by their names, the next one first */
+  readonly preparing: readonly string[];
+  /** about how long it takes until the last one is ready */
+  readonly left_s: number;
 }
 
 /** Who controls the camera. */
@@ -968,11 +977,11 @@ export interface ReconstructionDocument {
   readonly return_threshold: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
    * least over the scenes of docs/likelihood.md together, and `pisarenko` where the noise of the
-   * sensor is not known, and in the daemon until the kernel is compiled; each frame names its
-   * `estimator`. The paper's are `pisarenko` and
+   * sensor is not known; each frame names its `estimator`. The paper's are `pisarenko` and
    * `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
    * frequencies; for those with gaps `automatic` is `two-returns`, or `unwrapped-phase` where there
-   * are but two and until the kernel is compiled. The others are there for comparison. */
+   * are but two. The others are there for comparison. Until its kernel is compiled the same
+   * estimator runs in NumPy, more slowly. */
   readonly estimator:
     | "automatic"
     | "pisarenko"
@@ -1012,11 +1021,11 @@ export interface ReconstructionRequest {
   readonly return_threshold?: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
    * least over the scenes of docs/likelihood.md together, and `pisarenko` where the noise of the
-   * sensor is not known, and in the daemon until the kernel is compiled; each frame names its
-   * `estimator`. The paper's are `pisarenko` and
+   * sensor is not known; each frame names its `estimator`. The paper's are `pisarenko` and
    * `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
    * frequencies; for those with gaps `automatic` is `two-returns`, or `unwrapped-phase` where there
-   * are but two and until the kernel is compiled. The others are there for comparison. */
+   * are but two. The others are there for comparison. Until its kernel is compiled the same
+   * estimator runs in NumPy, more slowly. */
   readonly estimator?:
     | "automatic"
     | "pisarenko"

@@ -1,6 +1,6 @@
 """The JSON documents about the service itself."""
 
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -48,6 +48,12 @@ class InfoDocument(Document):
         asyncapi: str = Field(description="where its messages are described, as AsyncAPI 3")
         encodings: list[str] = Field(description="which a subscription may request")
 
+    class KernelsDocument(Document):
+        """Compiled code for the present sequence and estimator that is still being prepared."""
+
+        preparing: list[str] = Field(description="kernels by their names, the next one first")
+        left_s: float = Field(description="about how long it takes until the last one is ready")
+
     name: str
     version: str
     service_id: str
@@ -64,8 +70,9 @@ class InfoDocument(Document):
     """Which frames can be had, as in `GET /frames`."""
     clients: int
     """Streams open now."""
-    kernels: dict[str, Any]
-    """Which compiled kernels are ready; the others are computed with NumPy meanwhile."""
+    kernels: KernelsDocument | None
+    """What frames are computed without until it is compiled: more slowly, with the same results;
+    null where nothing is being prepared."""
     reconstruction: dict[str, float | str]
     """Settings of the reconstruction."""
 

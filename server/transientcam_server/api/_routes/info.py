@@ -9,7 +9,7 @@ from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._docs import asyncapi
 from transientcam_server.api._documents.frame import HistoryDocument
 from transientcam_server.api._documents.service import InfoDocument, VersionsDocument
-from transientcam_server.imaging import ENCODINGS, Product
+from transientcam_server.imaging import ENCODINGS, Product, Recipe
 from transientcam_server.service import VERSION
 
 router = APIRouter(tags=["info"])
@@ -52,9 +52,14 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
         ),
         history=HistoryDocument.model_validate(service.history),
         clients=service.hub.clients,
-        kernels=dict(tm.kernels.state()),
+        kernels=_kernels(service.pipeline.recipe_of(service.applied)),
         reconstruction=service.pipeline.reconstruction.settings.model_dump(),
     )
+
+
+def _kernels(recipe: Recipe) -> InfoDocument.KernelsDocument | None:
+    preparing, left_s = tm.kernels.preparing(recipe.kernels, recipe.applied.sequence.multiples[-1])
+    return InfoDocument.KernelsDocument(preparing=preparing, left_s=left_s) if preparing else None
 
 
 def _product(product: Product) -> InfoDocument.ProductDocument:

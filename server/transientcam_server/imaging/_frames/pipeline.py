@@ -1,5 +1,6 @@
 """Makes frames of captures: each with the settings, gains and lens of its moment."""
 
+import threading
 from collections.abc import Callable
 from typing import Protocol
 
@@ -99,21 +100,33 @@ class Pipeline:
     def frame(self, raw: RawFrame, applied: AppliedSequence) -> Frame:
         """Return the next frame, counted from 1."""
         self._frames += 1
-        version = self.reconstruction.for_live_frames(applied.sequence)
-        recipe = Recipe(
+        recipe = self.recipe_of(applied)
+        if self._recipe is None or recipe != self._recipe:
+            self._recipe = recipe  # else the same one: it holds what was prepared for it
+            self.prepare_kernels(applied)
+        previous, self._last = self._last, raw
+        return self.recorded_frame(self._frames, raw, self._recipe, previous=previous)
+
+    def recipe_of(self, applied: AppliedSequence) -> Recipe:
+        """Return what the next frame of a sequence is computed with."""
+        return Recipe(
             applied,
-            version.settings,
+            self.reconstruction.settings,
             self._full_scale,
             self.gains_for(applied),
-            version.id,
+            self.reconstruction.id,
             None if self._intrinsics is None else self._intrinsics(),
             self._sensor,
             None if self._simulation is None else self._simulation.lamp,
         )
-        if self._recipe is None or recipe != self._recipe:
-            self._recipe = recipe  # else the same one: it holds what was prepared for it
-        previous, self._last = self._last, raw
-        return self.recorded_frame(self._frames, raw, self._recipe, previous=previous)
+
+    def prepare_kernels(self, applied: AppliedSequence) -> threading.Thread | None:
+        """Have the kernels compiled, before all others, that frames of a sequence need.
+
+        Returns the thread that compiles, if one does.
+        """
+        kernels = self.recipe_of(applied).kernels
+        return tm.kernels.prepare(kernels, applied.sequence.multiples[-1])
 
     def recorded_frame(
         self,

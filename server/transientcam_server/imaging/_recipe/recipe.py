@@ -1,8 +1,7 @@
 """How images become moments and moments become returns."""
 
 import logging
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
 
@@ -20,10 +19,12 @@ from transientcam_server.imaging._recipe.moment_frame import MomentFrame
 from transientcam_server.settings import ReconstructionSettings
 
 _log = logging.getLogger("transientcam_server.imaging.recipe")
-_UNTIL_COMPILED: Final = "pisarenko"
-"""In NumPy as in compiled kernels fast enough for a camera of 163 x 120 pixels."""
 _ONE_RETURN: Final = "unwrapped-phase"
-"""For frequencies with gaps: in NumPy the only one that keeps up with 512 x 424 pixels."""
+_KERNELS_OF: Final = {
+    "likelihood": ("likelihood",),
+    "two-returns": ("pairs",),
+    "maximum-entropy": ("levinson", "peaks"),
+}
 _LEAST_FOR_PAIRS: Final = 3
 """Frequencies of which two returns leave something to judge them by."""
 
@@ -40,27 +41,6 @@ class SettingsVersion:
 
     id: int
     settings: ReconstructionSettings
-
-    def for_live_frames(
-        self, sequence: Sequence, *, ready: Callable[[str, int], bool] = tm.kernels.ready
-    ) -> "SettingsVersion":
-        """Return these settings with an estimator that keeps up with a camera now.
-
-        ``automatic`` stays where ``ready`` says that the kernel of its estimator is compiled for
-        this order. Until then it is Pisarenko's returns, and the unwrapped phase of one return for
-        multiples that have gaps.
-        """
-        if self.settings.estimator != "automatic":
-            return self
-        if sequence.sampling.consecutive:
-            kernel, until = "likelihood", _UNTIL_COMPILED
-        else:
-            kernel, until = "pairs", _ONE_RETURN
-            if _for_gaps(sequence.sampling) == until:
-                return self
-        if ready(kernel, sequence.multiples[-1]):
-            return self
-        return replace(self, settings=self.settings.model_copy(update={"estimator": until}))
 
     def followed_by(self, settings: ReconstructionSettings) -> "SettingsVersion":
         """Return the next version; the same one where the settings are equal."""
@@ -174,6 +154,12 @@ class Recipe:
         if not sampling.consecutive:
             return chosen if chosen in OF_ANY_MULTIPLES else _for_gaps(sampling)
         return self.settings.technique(noise_known=self.sensor is not None)
+
+    @property
+    def kernels(self) -> tuple[str, ...]:
+        """Names of the kernels that its frames take longest without, the most urgent first."""
+        harmonics = () if self.waveform is None else ("harmonics",)
+        return (*_KERNELS_OF.get(self.technique, ()), "reconstruct", *harmonics)
 
     @property
     def waveform(self) -> NDArray[Any] | None:
