@@ -8,11 +8,11 @@ import type {
   CalibrationDocument,
   CalibrationRequest,
   CalibrationsDocument,
-  CallerDocument,
   CameraDocument,
   ExplanationDocument,
   FaultRequest,
   GrantedLeaseDocument,
+  InfoDocument,
   JobDocument,
   LeaseDocument,
   LeaseRequest,
@@ -100,14 +100,14 @@ export class Api {
 
   // -- the camera --------------------------------------------------------------------------------
 
-  /** Who the service takes this page for. */
-  async caller(): Promise<CallerDocument> {
-    return (await this.#json("GET /info")).caller;
+  /** What the service is, and who it takes this page for. */
+  info(): Promise<InfoDocument> {
+    return this.#json("GET /info");
   }
 
   /** Why frames do not have some products, by their names. */
   async absentProducts(): Promise<Readonly<Record<string, string>>> {
-    const { absent_products: absent } = await this.#json("GET /info");
+    const { absent_products: absent } = await this.info();
     return Object.fromEntries(absent.map(({ name, reason }) => [name, reason]));
   }
 

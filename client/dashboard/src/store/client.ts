@@ -114,6 +114,7 @@ export class StreamClient {
         break;
       case "refused":
         status.connection.value = { kind: "refused" };
+        this.#store.caller.forget();
         this.#store.asksForToken.value = true;
         break;
       case "waiting":
@@ -237,6 +238,7 @@ export class StreamClient {
         break;
       case "sequence-changed":
         this.#takeSequence(notice.sequence);
+        void this.#store.caller.look(); // kernels may have to be prepared for it
         // A calibration is good for some sequences only.
         if (this.#store.calibrations.document.peek() !== null) void this.#store.calibrations.refresh();
         break;
@@ -245,6 +247,7 @@ export class StreamClient {
         break;
       case "reconstruction-changed":
         this.#store.replay.recompute();
+        void this.#store.caller.look();
         if (this.#store.reconstruction.current.peek() !== null) void this.#store.reconstruction.refresh();
         break;
       case "calibration-changed":

@@ -46,11 +46,8 @@ const ENOUGH_HZ = 5;
 /** How many times as many frames the link carries in codes, and of a quarter of the pixels. */
 const CODED_GAIN = 1.7;
 const PART_GAIN = 4;
-/** Pictures a second that are fluent, less what counting may miss of 30, and those that leave room for more frames. */
+/** Pictures a second that are fluent, less what counting may miss of 30. */
 const FLUENT_HZ = 29;
-const ROOMY_HZ = 40;
-/** Nearly all that this display was seen to show leaves room, too: some show 30 a second. */
-const NEARLY = 0.95;
 /** Share of the frames that a page asks for that they keep from drawing. */
 const FEWER = 0.5;
 /** A step helps where it gives so many times as many frames, or pictures. */
@@ -71,17 +68,14 @@ interface Step {
   readonly carried_bytes_s: number;
 }
 
-/** What came in a window. */
+/** What came in a window: pictures are null where no light moved, `taken` is the share of the frames that were due. */
 interface Counted {
   readonly frames_hz: number;
-  /** Null where no light moved. */
   readonly pictures_hz: number | null;
   readonly carried_bytes_s: number;
   readonly lost: number;
-  /** Share of the frames that arrived of those that were due. */
   readonly taken: number;
   readonly waited: number;
-  /** Frames a second that are enough of this camera's. */
   readonly enough_hz: number;
 }
 
@@ -97,7 +91,6 @@ export class DemandControl {
   #calm = 0;
   #patience = PATIENCE;
   #raised = false;
-  #best_hz = 0;
   /** The window: since when, and what came in it; null before its first frame. */
   #began_s: number | null = null;
   #first = 0;
@@ -126,7 +119,7 @@ export class DemandControl {
   /** Another session or sequence: what was measured does not hold any more. */
   reset(): void {
     [this.#steps, this.#tried, this.#raised, this.#vain_hz] = [[], false, false, NEVER_IN_VAIN];
-    [this.#slow, this.#calm, this.#patience, this.#best_hz] = [0, 0, PATIENCE, 0];
+    [this.#slow, this.#calm, this.#patience] = [0, 0, PATIENCE];
     this.restart();
   }
 
@@ -144,7 +137,6 @@ export class DemandControl {
   /** Pictures a second that were drawn of moving light. */
   pictured(pictures_hz: number): void {
     this.#pictures_hz = pictures_hz;
-    this.#best_hz = Math.max(this.#best_hz, pictures_hz);
   }
 
   /** The service left out frames of a channel, for want of acknowledgements. */
@@ -235,7 +227,7 @@ export class DemandControl {
   /** Nothing is too slow: the last step is taken back after enough windows with room. */
   #hasRoom({ frames_hz, pictures_hz, lost, enough_hz }: Counted, top: Step | undefined): boolean {
     this.#slow = 0;
-    const fluent = pictures_hz === null || pictures_hz >= ROOMY_HZ || pictures_hz >= Math.max(FLUENT_HZ, NEARLY * this.#best_hz);
+    const fluent = pictures_hz === null || pictures_hz >= FLUENT_HZ;
     const carried = lost === 0 || frames_hz >= (top?.demand.part ? PART_GAIN : CODED_GAIN) * enough_hz;
     this.#calm = (top?.slow === "link" ? carried : fluent) ? this.#calm + 1 : 0;
     if (top === undefined) {

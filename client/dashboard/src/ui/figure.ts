@@ -3,8 +3,9 @@
 import { type ColourMapName, colourTable, LEVELS, levelOf } from "../scales/colourMaps";
 import { engineering, fixed, significant, withUnit } from "../scales/format";
 import { decimalsFor, fraction, niceStep, type Scale, ticks } from "../scales/scale";
+import { multiplesWords } from "../store/events";
 import { sentWords } from "../store/frames";
-import type { FrameMeta } from "../stream/documents";
+import type { AppliedDocument, FrameMeta } from "../stream/documents";
 
 export interface Figure {
   /** The picture as an address that stands in the file; null leaves its place empty. */
@@ -43,9 +44,10 @@ export function figureLayout(columns: number, rows: number, wide: number): Figur
 }
 
 /** What was measured with, in a line, and which pixels were. */
-export function captionOf(meta: FrameMeta): string {
+export function captionOf(meta: FrameMeta, applied: AppliedDocument | null): string {
   const { harmonics, base_frequency_hz, zeroth, exposure_s, takes, calibration_id, estimator, frame } = meta;
-  const sequence = `m = ${harmonics}, ${engineering(base_frequency_hz, "Hz", 4)}, b₀ ${zeroth.replaceAll("_", " ")}, ${engineering(exposure_s, "s")} × ${takes}`;
+  const measured = multiplesWords(harmonics, applied?.sequence_id === meta.sequence_id ? applied?.sampling : null);
+  const sequence = `${measured}, ${engineering(base_frequency_hz, "Hz", 4)}, b₀ ${zeroth.replaceAll("_", " ")}, ${engineering(exposure_s, "s")} × ${takes}`;
   const sent = sentWords(meta);
   return `${sequence}; ${estimator}; calibration ${calibration_id || "none"}; frame ${frame}${sent && `, ${sent}`}`;
 }

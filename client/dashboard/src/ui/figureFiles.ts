@@ -16,10 +16,9 @@ export type FigureParts = Omit<Figure, "picture" | "columns" | "rows">;
  */
 export async function saveFigure(name: string, canvas: HTMLCanvasElement | null, parts: FigureParts, kind: "png" | "svg"): Promise<void> {
   if (canvas === null) return;
-  const picture = copyOf(canvas);
-  const { width: columns, height: rows } = picture;
+  const [columns, rows] = [canvas.width, canvas.height];
   const layout = figureLayout(columns, rows, FIGURE_PX);
-  const svg = figureSvg({ ...parts, columns, rows, picture: picture.toDataURL("image/png") }, layout);
+  const svg = figureSvg({ ...parts, columns, rows, picture: canvas.toDataURL("image/png") }, layout);
   if (kind === "svg") {
     save(`${name}.svg`, new Blob([svg], { type: "image/svg+xml" }));
     return;
@@ -27,25 +26,19 @@ export async function saveFigure(name: string, canvas: HTMLCanvasElement | null,
   const drawn = document.createElement("canvas");
   [drawn.width, drawn.height] = [PNG_SCALE * layout.width, PNG_SCALE * layout.height];
   const context = drawn.getContext("2d") as CanvasRenderingContext2D;
-  context.drawImage(await imageOf(svg), 0, 0, drawn.width, drawn.height);
-  // The picture again, pixel by pixel: a browser may smooth what is within an SVG.
+  // The picture first, before anything moves, and pixel by pixel: a browser may smooth what is within an SVG.
   context.imageSmoothingEnabled = false;
   context.drawImage(
-    picture,
+    canvas,
     PNG_SCALE * layout.left,
     PNG_SCALE * layout.top,
     PNG_SCALE * layout.pictureWidth,
     PNG_SCALE * layout.pictureHeight,
   );
+  context.globalCompositeOperation = "destination-over";
+  context.drawImage(await imageOf(svg), 0, 0, drawn.width, drawn.height);
   const content = await new Promise<Blob | null>((done) => drawn.toBlob(done, "image/png"));
   if (content !== null) save(`${name}.png`, content);
-}
-
-function copyOf(canvas: HTMLCanvasElement): HTMLCanvasElement {
-  const copy = document.createElement("canvas");
-  [copy.width, copy.height] = [canvas.width, canvas.height];
-  (copy.getContext("2d") as CanvasRenderingContext2D).drawImage(canvas, 0, 0);
-  return copy;
 }
 
 /** An SVG as an image that can be drawn. */

@@ -58,7 +58,7 @@ test("a caption says what was measured with, and which pixels were", () => {
     region: [0, 0, 163, 120],
     decimation: 1,
   } as unknown as FrameMeta;
-  const words = (changed: Partial<FrameMeta>): string => captionOf({ ...meta, ...changed }).replaceAll("\u202f", " ");
+  const words = (changed: Partial<FrameMeta>): string => captionOf({ ...meta, ...changed }, null).replaceAll("\u202f", " ");
   const all = "m = 3, 23.00 MHz, b₀ low-frequency, 1.92 ms × 2; pisarenko; calibration nominal; frame 7";
   expect(words({})).toBe(all);
   expect(words({ decimation: 2 })).toBe(`${all}, every 2nd pixel`);

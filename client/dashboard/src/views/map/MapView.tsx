@@ -40,7 +40,7 @@ interface MapPanelProps {
 function MapPanel({ name, choice }: MapPanelProps) {
   const store = useStore();
   const absent = store.frames.absent.value;
-  const obstacleOf = ({ product, scatterOf }: MapProduct): string | undefined => absent[scatterOf ?? product];
+  const obstacleOf = ({ product }: MapProduct): string | undefined => absent[product];
   const shown = MAP_PRODUCTS.find((each) => each.product === choice.value && obstacleOf(each) === undefined) ?? MAP_PRODUCTS[0];
   const look = store.looks.of(shown.product);
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -49,7 +49,7 @@ function MapPanel({ name, choice }: MapPanelProps) {
     if (meta === undefined) return;
     const parts = {
       title: shown.name,
-      caption: captionOf(meta),
+      caption: captionOf(meta, store.sequence.peek()),
       scale: look.scale.peek(),
       colours: look.colours.peek(),
       unit: shown.unit,
@@ -107,7 +107,7 @@ interface MapProps {
 function MapPicture({ look, canvas }: MapProps) {
   const store = useStore();
   const { product: shown, frame } = look;
-  useProducts([shown.scatterOf ?? shown.product, store.frames.amplitude.value]);
+  useProducts([shown.product, store.frames.amplitude.value]);
   const { size, waiting, marked } = useMemo(
     () =>
       signalsOf(
@@ -146,7 +146,7 @@ function MapPicture({ look, canvas }: MapProps) {
       <div class="picture">
         <Stage width={width} height={height} frame={frame} label={`${shown.name} map`}>
           <canvas ref={canvas} />
-          {shown.unit === "m" && shown.scatterOf === undefined && <Hatch />}
+          {shown.unit === "m" && <Hatch />}
           {waiting.value && <FirstFrame />}
         </Stage>
         {waiting.value ? (

@@ -17,16 +17,16 @@ export function valueAtPixel(frame: Frame | null, pixel: Pixel | null): number {
   return pixel.x < width && pixel.y < height ? frame.values[pixel.y * width + pixel.x] : NaN;
 }
 
-/** What the range of a pixel is worth: its error, and what that is made of or why not to trust it. */
-function rangeWorth(errors: RangeErrors, pixel: Pixel): { readonly error: string; readonly words: string } {
-  const reason = DISTRUST.find(({ bit }) => bit === errors.at("trust", pixel));
-  const [noise, bias] = [errors.at("range_std", pixel), errors.at("range_bias", pixel)];
-  const parts = [
-    Number.isFinite(noise) ? `noise ${engineering(noise, "m", 2)}` : "",
-    Number.isFinite(bias) ? `bias ${engineering(bias, "m", 2)}` : "",
-    reason === undefined ? "" : `not trusted: ${reason.words}`,
-  ];
-  return { error: deviation(errors.at("range_error", pixel), "m"), words: parts.filter((part) => part !== "").join(", ") };
+/** What the range of a pixel is worth: its error, and what that is made of or why not to trust it; null where that is not known. */
+function rangeWorth(errors: RangeErrors, pixel: Pixel): { readonly error: string; readonly words: string } | null {
+  const [trust, noise, bias] = [errors.at("trust", pixel), errors.at("range_std", pixel), errors.at("range_bias", pixel)];
+  if (Number.isNaN(trust)) return null;
+  const reason = DISTRUST.find(({ bit }) => bit === trust);
+  const parts = `noise ${engineering(noise, "m", 2)}, bias ${engineering(bias, "m", 2)}`;
+  return {
+    error: deviation(errors.at("range_error", pixel), "m"),
+    words: reason === undefined ? parts : `${parts}; not trusted: ${reason.words}`,
+  };
 }
 
 /** The value under the pointer, how much it scatters, and how much light it rests on. */
@@ -64,7 +64,7 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
         </output>{" "}
         {value.value === NOTHING ? (
           <span class="quiet">no value</span>
-        ) : worth.value === null ? (
+        ) : shown.product !== "range" ? (
           <span
             class="quiet readout-scatter"
             data-field="scatter"
@@ -74,7 +74,7 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
           </span>
         ) : (
           <span class="quiet" data-field="worth">
-            {worth.value.words}
+            {worth.value?.words}
           </span>
         )}
       </span>

@@ -1,5 +1,6 @@
 import { useSignal } from "@preact/signals";
 
+import { numberOf } from "../../scales/format";
 import type { PlanRequest } from "../../stream/documents";
 import "./GoalForm.css";
 
@@ -12,7 +13,7 @@ interface GoalFormProps {
 export function GoalForm({ disabled, onGoal }: GoalFormProps) {
   const error_mm = useSignal("");
   const rate_hz = useSignal("");
-  const [error, rate] = [error_mm, rate_hz].map(({ value }) => (value.trim() === "" ? null : Number(value)));
+  const [error, rate] = [error_mm, rate_hz].map(({ value }) => (value.trim() === "" ? null : numberOf(value)));
   const wanted = [error, rate];
   const sensible = wanted.some((value) => value !== null) && wanted.every((value) => value === null || value > 0);
   const field = (label: string, unit: string, text: typeof error_mm, name: string) => (

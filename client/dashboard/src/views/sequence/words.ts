@@ -1,10 +1,11 @@
 import { deviation, engineering, fixed } from "../../scales/format";
 import { plainWords } from "../../store/api";
 import type { RangeErrorFigure } from "../../store/rangeErrors";
+import type { SequenceDocument } from "../../stream/documents";
 import type { Problem, TakeOrder, Zeroth } from "../../stream/protocol";
 
 /** Names of the fields as the form has them. */
-const FIELD_NAMES: Readonly<Record<string, string>> = {
+export const FIELD_NAMES: Readonly<Record<string, string>> = {
   base_frequency_hz: "Base frequency",
   harmonics: "Harmonics m",
   zeroth: "Zeroth moment",
@@ -12,6 +13,15 @@ const FIELD_NAMES: Readonly<Record<string, string>> = {
   takes: "Takes",
   take_order: "Order of takes",
 };
+
+/** What is measured of the base frequency: its multiples 1 to m, or others that a camera has of its own. */
+export function measuredOf({ harmonics, sampling }: Pick<SequenceDocument, "harmonics" | "sampling">): {
+  readonly name: string;
+  readonly value: string;
+} {
+  const multiples = sampling?.multiples ?? [];
+  return multiples.length === 0 ? { name: "Harmonics m", value: String(harmonics) } : { name: "Multiples", value: multiples.join(", ") };
+}
 
 /** The name of the field that a problem is about, as "harmonics" or as "body.harmonics". */
 export function fieldOf(problem: Problem): string | null {
