@@ -1,5 +1,5 @@
 /** What the ranges of a picture and of each pixel are worth, as one statement for the whole page. */
-import { computed, effect, type ReadonlySignal, type Signal, signal, untracked } from "@preact/signals";
+import { computed, effect, type ReadonlySignal, type Signal, signal } from "@preact/signals";
 
 import type { FrameMeta } from "../stream/documents";
 import { LIVE, liveFrame, RequestError } from "./api";
@@ -104,11 +104,13 @@ export class RangeErrors {
   /** Of the frame that is shown: where one of a recording is, its origin says. */
   async #request(status: Status, again: boolean): Promise<void> {
     const [timer, scene, began_ms] = [this.#timer, this.#scene.peek(), performance.now()];
-    const range = untracked(() => this.#frames.of("range").value);
-    const number = status.newest.peek()?.frame;
-    const path = range !== null && range.origin !== LIVE ? range.origin : number === undefined ? LIVE : liveFrame(number);
+    const origin = this.#frames.of("range").peek()?.origin ?? LIVE;
+    const still = origin === LIVE ? liveFrame(status.newest.peek()?.frame ?? 0) : origin;
     try {
-      const reports = (await this.loader?.(path, PRODUCTS)) ?? [];
+      // While frames come, the one on screen may be gone.
+      const first = (await this.loader?.(again ? LIVE : still, PRODUCTS.slice(0, 1))) ?? [];
+      const path = again ? liveFrame(first[0]?.message.meta.frame ?? 0) : still;
+      const reports = [...first, ...((await this.loader?.(path, PRODUCTS.slice(1))) ?? [])];
       if (scene === this.#scene.peek()) this.#brought.value = reports.map((report) => frameOf(report, path));
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;

@@ -39,8 +39,6 @@ const SLOW_WINDOWS = 2;
 const TAKEN = 0.75;
 /** Least share of the time in which the page waits for frames, where it is not the page that is slow. */
 const WAITING = 0.5;
-/** A link that carries so much is not thin: what is slow then is the service. */
-const WIDE_BYTES_S = 40e6;
 /** So many frames a second, or half of the camera's, are enough. */
 const ENOUGH_HZ = 5;
 /** How many times as many frames the link carries in codes, and of a quarter of the pixels. */
@@ -73,7 +71,6 @@ interface Counted {
   readonly frames_hz: number;
   readonly pictures_hz: number | null;
   readonly carried_bytes_s: number;
-  readonly lost: number;
   readonly taken: number;
   readonly waited: number;
   readonly enough_hz: number;
@@ -170,7 +167,6 @@ export class DemandControl {
         frames_hz: this.#frames / span_s,
         pictures_hz: this.#pictures_hz,
         carried_bytes_s: this.#bytes / span_s,
-        lost,
         taken: this.#frames / (this.#frames + lost),
         waited: this.#waited_s / span_s,
         enough_hz: Math.min(ENOUGH_HZ, (frame - this.#first) / span_s / 2),
@@ -208,8 +204,8 @@ export class DemandControl {
 
   /** What is too slow, where less might help. */
   #bottleneck(counted: Counted): Bottleneck | null {
-    const { frames_hz, pictures_hz, carried_bytes_s, lost, taken, waited, enough_hz } = counted;
-    const thin = lost > 0 && taken < TAKEN && waited >= WAITING && carried_bytes_s <= WIDE_BYTES_S;
+    const { frames_hz, pictures_hz, taken, waited, enough_hz } = counted;
+    const thin = taken < TAKEN && waited >= WAITING;
     if (thin && frames_hz < Math.min(enough_hz, this.#vain_hz.link)) return "link";
     return pictures_hz !== null && pictures_hz < Math.min(FLUENT_HZ, this.#vain_hz.page) ? "page" : null;
   }
@@ -225,10 +221,10 @@ export class DemandControl {
   }
 
   /** Nothing is too slow: the last step is taken back after enough windows with room. */
-  #hasRoom({ frames_hz, pictures_hz, lost, enough_hz }: Counted, top: Step | undefined): boolean {
+  #hasRoom({ frames_hz, pictures_hz, taken, enough_hz }: Counted, top: Step | undefined): boolean {
     this.#slow = 0;
     const fluent = pictures_hz === null || pictures_hz >= FLUENT_HZ;
-    const carried = lost === 0 || frames_hz >= (top?.demand.part ? PART_GAIN : CODED_GAIN) * enough_hz;
+    const carried = taken === 1 || frames_hz >= (top?.demand.part ? PART_GAIN : CODED_GAIN) * enough_hz;
     this.#calm = (top?.slow === "link" ? carried : fluent) ? this.#calm + 1 : 0;
     if (top === undefined) {
       // Long well with everything: what was slow is over.

@@ -52,10 +52,10 @@ describe("the error of the range", () => {
     expect(requests).toEqual([]);
     expect(errors.now.value).toEqual(noise);
     await vi.advanceTimersByTimeAsync(1000);
-    expect(requests).toEqual(["/frames/4"]);
+    expect(requests).toEqual(["/frames/latest", "/frames/4"]);
     expect(errors.now.value).toEqual(interval(5e-3));
     await vi.advanceTimersByTimeAsync(3000);
-    expect(requests).toHaveLength(2);
+    expect(requests).toHaveLength(4);
     status.newest.value = meta(5);
     expect(errors.now.value).toEqual(noise);
   });
@@ -84,7 +84,7 @@ describe("the error of the range", () => {
     status.newest.value = meta(4, null, 7);
     held.value = true;
     await vi.advanceTimersByTimeAsync(60_000);
-    expect(requests).toEqual(["/frames/7"]);
+    expect(requests).toEqual(["/frames/7", "/frames/7"]);
     expect(errors.now.value).toEqual(noise); // the service answered with another frame
     status.newest.value = meta(4, null, 8);
     expect(errors.now.value).toEqual(interval(5e-3));
@@ -122,7 +122,7 @@ test("a picture's ranges are stated as shares of it", () => {
     Object.values(shareWords(figure)).map((each) => each.replaceAll("\u202f", " "));
   expect(words({ ...interval(5e-3), of: "interval" })).toEqual([
     "82 % ± 4.0 mm",
-    "82 % of the picture ± 4.0 mm or better (90 % intervals), 18 % not trusted",
+    "82 % of the picture ± 4.0 mm (90 % intervals), 18 % not trusted",
   ]);
   expect(words({ error_m: 1e-3, of: "noise", trusted_share: 0.5, within_m: null })[0]).toBe("50 % trusted");
   expect(words({ ...noise, of: "noise" })[0]).toBe("± 1.0 mm noise");

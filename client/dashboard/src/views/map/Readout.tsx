@@ -45,9 +45,8 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
   const lightScatter = useComputed(() =>
     lightNoise.frames.value === 0 ? "" : deviation(lightNoise.std(at(amplitude.value?.shape[1])), amplitude.value?.unit ?? ""),
   );
-  const worth = useComputed(() =>
-    shown.product === "range" && looked.value !== null ? rangeWorth(store.rangeErrors, looked.value) : null,
-  );
+  const isRange = shown.product === "range";
+  const worth = useComputed(() => (isRange && looked.value !== null ? rangeWorth(store.rangeErrors, looked.value) : null));
   const number = useComputed(() => frame.value?.meta.frame ?? "");
   if (place.value === "") return <p class="readout quiet">Point at the picture to read it.</p>;
   return (
@@ -55,26 +54,18 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
       <span>
         <output class="readout-value" data-field="value">
           {value}
-          {value.value !== NOTHING && worth.value !== null && (
-            <span data-field="error" title="Half of the 90 % interval of this pixel's range, of noise and bias">
-              {" "}
-              {worth.value.error}
-            </span>
-          )}
         </output>{" "}
-        {value.value === NOTHING ? (
-          <span class="quiet">no value</span>
-        ) : shown.product !== "range" ? (
+        {isRange ? (
+          <span class="readout-value readout-error" data-field="error" title="Half of the 90 % interval of this pixel's range">
+            {value.value === NOTHING ? "" : worth.value?.error}
+          </span>
+        ) : (
           <span
             class="quiet readout-scatter"
             data-field="scatter"
             title={`Standard deviation (1 σ) over the last ${WINDOW} frames, as measured at this pixel`}
           >
-            {scatter}
-          </span>
-        ) : (
-          <span class="quiet" data-field="worth">
-            {worth.value?.words}
+            {value.value === NOTHING ? "no value" : scatter}
           </span>
         )}
       </span>
@@ -92,6 +83,11 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
       <span class="quiet readout-pixel" data-field="pixel" title="Column and row of the pixel">
         {place}
       </span>
+      {isRange && (
+        <span class="quiet readout-worth" data-field="worth" title={worth.value?.words}>
+          {value.value === NOTHING ? "no value" : worth.value?.words}
+        </span>
+      )}
     </p>
   );
 }

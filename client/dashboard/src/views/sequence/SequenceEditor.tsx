@@ -6,6 +6,7 @@ import { RequestError } from "../../store/api";
 import { useStore } from "../../store/store";
 import type { AppliedDocument } from "../../stream/documents";
 import type { Problem, SequenceRequest, TakeOrder, Zeroth } from "../../stream/protocol";
+import { NumberField } from "../../ui/controls";
 import { Obstacle, Steer } from "../../ui/Steer";
 import { DRAFT_FIELD, type Draft, documentOf, draftOf, missingOf } from "./draft";
 import { Figures } from "./Figures";
@@ -70,22 +71,15 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; 
   const judged = verdict.value;
   const wrong = judged.kind === "refused" ? (DRAFT_FIELD[fieldOf(judged.problem) ?? ""] ?? null) : null;
   const field = (name: keyof Draft, label: string, unit: string) => (
-    <label class="field">
-      <span>{label}</span>
-      <span class="field-input">
-        <input
-          type="text"
-          inputMode="decimal"
-          autocomplete="off"
-          name={name}
-          value={draft.value[name] ?? ""}
-          aria-invalid={wrong === name}
-          aria-describedby="sequence-verdict"
-          onInput={(event) => (draft.value = { ...draft.peek(), [name]: event.currentTarget.value })}
-        />
-        <span class="quiet">{unit}</span>
-      </span>
-    </label>
+    <NumberField
+      label={label}
+      unit={unit}
+      name={name}
+      value={draft.value[name] ?? ""}
+      aria-invalid={wrong === name}
+      aria-describedby="sequence-verdict"
+      onType={(text) => (draft.value = { ...draft.peek(), [name]: text })}
+    />
   );
 
   return (

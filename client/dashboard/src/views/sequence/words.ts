@@ -77,14 +77,11 @@ export function errorWords(error: RangeErrorFigure | null): string {
 
 /** What the ranges of a picture are worth: as shares of it where these are known. */
 export function shareWords(error: RangeErrorFigure | null): { readonly short: string; readonly long: string } {
-  const [share, within] = [error?.trusted_share ?? null, deviation(error?.within_m, "m")];
-  if (share === null) {
+  const within = deviation(error?.within_m, "m") || "trusted";
+  if (error?.trusted_share == null) {
     const short = `${deviation(error?.error_m, "m")}${error?.of === "noise" ? " noise" : ""}`;
     return { short, long: `the error of the range in the median pixel is ${errorWords(error)}` };
   }
-  const trusted = fixed(100 * share, 0, "%");
-  return {
-    short: within === "" ? `${trusted} trusted` : `${trusted} ${within}`,
-    long: `${trusted} of the picture ${within === "" ? "is trusted" : `${within} or better (90 % intervals)`}, ${fixed(100 * (1 - share), 0, "%")} not trusted`,
-  };
+  const [trusted, rest] = [error.trusted_share, 1 - error.trusted_share].map((share) => fixed(100 * share, 0, "%"));
+  return { short: `${trusted} ${within}`, long: `${trusted} of the picture ${within} (90 % intervals), ${rest} not trusted` };
 }

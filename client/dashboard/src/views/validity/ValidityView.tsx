@@ -2,9 +2,9 @@ import { computed, type ReadonlySignal, useComputed } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 import { fixed, grouped } from "../../scales/format";
 import { drawnOf, type Frame, sentOf } from "../../store/frames";
-import { oneOf, type Setting } from "../../store/settings";
+import { aBoolean, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
-import { Tabs } from "../../ui/controls";
+import { Toggle } from "../../ui/controls";
 import { saveNumbers, savePicture } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing, useProducts } from "../../ui/hooks";
@@ -14,18 +14,15 @@ import { countReasons, paintReasons, REASONS, type Reasons } from "./reasons";
 import "../response/Listings.css";
 import "./ValidityView.css";
 
-const KIND: Setting<keyof typeof REASONS> = { key: "validity.kind", initial: "flags", ...oneOf<keyof typeof REASONS>(["flags", "trust"]) };
-const KINDS = [
-  { value: "flags", text: "Flags", hint: "What was wrong with a pixel" },
-  { value: "trust", text: "Trust", hint: "Which ranges can be trusted, and why others cannot" },
-] as const;
+/** Whether it is shown which ranges can be trusted, instead of the flags. */
+const TRUST: Setting<boolean> = { key: "validity.trust", initial: false, ...aBoolean() };
 
 /** Which pixels something is wrong with, and what. */
 export function ValidityView() {
   const store = useStore();
   const amplitude = store.frames.amplitude.value;
-  const kind = store.settings.of(KIND);
-  const reasons = REASONS[kind.value];
+  const trust = store.settings.of(TRUST);
+  const reasons = REASONS[trust.value ? "trust" : "flags"];
   useProducts([reasons.product, amplitude]);
   const frame = store.frames.of(reasons.product);
   const scene = store.frames.of(amplitude);
@@ -51,13 +48,21 @@ export function ValidityView() {
     <Panel
       name="validity"
       title={<h2>Validity</h2>}
-      tools={<Tabs label="What of the pixels" value={kind.value} options={KINDS} onChange={(value) => (kind.value = value)} />}
+      tools={
+        <Toggle
+          pressed={trust.value}
+          title="Which ranges can be trusted, and why others cannot"
+          onToggle={() => (trust.value = !trust.peek())}
+        >
+          Trust
+        </Toggle>
+      }
       downloads={[
         {
           text: "Picture (PNG)",
-          run: () => savePicture(`${reasons.product === "flags" ? "validity" : "trust"}-${frame.peek()?.meta.frame ?? 0}`, canvas.current),
+          run: () => savePicture(`${trust.value ? "trust" : "validity"}-${frame.peek()?.meta.frame ?? 0}`, canvas.current),
         },
-        { text: `${kind.value === "flags" ? "Flags" : "Trust"} (NPY)`, run: () => saveNumbers(store.api, frame.peek()) },
+        { text: `${trust.value ? "Trust" : "Flags"} (NPY)`, run: () => saveNumbers(store.api, frame.peek()) },
       ]}
     >
       <Stage width={width} height={height} frame={frame} label="Validity map">
