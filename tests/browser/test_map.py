@@ -28,7 +28,7 @@ TOLERANCE = {"viridis": 6, "cividis": 12, "grey": 1, "coolwarm": 6}
 SHORT = ("–", "", "–", "", "0, 0", "no value")
 LONG = (
     *("7.345\u202fm", "±\u202f123\u202fmm", "1234\u202fDN", "±\u202f123\u202fDN", "163, 120"),
-    "noise 123\u202fmm, bias 123\u202fmm; not trusted: what is nearer hides this point from the lamp",
+    "noise 123\u202fmm, bias 123\u202fmm; not trusted: what is nearer hides this from the lamp",
 )
 
 

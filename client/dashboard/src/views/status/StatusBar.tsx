@@ -117,7 +117,7 @@ function Exposure() {
   if (exposure_s === null || applied.exposure_s !== shown?.exposure_s) return <Sign field="exposure" short={word} long={long} />;
   const set = (): Promise<boolean> => task.run("Applying…", () => sequencing.set({ ...applied, exposure_s }));
   return (
-    <span class="advice" data-field="exposure">
+    <span data-field="exposure">
       <Steer title={task.refusal.value ?? long} disabled={task.busy.value !== null} onClick={() => void set()}>
         {word}
         <span class="wide">: exposure {engineering(exposure_s, "s", 2)}</span>

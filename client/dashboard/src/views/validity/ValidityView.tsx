@@ -49,19 +49,12 @@ export function ValidityView() {
       name="validity"
       title={<h2>Validity</h2>}
       tools={
-        <Toggle
-          pressed={trust.value}
-          title="Which ranges can be trusted, and why others cannot"
-          onToggle={() => (trust.value = !trust.peek())}
-        >
+        <Toggle pressed={trust.value} title="Which ranges can be trusted, and why" onToggle={() => (trust.value = !trust.peek())}>
           Trust
         </Toggle>
       }
       downloads={[
-        {
-          text: "Picture (PNG)",
-          run: () => savePicture(`${trust.value ? "trust" : "validity"}-${frame.peek()?.meta.frame ?? 0}`, canvas.current),
-        },
+        { text: "Picture (PNG)", run: () => savePicture(`${reasons.product}-${frame.peek()?.meta.frame ?? 0}`, canvas.current) },
         { text: `${trust.value ? "Trust" : "Flags"} (NPY)`, run: () => saveNumbers(store.api, frame.peek()) },
       ]}
     >
@@ -83,11 +76,11 @@ function Legend({ frame, reasons }: { frame: ReadonlySignal<Frame | null>; reaso
       <tbody>
         <tr data-flag="valid">
           <th scope="row">
-            <Swatch colour={null} /> {reasons.good.title}
+            <Swatch colour={null} /> {reasons.good[0]}
           </th>
           <td>{grouped(valid)}</td>
           <td>{share(valid)}</td>
-          <td class="legend-words">{reasons.good.words}</td>
+          <td class="legend-words">{reasons.good[1]}</td>
         </tr>
         {reasons.all.map(({ name, title, words, colour }) => (
           <tr key={name} data-flag={name} class={byName[name] === 0 ? "quiet" : ""} title={words}>

@@ -6,22 +6,17 @@ export interface Reasons {
   readonly product: string;
   readonly all: readonly Flag[];
   readonly has: (value: number, reason: Flag) => boolean;
-  /** What a pixel is that nothing was wrong with. */
-  readonly good: { readonly title: string; readonly words: string };
+  /** What a pixel is called that nothing was wrong with, and what that means. */
+  readonly good: readonly [title: string, words: string];
 }
 
 export const REASONS = {
-  flags: {
-    product: "flags",
-    all: FLAGS,
-    has: (value, { bit }) => (value & bit) !== 0,
-    good: { title: "Valid", words: "nothing was wrong" },
-  },
+  flags: { product: "flags", all: FLAGS, has: (value, { bit }) => (value & bit) !== 0, good: ["Valid", "nothing was wrong"] },
   trust: {
     product: "trust",
     all: DISTRUST,
     has: (value, { bit }) => value === bit,
-    good: { title: "Trusted", words: "the 90 % interval holds the range" },
+    good: ["Trusted", "the 90 % interval holds the range"],
   },
 } satisfies Readonly<Record<string, Reasons>>;
 
