@@ -187,7 +187,6 @@ function Hatch() {
     const image = context.createImageData(target.width, target.height);
     hatch(frame.values, columns, HATCH, new Uint32Array(image.data.buffer));
     context.putImageData(image, 0, 0);
-    target.dataset.frame = String(frame.meta.frame);
   }, [trust]);
   return <canvas ref={canvas} class="stage-hatch" title="Hatched: the range is not trusted" />;
 }
