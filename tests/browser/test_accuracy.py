@@ -83,6 +83,7 @@ def test_the_front_fills_and_its_slider_sets_a_sequence_that_can_be_undone(
     expect(page.locator("[data-field=now]")).to_be_visible()
     expect(page.locator("[data-field=ghost]")).to_be_visible()
     # the header states shares of the picture, of which the panel has the median pixel
+    page.wait_for_function("() => transientcam.store.rangeErrors.of('range_error').value !== null")
     stated = page.locator(f"{PANEL} [data-field=now_range_error_m]")
     expect(stated).to_have_attribute("title", re.compile("90 % interval, of noise and bias"))
     shown = page.evaluate("() => transientcam.store.rangeErrors.of('range_error').value.meta")
