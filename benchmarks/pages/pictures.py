@@ -153,7 +153,9 @@ def views(page: Page, to: Path) -> None:
 
 # every picture has its frame, and nothing waits for one
 _DRAWN = """
-() => [...document.querySelectorAll(".stage canvas, .streak-picture canvas, .points canvas")]
+() => [
+    ...document.querySelectorAll(".stage [data-product], .streak-picture canvas, .points canvas"),
+  ]
     .every((each) => "frame" in each.dataset)
   && ![...document.querySelectorAll(".stage-empty")]
     .some((each) => /Waiting|Loading/.test(each.textContent))

@@ -32,7 +32,7 @@ def _image(png: str) -> NDArray[np.uint8]:
 
 def map_canvas(page: Page) -> Locator:
     """The canvas of the map view."""
-    return page.locator(".panel-map .stage canvas")
+    return page.locator(".panel-map .stage canvas[data-product]")
 
 
 def transient_canvas(page: Page) -> Locator:
@@ -52,7 +52,7 @@ def open_page(page: Page, path: str = "/?debug") -> None:
 def shows_frame(page: Page, frame: int) -> None:
     """Wait until both pictures show this frame."""
     page.wait_for_function(
-        """(frame) => [".panel-map .stage canvas", "canvas[data-product=transient]"]
+        """(frame) => [".panel-map .stage canvas[data-product]", "canvas[data-product=transient]"]
              .every((each) => document.querySelector(each)?.dataset.frame === String(frame))""",
         arg=frame,
     )
@@ -104,7 +104,7 @@ def point_at(page: Page, picture: str, x: int, y: int, *, click: bool = False) -
 
     The pointer follows where the page is laid out anew meanwhile.
     """
-    canvas = page.locator(f".panel-{picture} .stage canvas")
+    canvas = page.locator(f".panel-{picture} .stage canvas[data-product]")
     before = None
     while (box := canvas.bounding_box()) != before:
         assert box is not None

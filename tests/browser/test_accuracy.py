@@ -82,12 +82,18 @@ def test_the_front_fills_and_its_slider_sets_a_sequence_that_can_be_undone(
     assert [y for _, y in centres] == sorted(y for _, y in centres), "less error further down"
     expect(page.locator("[data-field=now]")).to_be_visible()
     expect(page.locator("[data-field=ghost]")).to_be_visible()
-    # header and panel state one figure
+    # the header states shares of the picture, of which the panel has the median pixel
+    page.wait_for_function("() => transientcam.store.rangeErrors.of('range_error').value !== null")
     stated = page.locator(f"{PANEL} [data-field=now_range_error_m]")
-    expect(stated).to_have_attribute("title", re.compile("noise .* and bias together"))
-    header = page.locator("[data-field=deviation]")
-    assert text(page, ".bar", "deviation") == str(stated.text_content()).replace("\u202f", " ")
-    expect(header).not_to_contain_text("noise")
+    expect(stated).to_have_attribute("title", re.compile("90 % interval, of noise and bias"))
+    shown = page.evaluate("() => transientcam.store.rangeErrors.of('range_error').value.meta")
+    worth = shown["accuracy"]
+    assert number(text(page, PANEL, "now_range_error_m").removeprefix("\u00b1 ")) == pytest.approx(
+        worth["range_error_m"], rel=0.05
+    )
+    share, within = text(page, ".bar", "deviation").split(" % \u00b1 ")
+    assert float(share) == round(100 * worth["trusted_share"])
+    assert number(within) == pytest.approx(worth["within_m"], rel=0.05)
     assert offences_of(page, within=PANEL) == []
 
     # a point is looked at, and nothing set

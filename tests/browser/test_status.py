@@ -108,7 +108,7 @@ def test_a_held_page_keeps_its_frame_while_the_camera_goes_on(page: Page, served
     open_page(page)
     page.keyboard.press("h")
     expect(page.locator("[data-field=state]")).to_have_text("Held")
-    canvas = page.locator(".panel-map .stage canvas")
+    canvas = page.locator(".panel-map .stage canvas[data-product]")
     held = int(str(canvas.get_attribute("data-frame")))
     after = httpx.get(f"{served.url}/api/v1/frames/latest").json()["frame"]
     httpx.get(f"{served.url}/api/v1/frames/latest", params={"after": after + 2, "wait_s": 10})

@@ -399,3 +399,32 @@ def test_a_film_and_a_figure_are_handed_out(page: Page, served: Served) -> None:
     # 2 x 4 pixels of the figure for each of the sensor's, behind margins of 2 x 46 and 2 x 30
     middles = figure[64 : 64 + 8 * 120 : 8, 96 : 96 + 8 * 163 : 8]
     np.testing.assert_array_equal(middles, canvas_pixels(map_canvas(page)))
+
+
+def test_figures_of_moving_light_show_the_time_they_state(page: Page, served: Served) -> None:
+    open_page(page)
+    shows_frame(page, stop(served))
+    for turn in (0.2, 0.35, 0.5):
+        page.evaluate(
+            """(turn) => { const { player } = transientcam.store;
+                 player.speed_ns.value = 20; player.seek(turn); player.playing.value = true; }""",
+            turn,
+        )
+        name, moving = figure_of_light(page)
+        time_s = float(re.findall(r"-([0-9]+)ps-", name)[0]) * 1e-12
+        page.evaluate(
+            """(time_s) => { const { player, period_s } = transientcam.store;
+                 player.playing.value = false; player.seek(time_s / period_s.value); }""",
+            time_s,
+        )
+        assert figure_of_light(page)[0] == name
+        # the name states whole picoseconds
+        assert np.abs(moving - figure_of_light(page)[1]).mean() < 0.05
+
+
+def figure_of_light(page: Page) -> tuple[str, NDArray[np.float64]]:
+    """Name and pixels of a figure of the light, saved now."""
+    with page.expect_download() as download:
+        choose(page, "transient", "Figure (PNG)")
+    with Image.open(download.value.path()) as image:
+        return download.value.suggested_filename, np.array(image.convert("RGB"), dtype=np.float64)

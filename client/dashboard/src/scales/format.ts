@@ -54,6 +54,11 @@ export function deviation(std: number | null | undefined, unit: string): string 
   return `±\u202f${unit === "m" || unit === "s" ? engineering(std, unit, 2) : significant(std, 2, unit)}`;
 }
 
+/** The number that is typed, with a decimal point or comma; NaN where it is none. */
+export function numberOf(text: string): number {
+  return text.trim() === "" ? NaN : Number(text.replace(",", "."));
+}
+
 /** A whole number with its thousands apart. */
 export function grouped(value: number): string {
   return Math.round(value)

@@ -8,11 +8,11 @@ import type {
   CalibrationDocument,
   CalibrationRequest,
   CalibrationsDocument,
-  CallerDocument,
   CameraDocument,
   ExplanationDocument,
   FaultRequest,
   GrantedLeaseDocument,
+  InfoDocument,
   JobDocument,
   LeaseDocument,
   LeaseRequest,
@@ -43,6 +43,11 @@ export class RequestError extends Error {
   /** The kind of problem: "lease-held" of "/problems/lease-held"; "" where it has none. */
   get kind(): string {
     return kindOf(this.problem);
+  }
+
+  /** It is about a frame that the service kept for some seconds, or never had: it was started anew. */
+  get isGone(): boolean {
+    return this.kind === "frame-gone" || this.kind === "unknown-frame";
   }
 }
 
@@ -95,14 +100,14 @@ export class Api {
 
   // -- the camera --------------------------------------------------------------------------------
 
-  /** Who the service takes this page for. */
-  async caller(): Promise<CallerDocument> {
-    return (await this.#json("GET /info")).caller;
+  /** What the service is, and who it takes this page for. */
+  info(): Promise<InfoDocument> {
+    return this.#json("GET /info");
   }
 
   /** Why frames do not have some products, by their names. */
   async absentProducts(): Promise<Readonly<Record<string, string>>> {
-    const { absent_products: absent } = await this.#json("GET /info");
+    const { absent_products: absent } = await this.info();
     return Object.fromEntries(absent.map(({ name, reason }) => [name, reason]));
   }
 

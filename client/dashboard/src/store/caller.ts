@@ -1,29 +1,45 @@
 import { computed, signal } from "@preact/signals";
-import type { CallerDocument } from "../stream/documents";
+import type { InfoDocument } from "../stream/documents";
 import { type Api, RequestError } from "./api";
 
-/** Who the service takes this page for, by its token. */
+/** How often a service is looked at that prepares its kernels. */
+const PREPARING_MS = 1000;
+
+/** What the service is to this page: who it takes it for, by its token, and what it has still to prepare. */
 export class Caller {
+  readonly #info = signal<InfoDocument | null>(null);
   /** Null while that is not known. */
-  readonly document = signal<CallerDocument | null>(null);
+  readonly document = computed(() => this.#info.value?.caller ?? null);
+  /** Kernels that are not ready, so that frames come slowly; null where all are. */
+  readonly kernels = computed(() => this.#info.value?.kernels ?? null);
   /** Why this page may change nothing at all; null where it may. */
   readonly obstacle = computed(() => {
     const caller = this.document.value;
     return caller?.role === "viewer" ? `The token ${caller.name} is a viewer's` : null;
   });
   readonly #api: Api;
+  #timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(api: Api) {
     this.#api = api;
   }
 
-  /** Asks the service. */
+  /** Asks the service, and again while it prepares its kernels. */
   async look(): Promise<void> {
+    clearTimeout(this.#timer);
     try {
-      this.document.value = await this.#api.caller();
+      this.#info.value = await this.#api.info();
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;
-      this.document.value = null;
+      this.forget();
     }
+    clearTimeout(this.#timer);
+    if (this.kernels.peek() !== null) this.#timer = setTimeout(() => void this.look(), PREPARING_MS);
+  }
+
+  /** The service does not know this page any more. */
+  forget(): void {
+    clearTimeout(this.#timer);
+    this.#info.value = null;
   }
 }

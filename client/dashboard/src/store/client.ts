@@ -36,7 +36,7 @@ export class StreamClient {
   #looking: ReturnType<typeof setTimeout> | undefined;
   #session = "";
   readonly #fluency = new Fluency();
-  /** The worker knows that no light moves. */
+  /** The worker knows that light stands or is measured. */
   #rests = false;
 
   constructor(store: Store, worker: WorkerPort, loop: AnimationLoop, now_s: Clock = () => Date.now() / 1000) {
@@ -114,6 +114,7 @@ export class StreamClient {
         break;
       case "refused":
         status.connection.value = { kind: "refused" };
+        this.#store.caller.forget();
         this.#store.asksForToken.value = true;
         break;
       case "waiting":
@@ -123,7 +124,7 @@ export class StreamClient {
         this.#takeCamera(report.document);
         break;
       case "demand":
-        status.demanded.value = report.demand.maxRate_hz === null ? null : report;
+        status.demanded.value = report.carried_bytes_s === null && report.pictures_hz === null ? null : report;
         this.#fluency.restart();
         break;
       case "unreadable":
@@ -237,6 +238,7 @@ export class StreamClient {
         break;
       case "sequence-changed":
         this.#takeSequence(notice.sequence);
+        void this.#store.caller.look(); // kernels may have to be prepared for it
         // A calibration is good for some sequences only.
         if (this.#store.calibrations.document.peek() !== null) void this.#store.calibrations.refresh();
         break;
@@ -245,6 +247,7 @@ export class StreamClient {
         break;
       case "reconstruction-changed":
         this.#store.replay.recompute();
+        void this.#store.caller.look();
         if (this.#store.reconstruction.current.peek() !== null) void this.#store.reconstruction.refresh();
         break;
       case "calibration-changed":
@@ -254,6 +257,7 @@ export class StreamClient {
         this.#store.frames.sceneSince_s = status.serviceTime_s(this.#now_s());
         this.#store.accuracy.sceneChanged();
         this.#store.rangeErrors.sceneChanged();
+        this.#store.details.forget();
         if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
         break;
       case "recording-started":
@@ -310,7 +314,6 @@ export class StreamClient {
     }
     this.#store.status.encode_s.value = encode_s;
     this.#pending.clear();
-    this.#fluency.frameTaken(newest);
     // Another client may have started the camera; or this frame was on its way when it stopped: read the state.
     if (this.#store.status.cameraState.peek() !== "streaming") void this.#readCamera();
     this.#send({ type: "acknowledge", frame: newest });
@@ -318,18 +321,17 @@ export class StreamClient {
 
   /** Counts how fluently the light of the stream moves; true while each refresh of the screen is to be counted. */
   #count(): boolean {
-    const { player, frames, held, replay } = this.#store;
-    const moves = (player.playing.peek() || player.scrubbed.peek()) && frames.of("coefficients").peek() !== null;
-    const measures = this.#store.measures.pins.peek().length > 0 || this.#store.measures.region.peek() !== null;
-    if (!moves || measures || held.peek() || replay.active.peek()) {
+    const { player, frames, held, replay, measures } = this.#store;
+    const measured = measures.pins.peek().length > 0 || measures.region.peek() !== null;
+    const rests = !(player.playing.peek() || player.scrubbed.peek()) || measured || held.peek() || replay.active.peek();
+    if (rests !== this.#rests) this.#send({ type: "rest", rests });
+    this.#rests = rests;
+    if (rests || frames.of("coefficients").peek() === null) {
       this.#fluency.restart();
-      if (!this.#rests) this.#send({ type: "rested" });
-      this.#rests = true;
       return false;
     }
-    this.#rests = false;
-    const report = this.#fluency.refreshed(this.#now_s());
-    if (report !== null) this.#send({ type: "moved", ...report });
+    const pictures_hz = this.#fluency.refreshed(this.#now_s());
+    if (pictures_hz !== null) this.#send({ type: "moved", pictures_hz });
     return true;
   }
 

@@ -1,12 +1,9 @@
-import { effect, type ReadonlySignal, signal, untracked } from "@preact/signals";
+import { batch, effect, type ReadonlySignal, signal, untracked } from "@preact/signals";
 
 import type { PixelDocument } from "../stream/documents";
 import { type Api, LIVE, liveFrame, RequestError } from "./api";
 import type { Frame } from "./frames";
 import type { Pixel } from "./pixel";
-
-/** A frame that the service kept for some seconds, or that it has never had: it was started anew. */
-const GONE: readonly string[] = ["frame-gone", "unknown-frame"];
 
 /** Least time between two questions about the same pixel. */
 const PAUSE_S = 0.5;
@@ -16,6 +13,8 @@ const PAUSE_S = 0.5;
  */
 export class Details {
   readonly document = signal<PixelDocument | null>(null);
+  /** The frame on screen that it was asked of, so that all that is shown of the pixel is of one frame. */
+  readonly frame = signal<Frame | null>(null);
   readonly #api: Api;
   readonly #now_s: () => number;
   #place: Pixel | null = null;
@@ -43,12 +42,18 @@ export class Details {
     };
   }
 
+  /** What is known is of another scene, pixel or sequence than what is on screen. */
+  forget(): void {
+    batch(() => ([this.document.value, this.frame.value] = [null, null]));
+  }
+
   async #look(): Promise<void> {
     const [place, newest] = [this.#place, this.#newest];
     const known = this.document.peek();
     const sourceChanged = newest !== null && (newest.origin === LIVE) !== (this.#origin === LIVE);
-    const same = known !== null && known.x === place?.x && known.y === place.y && !sourceChanged;
-    if (!same) this.document.value = null;
+    const sequenceChanged = newest !== null && newest.meta.sequence_id !== known?.meta.sequence_id;
+    const same = known !== null && known.x === place?.x && known.y === place.y && !sourceChanged && !sequenceChanged;
+    if (!same) this.forget();
     if (place === null || newest === null || this.#asking) return;
     if (place.x >= newest.meta.width || place.y >= newest.meta.height) return;
     if (same) {
@@ -60,10 +65,12 @@ export class Details {
     this.#origin = newest.origin;
     try {
       const answer = await this.#ask(place, newest);
-      if (this.#place?.x === answer.x && this.#place.y === answer.y) this.document.value = answer;
+      const asked = this.#place?.x === answer.x && this.#place.y === answer.y;
+      if (asked && this.#newest?.meta.sequence_id === answer.meta.sequence_id)
+        batch(() => ([this.document.value, this.frame.value] = [answer, newest]));
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;
-      this.document.value = null; // asked again with the next frame
+      this.forget(); // asked again with the next frame
     } finally {
       this.#asking = false;
     }
@@ -76,7 +83,7 @@ export class Details {
     try {
       return await this.#api.pixel(x, y, liveFrame(meta.frame));
     } catch (error) {
-      if (!(error instanceof RequestError) || !GONE.includes(error.kind)) throw error;
+      if (!(error instanceof RequestError) || !error.isGone) throw error;
       return this.#api.pixel(x, y);
     }
   }

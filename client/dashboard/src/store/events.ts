@@ -1,7 +1,7 @@
 /** What happened, for people: notices of the service and what this page noticed, the newest last. */
 import { signal } from "@preact/signals";
 import { engineering, fixed, grouped } from "../scales/format";
-import type { AppliedDocument } from "../stream/documents";
+import type { AppliedDocument, SamplingDocument } from "../stream/documents";
 import type { Notice } from "../stream/protocol";
 
 export type EventTone = "plain" | "good" | "bad";
@@ -150,8 +150,14 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
   }
 }
 
-export function sequenceWords({ harmonics, exposure_s, images, base_frequency_hz }: AppliedDocument): string {
-  return `The sequence changed: ${engineering(base_frequency_hz, "Hz")}, m = ${harmonics}, ${engineering(exposure_s, "s")}, ${images} images.`;
+/** Which multiples of the base frequency are measured: 1 to m, or others that a camera has of its own. */
+export function multiplesWords(harmonics: number, sampling: SamplingDocument | null | undefined): string {
+  const multiples = sampling?.multiples ?? [];
+  return multiples.length === 0 ? `m = ${harmonics}` : `multiples ${multiples.join(", ")}`;
+}
+
+export function sequenceWords({ harmonics, sampling, exposure_s, images, base_frequency_hz }: AppliedDocument): string {
+  return `The sequence changed: ${engineering(base_frequency_hz, "Hz")}, ${multiplesWords(harmonics, sampling)}, ${engineering(exposure_s, "s")}, ${images} images.`;
 }
 
 /** Names the change to a sequence, of which service and page both know. */

@@ -97,6 +97,15 @@ export function isWhole({ region, decimation, width, height }: FrameMeta): boole
   return decimation === 1 && region[2] === width && region[3] === height;
 }
 
+/** Which pixels of a frame the service sent, in words; "" for all. */
+export function sentWords(meta: FrameMeta): string {
+  if (isWhole(meta)) return "";
+  return meta.decimation > 1 ? THINNED : "what was in sight";
+}
+
+/** Pixels are left out in both directions. */
+export const THINNED = "every 2nd pixel";
+
 /** Values of a map as they are drawn: pixels that were not sent like those beside them. */
 export function drawnOf(frame: Frame): Numbers {
   const { values, shape } = frame;

@@ -5,8 +5,6 @@ import { COLOUR_MAPS, type ColourMapName } from "../scales/colourMaps";
 import { autoLimits, type Scale, type ScaleKind, type Span, symmetric } from "../scales/scale";
 import type { Frame, Frames } from "./frames";
 import { MAP_PRODUCTS, type MapProduct } from "./mapCatalogue";
-import { mapFrame } from "./mapFrames";
-import type { Noises } from "./noise";
 import { type Kind, oneOf, type Setting, type Settings } from "./settings";
 
 /** Where the ends of a scale stand before anything was measured. */
@@ -55,8 +53,8 @@ export class Looks {
   readonly locked = signal(false);
   readonly #all: ReadonlyMap<string, Look>;
 
-  constructor(frames: Frames, noises: Noises, settings: Settings) {
-    this.#all = new Map(MAP_PRODUCTS.map((shown) => [shown.product, new Look(shown, mapFrame(frames, noises, shown), settings)]));
+  constructor(frames: Frames, settings: Settings) {
+    this.#all = new Map(MAP_PRODUCTS.map((shown) => [shown.product, new Look(shown, frames.of(shown.product), settings)]));
   }
 
   of(product: string): Look {

@@ -12,8 +12,6 @@ export interface MapProduct {
   readonly decimals: number;
   /** Zero means something: limits lie evenly around it. */
   readonly signed?: boolean;
-  /** The product whose scatter over frames this page measures; absent for what the service computes. */
-  readonly scatterOf?: string;
 }
 
 /** The maps on offer, in the order of their tabs. */
@@ -57,23 +55,13 @@ export const MAP_PRODUCTS: readonly MapProduct[] = [
     signed: true,
   },
   {
-    product: "range_std",
-    name: "Deviation",
-    hint: "Standard deviation of the range that the noise of the sensor predicts, by the likelihood estimate",
+    product: "range_error",
+    name: "Error",
+    hint: "Half of the 90 % interval of each pixel's range, of noise and bias",
     unit: "m",
     colours: "cividis",
     scale: "logarithmic",
     decimals: 4,
-  },
-  {
-    product: "range_scatter",
-    name: "Scatter",
-    hint: "Standard deviation of the range over the last 30 frames, as measured here",
-    unit: "m",
-    colours: "cividis",
-    scale: "logarithmic",
-    decimals: 4,
-    scatterOf: "range",
   },
 ];
 

@@ -51,11 +51,6 @@ export class Noise {
     const count = this.#count[at] ?? 0;
     return count < FEWEST ? NaN : Math.sqrt(this.#square[at] / (1 - SQUARED_WEIGHTS[count]));
   }
-
-  /** Standard deviations of all pixels. */
-  map(): Float32Array {
-    return Float32Array.from(this.#count, (_, at) => this.std(at));
-  }
 }
 
 /** Counts beyond this change the sum of squared weights no more. */

@@ -1,6 +1,6 @@
 import { computed, signal } from "@preact/signals";
 
-import type { Decision } from "../stream/connection";
+import type { Decision } from "../stream/demand";
 import type { FrameMeta } from "../stream/documents";
 import type { CameraState } from "../stream/protocol";
 

@@ -140,11 +140,14 @@ export class Store {
     this.sequencing = new Sequencing(api, this.events, this.sequence);
     this.accuracy = new Accuracy(api);
     this.replay = new Replay(api, this.frames, this.status);
-    this.rangeErrors = new RangeErrors(this.frames, this.status, this.replay.active);
+    this.rangeErrors = new RangeErrors(this.frames, this.status, this.replay.active, this.held);
     this.trends = new Trends(this.status, this.rangeErrors);
     api.onRefusal = (problem) => {
       this.lease.refused(kindOf(problem));
-      if (problem.status === 401) this.asksForToken.value = true;
+      if (problem.status !== 401) return;
+      this.api.credentials.refused.value = problem;
+      this.caller.forget();
+      this.asksForToken.value = true;
     };
     this.details = new Details(api);
     const aMap = oneOf(MAP_PRODUCTS.map(({ product }) => product));
@@ -172,7 +175,7 @@ export class Store {
       if (!seesLight && JSON.stringify(this.layout.peek()) === JSON.stringify(OVERVIEW)) this.layout.value = SPACE;
     });
     this.layouts = new Layouts(settings, this.layout);
-    this.looks = new Looks(this.frames, this.noises, settings);
+    this.looks = new Looks(this.frames, settings);
     this.light = new TransientLook(this.frames.of("coefficients"), settings);
     this.measures = new Measures(settings);
     this.viewport = new Viewport(settings);

@@ -5,10 +5,8 @@
  */
 import { Announced, type Announcement } from "./announced";
 import { codesFor } from "./compact";
-import { type Demand, DemandControl, EVERYTHING } from "./demand";
+import { type Decision, type Demand, DemandControl, EVERYTHING } from "./demand";
 import type { CameraDocument } from "./documents";
-import type { FluencyReport } from "./fluency";
-import { PaceControl } from "./pace";
 import {
   ANNOUNCING,
   decodeMessage,
@@ -46,15 +44,6 @@ export interface Surroundings {
   bring(announcement: Announcement, query: string): Promise<ArrayBuffer>;
 }
 
-/** What is asked for, and why less than everything; null for what is no reason. */
-export interface Decision {
-  readonly demand: Demand;
-  /** What the link carried. */
-  readonly carried_bytes_s: number | null;
-  /** Pictures of the light a second that the page drew while it took all frames. */
-  readonly pictures_hz: number | null;
-}
-
 export type ConnectionEvent =
   | { readonly type: "connecting" }
   | { readonly type: "open" }
@@ -70,8 +59,6 @@ export const CREDITS = 2;
 
 /** Frames of so many pixels are announced by the stream, and requested: smaller ones come sooner as messages. */
 const LARGE_PIXELS = 2 ** 16;
-/** So long after the last report light may still move; it comes every 2 s. */
-const MOVING_S = 4;
 const FIRST_RETRY_S = 0.5;
 const LONGEST_RETRY_S = 8;
 /** The service admits no client without a valid token. */
@@ -91,11 +78,7 @@ export class StreamConnection {
   #attempts = 0;
   #timer: number | null = null;
   #inFlight = new Set<number>();
-  readonly #link = new DemandControl();
-  #carried_bytes_s = 0;
-  #pace = new PaceControl();
-  /** When the page last said how fluently light moves. */
-  #moved_s = -Infinity;
+  readonly #control = new DemandControl();
   #adapts = true;
   /** The part of the picture in sight: column and row of its first pixel, width and height; null for all of it. */
   #sight: readonly number[] | null = null;
@@ -152,21 +135,20 @@ export class StreamConnection {
     const done = Math.min(frame, this.#announced.done); // the service keeps a frame whose products are still requested
     const known = this.#inFlight.size;
     for (const number of this.#inFlight) if (number <= done) this.#inFlight.delete(number);
-    if (this.#inFlight.size === 0) this.#link.drewAll(this.#around.now_s());
+    if (this.#inFlight.size === 0) this.#control.drewAll(this.#around.now_s());
     if (this.#open && (done === frame || this.#inFlight.size < known)) this.#socket?.send(encodeAck(done));
   }
 
-  /** How fluently light moved on the page over a while. */
-  moved(report: FluencyReport): void {
-    this.#moved_s = this.#around.now_s();
-    if (this.#adapts && this.#open && this.#pace.judge(report)) this.#askAnew();
+  /** Pictures a second of light that moves on the page. */
+  moved(pictures_hz: number): void {
+    this.#control.pictured(pictures_hz);
   }
 
-  /** Light stands still, or something is measured: however slow pictures were, they are not what is waited for. */
-  rested(): void {
-    if (this.#pace.maxRate_hz === null) return;
-    this.#pace = new PaceControl();
-    this.#askAnew();
+  /** Light stands still or is measured from now on, or does not any more. */
+  rest(rests: boolean): void {
+    const asked = this.#demand;
+    this.#control.rest(rests);
+    if (this.#demand !== asked) this.#askAnew();
   }
 
   /** Tries at once instead of waiting out the pause between attempts. */
@@ -208,7 +190,7 @@ export class StreamConnection {
     const products = this.#products.length === 0 ? LEAST_PRODUCTS : this.#products;
     this.#inFlight.clear(); // the service forgets them too
     this.#announced.clear();
-    this.#link.restart();
+    this.#control.restart();
     this.#socket?.send(
       encodeSubscribe(
         products.map((product) => this.#subscriptionOf(product)),
@@ -253,31 +235,19 @@ export class StreamConnection {
     if (this.#open) this.#subscribe();
   }
 
-  /** What link and page can take. */
   get #demand(): Demand {
-    const { demand } = this.#link;
-    const limit_hz = this.#pace.maxRate_hz;
-    if (limit_hz === null) return demand;
-    return { ...demand, maxRate_hz: Math.min(limit_hz, demand.maxRate_hz ?? Infinity), part: demand.part || this.#pace.part };
+    return this.#control.demand;
   }
 
   #askForAll(): void {
     const asked = this.#demand;
-    this.#link.reset();
-    this.#pace = new PaceControl();
+    this.#control.reset();
     if (asked !== EVERYTHING) this.#askAnew();
   }
 
   /** Says what is asked for now, and asks for it. */
   #askAnew(): void {
-    const pictures_hz = this.#pace.maxRate_hz === null ? null : this.#pace.before_hz;
-    this.#link.limited = pictures_hz !== null;
-    this.#emit({
-      type: "demand",
-      demand: this.#demand,
-      carried_bytes_s: this.#link.demand === EVERYTHING ? null : this.#carried_bytes_s,
-      pictures_hz,
-    });
+    this.#emit({ type: "demand", ...this.#control.decision });
     if (this.#open) this.#subscribe();
   }
 
@@ -285,17 +255,12 @@ export class StreamConnection {
   #weigh(message: ServerMessage, bytes: number): void {
     if (!this.#adapts) return;
     if (message.type === "notice" && message.kind === "dropped")
-      this.#link.dropped(message.channel, message.unacknowledged ?? message.count);
+      this.#control.dropped(message.channel, message.unacknowledged ?? message.count);
     if (message.type === "notice" && message.kind === "sequence-changed") this.#askForAll();
     if (message.type !== "frame") return;
     const { product, axes, array, meta } = message;
     this.#codes.set(product, codesFor(axes, array.dtype));
-    const now_s = this.#around.now_s();
-    this.#link.excused = this.#pace.acts && now_s - this.#moved_s < MOVING_S;
-    const decision = this.#link.arrived(now_s, meta.frame, bytes);
-    if (decision === null) return;
-    this.#carried_bytes_s = decision.carried_bytes_s;
-    this.#askAnew();
+    if (this.#control.arrived(this.#around.now_s(), meta.frame, bytes)) this.#askAnew();
   }
 
   #receive(data: ArrayBuffer): void {

@@ -3,7 +3,6 @@
 import type { Announcement } from "./announced";
 import { type ConnectionEvent, FrameGone, StreamConnection } from "./connection";
 import type { CameraDocument } from "./documents";
-import type { FluencyReport } from "./fluency";
 import { frameUrl } from "./frameUrl";
 import { decodeMessage, type Problem, ProtocolError } from "./protocol";
 import { type FrameReport, summarised } from "./summary";
@@ -16,8 +15,8 @@ export type Command =
   | { readonly type: "adapt"; readonly adapts: boolean }
   | { readonly type: "look"; readonly sight: readonly number[] | null }
   | { readonly type: "acknowledge"; readonly frame: number }
-  | ({ readonly type: "moved" } & FluencyReport)
-  | { readonly type: "rested" }
+  | { readonly type: "moved"; readonly pictures_hz: number }
+  | { readonly type: "rest"; readonly rests: boolean }
   | { readonly type: "retry" }
   | { readonly type: "bring"; readonly ticket: number; readonly path: string; readonly products: readonly string[] };
 
@@ -131,10 +130,10 @@ scope.onmessage = ({ data: command }) => {
       connection?.acknowledge(command.frame);
       break;
     case "moved":
-      connection?.moved(command);
+      connection?.moved(command.pictures_hz);
       break;
-    case "rested":
-      connection?.rested();
+    case "rest":
+      connection?.rest(command.rests);
       break;
     case "bring":
       void bring(command.ticket, command.path, command.products);

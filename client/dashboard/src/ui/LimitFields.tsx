@@ -1,4 +1,5 @@
 import { useSignal } from "@preact/signals";
+import { numberOf } from "../scales/format";
 import type { Span } from "../scales/scale";
 import type { Look, Looks } from "../store/looks";
 import { Check } from "./controls";
@@ -6,8 +7,8 @@ import "./LimitFields.css";
 
 /** Limits with one end typed anew, or why they make no sense. */
 export function typed({ low, high }: Span, end: keyof Span, text: string): Span | string {
-  const value = Number(text.trim().replace(",", "."));
-  if (text.trim() === "" || !Number.isFinite(value)) return `${text.trim() === "" ? "Nothing" : `“${text}”`} is no number.`;
+  const value = numberOf(text);
+  if (!Number.isFinite(value)) return `${text.trim() === "" ? "Nothing" : `“${text}”`} is no number.`;
   const limits = { low, high, [end]: value };
   return limits.high > limits.low ? limits : `The low end must lie below the high end: ${limits.low} does not lie below ${limits.high}.`;
 }

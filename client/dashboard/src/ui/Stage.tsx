@@ -1,7 +1,8 @@
-import { computed } from "@preact/signals";
+import { computed, type ReadonlySignal, useComputed } from "@preact/signals";
 import type { ComponentChildren } from "preact";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 
+import { type Frame, sentWords } from "../store/frames";
 import { regionOf } from "../store/measures";
 import { type Pixel, stepped } from "../store/pixel";
 import { useStore } from "../store/store";
@@ -14,6 +15,8 @@ interface StageProps {
   readonly width: number;
   readonly height: number;
   readonly label: string;
+  /** What it is a picture of. */
+  readonly frame: ReadonlySignal<Frame | null>;
   /** The canvas. */
   readonly children: ComponentChildren;
 }
@@ -40,7 +43,7 @@ interface Drag {
  * selected pixel, + and − zoom, Enter pins it, R marks a region around it, C sets a corner there and Escape takes
  * regions and pins away.
  */
-export function Stage({ width, height, label, children }: StageProps) {
+export function Stage({ width, height, label, frame, children }: StageProps) {
   const store = useStore();
   const { viewport, measures } = store;
   const picture = useRef<HTMLDivElement>(null);
@@ -128,6 +131,7 @@ export function Stage({ width, height, label, children }: StageProps) {
     [viewport],
   );
   const zoomed = viewport.view.value !== WHOLE;
+  const sent = useComputed(() => (frame.value === null ? "" : sentWords(frame.value.meta))).value;
   return (
     <div class="stage" style={{ "--aspect": width / height }}>
       <div
@@ -150,6 +154,11 @@ export function Stage({ width, height, label, children }: StageProps) {
           {children}
         </div>
         <Marks width={width} height={height} />
+        {sent !== "" && (
+          <span class="stage-sent" title="The other pixels were not sent: they are drawn like those beside them, and have no value">
+            {sent}
+          </span>
+        )}
       </div>
       {zoomed && (
         <button type="button" class="stage-whole" title="Show the whole picture (double click)" onClick={() => viewport.reset()}>

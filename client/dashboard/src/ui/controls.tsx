@@ -113,3 +113,27 @@ export function Toggle({ pressed, title, onToggle, children }: ToggleProps) {
     </button>
   );
 }
+
+interface NumberFieldProps {
+  readonly label: string;
+  readonly unit: string;
+  readonly name: string;
+  readonly value: string;
+  readonly onType: (text: string) => void;
+  readonly placeholder?: string;
+  readonly "aria-invalid"?: boolean;
+  readonly "aria-describedby"?: string;
+}
+
+/** A number as it is typed, with its unit. */
+export function NumberField({ label, unit, onType, ...input }: NumberFieldProps) {
+  return (
+    <label class="field">
+      <span>{label}</span>
+      <span class="field-input">
+        <input type="text" inputMode="decimal" autocomplete="off" {...input} onInput={(event) => onType(event.currentTarget.value)} />
+        <span class="quiet">{unit}</span>
+      </span>
+    </label>
+  );
+}

@@ -23,8 +23,7 @@ export function savePicture(name: string, canvas: HTMLCanvasElement | null): voi
 /**
  * The numbers of a frame as NPY, as the service has them: all pixels, not in codes.
  *
- * Of a map that the page measures itself, and of a frame that the service has no more, those of the page: NaN where a
- * pixel was not sent.
+ * Of a frame that the service has no more, those of the page: NaN where a pixel was not sent.
  */
 export async function saveNumbers(api: Api, frame: Frame | null): Promise<void> {
   if (frame === null) return;

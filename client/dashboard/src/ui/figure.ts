@@ -3,7 +3,9 @@
 import { type ColourMapName, colourTable, LEVELS, levelOf } from "../scales/colourMaps";
 import { engineering, fixed, significant, withUnit } from "../scales/format";
 import { decimalsFor, fraction, niceStep, type Scale, ticks } from "../scales/scale";
-import type { FrameMeta } from "../stream/documents";
+import { multiplesWords } from "../store/events";
+import { sentWords } from "../store/frames";
+import type { AppliedDocument, FrameMeta } from "../stream/documents";
 
 export interface Figure {
   /** The picture as an address that stands in the file; null leaves its place empty. */
@@ -41,10 +43,13 @@ export function figureLayout(columns: number, rows: number, wide: number): Figur
   return { width: left + pictureWidth + right, height: top + pictureHeight + bottom, left, top, pictureWidth, pictureHeight };
 }
 
-/** What was measured with, in a line. */
-export function captionOf({ harmonics, base_frequency_hz, zeroth, exposure_s, takes, calibration_id, frame }: FrameMeta): string {
-  const sequence = `m = ${harmonics}, ${engineering(base_frequency_hz, "Hz", 4)}, b₀ ${zeroth.replaceAll("_", " ")}, ${engineering(exposure_s, "s")} × ${takes}`;
-  return `${sequence}; calibration ${calibration_id === "" ? "none" : calibration_id}; frame ${frame}`;
+/** What was measured with, in a line, and which pixels were. */
+export function captionOf(meta: FrameMeta, applied: AppliedDocument | null): string {
+  const { harmonics, base_frequency_hz, zeroth, exposure_s, takes, calibration_id, estimator, frame } = meta;
+  const measured = multiplesWords(harmonics, applied?.sequence_id === meta.sequence_id ? applied?.sampling : null);
+  const sequence = `${measured}, ${engineering(base_frequency_hz, "Hz", 4)}, b₀ ${zeroth.replaceAll("_", " ")}, ${engineering(exposure_s, "s")} × ${takes}`;
+  const sent = sentWords(meta);
+  return `${sequence}; ${estimator}; calibration ${calibration_id || "none"}; frame ${frame}${sent && `, ${sent}`}`;
 }
 
 export function figureSvg(figure: Figure, layout: FigureLayout): string {

@@ -9,7 +9,11 @@ const PNG_SCALE = 2;
 /** What a figure is made of, but for its picture, which is a canvas of the sensor's size. */
 export type FigureParts = Omit<Figure, "picture" | "columns" | "rows">;
 
-/** Hands a figure of a canvas out. Of WebGL only in the task that drew it. */
+/**
+ * Hands a figure of a canvas out, as canvas and words are when this is called: the light plays on while it is drawn.
+ *
+ * Of WebGL only in the task that drew it.
+ */
 export async function saveFigure(name: string, canvas: HTMLCanvasElement | null, parts: FigureParts, kind: "png" | "svg"): Promise<void> {
   if (canvas === null) return;
   const [columns, rows] = [canvas.width, canvas.height];
@@ -22,8 +26,7 @@ export async function saveFigure(name: string, canvas: HTMLCanvasElement | null,
   const drawn = document.createElement("canvas");
   [drawn.width, drawn.height] = [PNG_SCALE * layout.width, PNG_SCALE * layout.height];
   const context = drawn.getContext("2d") as CanvasRenderingContext2D;
-  context.drawImage(await imageOf(svg), 0, 0, drawn.width, drawn.height);
-  // The picture again, pixel by pixel: a browser may smooth what is within an SVG.
+  // The picture first, before anything moves, and pixel by pixel: a browser may smooth what is within an SVG.
   context.imageSmoothingEnabled = false;
   context.drawImage(
     canvas,
@@ -32,6 +35,8 @@ export async function saveFigure(name: string, canvas: HTMLCanvasElement | null,
     PNG_SCALE * layout.pictureWidth,
     PNG_SCALE * layout.pictureHeight,
   );
+  context.globalCompositeOperation = "destination-over";
+  context.drawImage(await imageOf(svg), 0, 0, drawn.width, drawn.height);
   const content = await new Promise<Blob | null>((done) => drawn.toBlob(done, "image/png"));
   if (content !== null) save(`${name}.png`, content);
 }

@@ -1,6 +1,7 @@
 /** What a pixel says about itself: the bits of the product `flags`, their names at the service, and words. */
 
 export interface Flag {
+  /** Its bit, or its code where a pixel has one alone. */
   readonly bit: number;
   /** As the service calls it. */
   readonly name: string;
@@ -44,6 +45,20 @@ export const FLAGS: readonly Flag[] = [
     words: "normal: sharp returns or noise left no even light, and the moments were moved to the nearest that have some",
     colour: "#7f93a3",
   },
+];
+
+/** Why a range is not trusted: the codes of the product `trust`. */
+export const DISTRUST: readonly Flag[] = [
+  { bit: 1, name: "no_range", title: "No range", words: "there is none: too little light, or too much", colour: "#1b2a6b" },
+  { bit: 2, name: "corrupt_image", title: "Corrupt image", words: "an image was lost or out of step", colour: "#cc79a7" },
+  { bit: 3, name: "motion", title: "Motion", words: "the light changed while the frame was captured", colour: "#f0e442" },
+  { bit: 4, name: "no_direct_light", title: "No direct light", words: "too bright for this range: light came around", colour: "#d55e00" },
+  { bit: 5, name: "shadow", title: "Shadow", words: "what is nearer hides this point from the lamp", colour: "#7f93a3" },
+  { bit: 6, name: "edge", title: "Edge", words: "near and far meet here", colour: "#56b4e9" },
+  { bit: 7, name: "later_light_unresolved", title: "Merged light", words: "later light is merged with the first", colour: "#e69f00" },
+  { bit: 8, name: "later_light", title: "Later light", words: "a return close behind may have moved the first", colour: "#009e73" },
+  { bit: 9, name: "drift", title: "Drift", words: "the camera is much warmer or colder than at its calibration", colour: "#b8860b" },
+  { bit: 10, name: "noise", title: "Noise", words: "the noise leaves the range open", colour: "#a0522d" },
 ];
 
 /** The gravest flag of a pixel; null where nothing was wrong. */

@@ -8,6 +8,19 @@ export function paint(values: ArrayLike<number>, scale: Scale, colours: ColourMa
   for (let pixel = 0; pixel < pixels.length; pixel++) pixels[pixel] = pick(values[pixel]);
 }
 
+const [DARK, LIGHT] = [0xa0000000, 0xa0ffffff];
+
+/** Draws dark and light diagonal lines over the pixels that have a reason, on RGBA pixels, `scale` to each across and down. */
+export function hatch(reasons: ArrayLike<number>, columns: number, scale: number, pixels: Uint32Array): void {
+  const width = scale * columns;
+  for (let at = 0; at < pixels.length; at++) {
+    const [x, y] = [at % width, Math.floor(at / width)];
+    const line = (x + y) % (2 * scale);
+    if (line > 1 || reasons[Math.floor(y / scale) * columns + Math.floor(x / scale)] === 0) continue;
+    pixels[at] = line === 0 ? DARK : LIGHT;
+  }
+}
+
 /** The colour of a value as RGBA bytes in one number; 0, which is clear, where there is no value. */
 export function picker(scale: Scale, colours: ColourMapName): (value: number) => number {
   const table = new Uint32Array(colourTable(colours).buffer);

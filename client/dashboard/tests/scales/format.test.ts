@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 
-import { engineering, fixed, grouped, significant, superscript } from "../../src/scales/format";
+import { engineering, fixed, grouped, numberOf, significant, superscript } from "../../src/scales/format";
 
 const plain = (text: string): string => text.replaceAll("\u202f", " ");
 
@@ -27,4 +27,9 @@ test("thousands stand apart, and a minus is a minus", () => {
   expect(grouped(0)).toBe("0");
   expect(fixed(-1.5, 1)).toBe("−1.5");
   expect(superscript(-12)).toBe("⁻¹²");
+});
+
+test("a typed number has a decimal point or comma", () => {
+  expect(["12.5", " 12,5 ", "1e-3", "-3"].map(numberOf)).toEqual([12.5, 12.5, 1e-3, -3]);
+  for (const text of ["", " ", "1,234.5", "1,2,3", "three"]) expect(numberOf(text)).toBeNaN();
 });

@@ -1,4 +1,4 @@
-import { expect, test } from "vitest";
+import { expect, test, vi } from "vitest";
 
 import { Api } from "../../src/store/api";
 import { Caller } from "../../src/store/caller";
@@ -28,4 +28,16 @@ test("a caller that is refused from now on is forgotten", async () => {
   await caller.look();
   expect(caller.document.value).toBeNull();
   expect(caller.obstacle.value).toBeNull();
+});
+
+test("a service that prepares its kernels is asked until they are ready", async () => {
+  vi.useFakeTimers();
+  let left_s = 3;
+  const caller = answering(() => Response.json({ caller: {}, kernels: left_s > 0 ? { preparing: ["returns"], left_s: left_s-- } : null }));
+  await caller.look();
+  expect(caller.kernels.value).toEqual({ preparing: ["returns"], left_s: 3 });
+  await vi.advanceTimersByTimeAsync(60_000);
+  expect(caller.kernels.value).toBeNull();
+  expect(vi.getTimerCount()).toBe(0);
+  vi.useRealTimers();
 });

@@ -6,7 +6,8 @@ import { Details } from "../../src/store/details";
 import type { Frame } from "../../src/store/frames";
 import type { Pixel } from "../../src/store/pixel";
 
-const frame = (number: number): Frame => ({ origin: LIVE, meta: { frame: number, width: 10, height: 10 } }) as Frame;
+const frame = (number: number, sequence_id = 1): Frame =>
+  ({ origin: LIVE, meta: { frame: number, sequence_id, width: 10, height: 10 } }) as Frame;
 const settled = (): Promise<void> => new Promise((done) => setTimeout(done));
 
 function watched() {
@@ -16,17 +17,17 @@ function watched() {
   const api = {
     pixel: (x: number, y: number) => {
       asked.push(`${x},${y}`);
-      return Promise.resolve({ x, y, meta: { frame: number } });
+      return Promise.resolve({ x, y, meta: { frame: number, sequence_id: 1 } });
     },
   } as unknown as Api;
   const details = new Details(api, () => now_s);
   const pixel = signal<Pixel | null>(null);
   const newest = signal<Frame | null>(frame(1));
   const end = details.follow(pixel, newest);
-  const arrive = (after_s: number): void => {
+  const arrive = (after_s: number, sequence_id?: number): void => {
     now_s += after_s;
     number += 1;
-    newest.value = frame(number);
+    newest.value = frame(number, sequence_id);
   };
   return { asked, details, pixel, arrive, end };
 }
@@ -65,6 +66,18 @@ test("what is known of one pixel is not shown as another's", async () => {
   end();
 });
 
+test("what is known goes with the frame that it is of, and is forgotten with its sequence", async () => {
+  const { details, pixel, arrive, end } = watched();
+  pixel.value = { x: 3, y: 4 };
+  await settled();
+  expect(details.frame.value?.meta.frame).toBe(1);
+  arrive(0.1); // too soon to ask: it stays beside what was found in it
+  expect([details.document.value?.meta.frame, details.frame.value?.meta.frame]).toEqual([1, 1]);
+  arrive(0.1, 2);
+  expect([details.document.value, details.frame.value]).toEqual([null, null]);
+  end();
+});
+
 /** A service whose newest frame is 90, and which keeps no frame before 80. */
 function keeping(): { api: Api; asked: string[] } {
   const asked: string[] = [];
@@ -72,7 +85,7 @@ function keeping(): { api: Api; asked: string[] } {
     asked.push(address);
     const number = address === LIVE ? 90 : Number(address.split("/").pop());
     if (number < 80) return Promise.reject(new RequestError({ type: "/problems/frame-gone" }));
-    return Promise.resolve({ x, y, meta: { frame: number } });
+    return Promise.resolve({ x, y, meta: { frame: number, sequence_id: 1 } });
   };
   return { api: { pixel } as unknown as Api, asked };
 }

@@ -11,7 +11,7 @@ const meta = (frame: number, host_time_s: number): FrameMeta =>
 
 function followed(): { status: Status; trends: Trends } {
   const status = new Status();
-  return { status, trends: new Trends(status, new RangeErrors(new Frames(), status, signal(false))) };
+  return { status, trends: new Trends(status, new RangeErrors(new Frames(), status, signal(false), signal(false))) };
 }
 
 describe("trends", () => {

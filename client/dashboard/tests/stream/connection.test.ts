@@ -121,7 +121,7 @@ beforeEach(() => {
   world.connection.want(["range"]);
 });
 
-describe("over a thin link", () => {
+describe("that is too slow", () => {
   const picture = (number: number): unknown => ({
     type: "frame",
     product: "range",
@@ -130,146 +130,77 @@ describe("over a thin link", () => {
     array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) },
   });
   const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.subscriptions;
-  /** A frame every 2 s of a camera that takes ten a second, drawn at once. */
-  const starves = async (): Promise<void> => {
-    for (let frame = 1; frame <= 5; frame++) {
-      world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: 19, total: 19 });
-      world.socket.receives(picture(20 * frame));
-      world.connection.acknowledge(20 * frame);
-      await world.passes(2);
+  let number = 0;
+  /** So many frames, one each `every_s`, of a camera that takes ten a second, drawn at once. */
+  const come = async (frames: number, every_s: number, pictures_hz?: number): Promise<void> => {
+    for (let n = 0; n < frames; n++) {
+      const lost = 10 * every_s - 1;
+      if (lost > 0) world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: lost, total: lost });
+      if (pictures_hz !== undefined) world.connection.moved(pictures_hz);
+      number += 10 * every_s;
+      world.socket.receives(picture(number));
+      world.connection.acknowledge(number);
+      await world.passes(every_s);
     }
   };
+  const ALL = [{ product: "range", max_rate_hz: null }];
 
-  test("asks for fewer and smaller frames and says so, and for all when the user says", async () => {
+  beforeEach(() => {
+    number = 0;
     world.socket.opens();
-    await starves();
+  });
+
+  test("a link is asked for smaller frames and says so, and for all when the user says", async () => {
+    await come(3, 4);
+    expect(asked()).toMatchObject([{ product: "range", encoding: "u16" }]);
+    await come(5, 2);
     expect(asked()).toMatchObject([{ product: "range", encoding: "u16", decimation: 2 }]);
     expect(world.events.filter(({ type }) => type === "demand")).toMatchObject([
-      { demand: { coded: true, part: false } },
+      { demand: { coded: true, part: false }, carried_bytes_s: expect.any(Number) as number, pictures_hz: null },
       { demand: { coded: true, part: true } },
     ]);
     world.connection.look([3, 4, 50, 60]);
     expect(asked()).toMatchObject([{ encoding: "u16", region: [3, 4, 50, 60] }]);
     world.connection.adapt(false);
-    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
-    expect(world.events.at(-1)).toMatchObject({ type: "demand", demand: { maxRate_hz: null } });
-    await starves();
-    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+    expect(asked()).toEqual(ALL);
+    expect(world.events.at(-1)).toMatchObject({ type: "demand", demand: { coded: false, part: false } });
+    await come(6, 4);
+    expect(asked()).toEqual(ALL);
   });
 
-  test("asks for all of another sequence, and for what is in sight only while it asks for parts", async () => {
-    world.socket.opens();
+  test("a browser is asked for fewer frames and says so", async () => {
+    await come(60, 0.1, 14.5);
+    expect(asked()).toEqual([{ product: "range", max_rate_hz: expect.closeTo(5, 1) as number }]);
+    expect(world.events.filter(({ type }) => type === "demand")).toMatchObject([{ carried_bytes_s: null, pictures_hz: 14.5 }]);
+  });
+
+  test("all is asked for while light rests, and of another sequence", async () => {
     world.connection.look([3, 4, 50, 60]);
-    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
-    await starves();
+    await come(3, 4);
+    const less = asked();
+    expect(less).not.toEqual(ALL);
+    world.connection.rest(true);
+    expect(asked()).toEqual(ALL);
+    expect(world.events.at(-1)).toMatchObject({ carried_bytes_s: null, demand: { coded: false } });
+    world.connection.rest(false);
+    expect(asked()).toEqual(less);
     world.socket.receives({ type: "notice", kind: "sequence-changed", sequence: {} });
-    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
-  });
-});
-
-describe("with a slow browser", () => {
-  const asked = (): unknown => world.socket.sent.filter(({ type }) => type === "subscribe").at(-1)?.subscriptions;
-  const stutters = (): void => {
-    for (let window = 0; window < 2; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: 16, camera_hz: 16 });
-  };
-
-  test("asks for fewer frames and says so, and for all when the user says", () => {
-    world.socket.opens();
-    stutters();
-    expect(asked()).toEqual([{ product: "range", max_rate_hz: 8 }]);
-    expect(world.events.at(-1)).toEqual({
-      type: "demand",
-      demand: { maxRate_hz: 8, coded: false, part: false },
-      carried_bytes_s: null,
-      pictures_hz: 14.5,
-    });
-    world.connection.adapt(false);
-    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
-    expect(world.events.at(-1)).toMatchObject({ type: "demand", demand: { maxRate_hz: null }, pictures_hz: null });
-    stutters();
-    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
+    expect(asked()).toEqual(ALL);
   });
 
-  test("asks for everything as soon as nothing moves", () => {
-    world.socket.opens();
-    for (let window = 0; window < 5; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: 1, camera_hz: 16 });
-    expect(asked()).toEqual([expect.objectContaining({ decimation: 2 })]);
-    world.connection.rested();
-    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
-    expect(world.events.at(-1)).toMatchObject({ type: "demand", demand: { maxRate_hz: null, part: false } });
-  });
-
-  test("asks for more again where there is room, and for all of another sequence", () => {
-    world.socket.opens();
-    stutters();
-    world.connection.moved({ pictures_hz: 50, frames_hz: 8, camera_hz: 16 });
-    expect(asked()).toEqual([{ product: "range", max_rate_hz: 12 }]);
-    world.socket.receives({ type: "notice", kind: "sequence-changed", sequence: {} });
-    expect(asked()).toEqual([{ product: "range", max_rate_hz: null }]);
-  });
-
-  test("asks for the part in sight where fewer frames do not do, whichever way they come", () => {
-    world.socket.opens();
-    for (let window = 0; window < 5; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: 1, camera_hz: 16 });
+  test("large frames are requested in the part that is in sight", async () => {
+    await come(15, 1, 14.5); // hardly as many frames as there could be fewer of
+    expect(asked()).toMatchObject([{ decimation: 2 }]);
     world.connection.look([3, 4, 50, 60]);
-    expect(asked()).toEqual([{ product: "range", max_rate_hz: expect.closeTo(0.7, 6) as number, region: [3, 4, 50, 60] }]);
+    expect(asked()).toMatchObject([{ region: [3, 4, 50, 60] }]);
     world.socket.receives({ type: "hello", channels: [{ product: "range", shape: [480, 640] }] });
     world.socket.receives({
       type: "frame",
       product: "range",
-      meta: { frame: 7, width: 640, height: 480, region: [0, 0, 1, 1], decimation: 1 },
+      meta: { frame: 700, width: 640, height: 480, region: [0, 0, 1, 1], decimation: 1 },
       array: { dtype: "|u1", shape: [1, 1], data: new Uint8Array(1) },
     });
-    expect(world.requested).toEqual(["7 range?region=3,4,50,60"]);
-  });
-
-  test("does not take frames that it is late for to be lost on the way, while it can ask for fewer and light moves", async () => {
-    world.socket.opens();
-    const late = async (frame: number, report: boolean): Promise<void> => {
-      world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: 9, total: 9 });
-      world.socket.receives({
-        type: "frame",
-        product: "range",
-        axes: ["y", "x"],
-        meta: { frame },
-        array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) },
-      });
-      world.connection.acknowledge(frame);
-      // slow, but from window to window not twice in a row
-      if (report) world.connection.moved({ pictures_hz: 40, frames_hz: 1, camera_hz: 16 });
-      if (report) world.connection.moved({ pictures_hz: 12, frames_hz: 1, camera_hz: 16 });
-      await world.passes(2);
-    };
-    for (let frame = 1; frame <= 6; frame++) await late(frame, true);
-    expect(world.events.filter(({ type }) => type === "demand")).toEqual([]);
-    for (let frame = 7; frame <= 12; frame++) await late(frame, false); // the light stands
-    expect(world.events.filter(({ type }) => type === "demand").at(-1)).toMatchObject({ pictures_hz: null, demand: { coded: true } });
-  });
-
-  test("asks for what both the link and the browser take", async () => {
-    world.socket.opens();
-    for (let frame = 1; frame <= 5; frame++) {
-      world.socket.receives({ type: "notice", kind: "dropped", channel: 0, count: 3, total: 3 });
-      world.socket.receives({
-        type: "frame",
-        product: "range",
-        axes: ["y", "x"],
-        meta: { frame: 4 * frame },
-        array: { dtype: "<f4", shape: [1, 1], data: new Uint8Array(4) },
-      });
-      world.connection.acknowledge(4 * frame);
-      await world.passes(1);
-    }
-    const [{ max_rate_hz: linked_hz }] = asked() as { max_rate_hz: number }[];
-    expect(linked_hz).toBeLessThan(2);
-    for (let window = 0; window < 2; window++) world.connection.moved({ pictures_hz: 14.5, frames_hz: linked_hz, camera_hz: 16 });
-    const event = world.events.at(-1);
-    expect(event).toMatchObject({
-      type: "demand",
-      pictures_hz: 14.5,
-      demand: { maxRate_hz: expect.closeTo(0.7 * linked_hz, 6) as number },
-    });
-    expect(event).not.toMatchObject({ carried_bytes_s: null });
+    expect(world.requested).toEqual(["700 range?region=3,4,50,60"]);
   });
 });
 

@@ -43,15 +43,24 @@ describe("a figure", () => {
   });
 });
 
-test("a caption says what was measured with", () => {
+test("a caption says what was measured with, and which pixels were", () => {
   const meta = {
     harmonics: 3,
     base_frequency_hz: 23e6,
     zeroth: "low-frequency",
     exposure_s: 1.92e-3,
     takes: 2,
+    estimator: "pisarenko",
     calibration_id: "nominal",
     frame: 7,
-  } as FrameMeta;
-  expect(captionOf(meta).replaceAll("\u202f", " ")).toBe("m = 3, 23.00 MHz, b₀ low-frequency, 1.92 ms × 2; calibration nominal; frame 7");
+    width: 163,
+    height: 120,
+    region: [0, 0, 163, 120],
+    decimation: 1,
+  } as unknown as FrameMeta;
+  const words = (changed: Partial<FrameMeta>): string => captionOf({ ...meta, ...changed }, null).replaceAll("\u202f", " ");
+  const all = "m = 3, 23.00 MHz, b₀ low-frequency, 1.92 ms × 2; pisarenko; calibration nominal; frame 7";
+  expect(words({})).toBe(all);
+  expect(words({ decimation: 2 })).toBe(`${all}, every 2nd pixel`);
+  expect(words({ region: [40, 30, 20, 10] })).toBe(`${all}, what was in sight`);
 });

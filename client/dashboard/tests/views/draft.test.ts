@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 
 import type { SequenceDocument } from "../../src/stream/documents";
-import { documentOf, draftOf } from "../../src/views/sequence/draft";
+import { documentOf, draftOf, missingOf } from "../../src/views/sequence/draft";
 
 const SEQUENCE: SequenceDocument = {
   base_frequency_hz: 23e6,
@@ -27,6 +27,10 @@ describe("a sequence being typed", () => {
   test("is no document while a field is empty or no number", () => {
     for (const harmonics of ["", "  ", "three", "1e999"]) {
       expect(documentOf({ ...draftOf(SEQUENCE), harmonics }, SEQUENCE)).toBeNull();
+      expect(missingOf({ ...draftOf(SEQUENCE), harmonics })).toBe("harmonics");
     }
   });
+
+  test("is read with a decimal comma", () =>
+    expect(documentOf({ ...draftOf(SEQUENCE), base_frequency_mhz: "12,5" }, SEQUENCE)?.base_frequency_hz).toBe(12.5e6));
 });

@@ -5,7 +5,6 @@ import { beyond, colourTable } from "../../src/scales/colourMaps";
 import { type Frame, Frames } from "../../src/store/frames";
 import { Look, Looks } from "../../src/store/looks";
 import { MAP_PRODUCTS } from "../../src/store/mapCatalogue";
-import { Noises } from "../../src/store/noise";
 import { Settings } from "../../src/store/settings";
 import { drawn, onBar } from "../../src/ui/ColourBar";
 import { typed } from "../../src/ui/LimitFields";
@@ -54,7 +53,7 @@ describe("the look of a map", () => {
 describe("looks", () => {
   const looks = (): Looks => {
     const frames = new Frames();
-    return new Looks(frames, new Noises(frames), new Settings(null));
+    return new Looks(frames, new Settings(null));
   };
 
   test("that are locked keep the same limits within a unit, and each its own again afterwards", () => {

@@ -76,21 +76,21 @@ describe("the distance of two pins", () => {
 
   test("is that of their points in space", () => {
     // both 4 m ahead: one on the axis, one 3 m to the right
-    const a = { x: 50, y: 40, range_m: 4, std_m: 0 };
-    const b = { x: 125, y: 40, range_m: 5, std_m: 0 };
+    const a = { x: 50, y: 40, range_m: 4, error_m: 0 };
+    const b = { x: 125, y: 40, range_m: 5, error_m: 0 };
     expect(distanceOf(lens, a, b).distance_m).toBeCloseTo(3, 5);
     expect(distanceOf(lens, b, a).distance_m).toBeCloseTo(3, 5);
   });
 
   test("has the deviation that small changes of the ranges give it", () => {
-    const a = { x: 10, y: 70, range_m: 2.5, std_m: 0.01 };
-    const b = { x: 90, y: 20, range_m: 4.1, std_m: 0.02 };
+    const a = { x: 10, y: 70, range_m: 2.5, error_m: 0.01 };
+    const b = { x: 90, y: 20, range_m: 4.1, error_m: 0.02 };
     const apart = (da: number, db: number): number =>
       distanceOf(lens, { ...a, range_m: a.range_m + da }, { ...b, range_m: b.range_m + db }).distance_m;
     const step = 1e-2;
     const byA = (apart(step, 0) - apart(-step, 0)) / (2 * step);
     const byB = (apart(0, step) - apart(0, -step)) / (2 * step);
-    expect(distanceOf(lens, a, b).std_m).toBeCloseTo(Math.hypot(byA * 0.01, byB * 0.02), 4);
+    expect(distanceOf(lens, a, b).error_m).toBeCloseTo(Math.hypot(byA * 0.01, byB * 0.02), 4);
   });
 });
 

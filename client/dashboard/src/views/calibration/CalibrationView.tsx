@@ -4,6 +4,7 @@ import { fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
 import type { CalibrationDocument, JobDocument } from "../../stream/documents";
 import { Confirm } from "../../ui/Confirm";
+import { NumberField } from "../../ui/controls";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
@@ -94,18 +95,14 @@ function MeasureForm({ task }: { task: Task }) {
           onInput={(event) => (name.value = event.currentTarget.value)}
         />
       </label>
-      <label class="field">
-        <span>Frames, with and without light</span>
-        <input
-          type="text"
-          inputMode="numeric"
-          name="frames"
-          autocomplete="off"
-          aria-invalid={!sensible}
-          value={frames.value}
-          onInput={(event) => (frames.value = event.currentTarget.value)}
-        />
-      </label>
+      <NumberField
+        label="Frames, with and without light"
+        unit=""
+        name="frames"
+        aria-invalid={!sensible}
+        value={frames.value}
+        onType={(text) => (frames.value = text)}
+      />
       <div class="record-actions">
         <Steer
           submit

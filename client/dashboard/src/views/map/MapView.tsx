@@ -17,7 +17,7 @@ import { useDrawing, useProducts } from "../../ui/hooks";
 import { LimitFields } from "../../ui/LimitFields";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
-import { paint } from "../../ui/paint";
+import { hatch, paint } from "../../ui/paint";
 import { Stage } from "../../ui/Stage";
 import { Measured } from "./Measured";
 import { Readout, valueAtPixel } from "./Readout";
@@ -40,7 +40,7 @@ interface MapPanelProps {
 function MapPanel({ name, choice }: MapPanelProps) {
   const store = useStore();
   const absent = store.frames.absent.value;
-  const obstacleOf = ({ product, scatterOf }: MapProduct): string | undefined => absent[scatterOf ?? product];
+  const obstacleOf = ({ product }: MapProduct): string | undefined => absent[product];
   const shown = MAP_PRODUCTS.find((each) => each.product === choice.value && obstacleOf(each) === undefined) ?? MAP_PRODUCTS[0];
   const look = store.looks.of(shown.product);
   const canvas = useRef<HTMLCanvasElement>(null);
@@ -49,7 +49,7 @@ function MapPanel({ name, choice }: MapPanelProps) {
     if (meta === undefined) return;
     const parts = {
       title: shown.name,
-      caption: captionOf(meta),
+      caption: captionOf(meta, store.sequence.peek()),
       scale: look.scale.peek(),
       colours: look.colours.peek(),
       unit: shown.unit,
@@ -107,7 +107,7 @@ interface MapProps {
 function MapPicture({ look, canvas }: MapProps) {
   const store = useStore();
   const { product: shown, frame } = look;
-  useProducts([shown.scatterOf ?? shown.product, store.frames.amplitude.value]);
+  useProducts([shown.product, store.frames.amplitude.value]);
   const { size, waiting, marked } = useMemo(
     () =>
       signalsOf(
@@ -144,8 +144,9 @@ function MapPicture({ look, canvas }: MapProps) {
   return (
     <>
       <div class="picture">
-        <Stage width={width} height={height} label={`${shown.name} map`}>
+        <Stage width={width} height={height} frame={frame} label={`${shown.name} map`}>
           <canvas ref={canvas} />
+          {shown.unit === "m" && <Hatch />}
           {waiting.value && <FirstFrame />}
         </Stage>
         {waiting.value ? (
@@ -167,6 +168,27 @@ function MapPicture({ look, canvas }: MapProps) {
       </footer>
     </>
   );
+}
+
+/** Screen pixels of the hatch to each of the sensor's. */
+const HATCH = 4;
+
+/** Hatches the pixels whose ranges are not trusted. */
+function Hatch() {
+  const trust = useStore().rangeErrors.of("trust");
+  const canvas = useRef<HTMLCanvasElement>(null);
+  useDrawing(() => {
+    const [frame, target] = [trust.value, canvas.current];
+    const context = target?.getContext("2d");
+    if (target === null || !context) return;
+    const [rows, columns] = frame?.shape ?? [0, 0];
+    [target.width, target.height] = [HATCH * columns, HATCH * rows]; // which clears it
+    if (frame === null) return;
+    const image = context.createImageData(target.width, target.height);
+    hatch(frame.values, columns, HATCH, new Uint32Array(image.data.buffer));
+    context.putImageData(image, 0, 0);
+  }, [trust]);
+  return <canvas ref={canvas} class="stage-hatch" title="Hatched: the range is not trusted" />;
 }
 
 function signalsOf({ frame }: Look, looked: ReadonlySignal<{ x: number; y: number } | null>) {

@@ -1,4 +1,3 @@
-import { useMemo } from "preact/hooks";
 import { deviation, fixed } from "../../scales/format";
 import type { Look } from "../../store/looks";
 import { PIN_COLOURS, type Pin } from "../../store/measures";
@@ -10,14 +9,14 @@ import { valueAtPixel } from "./Readout";
 /** The values at the pins, and how far what two of them see is apart. */
 export function PinsRow({ look }: { look: Look }) {
   const store = useStore();
-  const { measures, noises } = store;
+  const { measures, rangeErrors } = store;
   useProducts(["range"]);
-  const [noise, ranges] = useMemo(() => [noises.of("range"), store.frames.of("range")], [store, noises]);
+  const ranges = store.frames.of("range");
   const pins = measures.pins.value;
   const range = ranges.value;
   const ranged = (pin: Pin): Ranged | null => {
     const range_m = valueAtPixel(range, pin);
-    return Number.isNaN(range_m) ? null : { x: pin.x, y: pin.y, range_m, std_m: noise.std(pin.y * (range?.shape[1] ?? 0) + pin.x) };
+    return Number.isNaN(range_m) ? null : { x: pin.x, y: pin.y, range_m, error_m: rangeErrors.at("range_error", pin) };
   };
   const pairs = pins.flatMap((a, n) => pins.slice(n + 1).map((b) => [a, b] as const));
   return (
@@ -38,12 +37,12 @@ export function PinsRow({ look }: { look: Look }) {
             <span
               key={`${a.name}${b.name}`}
               data-distance={`${a.name}${b.name}`}
-              title="Distance of the two points in space, with 1 σ from the scatter of both ranges"
+              title="Distance of the two points in space, with half of the 90 % interval, from those of both ranges"
             >
               <span class="quiet">
                 {a.name} to {b.name}
               </span>{" "}
-              {fixed(apart?.distance_m, 3, "m")} <span class="quiet">{deviation(apart?.std_m, "m")}</span>
+              {fixed(apart?.distance_m, 3, "m")} <span class="quiet">{deviation(apart?.error_m, "m")}</span>
             </span>
           );
         })}

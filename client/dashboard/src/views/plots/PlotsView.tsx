@@ -26,8 +26,8 @@ export function PlotsView() {
   const store = useStore();
   const side = store.settings.of(SIDE);
   const look = store.looks.of(store.mapProduct.value);
-  const { product, name, scatterOf } = look.product;
-  useProducts([scatterOf ?? product]);
+  const { product, name } = look.product;
+  useProducts([product]);
   const key = `${product} ${side.value}`;
   const data = useMemo(() => signal<uPlot.AlignedData>([[]]), [key]);
   const csv = (): void => {

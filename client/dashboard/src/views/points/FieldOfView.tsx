@@ -1,5 +1,5 @@
 import { DEGREE } from "../../physics/constants";
-import { fixed } from "../../scales/format";
+import { fixed, numberOf } from "../../scales/format";
 import { useStore } from "../../store/store";
 import { fieldOfView } from "./cloud";
 import { FIELD_DEG, FIELDS_DEG, knownLens } from "./lens";
@@ -21,13 +21,13 @@ export function FieldOfView() {
       <span class="quiet">field of view</span>
       <input
         class="limit"
-        type="number"
-        min={5}
-        max={150}
+        type="text"
+        inputMode="decimal"
         value={field_deg.value}
         aria-label="Horizontal field of view in degrees"
         onChange={(event) => {
-          if (FIELDS_DEG.accepts(event.currentTarget.valueAsNumber)) field_deg.value = event.currentTarget.valueAsNumber;
+          const typed_deg = numberOf(event.currentTarget.value);
+          if (FIELDS_DEG.accepts(typed_deg)) field_deg.value = typed_deg;
         }}
       />
       °

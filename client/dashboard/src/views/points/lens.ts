@@ -28,22 +28,22 @@ export function lensOf(store: Store, width: number, height: number): Pinhole {
 /** A pixel with its range and the deviation of that, both in m. */
 export interface Ranged extends Pixel {
   readonly range_m: number;
-  readonly std_m: number;
+  readonly error_m: number;
 }
 
 /** Distance of what two pixels see, and its standard deviation by that of both ranges, to first order; in m. */
-export function distanceOf(lens: Pinhole, a: Ranged, b: Ranged): { readonly distance_m: number; readonly std_m: number } {
+export function distanceOf(lens: Pinhole, a: Ranged, b: Ranged): { readonly distance_m: number; readonly error_m: number } {
   const [from, to] = [pointAt(lens, a), pointAt(lens, b)];
   const between = from.map((value, axis) => value - to[axis]);
   const distance_m = Math.hypot(...between);
   // A range moves its point along its ray: only what of that lies along the distance changes it.
   const share = (point: readonly number[], { range_m }: Ranged): number =>
     point.reduce((sum, value, axis) => sum + (value / range_m) * (between[axis] / distance_m), 0);
-  return { distance_m, std_m: Math.hypot(share(from, a) * a.std_m, share(to, b) * b.std_m) };
+  return { distance_m, error_m: Math.hypot(share(from, a) * a.error_m, share(to, b) * b.error_m) };
 }
 
 /** The point that a pixel sees, in m, as `fillCloud` has it. */
-export function pointAt({ fx, fy, cx, cy }: Pinhole, { x, y, range_m }: Omit<Ranged, "std_m">): number[] {
+export function pointAt({ fx, fy, cx, cy }: Pinhole, { x, y, range_m }: Omit<Ranged, "error_m">): number[] {
   const cloud = makeCloud(1);
   // The same ray from a picture of this one pixel.
   fillCloud(cloud, [range_m], 1, { fx, fy, cx: cx - x, cy: cy - y });

@@ -1,6 +1,6 @@
 /** A form made of what the service says can be set: texts as they are typed, and what they stand for. */
 
-import { withUnit } from "../../scales/format";
+import { numberOf, withUnit } from "../../scales/format";
 import type { ParameterDocument } from "../../stream/documents";
 
 export type Draft = Readonly<Record<string, string>>;
@@ -22,7 +22,7 @@ export function readingOf(parameters: readonly ParameterDocument[], draft: Draft
     } else if (type === "boolean") {
       settings[name] = text === "true";
     } else if (isNumber(parameter)) {
-      const value = text === "" ? NaN : Number(text);
+      const value = numberOf(text);
       const whole = type !== "integer" || Number.isInteger(value);
       if (!Number.isFinite(value) || !whole || value < (parameter.min ?? -Infinity) || value > (parameter.max ?? Infinity)) {
         return { wrong: name, words: `${labelOf(name)} must be ${limitsOf(parameter)}.` };

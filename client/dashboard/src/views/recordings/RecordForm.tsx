@@ -2,6 +2,7 @@ import { useSignal } from "@preact/signals";
 
 import { PAST_S } from "../../store/recordings";
 import { useStore } from "../../store/store";
+import { NumberField } from "../../ui/controls";
 import type { Task } from "../../ui/useTask";
 import { limitsOf } from "./limits";
 import "./RecordForm.css";
@@ -24,21 +25,7 @@ export function RecordForm({ task }: { task: Task }) {
     if (saved) name.value = "";
   };
   const number = (label: string, unit: string, text: typeof name, field: string) => (
-    <label class="field">
-      <span>{label}</span>
-      <span class="field-input">
-        <input
-          type="text"
-          inputMode="decimal"
-          name={field}
-          autocomplete="off"
-          placeholder="none"
-          value={text.value}
-          onInput={(event) => (text.value = event.currentTarget.value)}
-        />
-        <span class="quiet">{unit}</span>
-      </span>
-    </label>
+    <NumberField label={label} unit={unit} name={field} placeholder="none" value={text.value} onType={(typed) => (text.value = typed)} />
   );
   const busy = task.busy.value !== null;
   return (

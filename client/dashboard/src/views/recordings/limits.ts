@@ -1,3 +1,4 @@
+import { numberOf } from "../../scales/format";
 import type { RecordingRequest } from "../../stream/documents";
 
 /** Limits of a recording as they are typed; empty for none. */
@@ -13,7 +14,7 @@ export function limitsOf({
   size_mb,
   frames,
 }: TypedLimits): Pick<RecordingRequest, "duration_s" | "max_bytes" | "frames"> | null {
-  const [duration, size, count] = [duration_s, size_mb, frames].map((text) => (text.trim() === "" ? null : Number(text)));
+  const [duration, size, count] = [duration_s, size_mb, frames].map((text) => (text.trim() === "" ? null : numberOf(text)));
   const sensible = (value: number | null): boolean => value === null || (Number.isFinite(value) && value > 0);
   if (![duration, size, count].every(sensible) || (count !== null && !Number.isInteger(count))) return null;
   return {

@@ -7,15 +7,15 @@ import type { FlagHistory } from "./flagShares";
 import { linesOf, type ReturnHistory, type ReturnLine, sifted } from "./returns";
 import "./Listings.css";
 
-/** What the service found at the pixel: returns, the truth where it is known, and flags. `held` is the number of the frame that is held. */
+/** What the service found at the pixel: returns, the truth where it is known, and flags. `of` is the number of the frame that the curves are of. */
 export function Found({
   details,
-  held,
+  of,
   flags,
   returns,
 }: {
   details: PixelDocument | null;
-  held: number | null;
+  of: number | null;
   flags: FlagHistory;
   returns: ReturnHistory;
 }) {
@@ -26,9 +26,9 @@ export function Found({
   returns.take(details, scene);
   return (
     <>
-      {held !== null && held !== details.meta.frame && (
+      {of !== null && of !== details.meta.frame && (
         <p class="quiet">
-          These values are of frame {details.meta.frame}; the curves are of frame {held}, which is held.
+          These values are of frame {details.meta.frame}; the curves are of frame {of}, which the service keeps no more.
         </p>
       )}
       <ReturnTable details={details} history={returns} />

@@ -48,20 +48,22 @@ export function ResponseView() {
   const returns = useMemo(() => new ReturnHistory(), []);
   const frame = store.frames.of(obstacle === undefined ? "coefficients" : "range");
   useEffect(() => store.details.follow(store.selected, frame), [store, frame]);
+  // The curves wait for what the service says of the same frame.
+  const looked = useComputed(() => store.details.frame.value ?? frame.value);
   useEffect(() => selectFirst(store, frame), [store, frame]);
   const side = store.settings.of(SIDE);
   const shown = useMemo(
     () =>
       computed(() => {
-        const coefficients = frame.value?.coefficients;
+        const coefficients = looked.value?.coefficients;
         const pixel = store.selected.value;
         if (!coefficients || pixel === null) return null;
         if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return null;
-        if (frame.value !== null && !wasSent(frame.value, pixel)) return null;
+        if (looked.value !== null && !wasSent(looked.value, pixel)) return null;
         const index = pixel.y * coefficients.width + pixel.x;
         return { pixel, coefficients, index };
       }),
-    [frame, store],
+    [looked, store],
   );
   const levinson = useComputed(() => (shown.value === null ? null : pixelOf(shown.value.coefficients, shown.value.index)));
   const logarithmic = store.settings.of(LOGARITHMIC);
@@ -73,7 +75,7 @@ export function ResponseView() {
     const now = shown.peek();
     if (now === null) return;
     const truth = store.details.document.peek()?.truth ?? null;
-    const name = `pixel-${now.pixel.x}-${now.pixel.y}-${aspect}-${frame.peek()?.meta.frame ?? 0}.csv`;
+    const name = `pixel-${now.pixel.x}-${now.pixel.y}-${aspect}-${looked.peek()?.meta.frame ?? 0}.csv`;
     save(name, new Blob([csvOf(drawnOf(aspect, now, store.measures.pins.peek(), truth))], { type: "text/csv" }));
   };
   return (
@@ -105,13 +107,8 @@ export function ResponseView() {
         )}
         {place.value !== null && (
           <aside class="response-side fades" aria-label="What was found at the pixel" tabIndex={0}>
-            <Found
-              flags={flags}
-              returns={returns}
-              details={store.details.document.value}
-              held={store.held.value ? (frame.peek()?.meta.frame ?? null) : null}
-            />
-            {pixel.value !== null && <PixelFigures key={place.value} pixel={pixel.value} />}
+            <Found flags={flags} returns={returns} details={store.details.document.value} of={looked.value?.meta.frame ?? null} />
+            <PixelFigures details={store.details.document.value} />
             <FlagWords flags={flags} looked={store.details.document.value !== null} />
           </aside>
         )}

@@ -1,7 +1,7 @@
 import { engineering, fixed } from "../../scales/format";
 import type { ChoiceDocument } from "../../stream/documents";
 import { Fact } from "./Figures";
-import { ZEROTH_NAMES } from "./words";
+import { measuredOf, ZEROTH_NAMES } from "./words";
 
 /** A sequence that is looked at, and what is predicted of it. */
 export function ChoiceFacts({ choice }: { choice: ChoiceDocument }) {
@@ -11,7 +11,7 @@ export function ChoiceFacts({ choice }: { choice: ChoiceDocument }) {
   const doubt = predicted.bias_known ? "" : ` – unknown, the look allows ${engineering(predicted.range_bias_most_m, "m", 2)}`;
   return (
     <dl class="facts" data-field="choice">
-      <Fact name="Harmonics m" value={String(sequence.harmonics)} field="choice_harmonics" strong />
+      <Fact {...measuredOf(sequence)} field="choice_harmonics" strong />
       <Fact name="Exposure" value={engineering(sequence.exposure_s, "s")} field="choice_exposure_s" strong />
       <Fact name="Takes" value={String(sequence.takes)} field="choice_takes" strong />
       <Fact name="Base frequency" value={engineering(sequence.base_frequency_hz, "Hz", 4)} field="choice_base_frequency_hz" />

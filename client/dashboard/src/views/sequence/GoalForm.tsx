@@ -1,6 +1,8 @@
 import { useSignal } from "@preact/signals";
 
+import { numberOf } from "../../scales/format";
 import type { PlanRequest } from "../../stream/documents";
+import { NumberField } from "../../ui/controls";
 import "./GoalForm.css";
 
 interface GoalFormProps {
@@ -12,25 +14,9 @@ interface GoalFormProps {
 export function GoalForm({ disabled, onGoal }: GoalFormProps) {
   const error_mm = useSignal("");
   const rate_hz = useSignal("");
-  const [error, rate] = [error_mm, rate_hz].map(({ value }) => (value.trim() === "" ? null : Number(value)));
+  const [error, rate] = [error_mm, rate_hz].map(({ value }) => (value.trim() === "" ? null : numberOf(value)));
   const wanted = [error, rate];
   const sensible = wanted.some((value) => value !== null) && wanted.every((value) => value === null || value > 0);
-  const field = (label: string, unit: string, text: typeof error_mm, name: string) => (
-    <label class="field">
-      <span>{label}</span>
-      <span class="field-input">
-        <input
-          type="text"
-          inputMode="decimal"
-          name={name}
-          autocomplete="off"
-          value={text.value}
-          onInput={(event) => (text.value = event.currentTarget.value)}
-        />
-        <span class="quiet">{unit}</span>
-      </span>
-    </label>
-  );
   return (
     <form
       class="goal"
@@ -42,8 +28,14 @@ export function GoalForm({ disabled, onGoal }: GoalFormProps) {
         });
       }}
     >
-      {field("Error at most", "mm", error_mm, "range_error_mm")}
-      {field("Frames at least", "Hz", rate_hz, "frame_rate_hz")}
+      <NumberField
+        label="Error at most"
+        unit="mm"
+        name="range_error_mm"
+        value={error_mm.value}
+        onType={(text) => (error_mm.value = text)}
+      />
+      <NumberField label="Frames at least" unit="Hz" name="frame_rate_hz" value={rate_hz.value} onType={(text) => (rate_hz.value = text)} />
       <button type="submit" disabled={disabled || !sensible}>
         Plan
       </button>

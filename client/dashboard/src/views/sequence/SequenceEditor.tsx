@@ -1,15 +1,17 @@
 import { useSignal } from "@preact/signals";
 import { useEffect, useMemo } from "preact/hooks";
 
+import { numberOf } from "../../scales/format";
 import { RequestError } from "../../store/api";
 import { useStore } from "../../store/store";
 import type { AppliedDocument } from "../../stream/documents";
 import type { Problem, SequenceRequest, TakeOrder, Zeroth } from "../../stream/protocol";
+import { NumberField } from "../../ui/controls";
 import { Obstacle, Steer } from "../../ui/Steer";
-import { DRAFT_FIELD, type Draft, documentOf, draftOf } from "./draft";
+import { DRAFT_FIELD, type Draft, documentOf, draftOf, missingOf } from "./draft";
 import { Figures } from "./Figures";
 import { PRESETS } from "./presets";
-import { fieldOf, sequenceProblem, TAKE_ORDER_NAMES, ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
+import { FIELD_NAMES, fieldOf, measuredOf, sequenceProblem, TAKE_ORDER_NAMES, ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
 import "./SequenceEditor.css";
 
 /** Pause after the last keystroke before the service is asked what the sequence would cost. */
@@ -33,7 +35,8 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; 
 
   useEffect(() => {
     if (document === null) {
-      verdict.value = refusal(new RequestError({ detail: "Every field needs a number." }));
+      const field = missingOf(draft.peek()) ?? "";
+      verdict.value = refusal(new RequestError({ field, detail: `${FIELD_NAMES[field]} needs a number.` }));
       return undefined;
     }
     const abort = new AbortController();
@@ -42,7 +45,7 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; 
       clearTimeout(timer);
       abort.abort();
     };
-  }, [JSON.stringify(document)]);
+  }, [JSON.stringify(document), missingOf(draft.value)]);
 
   const ask = async (asked: SequenceRequest, signal: AbortSignal): Promise<void> => {
     try {
@@ -68,22 +71,15 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; 
   const judged = verdict.value;
   const wrong = judged.kind === "refused" ? (DRAFT_FIELD[fieldOf(judged.problem) ?? ""] ?? null) : null;
   const field = (name: keyof Draft, label: string, unit: string) => (
-    <label class="field">
-      <span>{label}</span>
-      <span class="field-input">
-        <input
-          type="text"
-          inputMode="decimal"
-          autocomplete="off"
-          name={name}
-          value={draft.value[name] ?? ""}
-          aria-invalid={wrong === name}
-          aria-describedby="sequence-verdict"
-          onInput={(event) => (draft.value = { ...draft.peek(), [name]: event.currentTarget.value })}
-        />
-        <span class="quiet">{unit}</span>
-      </span>
-    </label>
+    <NumberField
+      label={label}
+      unit={unit}
+      name={name}
+      value={draft.value[name] ?? ""}
+      aria-invalid={wrong === name}
+      aria-describedby="sequence-verdict"
+      onType={(text) => (draft.value = { ...draft.peek(), [name]: text })}
+    />
   );
 
   return (
@@ -114,7 +110,7 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; 
           </select>
         </label>
         {field("base_frequency_mhz", "Base frequency", "MHz")}
-        {field("harmonics", "Harmonics m", "")}
+        {field("harmonics", measuredOf(base).name, "")}
         {field("exposure_ms", "Exposure", "ms")}
         {field("takes", "Takes", "")}
         <label class="field field-wide">
@@ -138,7 +134,7 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; 
             name="take_order"
             value={draft.value.take_order}
             aria-invalid={wrong === "take_order"}
-            disabled={Number(draft.value.takes) === 1}
+            disabled={numberOf(draft.value.takes) === 1}
             onChange={(event) => (draft.value = { ...draft.peek(), take_order: event.currentTarget.value as TakeOrder })}
           >
             {Object.entries(TAKE_ORDER_NAMES).map(([order, name]) => (

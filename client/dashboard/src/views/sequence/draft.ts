@@ -1,3 +1,4 @@
+import { numberOf } from "../../scales/format";
 import type { SequenceDocument } from "../../stream/documents";
 import type { SequenceRequest, TakeOrder, Zeroth } from "../../stream/protocol";
 
@@ -32,12 +33,18 @@ export function draftOf(sequence: SequenceDocument): Draft {
   };
 }
 
+/** The field of the document of which no number is typed; null where each has one. */
+export function missingOf(draft: Draft): string | null {
+  const numbers = ["base_frequency_hz", "harmonics", "exposure_s", "takes"];
+  return numbers.find((field) => !Number.isFinite(numberOf(draft[DRAFT_FIELD[field]]))) ?? null;
+}
+
 /** The document a draft stands for, with what is not edited from `base`; null where a field is no number. */
 export function documentOf(draft: Draft, base: SequenceDocument): SequenceRequest | null {
+  if (missingOf(draft) !== null) return null;
   const [frequency_mhz, harmonics, exposure_ms, takes] = [draft.base_frequency_mhz, draft.harmonics, draft.exposure_ms, draft.takes].map(
-    (text) => (text.trim() === "" ? NaN : Number(text)),
+    numberOf,
   );
-  if (![frequency_mhz, harmonics, exposure_ms, takes].every(Number.isFinite)) return null;
   return {
     base_frequency_hz: exact(frequency_mhz * 1e6),
     harmonics,

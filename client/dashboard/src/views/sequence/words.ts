@@ -1,10 +1,11 @@
-import { engineering } from "../../scales/format";
+import { deviation, engineering, fixed } from "../../scales/format";
 import { plainWords } from "../../store/api";
 import type { RangeErrorFigure } from "../../store/rangeErrors";
+import type { SequenceDocument } from "../../stream/documents";
 import type { Problem, TakeOrder, Zeroth } from "../../stream/protocol";
 
 /** Names of the fields as the form has them. */
-const FIELD_NAMES: Readonly<Record<string, string>> = {
+export const FIELD_NAMES: Readonly<Record<string, string>> = {
   base_frequency_hz: "Base frequency",
   harmonics: "Harmonics m",
   zeroth: "Zeroth moment",
@@ -12,6 +13,15 @@ const FIELD_NAMES: Readonly<Record<string, string>> = {
   takes: "Takes",
   take_order: "Order of takes",
 };
+
+/** What is measured of the base frequency: its multiples 1 to m, or others that a camera has of its own. */
+export function measuredOf({ harmonics, sampling }: Pick<SequenceDocument, "harmonics" | "sampling">): {
+  readonly name: string;
+  readonly value: string;
+} {
+  const multiples = sampling?.multiples ?? [];
+  return multiples.length === 0 ? { name: "Harmonics m", value: String(harmonics) } : { name: "Multiples", value: multiples.join(", ") };
+}
 
 /** The name of the field that a problem is about, as "harmonics" or as "body.harmonics". */
 export function fieldOf(problem: Problem): string | null {
@@ -62,5 +72,16 @@ export const TAKE_ORDER_NAMES: Readonly<Record<TakeOrder, string>> = {
 /** What an error of the range holds. */
 export function errorWords(error: RangeErrorFigure | null): string {
   if (error === null) return "not known yet";
-  return error.of === "noise" ? "noise alone (1 σ), as its bias is not known" : "noise (1 σ) and bias together";
+  return error.of === "noise" ? "noise alone (1 σ), as its bias is not known" : "half of the 90 % interval, of noise and bias together";
+}
+
+/** What the ranges of a picture are worth: as shares of it where these are known. */
+export function shareWords(error: RangeErrorFigure | null): { readonly short: string; readonly long: string } {
+  const within = deviation(error?.within_m, "m") || "trusted";
+  if (error?.trusted_share == null) {
+    const short = `${deviation(error?.error_m, "m")}${error?.of === "noise" ? " noise" : ""}`;
+    return { short, long: `the error of the range in the median pixel is ${errorWords(error)}` };
+  }
+  const [trusted, rest] = [error.trusted_share, 1 - error.trusted_share].map((share) => fixed(100 * share, 0, "%"));
+  return { short: `${trusted} ${within}`, long: `${trusted} of the picture ${within} (90 % intervals), ${rest} not trusted` };
 }

@@ -3,11 +3,12 @@ import { useEffect } from "preact/hooks";
 import { timeOfDay } from "../../scales/format";
 import { lossReason } from "../../store/events";
 import { useStore } from "../../store/store";
+import { tokenWords } from "./words";
 import "./Banner.css";
 
 /** Says at once what is wrong, and what is being done about it; goes away with it. */
 export function Banner({ onRetry }: { onRetry: () => void }) {
-  const { status, lease, lightOff, asksForToken } = useStore();
+  const { api, status, lease, lightOff, asksForToken } = useStore();
   const connection = status.connection.value;
   const off = lightOff.state.value;
   if (off !== null && off.kind !== "sent") {
@@ -27,7 +28,7 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
     return (
       <div class="banner" role="alert" data-banner="token">
         <p>
-          <strong>Not let in.</strong> This service requires a token.
+          <strong>Not let in.</strong> {tokenWords(api.credentials)}
         </p>
         <button type="button" onClick={() => (asksForToken.value = true)}>
           Enter a token

@@ -1,14 +1,16 @@
 import { useComputed } from "@preact/signals";
-import { deviation, fixed } from "../../scales/format";
+import { engineering, fixed } from "../../scales/format";
 import { flowTrouble } from "../../store/status";
 import { useStore } from "../../store/store";
 import { useNow } from "../../ui/hooks";
 import { LightOffButton } from "../../ui/LightOffButton";
-import { errorWords } from "../sequence/words";
+import { Steer } from "../../ui/Steer";
+import { useTask } from "../../ui/useTask";
+import { shareWords } from "../sequence/words";
 import { Figures } from "./Figures";
 import { Steering } from "./Steering";
 import { Toasts } from "./Toasts";
-import { demandWords } from "./words";
+import { demandWords, exposureAdvice } from "./words";
 import "./StatusBar.css";
 
 /** How things stand in three things: health, rate and deviation, and what one looks at; all else is behind a button. */
@@ -22,6 +24,8 @@ export function StatusBar() {
       <StateChip />
       <NoWatchdog />
       <LessAsked />
+      <Preparing />
+      <Exposure />
       <Performance />
       <Subject />
       <Figures />
@@ -74,12 +78,7 @@ function slowed(state: State, trouble: string | null): State {
 function NoWatchdog() {
   const warning = useStore().camera.value?.light_warning ?? null;
   if (warning === null) return null;
-  return (
-    <span class="chip chip-waiting no-watchdog" data-field="light-warning" title={warning}>
-      <i aria-hidden="true" />
-      No watchdog
-    </span>
-  );
+  return <Sign field="light-warning" short="No watchdog" long={warning} />;
 }
 
 /** That less is asked for than there is, and what. */
@@ -88,8 +87,49 @@ function LessAsked() {
   const decision = status.demanded.value;
   if (decision === null || replay.active.value) return null;
   const { long, short } = demandWords(decision, sight.value !== null);
+  return <Sign field="link" short={short} long={long} />;
+}
+
+/** That the service compiles what the frames are computed with. */
+function Preparing() {
+  const { caller, sequence } = useStore();
+  const kernels = caller.kernels.value;
+  if (kernels === null) return null;
+  const m = sequence.value === null ? "" : `, m = ${sequence.value.harmonics}`;
   return (
-    <span class="chip chip-waiting less-asked" role="status" data-field="link" title={long}>
+    <Sign
+      field="kernels"
+      short={`Preparing kernels${m}, ${fixed(kernels.left_s, 0, "s")} left`}
+      long={`Frames come more slowly until these are compiled: ${kernels.preparing.join(", ")}`}
+    />
+  );
+}
+
+/** That the picture is too bright or too dark to be measured, and a click that sets another exposure. */
+function Exposure() {
+  const { status, sequence, sequencing, camera, replay } = useStore();
+  const task = useTask();
+  const [applied, shown] = [sequence.value, status.newest.value];
+  const advice = exposureAdvice(shown, camera.value?.capabilities ?? {});
+  if (advice === null || applied === null || replay.active.value) return null;
+  const { word, long, exposure_s } = advice;
+  // What was changed already shows with the frames to come.
+  if (exposure_s === null || applied.exposure_s !== shown?.exposure_s) return <Sign field="exposure" short={word} long={long} />;
+  const set = (): Promise<boolean> => task.run("Applying…", () => sequencing.set({ ...applied, exposure_s }));
+  return (
+    <span data-field="exposure">
+      <Steer title={task.refusal.value ?? long} disabled={task.busy.value !== null} onClick={() => void set()}>
+        {word}
+        <span class="wide">: exposure {engineering(exposure_s, "s", 2)}</span>
+      </Steer>
+    </span>
+  );
+}
+
+/** A sign in the header, and what it means. */
+function Sign({ field, short, long }: { field: string; short: string; long: string }) {
+  return (
+    <span class="chip chip-waiting sign" role="status" data-field={field} title={long}>
       <i aria-hidden="true" />
       {short}
     </span>
@@ -100,22 +140,16 @@ function LessAsked() {
 function Performance() {
   const { status, alone, accuracy, rangeErrors } = useStore();
   const rate = useComputed(() => fixed(status.rate_hz.value, 1, "Hz"));
-  const error = rangeErrors.now.value;
+  const { short, long } = shareWords(rangeErrors.now.value);
   const open = (): void => {
     alone.value = alone.peek() === "sequence" ? null : "sequence";
     if (alone.peek() !== null && accuracy.tradeoff.peek() === null && status.newest.peek() !== null) void accuracy.predict();
   };
   return (
-    <button
-      type="button"
-      class="performance"
-      title={`Frames drawn a second, and the error of the range in the median pixel: ${errorWords(error)}. Shows what accuracy costs`}
-      onClick={open}
-    >
+    <button type="button" class="performance" title={`Frames drawn a second; ${long}. Shows what accuracy costs`} onClick={open}>
       <span data-field="rate">{rate}</span>
       <span class="quiet" data-field="deviation">
-        {deviation(error?.error_m, "m")}
-        {error?.of === "noise" && " noise"}
+        {short}
       </span>
     </button>
   );

@@ -1,8 +1,8 @@
 import { useSignal } from "@preact/signals";
 
-import { kindOf } from "../../store/api";
 import { useStore } from "../../store/store";
 import { SwitchedDialog } from "../../ui/Dialog";
+import { tokenWords } from "./words";
 
 /** Asks for the token that the service lets people in with. */
 export function TokenDialog() {
@@ -18,7 +18,6 @@ function TokenForm({ onDone }: { onDone: () => void }) {
   const { credentials } = api;
   const text = useSignal("");
   const known = credentials.token.value !== null;
-  const problem = credentials.refused.value;
   const recognised = caller.document.value;
   return (
     <form
@@ -29,10 +28,8 @@ function TokenForm({ onDone }: { onDone: () => void }) {
         onDone();
       }}
     >
-      <p class={known && problem !== null ? "refusal" : ""} data-field="token-words">
-        {known && problem !== null && kindOf(problem) === "token-refused"
-          ? "The service does not know this token: it may be mistyped, revoked or expired."
-          : "The service requires a token. Its operator makes one with transientcam token create."}
+      <p class={known && credentials.refused.value !== null ? "refusal" : ""} data-field="token-words">
+        {tokenWords(credentials)}
       </p>
       <label class="field">
         <span>Token</span>

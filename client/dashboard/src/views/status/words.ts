@@ -1,15 +1,47 @@
 /** Words of the header. */
 
-import { fixed } from "../../scales/format";
-import type { Decision } from "../../stream/connection";
+import { engineering, fixed } from "../../scales/format";
+import { kindOf } from "../../store/api";
+import type { Credentials } from "../../store/credentials";
+import { THINNED } from "../../store/frames";
+import type { Decision } from "../../stream/demand";
+import type { FrameMeta } from "../../stream/documents";
+
+/** Why the service lets this page in no more, or not yet. */
+export function tokenWords({ token, refused }: Credentials): string {
+  return token.value !== null && refused.value !== null && kindOf(refused.value) === "token-refused"
+    ? "The service does not know this token: it may be mistyped, revoked or expired."
+    : "The service requires a token. Its operator makes one with transientcam token create.";
+}
+
+/** Least share of saturated and of dark pixels that something is done about, and from where on much. */
+const [SATURATED, DARK, MOST] = [0.1, 0.5, 0.8];
+
+/** What to do about a frame with too much or too little light: the exposure to try, null where the camera has none; null where there is enough. */
+export function exposureAdvice(
+  meta: FrameMeta | null,
+  { min_exposure_s: least_s = 0, max_exposure_s: most_s = Infinity }: Readonly<Record<string, unknown>>,
+): { readonly word: string; readonly long: string; readonly exposure_s: number | null } | null {
+  if (!meta?.pixels) return null;
+  const { pixels, exposure_s } = meta;
+  const [bright, dark] = [pixels.saturated / pixels.total, pixels.no_signal / pixels.total];
+  const [word, share, why] = bright >= SATURATED ? ["Saturated", bright, "are saturated"] : ["Dark", dark, "get too little light"];
+  if (word === "Dark" && dark < DARK) return null;
+  const factor = (share >= MOST ? 8 : 2) ** (word === "Dark" ? 1 : -1);
+  const wanted_s = Math.min(Number(most_s), Math.max(Number(least_s), Number((factor * exposure_s).toPrecision(2))));
+  const remedy =
+    wanted_s === exposure_s ? "no exposure of this camera mends that" : `sets the exposure to ${engineering(wanted_s, "s", 2)}`;
+  const long = `${fixed(100 * share, 0, "%")} of the pixels ${why} and have no value: ${remedy}`;
+  return { word, long, exposure_s: wanted_s === exposure_s ? null : wanted_s };
+}
 
 /** What less is asked for, as a sign and as sentences; `zoomed` where only a part of the picture is in sight. */
 export function demandWords(
   { demand: { maxRate_hz, coded, part }, carried_bytes_s, pictures_hz }: Decision,
   zoomed: boolean,
 ): { readonly short: string; readonly long: string } {
-  const rate = fixed(maxRate_hz, (maxRate_hz ?? 0) < 1 ? 2 : 1, "Hz");
-  const cut = !part ? [] : [zoomed ? "the part in sight" : "every 2nd pixel"];
+  const rate = maxRate_hz === null ? [] : [fixed(maxRate_hz, maxRate_hz < 1 ? 2 : 1, "Hz")];
+  const cut = !part ? [] : [zoomed ? "the part in sight" : THINNED];
   const codes = coded ? ["16 bits"] : [];
   const link =
     carried_bytes_s === null
@@ -18,10 +50,14 @@ export function demandWords(
   const page =
     pictures_hz === null
       ? []
-      : [`With all frames this browser drew ${fixed(pictures_hz, 0, "")} pictures of the light a second, which do not flow.`];
-  const asked = [`at most ${rate}`, ...codes.map((each) => `numbers in ${each}`), ...cut.map((each) => `${each} only`)].join(", ");
+      : [`Before, this browser drew ${fixed(pictures_hz, 0, "")} pictures of the light a second, which do not flow.`];
+  const asked = [
+    ...rate.map((each) => `at most ${each}`),
+    ...codes.map((each) => `numbers in ${each}`),
+    ...cut.map((each) => `${each} only`),
+  ].join(", ");
   return {
-    short: [`${link.length > 0 ? "Thin link" : "Slow browser"}: ${rate}`, ...codes, ...cut].join(", "),
+    short: `${link.length > 0 ? "Thin link" : "Slow browser"}: ${[...rate, ...codes, ...cut].join(", ")}`,
     long: [
       ...link,
       ...page,

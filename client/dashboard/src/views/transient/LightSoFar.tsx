@@ -49,7 +49,7 @@ export function LightSoFar({ look }: { look: TransientLook }) {
   }, [frame, look]);
 
   return (
-    <Stage width={width} height={height} label={NAMES[look.play.value]}>
+    <Stage width={width} height={height} frame={frame} label={NAMES[look.play.value]}>
       <canvas ref={canvas} data-product="transient" data-renderer="closed-form" />
       {useComputed(() => frame.value === null).value && <FirstFrame />}
     </Stage>

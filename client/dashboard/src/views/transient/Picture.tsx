@@ -72,7 +72,7 @@ export function Picture({ look }: { look: TransientLook }) {
   useDrawing(draw, [renderer, look]);
 
   return (
-    <Stage width={width} height={height} label="Light in flight">
+    <Stage width={width} height={height} frame={frame} label="Light in flight">
       <canvas key={attempt.value} ref={canvas} data-product="transient" />
       {useComputed(() => frame.value === null).value && <FirstFrame />}
     </Stage>

@@ -133,7 +133,7 @@ function partsOf(look: TransientLook, store: Store): FigureParts {
   return {
     ...lightScale(look, store, look.play.peek()),
     title: `${NAMES[look.play.peek()]}, ${timeWords(time_s, rangeOfTime_m(time_s))}`,
-    caption: meta === undefined ? "" : captionOf(meta),
+    caption: meta === undefined ? "" : captionOf(meta, store.sequence.peek()),
     colours: look.colours.peek(),
     ground: "black",
   };

@@ -30,14 +30,15 @@ async function plateOf({ snapshot, parts }: Subject, store: Store): Promise<{ ca
   if (first === null) return null;
   const [columns, rows] = [first.width, first.height];
   const layout = figureLayout(columns, rows, PICTURE_PX);
-  const words = parts();
-  const frame = await imageOf(figureSvg({ ...words, title: "", picture: null, columns, rows }, layout));
+  // What changes from picture to picture is written with each.
+  const frame = await imageOf(figureSvg({ ...parts(), title: "", caption: "", picture: null, columns, rows }, layout));
   const canvas = document.createElement("canvas");
   // Videos want even sizes.
   [canvas.width, canvas.height] = [layout.width + (layout.width % 2), layout.height + (layout.height % 2)];
   const context = canvas.getContext("2d", { willReadFrequently: true }) as CanvasRenderingContext2D;
   const draw = (): void => {
     const picture = snapshot();
+    const { caption } = parts();
     context.fillStyle = "#000";
     context.fillRect(0, 0, canvas.width, canvas.height);
     context.drawImage(frame, 0, 0);
@@ -47,6 +48,8 @@ async function plateOf({ snapshot, parts }: Subject, store: Store): Promise<{ ca
     context.font = '600 15px "Inter Variable", sans-serif';
     const time_s = store.player.time_s.peek();
     context.fillText(timeWords(time_s, rangeOfTime_m(time_s)), layout.left, layout.top - 10);
+    context.font = '11px "Inter Variable", sans-serif';
+    context.fillText(caption, layout.left, layout.height - 12);
   };
   return { canvas, draw };
 }

@@ -1,27 +1,36 @@
-import { type ReadonlySignal, useComputed } from "@preact/signals";
-import { useRef } from "preact/hooks";
+import { computed, type ReadonlySignal, useComputed } from "@preact/signals";
+import { useMemo, useRef } from "preact/hooks";
 import { fixed, grouped } from "../../scales/format";
 import { drawnOf, type Frame, sentOf } from "../../store/frames";
+import { aBoolean, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
+import { Toggle } from "../../ui/controls";
 import { saveNumbers, savePicture } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
-import { FLAGS } from "../../ui/flags";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { Stage } from "../../ui/Stage";
-import { countFlags, paintFlags } from "./reasons";
+import { countReasons, paintReasons, REASONS, type Reasons } from "./reasons";
 import "../response/Listings.css";
 import "./ValidityView.css";
+
+/** Whether it is shown which ranges can be trusted, instead of the flags. */
+const TRUST: Setting<boolean> = { key: "validity.trust", initial: false, ...aBoolean() };
 
 /** Which pixels something is wrong with, and what. */
 export function ValidityView() {
   const store = useStore();
   const amplitude = store.frames.amplitude.value;
-  useProducts(["flags", amplitude]);
-  const frame = store.frames.of("flags");
+  const trust = store.settings.of(TRUST);
+  const reasons = REASONS[trust.value ? "trust" : "flags"];
+  useProducts([reasons.product, amplitude]);
+  const frame = store.frames.of(reasons.product);
   const scene = store.frames.of(amplitude);
   const canvas = useRef<HTMLCanvasElement>(null);
-  const size = useComputed(() => (frame.value?.shape ?? [120, 163]).join("x"));
+  const { empty, size } = useMemo(
+    () => ({ empty: computed(() => frame.value === null), size: computed(() => (frame.value?.shape ?? [120, 163]).join("x")) }),
+    [frame],
+  );
   const [height, width] = size.value.split("x").map(Number);
   useDrawing(() => {
     const [newest, brightness] = [frame.value, scene.value];
@@ -31,51 +40,55 @@ export function ValidityView() {
     if (canvas.current.width !== columns || canvas.current.height !== rows) [canvas.current.width, canvas.current.height] = [columns, rows];
     const image = context.createImageData(columns, rows);
     const fits = brightness?.values.length === newest.values.length;
-    paintFlags(newest.values, fits ? drawnOf(brightness) : null, brightness?.map?.high ?? 1, image.data);
+    paintReasons(reasons, newest.values, fits ? drawnOf(brightness) : null, brightness?.map?.high ?? 1, image.data);
     context.putImageData(image, 0, 0);
     canvas.current.dataset.frame = String(newest.meta.frame);
-  }, [frame, scene]);
-  const empty = useComputed(() => frame.value === null);
+  }, [frame, scene, reasons]);
   return (
     <Panel
       name="validity"
       title={<h2>Validity</h2>}
+      tools={
+        <Toggle pressed={trust.value} title="Which ranges can be trusted, and why" onToggle={() => (trust.value = !trust.peek())}>
+          Trust
+        </Toggle>
+      }
       downloads={[
-        { text: "Picture (PNG)", run: () => savePicture(`validity-${frame.peek()?.meta.frame ?? 0}`, canvas.current) },
-        { text: "Flags (NPY)", run: () => saveNumbers(store.api, frame.peek()) },
+        { text: "Picture (PNG)", run: () => savePicture(`${reasons.product}-${frame.peek()?.meta.frame ?? 0}`, canvas.current) },
+        { text: `${trust.value ? "Trust" : "Flags"} (NPY)`, run: () => saveNumbers(store.api, frame.peek()) },
       ]}
     >
-      <Stage width={width} height={height} label="Validity map">
-        <canvas ref={canvas} data-product="flags" />
+      <Stage width={width} height={height} frame={frame} label="Validity map">
+        <canvas ref={canvas} data-product={reasons.product} />
         {empty.value && <FirstFrame />}
       </Stage>
-      <Legend frame={frame} />
+      <Legend key={reasons.product} frame={frame} reasons={reasons} />
     </Panel>
   );
 }
 
-function Legend({ frame }: { frame: ReadonlySignal<Frame | null> }) {
-  const counts = useComputed(() => countFlags(frame.value === null ? [] : sentOf(frame.value)));
-  const { total, valid, byFlag } = counts.value;
+function Legend({ frame, reasons }: { frame: ReadonlySignal<Frame | null>; reasons: Reasons }) {
+  const counts = useComputed(() => countReasons(reasons, frame.value === null ? [] : sentOf(frame.value)));
+  const { total, valid, byName } = counts.value;
   const share = (count: number): string => fixed(total === 0 ? NaN : (100 * count) / total, count === 0 || count === total ? 0 : 1, "%");
   return (
     <table class="listing legend">
       <tbody>
         <tr data-flag="valid">
           <th scope="row">
-            <Swatch colour={null} /> Valid
+            <Swatch colour={null} /> {reasons.good[0]}
           </th>
           <td>{grouped(valid)}</td>
           <td>{share(valid)}</td>
-          <td class="legend-words">nothing was wrong</td>
+          <td class="legend-words">{reasons.good[1]}</td>
         </tr>
-        {FLAGS.map(({ name, title, words, colour }) => (
-          <tr key={name} data-flag={name} class={byFlag[name] === 0 ? "quiet" : ""} title={words}>
+        {reasons.all.map(({ name, title, words, colour }) => (
+          <tr key={name} data-flag={name} class={byName[name] === 0 ? "quiet" : ""} title={words}>
             <th scope="row">
               <Swatch colour={colour} /> {title}
             </th>
-            <td>{grouped(byFlag[name])}</td>
-            <td>{share(byFlag[name])}</td>
+            <td>{grouped(byName[name])}</td>
+            <td>{share(byName[name])}</td>
             <td class="legend-words">{words}</td>
           </tr>
         ))}

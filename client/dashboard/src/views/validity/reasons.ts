@@ -1,22 +1,45 @@
-/** Flags as a picture and as counts. */
-import { FLAGS, gravest } from "../../ui/flags";
+/** Flags, or why ranges are not trusted, as a picture and as counts. */
+import { DISTRUST, FLAGS, type Flag } from "../../ui/flags";
 
-const COLOURS = new Uint32Array(256);
-for (let bits = 0; bits < 256; bits++) {
-  const flag = gravest(bits);
-  const rgb = flag === null ? 0 : parseInt(flag.colour.slice(1), 16);
-  // RGBA bytes on a little-endian machine, as every browser's is
-  COLOURS[bits] = flag === null ? 0 : 0xff000000 | ((rgb & 0xff) << 16) | (rgb & 0xff00) | (rgb >> 16);
+/** What can be wrong with a pixel, the gravest first, and how its values say so. */
+export interface Reasons {
+  readonly product: string;
+  readonly all: readonly Flag[];
+  readonly has: (value: number, reason: Flag) => boolean;
+  /** What a pixel is called that nothing was wrong with, and what that means. */
+  readonly good: readonly [title: string, words: string];
 }
 
+export const REASONS = {
+  flags: { product: "flags", all: FLAGS, has: (value, { bit }) => (value & bit) !== 0, good: ["Valid", "nothing was wrong"] },
+  trust: {
+    product: "trust",
+    all: DISTRUST,
+    has: (value, { bit }) => value === bit,
+    good: ["Trusted", "the 90 % interval holds the range"],
+  },
+} satisfies Readonly<Record<string, Reasons>>;
+
 /**
- * Writes RGBA bytes: the colour of a pixel's gravest flag, and a grey for its light where nothing was wrong.
+ * Writes RGBA bytes: the colour of the gravest that is wrong with a pixel, and a grey for its light where nothing is.
  * `white` is the light shown brightest.
  */
-export function paintFlags(flags: ArrayLike<number>, light: ArrayLike<number> | null, white: number, rgba: Uint8ClampedArray): void {
+export function paintReasons(
+  { all, has }: Reasons,
+  values: ArrayLike<number>,
+  light: ArrayLike<number> | null,
+  white: number,
+  rgba: Uint8ClampedArray,
+): void {
+  const colours = Uint32Array.from({ length: 256 }, (_, value) => {
+    const reason = all.find((each) => has(value, each));
+    const rgb = parseInt(reason?.colour.slice(1) ?? "0", 16);
+    // RGBA bytes on a little-endian machine, as every browser's is
+    return reason === undefined ? 0 : 0xff000000 | ((rgb & 0xff) << 16) | (rgb & 0xff00) | (rgb >> 16);
+  });
   const pixels = new Uint32Array(rgba.buffer, rgba.byteOffset, rgba.byteLength / 4);
   for (let pixel = 0; pixel < pixels.length; pixel++) {
-    const colour = COLOURS[flags[pixel]];
+    const colour = colours[values[pixel]];
     if (colour !== 0) {
       pixels[pixel] = colour;
       continue;
@@ -27,18 +50,18 @@ export function paintFlags(flags: ArrayLike<number>, light: ArrayLike<number> | 
   }
 }
 
-export interface FlagCounts {
+export interface Counts {
   readonly total: number;
   readonly valid: number;
-  /** Pixels that carry each flag; one with two counts for both. */
-  readonly byFlag: Readonly<Record<string, number>>;
+  /** Pixels with each reason by its name; one with two counts for both. */
+  readonly byName: Readonly<Record<string, number>>;
 }
 
-export function countFlags(flags: ArrayLike<number>): FlagCounts {
+export function countReasons({ all, has }: Reasons, values: ArrayLike<number>): Counts {
   const seen = new Uint32Array(256);
-  for (let pixel = 0; pixel < flags.length; pixel++) seen[flags[pixel]]++;
-  const byFlag = Object.fromEntries(
-    FLAGS.map(({ bit, name }) => [name, seen.reduce((sum, count, bits) => sum + ((bits & bit) !== 0 ? count : 0), 0)]),
+  for (let pixel = 0; pixel < values.length; pixel++) seen[values[pixel]]++;
+  const byName = Object.fromEntries(
+    all.map((reason) => [reason.name, seen.reduce((sum, count, value) => sum + (has(value, reason) ? count : 0), 0)]),
   );
-  return { total: flags.length, valid: seen[0], byFlag };
+  return { total: values.length, valid: seen[0], byName };
 }
