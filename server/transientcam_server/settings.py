@@ -4,10 +4,10 @@ import os
 from collections.abc import Callable
 from ipaddress import ip_address
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
 from platformdirs import user_config_path, user_data_path
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 import transientcam_moments as tm
 from transientcam.wire import FIRST_MESSAGE_WITHIN_S, MAX_SUBSCRIPTIONS
@@ -124,7 +124,10 @@ class SensorSettings(_Group):
 
 
 class LensSettings(_Group):
-    """Where the pixels look, if the camera does not report it; point clouds rest on it."""
+    """Where the pixels look and the light is, in place of what camera or scene say of it.
+
+    Point clouds, depth images and what robots are told of the lens rest on it.
+    """
 
     field_of_view_deg: _Finite | None = Field(default=None, gt=0.0, lt=180.0)
     """Horizontal, for square pixels around the axis."""
@@ -136,6 +139,27 @@ class LensSettings(_Group):
     """Column that the axis goes through; the middle of the frame without it."""
     cy_px: _Finite | None = None
     """Row that the axis goes through."""
+    distortion: tuple[_Finite, ...] = ()
+    """k1, k2, p1, p2 and k3, as OpenCV has them, beside `fx_px`; none without it."""
+    light_x_m: _Finite | None = Field(default=None, ge=-10.0, le=10.0)
+    """How far to the right of the lens the light is; also without any other of these."""
+    light_y_m: _Finite | None = Field(default=None, ge=-10.0, le=10.0)
+    """How far below the lens."""
+    light_z_m: _Finite | None = Field(default=None, ge=-10.0, le=10.0)
+    """How far before the lens."""
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        """Refuse what contradicts itself, or would be left out."""
+        if self.field_of_view_deg is not None and self.fx_px is not None:
+            raise ValueError("field_of_view_deg and fx_px say the same: give one of them")
+        beside = ("fy_px", "cx_px", "cy_px", "distortion")
+        given = [name for name in beside if getattr(self, name) not in (None, ())]
+        if given and self.fx_px is None:
+            raise ValueError(f"{' and '.join(given)} must stand beside fx_px")
+        if len(self.distortion) not in (0, 5):
+            raise ValueError(f"distortion has 5 numbers or none, not {len(self.distortion)}")
+        return self
 
 
 class StreamSettings(_Group):

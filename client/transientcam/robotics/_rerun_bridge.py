@@ -10,6 +10,7 @@ from transientcam.camera import Camera
 from transientcam.errors import ParameterError
 from transientcam.frame import Frame
 from transientcam.robotics._messages import (
+    DEPTH,
     Calibration,
     Pinhole,
     Transform,
@@ -158,6 +159,8 @@ class RerunBridge:
         of_frame = self._direct if self._direct and self._direct.frame == frame.frame else None
         intensity = None if of_frame is None else of_frame.array
         for message in messages_of({frame.product: frame.array}, lens, intensity=intensity):
+            if any(lens.distortion) and message.topic == DEPTH:
+                continue  # its lens knows no distortion
             if lens != self._lens or not isinstance(message, Calibration | Transform):
                 log_message(self._recording, message)
         self._lens = lens

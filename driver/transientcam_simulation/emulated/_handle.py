@@ -2,9 +2,10 @@
 
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Protocol
 
-from transientcam_driver.camera import Explanation, Sensor, Truth
+from transientcam_driver.camera import Explanation, Lens, Sensor, Truth
 from transientcam_driver.errors import CameraError
 from transientcam_driver.sequence import Sequence
 from transientcam_simulation.base import giving_up_by
@@ -83,10 +84,13 @@ class SimulationHandle:
         """Text of the scene's file, where `change` was given it."""
         return self._definition
 
-    @property
-    def field_of_view_deg(self) -> float | None:
-        """Horizontal; None where the scene has no camera."""
-        return None if self._scene.camera is None else self._scene.camera.field_of_view_deg
+    def lens(self, *, width: int, height: int) -> Lens | None:
+        """Return what images are taken through, and where their light is; None without a place."""
+        camera, light_m = self._scene.camera, self._scene.light.position_m
+        if camera is None:
+            return None
+        seen = replace(camera, lens=self._world.world.lens)
+        return seen.as_lens(light_m, width=width, height=height)
 
     @property
     def effects(self) -> dict[str, str]:

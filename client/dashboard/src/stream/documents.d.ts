@@ -554,6 +554,10 @@ export interface IntrinsicsDocument {
   readonly distortion: readonly number[];
   /** How far to the right of the lens the light is. */
   readonly light_x_m: number;
+  /** How far below it. */
+  readonly light_y_m: number;
+  /** How far before it. */
+  readonly light_z_m: number;
   /** Its origin: the settings `[lens]`, the camera itself, the simulated scene, the recording,
    * the origin of a relay, or none. */
   readonly source: "settings" | "camera" | "scene" | "recording" | "origin" | "assumed";
