@@ -443,6 +443,7 @@ class Service:
                 frame = self.pipeline.frame(raw, applied)
                 self.history.append(frame)
                 self.hub.publish(frame)
+                self.calibrations.observe(raw.temperature_c, applied)
             case CameraLostEvent(reason):
                 self.hub.notify("camera-lost", {"reason": reason})
             case CameraRecoveredEvent():

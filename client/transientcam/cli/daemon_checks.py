@@ -148,6 +148,9 @@ def _camera(camera: Camera, seconds: float) -> Iterator[Finding]:
         yield Finding("warning", "light", warning, remedy)
     if (strange := Pinhole.of_document(about["intrinsics"]).off_the_image) is not None:
         yield Finding("warning", "lens", strange, "set [lens] for the resolution of this camera")
+    active = camera.calibrations.active()
+    if (warning := active.get("warning")) is not None:
+        yield Finding("warning", "calibration", str(warning), "transientcam calibrate")
     yield from _products(camera.info)
     if not camera.acquisition["running"]:
         message = "the capture is stopped, so nothing can be measured"

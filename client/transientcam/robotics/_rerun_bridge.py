@@ -26,7 +26,7 @@ from transientcam.robotics._rerun_messages import (
     log_transient,
 )
 from transientcam.robotics._scatter import Scatter
-from transientcam.robotics._source import Source
+from transientcam.robotics._source import Source, captured_s
 from transientcam.wire import PRODUCTS, Subscription
 
 LOGGED: Final = ("range", "direct", "indirect", "brightness", "pointcloud", "transient")
@@ -150,7 +150,7 @@ class RerunBridge:
     def _send(self, frame: Frame) -> None:
         lens = self._source.lens_of(frame)
         self._recording.set_time("frame", sequence=frame.frame)
-        self._recording.set_time("capture", timestamp=frame.meta["host_time_s"])
+        self._recording.set_time("capture", timestamp=captured_s(frame))
         if frame.product == "coefficients":
             log_transient(self._recording, frame, self._bins)
             return

@@ -11,6 +11,7 @@ from transientcam_driver.camera._capabilities import (
     AppliedSequence,
     Capabilities,
 )
+from transientcam_driver.camera._capture_clock import CaptureClock
 from transientcam_driver.camera._factory import FactoryCalibration, Lens
 from transientcam_driver.camera._frame import Counters, RawFrame
 from transientcam_driver.camera._hop import Hop
@@ -36,6 +37,7 @@ __all__ = [
     "CameraPlugin",
     "CameraState",
     "Capabilities",
+    "CaptureClock",
     "Counters",
     "DeviceState",
     "ExplainedEffect",

@@ -59,6 +59,8 @@ export interface ActiveDocument {
   readonly calibration_id: string;
   /** Why it is not. */
   readonly reason: string | null;
+  /** That it was measured at another temperature, and what that may do to ranges. */
+  readonly warning: string | null;
   /** What was active before, to which `POST /calibrations/active/undo` returns. */
   readonly former: string | null;
 }
@@ -200,8 +202,8 @@ export interface CalibrationDocument {
   /** What it was measured with, and is good for; the number of takes does not matter. */
   readonly sequence: Readonly<Record<string, unknown>>;
   readonly exposure_s: number;
-  /** Of the sensor, while it was measured. */
-  readonly temperature_c: number;
+  /** Of the sensor, while it was measured; null where the camera knows none. */
+  readonly temperature_c: number | null;
   /** Size of its file. */
   readonly bytes: number;
   /** Whether it is good for this camera with its present sequence. */
@@ -411,6 +413,9 @@ export interface FrameDocument {
   readonly device_time_s: number;
   /** Arrival of the last image, Unix time. */
   readonly host_time_s: number;
+  /** Start of the first exposure, Unix time: the camera's clock, set by that of the service at its
+   * first frame. No step of the service's clock moves it. */
+  readonly captured_unix_s: number | null;
   /** Measured by the camera's clock. */
   readonly capture_s: number;
   /** Computing time spent on this frame so far; null until something was computed. */
@@ -422,7 +427,8 @@ export interface FrameDocument {
   readonly takes: number;
   readonly width: number;
   readonly height: number;
-  readonly temperature_c: number;
+  /** Of the sensor; null where the camera knows none. */
+  readonly temperature_c: number | null;
   /** Images lost or corrupt between the frame before and this one. */
   readonly lost_images: number;
   /** The relays that it came through, the first one first; none where the camera is here. */
@@ -1445,6 +1451,7 @@ export type Notice =
       readonly kind: "calibration-changed";
       readonly calibration_id: string;
       readonly reason: string | null;
+      readonly warning?: string | null;
     }
   | {
       readonly type: "notice";

@@ -96,8 +96,8 @@ class CalibrationDocument(Document):
     sequence: dict[str, Any]
     """What it was measured with, and is good for; the number of takes does not matter."""
     exposure_s: float
-    temperature_c: float
-    """Of the sensor, while it was measured."""
+    temperature_c: float | None
+    """Of the sensor, while it was measured; null where the camera knows none."""
     bytes: int
     """Size of its file."""
     fits: bool
@@ -126,6 +126,8 @@ class ActiveDocument(Document):
     active one is not good for the sequence."""
     reason: str | None = None
     """Why it is not."""
+    warning: str | None = None
+    """That it was measured at another temperature, and what that may do to ranges."""
     former: str | None = None
     """What was active before, to which `POST /calibrations/active/undo` returns."""
 
