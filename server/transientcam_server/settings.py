@@ -4,10 +4,18 @@ import os
 from collections.abc import Callable
 from ipaddress import ip_address
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, get_args
 
 from platformdirs import user_config_path, user_data_path
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
 
 import transientcam_moments as tm
 from transientcam.wire import FIRST_MESSAGE_WITHIN_S, MAX_SUBSCRIPTIONS
@@ -19,8 +27,21 @@ _DEFAULTS = tm.Settings()  # the paper's
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
+def no_switch_for_a_number(model: type[BaseModel], value: object, info: ValidationInfo) -> object:
+    """Refuse true and false where a number is due: pydantic takes them for 1 and 0."""
+    annotation = model.model_fields[str(info.field_name)].annotation
+    if isinstance(value, bool) and _holds(annotation, int, float) and not _holds(annotation, bool):
+        raise PydanticCustomError("number", "Input should be a number, not true or false")
+    return value
+
+
+def _holds(annotation: Any, *wanted: type) -> bool:
+    return annotation in wanted or any(_holds(each, *wanted) for each in get_args(annotation))
+
+
 class _Group(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    _numbers = field_validator("*", mode="before")(classmethod(no_switch_for_a_number))
 
 
 if TYPE_CHECKING:
@@ -301,6 +322,8 @@ class Settings(_Group):
     """Address to listen on."""
     port: int = Field(default=8000, ge=0, le=65535)
     """TCP port to listen on; 0 takes any free one."""
+    root_path: str = Field(default="", pattern=r"^(/[A-Za-z0-9._~-]+)*$", max_length=200)
+    """Path below which a proxy serves this, as in ``/lidar``, whether it takes it off or not."""
     announce: Literal["auto", "on", "off"] = "auto"
     """Announce the service on the local network (mDNS); ``auto``: if other machines reach it, and
     not from a container; ``off``: nor look there for other cameras."""

@@ -11,7 +11,7 @@ from transientcam_driver.camera._capabilities import (
     AppliedSequence,
     Capabilities,
 )
-from transientcam_driver.camera._capture_clock import CaptureClock
+from transientcam_driver.camera._capture_clock import CaptureClock, capture_times
 from transientcam_driver.camera._factory import FactoryCalibration, Lens
 from transientcam_driver.camera._frame import Counters, RawFrame
 from transientcam_driver.camera._hop import Hop
@@ -54,6 +54,7 @@ __all__ = [
     "Status",
     "StatusFlag",
     "Truth",
+    "capture_times",
     "check_camera",
     "has_light",
     "kinds",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import RawFrame
-from transientcam_driver.camera import CaptureClock
+from transientcam_driver.camera import capture_times
 from transientcam_server.errors import DamagedFrame, NotARecording
 from transientcam_server.recording import _layout as layout, _lock as lock, _swmr as swmr
 from transientcam_server.recording._heaps import CheckedReader, require_sound_heaps
@@ -107,12 +107,8 @@ class Recording:
 
     @cached_property
     def captured_unix_s(self) -> NDArray[np.float64]:
-        """When the first exposure of each frame began, see `CaptureClock`."""
-        names = ("device_time_s", "capture_s", "host_time_s")
-        rows = zip(*(self.series(name).tolist() for name in names), strict=True)
-        clock = CaptureClock()
-        times = (clock.unix_s(**dict(zip(names, row, strict=True))) for row in rows)
-        return np.fromiter(times, np.float64, self.frames)
+        """When the first exposure of each frame began, in Unix time."""
+        return capture_times(*map(self.series, ("device_time_s", "capture_s", "host_time_s")))
 
     def frame(self, index: int) -> RawFrame:
         """Return a frame, bit for bit as it was captured.

@@ -5,7 +5,7 @@ from typing import Any, Final, Literal
 from pydantic import ConfigDict, Field
 
 from transientcam_driver.calibration import DEFAULT_TAKES
-from transientcam_server.api._documents.document import Document, JsonInteger
+from transientcam_server.api._documents.document import Document, JsonInteger, RequestDocument
 
 MAX_NAME: Final = 200
 
@@ -145,7 +145,7 @@ class CalibrationsDocument(Document):
     """The newest first."""
 
 
-class CalibrationRequest(Document):
+class CalibrationRequest(RequestDocument):
     """A calibration that is to be measured with the present sequence."""
 
     model_config = ConfigDict(
@@ -166,7 +166,7 @@ class CalibrationRequest(Document):
     if the camera can."""
 
 
-class ActivationRequest(Document):
+class ActivationRequest(RequestDocument):
     """The calibration that frames are to be calibrated by."""
 
     model_config = ConfigDict(

@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict
 
-from transientcam_server.api._documents.document import Document
+from transientcam_server.api._documents.document import Document, RequestDocument
 from transientcam_server.camera import Cause, State
 
 
@@ -116,7 +116,7 @@ class AcquisitionDocument(Document):
     and is asked again until it does."""
 
 
-class AcquisitionRequest(Document):
+class AcquisitionRequest(RequestDocument):
     """What the acquisition should do."""
 
     model_config = ConfigDict(

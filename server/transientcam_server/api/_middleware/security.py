@@ -5,11 +5,12 @@ All three are plain ASGI, so the stream passes through them like any request.
 
 import socket
 from ipaddress import ip_address
+from posixpath import dirname, relpath
 from typing import Final
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import Response
+from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from transientcam_server.api._problems import problem_response
@@ -38,7 +39,7 @@ SECURITY_HEADERS: Final = {
 
 
 class SecurityHeaders:
-    """Adds `SECURITY_HEADERS` to every answer."""
+    """Adds `SECURITY_HEADERS` to every answer, and makes the addresses in headers relative."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -51,9 +52,32 @@ class SecurityHeaders:
                 headers = MutableHeaders(scope=message)
                 for name, value in SECURITY_HEADERS.items():
                     headers.setdefault(name, value)
+                if (location := headers.get("location", "")).startswith("/"):
+                    # relative, since a proxy may serve this below any path
+                    headers["location"] = relpath(location, dirname(scope["path"]))
             await send(message)
 
         await self._app(scope, receive, with_headers)
+
+
+class RootPath:
+    """Takes off the path below which a proxy serves this, where the proxy leaves it."""
+
+    def __init__(self, app: ASGIApp, *, root_path: str) -> None:
+        self._app = app
+        self._root = root_path
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer as without it; the path itself leads to the page below it."""
+        path, raw = str(scope.get("path", "")), bytes(scope.get("raw_path") or b"")
+        if path == self._root and scope["type"] == "http":
+            # what the page names is relative to it
+            await RedirectResponse(f"{self._root}/", 308)(scope, receive, send)
+            return
+        root = self._root.encode()
+        if path.startswith(f"{self._root}/") and raw.startswith(root):
+            scope = scope | {"path": path[len(root) :], "raw_path": raw[len(root) :]}
+        await self._app(scope, receive, send)
 
 
 def own_names() -> tuple[str, ...]:
