@@ -1285,9 +1285,9 @@ export interface TimelineDocument {
   readonly duration_s: number;
   /** On average; null before there are two. */
   readonly frame_rate_hz: number | null;
-  /** Arrival of the first frame, Unix time. */
+  /** Capture of the first frame, Unix time. */
   readonly host_time_s: number | null;
-  /** Arrival of every `times_step`-th frame, beginning with the first, after the first. */
+  /** Capture of every `times_step`-th frame, beginning with the first, after the first. */
   readonly times_s: readonly number[];
   /** 1 unless there are very many. */
   readonly times_step: number;

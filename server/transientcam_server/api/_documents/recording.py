@@ -96,9 +96,9 @@ class TimelineDocument(Document):
     frame_rate_hz: float | None = None
     """On average; null before there are two."""
     host_time_s: float | None = None
-    """Arrival of the first frame, Unix time."""
+    """Capture of the first frame, Unix time."""
     times_s: list[float]
-    """Arrival of every `times_step`-th frame, beginning with the first, after the first."""
+    """Capture of every `times_step`-th frame, beginning with the first, after the first."""
     times_step: int
     """1 unless there are very many."""
 
