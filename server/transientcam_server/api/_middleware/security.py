@@ -5,7 +5,6 @@ All three are plain ASGI, so the stream passes through them like any request.
 
 import socket
 from ipaddress import ip_address
-from posixpath import dirname, relpath
 from typing import Final
 from urllib.parse import urlsplit
 
@@ -39,7 +38,7 @@ SECURITY_HEADERS: Final = {
 
 
 class SecurityHeaders:
-    """Adds `SECURITY_HEADERS` to every answer, and makes the addresses in headers relative."""
+    """Adds `SECURITY_HEADERS` to every answer."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -52,16 +51,13 @@ class SecurityHeaders:
                 headers = MutableHeaders(scope=message)
                 for name, value in SECURITY_HEADERS.items():
                     headers.setdefault(name, value)
-                if (location := headers.get("location", "")).startswith("/"):
-                    # relative, since a proxy may serve this below any path
-                    headers["location"] = relpath(location, dirname(scope["path"]))
             await send(message)
 
         await self._app(scope, receive, with_headers)
 
 
 class RootPath:
-    """Takes off the path below which a proxy serves this, where the proxy leaves it."""
+    """Takes off the path below which a proxy serves this, and names it in addresses."""
 
     def __init__(self, app: ASGIApp, *, root_path: str) -> None:
         self._app = app
@@ -77,7 +73,15 @@ class RootPath:
         root = self._root.encode()
         if path.startswith(f"{self._root}/") and raw.startswith(root):
             scope = scope | {"path": path[len(root) :], "raw_path": raw[len(root) :]}
-        await self._app(scope, receive, send)
+
+        async def below(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                if (location := headers.get("location", "")).startswith("/"):
+                    headers["location"] = self._root + location
+            await send(message)
+
+        await self._app(scope, receive, below)
 
 
 def own_names() -> tuple[str, ...]:

@@ -145,7 +145,7 @@ def test_a_service_open_to_others_is_reached_by_address_and_configured_names_onl
 
 
 @pytest.mark.parametrize("path", ["/lidar/api/v1/x?y=1", "/api/v1/x?y=1"])
-def test_a_path_of_a_proxy_is_taken_off_and_addresses_are_relative(path: str) -> None:
+def test_a_path_of_a_proxy_is_taken_off_and_named_in_addresses(path: str) -> None:
     async def app(scope: Scope, receive: Receive, send: Send) -> None:
         assert (scope["path"], scope["raw_path"]) == ("/api/v1/x", b"/api/v1/x")
         await Response(headers={"Location": "/api/v1/jobs/j"})(scope, receive, send)
@@ -157,5 +157,5 @@ def test_a_path_of_a_proxy_is_taken_off_and_addresses_are_relative(path: str) ->
 
     answer, page = asyncio.run(ask())
 
-    assert answer.headers["location"] == "jobs/j"
+    assert answer.headers["location"] == "/lidar/api/v1/jobs/j"
     assert (page.status_code, page.headers["location"]) == (308, "/lidar/")
