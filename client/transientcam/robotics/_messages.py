@@ -203,8 +203,10 @@ def messages_of(
     """
     messages = (Transform(), Calibration(lens), *_of_products(arrays, intensity))
     for each in messages:
-        if each.topic == DEPTH and (
-            any(lens.distortion) if topics is None else RECTIFIED in topics
+        if (
+            isinstance(each, Image)
+            and each.topic == DEPTH
+            and (any(lens.distortion) if topics is None else RECTIFIED in topics)
         ):
             yield Image(RECTIFIED, lens.rectified(each.values))
         if topics is None or each.topic in topics:

@@ -72,7 +72,7 @@ class RootPath:
             return
         root = self._root.encode()
         if path.startswith(f"{self._root}/") and raw.startswith(root):
-            scope = scope | {"path": path[len(root) :], "raw_path": raw[len(root) :]}
+            scope = {**scope, "path": path[len(root) :], "raw_path": raw[len(root) :]}
 
         async def below(message: Message) -> None:
             if message["type"] == "http.response.start":
