@@ -5,6 +5,8 @@ import { defineConfig } from "vite";
 const DAEMON = process.env.TRANSIENTCAM_URL ?? "http://127.0.0.1:8000";
 
 export default defineConfig({
+  // The service may stand below a path of a proxy.
+  base: "./",
   build: {
     // The wheel carries what stands here; the daemon serves it at `/`.
     outDir: "../../server/transientcam_server/static",

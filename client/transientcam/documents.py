@@ -108,6 +108,9 @@ class FrameDocument(TypedDict):
     """Start of the first exposure, by the camera's clock."""
     host_time_s: float
     """Arrival of the last image, Unix time."""
+    captured_unix_s: float | None
+    """Start of the first exposure, Unix time: the camera's clock, set by that of the service at its
+    first frame. No step of the service's clock moves it."""
     capture_s: float
     """Measured by the camera's clock."""
     reconstruct_s: float | None
@@ -119,7 +122,8 @@ class FrameDocument(TypedDict):
     takes: int
     width: int
     height: int
-    temperature_c: float
+    temperature_c: float | None
+    """Of the sensor; null where the camera knows none."""
     lost_images: int
     """Images lost or corrupt between the frame before and this one."""
     hops: list[HopDocument]

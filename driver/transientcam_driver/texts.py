@@ -35,3 +35,8 @@ def read_text(path: Path) -> str:
         found = f"byte 0x{data[error.start]:02x} in line {line}"
         raise ValueError(f"is not UTF-8 ({found}); save it as UTF-8") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def in_celsius(temperature_c: float | None) -> str:
+    """Return a temperature in words."""
+    return "no temperature known" if temperature_c is None else f"{temperature_c:.1f} °C"

@@ -233,6 +233,8 @@ class Service:
             dark = Dark("start")
         if dark is not None:
             _log.warning("%s", dark)
+        if (strange := self.intrinsics.off_the_image) is not None:
+            _log.warning("lens: %s", strange)
         self._light.turned()
         self._light.used()
         self.acquisition.start(dark=dark)
@@ -303,12 +305,13 @@ class Service:
     def intrinsics(self) -> Intrinsics:
         """Where the pixels look; another simulated scene may have another lens."""
         camera, simulation = self.camera, self.camera.simulation
+        width, height = camera.capabilities.width, camera.capabilities.height
         return known_intrinsics(
             self.settings.lens,
-            width=camera.capabilities.width,
-            height=camera.capabilities.height,
+            width=width,
+            height=height,
             reported=None if camera.factory is None else camera.factory.lens,
-            scene_field_deg=None if simulation is None else simulation.field_of_view_deg,
+            scene=None if simulation is None else simulation.lens(width=width, height=height),
             recorded=camera.intrinsics if isinstance(camera, ReplayCamera) else None,
             relayed=None if self.relay is None else self.relay.origin.intrinsics,
         )
@@ -441,6 +444,7 @@ class Service:
                 frame = self.pipeline.frame(raw, applied)
                 self.history.append(frame)
                 self.hub.publish(frame)
+                self.calibrations.observe(raw.temperature_c, applied)
             case CameraLostEvent(reason):
                 self.hub.notify("camera-lost", {"reason": reason})
             case CameraRecoveredEvent():

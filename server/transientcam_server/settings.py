@@ -4,10 +4,18 @@ import os
 from collections.abc import Callable
 from ipaddress import ip_address
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, get_args
 
 from platformdirs import user_config_path, user_data_path
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
 
 import transientcam_moments as tm
 from transientcam.wire import FIRST_MESSAGE_WITHIN_S, MAX_SUBSCRIPTIONS
@@ -19,8 +27,21 @@ _DEFAULTS = tm.Settings()
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
+def no_switch_for_a_number(model: type[BaseModel], value: object, info: ValidationInfo) -> object:
+    """Refuse true and false where a number is due: pydantic takes them for 1 and 0."""
+    annotation = model.model_fields[str(info.field_name)].annotation
+    if isinstance(value, bool) and _holds(annotation, int, float) and not _holds(annotation, bool):
+        raise PydanticCustomError("number", "Input should be a number, not true or false")
+    return value
+
+
+def _holds(annotation: Any, *wanted: type) -> bool:
+    return annotation in wanted or any(_holds(each, *wanted) for each in get_args(annotation))
+
+
 class _Group(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    _numbers = field_validator("*", mode="before")(classmethod(no_switch_for_a_number))
 
 
 if TYPE_CHECKING:
@@ -129,7 +150,10 @@ class SensorSettings(_Group):
 
 
 class LensSettings(_Group):
-    """Where the pixels look, if the camera does not report it; point clouds rest on it."""
+    """Where the pixels look and the light is, in place of what camera or scene say of it.
+
+    Point clouds, depth images and what robots are told of the lens rest on it.
+    """
 
     field_of_view_deg: _Finite | None = Field(default=None, gt=0.0, lt=180.0)
     """Horizontal, for square pixels around the axis."""
@@ -141,6 +165,27 @@ class LensSettings(_Group):
     """Column that the axis goes through; the middle of the frame without it."""
     cy_px: _Finite | None = None
     """Row that the axis goes through."""
+    distortion: tuple[_Finite, ...] = ()
+    """k1, k2, p1, p2 and k3, as OpenCV has them, beside `fx_px`; none without it."""
+    light_x_m: _Finite | None = Field(default=None, ge=-10.0, le=10.0)
+    """How far to the right of the lens the light is; also without any other of these."""
+    light_y_m: _Finite | None = Field(default=None, ge=-10.0, le=10.0)
+    """How far below the lens."""
+    light_z_m: _Finite | None = Field(default=None, ge=-10.0, le=10.0)
+    """How far before the lens."""
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        """Refuse what contradicts itself, or would be left out."""
+        if self.field_of_view_deg is not None and self.fx_px is not None:
+            raise ValueError("field_of_view_deg and fx_px say the same: give one of them")
+        beside = ("fy_px", "cx_px", "cy_px", "distortion")
+        given = [name for name in beside if getattr(self, name) not in (None, ())]
+        if given and self.fx_px is None:
+            raise ValueError(f"{' and '.join(given)} must stand beside fx_px")
+        if len(self.distortion) not in (0, 5):
+            raise ValueError(f"distortion has 5 numbers or none, not {len(self.distortion)}")
+        return self
 
 
 class StreamSettings(_Group):
@@ -282,6 +327,8 @@ class Settings(_Group):
     """Address to listen on."""
     port: int = Field(default=8000, ge=0, le=65535)
     """TCP port to listen on; 0 takes any free one."""
+    root_path: str = Field(default="", pattern=r"^(/[A-Za-z0-9._~-]+)*$", max_length=200)
+    """Path below which a proxy serves this, as in ``/lidar``, whether it takes it off or not."""
     announce: Literal["auto", "on", "off"] = "auto"
     """Announce the service on the local network (mDNS); ``auto``: if other machines reach it, and
     not from a container; ``off``: nor look there for other cameras."""

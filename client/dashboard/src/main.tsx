@@ -34,7 +34,7 @@ render(
   root,
 );
 
-const address = new URL("/api/v1/stream", window.location.href);
+const address = new URL("api/v1/stream", window.location.href);
 address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
 void stream.learnAbsent().then(() => stream.open(address.href));
 

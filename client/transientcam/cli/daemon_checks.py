@@ -16,6 +16,7 @@ from transientcam.camera import Camera
 from transientcam.cli.findings import Finding, absent_in_words
 from transientcam.errors import FrameTimeout, ProblemError, TransientcamError
 from transientcam.requests import MOST_DOCUMENT_BYTES
+from transientcam.robotics import Pinhole
 from transientcam.transport import bounded, http_options, parse_address, read, translated, within
 
 CLOCKS_WITHIN_S: Final = 1.5
@@ -145,6 +146,11 @@ def _camera(camera: Camera, seconds: float) -> Iterator[Finding]:
     if (warning := about.get("light_warning")) is not None:  # older daemons say nothing of it
         remedy = "docs/operations.md says what switches the light off, and after how long"
         yield Finding("warning", "light", warning, remedy)
+    if (strange := Pinhole.of_document(about["intrinsics"]).off_the_image) is not None:
+        yield Finding("warning", "lens", strange, "set [lens] for the resolution of this camera")
+    active = camera.calibrations.active()
+    if (warning := active.get("warning")) is not None:
+        yield Finding("warning", "calibration", str(warning), "transientcam calibrate")
     yield from _products(camera.info)
     if not camera.acquisition["running"]:
         message = "the capture is stopped, so nothing can be measured"

@@ -28,7 +28,7 @@ from transientcam.robotics._messages import (
     viewable,
 )
 from transientcam.robotics._reports import Report
-from transientcam.robotics._source import Source
+from transientcam.robotics._source import Source, captured_s
 from transientcam.robotics._viewer_server import ViewerServer
 from transientcam.robotics._watching import SERVICES, Watching
 from transientcam.wire import PRODUCTS, Notice
@@ -182,7 +182,7 @@ class FoxgloveBridge:
         if frame.frame == self._newest:
             topics -= _FIXED  # they came with another product of this frame
         self._newest = frame.frame
-        time_ns = round(frame.meta["host_time_s"] * 1e9)
+        time_ns = round(captured_s(frame) * 1e9)
         self._send({frame.product: frame.array}, time_ns, topics)
 
     def _send(

@@ -111,7 +111,7 @@ def _calibration(message: Calibration, stamp: Timestamp) -> CameraCalibration:
         width=lens.width,
         height=lens.height,
         distortion_model="plumb_bob",
-        D=[0.0] * 5,
+        D=lens.coefficients,
         K=lens.matrix,
         R=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         P=lens.projection,

@@ -19,12 +19,14 @@ OPTICAL_FRAME: Final = "camera_optical_frame"
 """x right, y down, z where the camera looks, in m: the frame of images and points."""
 DEPTH: Final = "/depth"
 """Topic of the depth image of REP 118: z of the points. Product ``range`` is along the ray."""
+RECTIFIED: Final = "/depth_rect"
+"""Topic of the same through the lens without its distortion, for programs that know no other."""
 _ENCODINGS: Final = {"<f4": "32FC1", "<u2": "16UC1", "|u1": "mono8"}
 
 
 @dataclass(frozen=True, slots=True)
 class Pinhole:
-    """A lens without distortion: pixel (column, row) looks along ((c - cx) / fx, (r - cy) / fy, 1).
+    """A lens; without distortion pixel (c, r) looks along ((c - cx) / fx, (r - cy) / fy, 1).
 
     Attributes
     ----------
@@ -34,6 +36,8 @@ class Pinhole:
         Of the image, in pixels.
     source
         Where they are known from; ``assumed`` is a guess of the service.
+    distortion
+        k1, k2, p1, p2, k3 in the order of OpenCV (ROS calls it ``plumb_bob``), or empty.
     """
 
     fx: float
@@ -43,11 +47,19 @@ class Pinhole:
     width: int
     height: int
     source: str
+    distortion: tuple[float, ...] = ()
 
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> Self:
         """Return the intrinsics that a point cloud, or the camera's document, has."""
-        return cls(**{name: document[name] for name in cls.__slots__})
+        names = ("fx", "fy", "cx", "cy", "width", "height", "source")
+        distortion = tuple(document.get("distortion", ()))
+        return cls(**{name: document[name] for name in names}, distortion=distortion)
+
+    @property
+    def coefficients(self) -> list[float]:
+        """The five numbers of the distortion, also where there is none."""
+        return [float(each) for each in self.distortion] or [0.0] * 5
 
     @property
     def matrix(self) -> list[float]:
@@ -58,6 +70,39 @@ class Pinhole:
     def projection(self) -> list[float]:
         """The 3 x 4 projection of a single camera, row by row."""
         return [self.fx, 0.0, self.cx, 0.0, 0.0, self.fy, self.cy, 0.0, 0.0, 0.0, 1.0, 0.0]
+
+    @property
+    def off_the_image(self) -> str | None:
+        """What to say of a principal point that is outside the image; None of any other."""
+        if 0 <= self.cx <= self.width - 1 and 0 <= self.cy <= self.height - 1:
+            return None
+        return (
+            f"the principal point ({self.cx:g}, {self.cy:g}) is outside the image of "
+            f"{self.width} x {self.height} pixels: was the lens calibrated at another resolution?"
+        )
+
+    def rectified(self, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return a depth image (H, W) as the same lens without its distortion sees it.
+
+        Each pixel has the depth of the nearest one that looks its way, NaN where there is none.
+        """
+        if not any(self.distortion):
+            return depth_m
+        k1, k2, p1, p2, k3 = self.distortion
+        height, width = depth_m.shape
+        x, y = np.meshgrid(
+            (np.arange(width) - self.cx) / self.fx, (np.arange(height) - self.cy) / self.fy
+        )
+        square = x * x + y * y
+        radial = 1.0 + square * (k1 + square * (k2 + square * k3))
+        bent_x = x * radial + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x)
+        bent_y = y * radial + p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y
+        column = np.rint(self.fx * bent_x + self.cx)
+        row = np.rint(self.fy * bent_y + self.cy)
+        seen = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        found = np.full_like(depth_m, np.nan)
+        found[seen] = depth_m[row[seen].astype(np.intp), column[seen].astype(np.intp)]
+        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,7 +164,7 @@ def viewable(product: str) -> bool:
 def topics_of(product: str) -> dict[str, type[Message]]:
     """Return the topics that show a product (raw images excepted), and what is on each."""
     if product == "pointcloud":
-        return {DEPTH: Image, Points.topic: Points}
+        return {DEPTH: Image, RECTIFIED: Image, Points.topic: Points}
     return {f"/{product}": Image}
 
 
@@ -129,7 +174,7 @@ def products_of(topics: Iterable[str]) -> tuple[str, ...]:
     for topic in topics:
         if topic == Points.topic:
             products |= {"pointcloud", "direct"}  # points are coloured by the direct light
-        elif topic == DEPTH:
+        elif topic in (DEPTH, RECTIFIED):
             products.add("pointcloud")
         elif topic not in (Calibration.topic, Transform.topic):
             products.add(topic.removeprefix("/"))
@@ -157,7 +202,15 @@ def messages_of(
         Those to yield; None for all.
     """
     messages = (Transform(), Calibration(lens), *_of_products(arrays, intensity))
-    yield from (each for each in messages if topics is None or each.topic in topics)
+    for each in messages:
+        if (
+            isinstance(each, Image)
+            and each.topic == DEPTH
+            and (any(lens.distortion) if topics is None else RECTIFIED in topics)
+        ):
+            yield Image(RECTIFIED, lens.rectified(each.values))
+        if topics is None or each.topic in topics:
+            yield each
 
 
 def _of_products(

@@ -10,6 +10,7 @@ from transientcam.camera import Camera
 from transientcam.errors import ParameterError
 from transientcam.frame import Frame
 from transientcam.robotics._messages import (
+    DEPTH,
     Calibration,
     Pinhole,
     Transform,
@@ -25,7 +26,7 @@ from transientcam.robotics._rerun_messages import (
     log_transient,
 )
 from transientcam.robotics._scatter import Scatter
-from transientcam.robotics._source import Source
+from transientcam.robotics._source import Source, captured_s
 from transientcam.wire import PRODUCTS, Subscription
 
 LOGGED: Final = ("range", "direct", "indirect", "brightness", "pointcloud", "transient")
@@ -149,7 +150,7 @@ class RerunBridge:
     def _send(self, frame: Frame) -> None:
         lens = self._source.lens_of(frame)
         self._recording.set_time("frame", sequence=frame.frame)
-        self._recording.set_time("capture", timestamp=frame.meta["host_time_s"])
+        self._recording.set_time("capture", timestamp=captured_s(frame))
         if frame.product == "coefficients":
             log_transient(self._recording, frame, self._bins)
             return
@@ -158,6 +159,8 @@ class RerunBridge:
         of_frame = self._direct if self._direct and self._direct.frame == frame.frame else None
         intensity = None if of_frame is None else of_frame.array
         for message in messages_of({frame.product: frame.array}, lens, intensity=intensity):
+            if any(lens.distortion) and message.topic == DEPTH:
+                continue  # its lens knows no distortion
             if lens != self._lens or not isinstance(message, Calibration | Transform):
                 log_message(self._recording, message)
         self._lens = lens

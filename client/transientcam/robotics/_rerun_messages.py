@@ -12,6 +12,7 @@ from transientcam.frame import Frame
 from transientcam.notebook import palette
 from transientcam.robotics._messages import (
     DEPTH,
+    RECTIFIED,
     Calibration,
     Image,
     Message,
@@ -35,7 +36,7 @@ _LEVELS: Final[dict[Level, str]] = {"info": "INFO", "warning": "WARN", "error": 
 def log_message(recording: rr.RecordingStream, message: Message) -> None:
     """Log a message: lens and pose once and for all, images and points at the present time."""
     match message:
-        case Image(topic=topic, values=values) if topic == DEPTH:
+        case Image(topic=topic, values=values) if topic in (DEPTH, RECTIFIED):
             recording.log(DEPTH_IMAGE, rr.DepthImage(values, meter=1.0))
         case Image(topic=topic, values=values):
             recording.log(f"images{topic}", rr.Image(values, color_model="L"))

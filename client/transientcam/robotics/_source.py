@@ -20,6 +20,12 @@ _LENS_MAY_CHANGE: Final = ("reconnected", "sequence-changed", "simulation-change
 _T = TypeVar("_T")
 
 
+def captured_s(frame: Frame) -> float:
+    """Return when a frame was captured, in Unix time; of older daemons when it arrived."""
+    captured_unix_s = frame.meta.get("captured_unix_s")
+    return float(frame.meta["host_time_s"] if captured_unix_s is None else captured_unix_s)
+
+
 class Source:
     """What every bridge needs of a camera.
 

@@ -100,8 +100,9 @@ NOTICES: Final[dict[str, NoticeKind]] = {
         ),
         NoticeKind(
             "calibration-changed",
-            "which gains frames are computed with from now on",
-            {"calibration_id": "string", "reason": _OR_NIL},
+            "which gains frames are computed with from now on, and whether these are doubtful",
+            {"calibration_id": "string", "reason": _OR_NIL, "warning": _OR_NIL},
+            optional=("warning",),
         ),
         NoticeKind(
             "noise-differs",

@@ -5,6 +5,7 @@ from transientcam_driver.calibration._capture import (
     capture_calibration,
     mean_of_takes,
 )
+from transientcam_driver.calibration._drift import TemperatureDrift
 from transientcam_driver.calibration._file import (
     DEVICE_FIELDS,
     CalibrationCapture,
@@ -19,6 +20,7 @@ __all__ = [
     "SWEEP_STEPS",
     "CalibrationCapture",
     "CalibrationSubject",
+    "TemperatureDrift",
     "capture_calibration",
     "mean_of_takes",
 ]

@@ -135,6 +135,7 @@ def capture_calibration(
         average(np.stack([frame.images[k : k + 1] for frame in frames]))
         for k in range(applied.images)
     ]
+    known_c = [each.temperature_c for each in frames if each.temperature_c is not None]
     return CalibrationCapture(
         images=np.concatenate([images for images, _ in averaged]).astype(np.float32),
         kept=np.concatenate([kept for _, kept in averaged], axis=1),
@@ -143,7 +144,7 @@ def capture_calibration(
         serial=camera.capabilities.serial,
         model=camera.capabilities.model,
         firmware=camera.capabilities.firmware,
-        temperature_c=float(np.mean([frame.temperature_c for frame in frames])),
+        temperature_c=float(np.mean(known_c)) if known_c else None,
         captured_unix_s=frames[-1].host_time_s,
         dark=None if dark is None else dark.mean(axis=0),
         dark_deviation=None if dark is None else dark.std(axis=0, ddof=1),

@@ -114,7 +114,7 @@ class CalibrationCapture:
     serial: str
     model: str
     firmware: str
-    temperature_c: float
+    temperature_c: float | None
     captured_unix_s: float
     dark: NDArray[np.float32] | None = None
     dark_deviation: NDArray[np.float32] | None = None
@@ -266,7 +266,8 @@ def _checked(path: Path, content: Mapping[str, NDArray[Any]]) -> CalibrationCapt
             name: _text(document[name]) for name in ("serial", "model", "firmware")
         }
         for name in ("low_frequency_hz", "temperature_c", "captured_unix_s"):
-            fields[name] = _number(document[name])
+            unknown = name == "temperature_c" and document[name] is None
+            fields[name] = None if unknown else _number(document[name])
         fields["notes"] = dict(document.get("notes", {}))
     except KeyError as error:
         raise CalibrationFileError(path, "document", f"without {error}", "complete") from error

@@ -11,6 +11,7 @@ from transientcam_driver.camera._capabilities import (
     AppliedSequence,
     Capabilities,
 )
+from transientcam_driver.camera._capture_clock import CaptureClock, capture_times
 from transientcam_driver.camera._factory import FactoryCalibration, Lamp, Lens
 from transientcam_driver.camera._frame import Counters, RawFrame
 from transientcam_driver.camera._hop import Hop
@@ -37,6 +38,7 @@ __all__ = [
     "CameraPlugin",
     "CameraState",
     "Capabilities",
+    "CaptureClock",
     "Counters",
     "DeviceState",
     "ExplainedEffect",
@@ -55,6 +57,7 @@ __all__ = [
     "StatusFlag",
     "SurfaceSeen",
     "Truth",
+    "capture_times",
     "check_camera",
     "has_light",
     "kinds",

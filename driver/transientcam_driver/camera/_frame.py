@@ -29,11 +29,13 @@ class RawFrame:
     capture_s
         From the first exposure to the last read-out, by the device's clock.
     temperature_c
-        Of the sensor, at the last image.
+        Of the sensor, at the last image; None where the camera knows none.
     lost_images
         Images lost or corrupt between the frame delivered before and this one.
     hops
         The relays that it came through, the first one first; of a camera on this machine none.
+    captured_unix_s
+        Begin of the first exposure as `CaptureClock` has it; None until it is asked.
     """
 
     number: int
@@ -43,9 +45,10 @@ class RawFrame:
     device_time_s: float
     host_time_s: float
     capture_s: float
-    temperature_c: float
+    temperature_c: float | None
     lost_images: int
     hops: tuple[Hop, ...] = ()
+    captured_unix_s: float | None = None
 
     @property
     def size_bytes(self) -> int:

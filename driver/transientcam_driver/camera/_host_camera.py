@@ -73,7 +73,7 @@ class HostCamera(ABC):
         """Return what would be set, without a request to the device; the epoch is 0."""
         return self._capabilities.apply(sequence)
 
-    def _status(self, *, light_on: bool, temperature_c: float) -> Status:
+    def _status(self, *, light_on: bool, temperature_c: float | None) -> Status:
         return Status.of_host(
             streaming=self._state is CameraState.STREAMING,
             light_on=light_on,

@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.camera._factory import Lamp
+from transientcam_driver.camera._factory import Lamp, Lens
 from transientcam_driver.camera._sensor import Sensor
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S, Sequence
 
@@ -177,9 +177,8 @@ class Simulation(Protocol):
         """Text of the scene's file where `change` was given it; None for one with a name."""
         ...
 
-    @property
-    def field_of_view_deg(self) -> float | None:
-        """Horizontal, of the scene's camera; None where the scene has no camera."""
+    def lens(self, *, width: int, height: int) -> Lens | None:
+        """Return what images are taken through, and where their light is; None without a place."""
         ...
 
     @property

@@ -37,7 +37,7 @@ class Status:
     dropped_images: int
     fifo_bytes: int
     fifo_high_water_bytes: int
-    temperature_c: float
+    temperature_c: float | None
 
     @classmethod
     def of_host(
@@ -48,7 +48,7 @@ class Status:
         epoch: int,
         next_image: int,
         device_time_s: float,
-        temperature_c: float,
+        temperature_c: float | None,
     ) -> "Status":
         """Return the status of a camera without watchdog, interlock and FIFO of its own."""
         flags = StatusFlag.INTERLOCK_CLOSED

@@ -10,6 +10,7 @@ from typing import Final
 from transientcam_driver.camera import light_warning, open_camera, plugin_of
 from transientcam_driver.contract import CLAUSES, Bench, ContractBroken, ContractSkipped
 from transientcam_driver.errors import DriverError
+from transientcam_driver.texts import in_celsius
 
 Reported = tuple[str, str, str, str | None]
 
@@ -57,7 +58,7 @@ def _capabilities(spec: str) -> Iterator[Reported]:
         rest = [camera.read_frame(timeout_s=_time_s(applied.frame_rate_hz)) for _ in range(_FRAMES)]
         took_s = (rest[-1].device_time_s - first.device_time_s) / _FRAMES
         rates = f"{1 / took_s:.3g} frames/s, stated {applied.frame_rate_hz:.3g}"
-        lost = f"{camera.counters.lost} images lost, {rest[-1].temperature_c:.1f} °C"
+        lost = f"{camera.counters.lost} images lost, {in_celsius(rest[-1].temperature_c)}"
         yield "ok", "frames", f"{applied.images} images each, {rates}; {lost}", None
         spread = (
             f"{int(image.min())}..{int(image.max())} (mean {float(image.mean()):.0f})"

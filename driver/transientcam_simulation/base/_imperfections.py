@@ -90,15 +90,16 @@ class Lens:
     Attributes
     ----------
     distortion
-        k1, k2, p1, p2 of Brown's model, in units of the focal length: a point at (x, y) before the
-        lens is seen at x (1 + k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2), and likewise in y.
+        k1, k2, p1, p2, k3 of Brown's model, in units of the focal length: a point at (x, y) before
+        the lens is seen at x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), and
+        likewise in y, which points up.
     centre
         Where the axis meets the image, right of and below its middle, in widths of the image.
     vignetting
         Light falls with this power of the cosine to the axis; 4 is that of a thin lens.
     """
 
-    distortion: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
     centre: tuple[float, float] = (0.0, 0.0)
     vignetting: float = 0.0
 
@@ -152,6 +153,6 @@ PROTOTYPE = DeviceProfile(
 
 TYPICAL = replace(PROTOTYPE, name="typical", dark_current=DarkCurrent(2e5))
 """The prototype, and chosen figures of what is not known of it: for effects that are forced on."""
-TYPICAL_LENS = Lens((-0.12, 0.02, 0.0, 0.0), (0.0, 0.0), 4.0)
+TYPICAL_LENS = Lens((-0.12, 0.02, 0.0, 0.0, 0.0), (0.0, 0.0), 4.0)
 
 PROFILES = {profile.name: profile for profile in (IDEAL, PROTOTYPE)}

@@ -1,6 +1,6 @@
 """From a scene to a simulated camera on a simulated bus."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -155,11 +155,18 @@ def build(
 
 
 def world_before(
-    scene: Scene, *, width: int, height: int, seed: int | None, readout_s: float
+    scene: Scene,
+    *,
+    width: int,
+    height: int,
+    seed: int | None,
+    readout_s: float,
+    seen_by: Callable[[Scene], Scene] = lambda scene: scene,
 ) -> tuple[SwitchableWorld, PrepareScene]:
     """Build the world in front of a unit of a camera, and what prepares another one for it.
 
-    Sensor, imperfections and what is off of its noise stay those of the scene given.
+    Sensor, imperfections and what is off of its noise stay those of the scene given; ``seen_by``
+    gives another scene the device's own lens.
 
     Raises
     ------
@@ -186,7 +193,7 @@ def world_before(
     def prepare(
         wanted: Scene | str, effects: Mapping[str, str], diffuser: bool
     ) -> tuple[Scene, World]:
-        found = seen(named(wanted) if isinstance(wanted, str) else wanted, effects)
+        found = seen_by(seen(named(wanted) if isinstance(wanted, str) else wanted, effects))
         behind = seen(find_scene(CALIBRATION), effects) if diffuser else found
         return found, world_of_scene(behind)
 

@@ -2,11 +2,12 @@
 
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
-from transientcam_driver.camera import Explanation, Lamp, Sensor, Truth
+from transientcam_driver.camera import Explanation, Lamp, Lens, Sensor, Truth
 from transientcam_driver.errors import CameraError
 from transientcam_driver.sequence import Sequence
 from transientcam_simulation.base import giving_up_by
@@ -85,10 +86,13 @@ class SimulationHandle:
         """Text of the scene's file, where `change` was given it."""
         return self._definition
 
-    @property
-    def field_of_view_deg(self) -> float | None:
-        """Horizontal; None where the scene has no camera."""
-        return None if self._scene.camera is None else self._scene.camera.field_of_view_deg
+    def lens(self, *, width: int, height: int) -> Lens | None:
+        """Return what images are taken through, and where their light is; None without a place."""
+        camera, light_m = self._scene.camera, self._scene.light.position_m
+        if camera is None:
+            return None
+        seen = replace(camera, lens=self._world.world.lens)
+        return seen.as_lens(light_m, width=width, height=height)
 
     @property
     def lamp(self) -> Lamp | None:
@@ -96,8 +100,8 @@ class SimulationHandle:
         camera, light = self._scene.camera, self._scene.light
         if camera is None or self._diffuser:
             return None
-        position = camera.axes() @ (light.position_m - camera.position_m)
-        axis = camera.axes() @ (light.aim_at_m - light.position_m)
+        position = camera.axes @ (light.position_m - camera.position_m)
+        axis = camera.axes @ (light.aim_at_m - light.position_m)
         axis = axis / np.linalg.norm(axis)
         white = light.electrons_per_s / self.sensor.gain_e_per_dn
         return Lamp(tuple(position), tuple(axis), light.beam_exponent, white)

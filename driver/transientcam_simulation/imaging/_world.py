@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.camera import ExplainedEffect, Explanation, Sensor, Truth
 from transientcam_driver.sequence import ImageLabel, Sequence
-from transientcam_simulation.base import IDEAL, PINHOLE, DeviceProfile, ask
+from transientcam_simulation.base import IDEAL, PINHOLE, DeviceProfile, Lens, ask
 from transientcam_simulation.effects import (
     CALLED_ABOVE,
     EFFECTS,
@@ -49,6 +49,7 @@ class _Plan:
     frequencies_hz: dict[int, float]
     conditions: Conditions
     trace: Callable[[], Views]
+    lens: Lens
     per_image: bool
     waveform: ModulationHarmonics | None
     on_light: tuple[PlaneEffect, ...]
@@ -123,6 +124,11 @@ class World:
         """Its sensor."""
         return self._sensor
 
+    @property
+    def lens(self) -> Lens:
+        """The lens that images are taken through; the scene's until a sequence is configured."""
+        return self._scenery.lens if self._plan is None else self._plan.lens
+
     def configure(self, sequence: Sequence, labels: tuple[ImageLabel, ...]) -> None:
         """Build the effects that the sequence calls for; `prepare` traces their light."""
         sequence = replace(sequence, phase_offset_rad=0.0)  # which the labels have in them
@@ -144,6 +150,7 @@ class World:
                     of_light, noise, conditions.highest_hz, lens, conditions.image_period_s
                 ),
             ),
+            lens,
             MotionDuringSequence.name in of_light,
             next((each for each in made if isinstance(each, ModulationHarmonics)), None),
             tuple(each for each in made if isinstance(each, PlaneEffect)),

@@ -55,7 +55,7 @@ def rays_through(
     height: int,
 ) -> Points:
     """Return unit vectors through places on the sensor; whole numbers are pixels' centres."""
-    right, down, forward = view.axes()
+    right, down, forward = view.axes
     half = np.tan(np.radians(view.field_of_view_deg) / 2)
     x = half * (2 * (column + 0.5) / width - 1)
     y = half * (height / width) * (1 - 2 * (row + 0.5) / height)
@@ -75,11 +75,11 @@ def _straightened(
 
     Brown's model is inverted by fixed-point iteration, as is usual.
     """
-    k1, k2, p1, p2 = lens.distortion
+    k1, k2, p1, p2, k3 = lens.distortion
     shown_x, shown_y = x, y
     for _step in range(_LENS_STEPS):
         squared = x * x + y * y
-        radial = np.maximum(1 + squared * (k1 + squared * k2), 0.2)
+        radial = np.maximum(1 + squared * (k1 + squared * (k2 + squared * k3)), 0.2)
         x, y = (
             (shown_x - 2 * p1 * x * y - p2 * (squared + 2 * x * x)) / radial,
             (shown_y - p1 * (squared + 2 * y * y) - 2 * p2 * x * y) / radial,

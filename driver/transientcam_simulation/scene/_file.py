@@ -174,12 +174,12 @@ def _viewpoint(table: Table) -> Viewpoint:
 
 
 def _lens(table: Table) -> Lens:
-    k1, k2, p1, p2 = (
+    k1, k2, p1, p2, k3 = (
         table.number(name, 0.0, least=-most, most=most)
-        for name, most in (("k1", 1.0), ("k2", 1.0), ("p1", 0.1), ("p2", 0.1))
+        for name, most in (("k1", 1.0), ("k2", 1.0), ("p1", 0.1), ("p2", 0.1), ("k3", 1.0))
     )
     x, y = (table.number(name, 0.0, least=-0.5, most=0.5) for name in ("centre_x", "centre_y"))
-    lens = Lens((k1, k2, p1, p2), (x, y), table.number("vignetting", 0.0, least=0, most=16))
+    lens = Lens((k1, k2, p1, p2, k3), (x, y), table.number("vignetting", 0.0, least=0, most=16))
     table.done()
     return lens
 

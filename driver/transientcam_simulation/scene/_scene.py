@@ -3,6 +3,7 @@
 The schema is described in docs/scenes.md; ``file`` reads it.
 """
 
+import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -10,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.camera import Sensor
+from transientcam_driver.camera import Lens as RealLens, Sensor
 from transientcam_simulation.base import IDEAL, PINHOLE, DeviceProfile, Lens, Scatter
 from transientcam_simulation.scene._geometry import Points, Rectangle, Shape
 from transientcam_simulation.scene._motion import Motion
@@ -29,13 +30,31 @@ class Viewpoint:
     field_of_view_deg: float
     lens: Lens = PINHOLE
 
+    @property
     def axes(self) -> Points:
-        """Return unit vectors (3, 3) to the right, downwards, and where the camera looks."""
+        """Unit vectors (3, 3) to the right, downwards, and where the camera looks."""
         forward = self.look_at_m - self.position_m
         forward = forward / np.linalg.norm(forward)
         right = np.cross(forward, [0.0, 0.0, 1.0])
         right /= np.linalg.norm(right)
         return np.stack([right, np.cross(forward, right), forward])
+
+    def as_lens(self, light_m: Points, *, width: int, height: int) -> RealLens:
+        """Return what a camera would report of this lens, and of a light at ``light_m``."""
+        focal_px = 0.5 * width / math.tan(math.radians(self.field_of_view_deg) / 2)
+        k1, k2, p1, p2, k3 = self.lens.distortion
+        right, down = (width * off for off in self.lens.centre)
+        x, y, z = (float(axis @ (light_m - self.position_m)) for axis in self.axes)
+        return RealLens(
+            focal_px,
+            focal_px,
+            (width - 1) / 2 + right,
+            (height - 1) / 2 + down,
+            (k1, k2, -p1, p2, k3) if any(self.lens.distortion) else (),  # its y is up
+            x,
+            y,
+            z,
+        )
 
 
 @dataclass(frozen=True, slots=True)

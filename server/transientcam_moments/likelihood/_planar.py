@@ -294,8 +294,11 @@ def _fit_tail(
     damping = sharp.FIRST_DAMPING + 0 * cost
     bar = bar_of_tail(data.penalty, found)
     state = _times(steps, step, (*banks, x, y, w, v, d, t, cost, damping), _moving)[5:12]
-    given = data.penalty, data.numbers >= 4, found
-    offer_tail(order, power, unknowns, data.weight, PRIOR, shapes, *state, *given)
+    x, y, w, v, d, t, cost = state
+    offer_tail(
+        order, power, unknowns, data.weight, PRIOR, shapes, x, y, w, v, d, t, cost, data.penalty,
+        data.numbers >= 4, found,
+    )  # fmt: skip
     return state
 
 

@@ -14,7 +14,12 @@ from transientcam_server.api._docs import openapi, pages
 from transientcam_server.api._metrics import Metrics
 from transientcam_server.api._middleware.answers import AnswerLimit
 from transientcam_server.api._middleware.requests import RequestLog
-from transientcam_server.api._middleware.security import BodyLimit, OriginCheck, SecurityHeaders
+from transientcam_server.api._middleware.security import (
+    BodyLimit,
+    OriginCheck,
+    RootPath,
+    SecurityHeaders,
+)
 from transientcam_server.api._neighbours import NeighbourSearch
 from transientcam_server.api._routes import (
     acquisition,
@@ -93,6 +98,7 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
         docs_url=None,  # pages.router has one that needs no other host
         redoc_url=None,
         swagger_ui_oauth2_redirect_url=None,
+        servers=[{"url": settings.root_path}] if settings.root_path else None,
     )
     app.state.service = service
     app.state.metrics = metrics
@@ -119,6 +125,8 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     app.add_middleware(OriginCheck, settings=settings)
     app.add_middleware(RequestLog, metrics=metrics)
     app.add_middleware(SecurityHeaders)
+    if settings.root_path:
+        app.add_middleware(RootPath, root_path=settings.root_path)
     _analyse_routes(app)
     return app
 

@@ -196,11 +196,12 @@ class _ServiceCollector(Collector):
         latest = self._service.hub.latest
         if latest is None:
             return
-        yield GaugeMetricFamily(
-            "transientcam_sensor_temperature_celsius",
-            "Of the camera, with its last frame.",
-            latest.raw.temperature_c,
-        )
+        if (temperature_c := latest.raw.temperature_c) is not None:
+            yield GaugeMetricFamily(
+                "transientcam_sensor_temperature_celsius",
+                "Of the camera, with its last frame.",
+                temperature_c,
+            )
         shares = GaugeMetricFamily(
             "transientcam_pixels_flagged_ratio",
             "Share of the pixels of the last frame that was looked at that carry a flag.",

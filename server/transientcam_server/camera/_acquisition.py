@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, Final, TypeVar
 
 from transientcam_driver import (
@@ -27,6 +28,7 @@ from transientcam_driver import (
     Sequence,
     Status,
 )
+from transientcam_driver.camera import CaptureClock
 from transientcam_server.camera._darkness import Dark, Darkness, KeptCause
 from transientcam_server.camera._events import (
     CameraLostEvent,
@@ -104,6 +106,7 @@ class Acquisition:
         self._moved_s = self._read_s = clock()
         self._arrivals_s: deque[float] = deque(maxlen=_RATE_FRAMES)
         self._applied: dict[int, AppliedSequence] = {}
+        self._capture_clock = CaptureClock()
         self._remember(camera.applied)
 
     # -- from any thread -----------------------------------------------------------------------
@@ -394,6 +397,13 @@ class Acquisition:
         return now_s - read_s >= heartbeat_s > 0.0
 
     def _report_frame(self, raw: RawFrame) -> None:
+        if raw.captured_unix_s is None:
+            captured_s = self._capture_clock.unix_s(
+                device_time_s=raw.device_time_s,
+                capture_s=raw.capture_s,
+                host_time_s=raw.host_time_s,
+            )
+            raw = replace(raw, captured_unix_s=captured_s)
         self._report(Captured(raw, self._applied[raw.epoch]))
 
     def _remember(self, applied: AppliedSequence) -> None:

@@ -62,7 +62,7 @@ class StoredCalibration:
     subject: CalibrationSubject
     model: str
     captured_unix_s: float
-    temperature_c: float
+    temperature_c: float | None
     notes: Mapping[str, Any]
     verdict: Verdict
     waveform: NDArray[Any] | None

@@ -20,7 +20,7 @@ from transientcam_driver import (
     RawFrame,
     capture_calibration,
 )
-from transientcam_driver.calibration import DEFAULT_TAKES
+from transientcam_driver.calibration import DEFAULT_TAKES, TemperatureDrift
 from transientcam_server.camera._acquisition import Acquisition
 from transientcam_server.camera._calibration_store import (
     CalibrationStore,
@@ -116,6 +116,7 @@ class Calibrator:
         self._history = history
         self._notify = notify
         self._clock = clock
+        self._warning: str | None = None
         self._drift: Drift | None = None
         self._drift_of = NOMINAL_ID
         self._drift_until_s = 0.0
@@ -150,7 +151,19 @@ class Calibrator:
         return {
             "calibration_id": calibration_id(self._pipeline.gains_for(applied)),
             "reason": None if misfit is None else str(misfit),
+            "warning": self._warning,
         }
+
+    def observe(self, temperature_c: float | None, applied: AppliedSequence) -> None:
+        """Compare a frame's temperature with that of the active calibration, and tell of both."""
+        calibration = self._pipeline.calibration
+        calibrated_c = None if calibration is None else calibration.capture.temperature_c
+        drift = TemperatureDrift.between(calibrated_c, temperature_c)
+        before, self._warning = self._warning, None if drift is None else drift.warning
+        if (before is None) != (self._warning is None):
+            if self._warning is not None:
+                _log.warning("the calibration may not hold: %s", self._warning)
+            self._notify(self.notice(applied))
 
     def misfit(
         self, stored: StoredCalibration, applied: AppliedSequence

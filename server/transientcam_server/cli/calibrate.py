@@ -14,7 +14,7 @@ import typer
 
 from transientcam.cli.options import TokenOption, require_suffix
 from transientcam.cli.terminal import Terminal, echo
-from transientcam_driver.texts import read_text
+from transientcam_driver.texts import in_celsius, read_text
 
 if TYPE_CHECKING:
     from transientcam_driver import Camera
@@ -277,7 +277,7 @@ def _print_capture(result: dict[str, Any]) -> None:
     lines = (
         f"{result['file']}: {result['calibration_id']}",
         f"  {result['width']} x {result['height']} pixels of {result['serial']} "
-        f"at {result['temperature_c']:.1f} °C, {result['bad_pixels']} of them bad",
+        f"at {in_celsius(result['temperature_c'])}, {result['bad_pixels']} of them bad",
         f"  {result['rejected_images']} of {captured} images left out as outliers",
         *_harmonics_lines(result),
         *_verdict_lines(result["verdict"]),
@@ -313,7 +313,7 @@ def _print_measured(result: dict[str, Any]) -> None:
     lines = [
         calibration["id"] + (f" ({name})" if name else ""),
         f"  {device['width']} x {device['height']} pixels of {device['serial']} "
-        f"at {calibration['temperature_c']:.1f} °C, {measured['bad_pixels']} of them bad",
+        f"at {in_celsius(calibration['temperature_c'])}, {measured['bad_pixels']} of them bad",
         f"  {measured['rejected_images']} of {measured['images']} images left out as outliers",
     ]
     lines += _harmonics_lines(measured)

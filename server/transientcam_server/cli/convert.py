@@ -5,14 +5,17 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 
 import json
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
+import numpy as np
 import typer
 
 from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import Terminal, echo
 from transientcam_server.cli.options import RecordingArgument
 from transientcam_server.cli.progress import progress_bar
+
+_CLOCK_SET_S: Final = 1.0
 
 
 def convert(
@@ -54,11 +57,18 @@ def convert(
             opened, output, products=products, schemas=schemas, url=url, progress=advance
         )
         frames, lens = opened.frames, lens_of(opened)
+        arrived_s = opened.series("host_time_s") - opened.captured_unix_s
     if as_json:
         echo(json.dumps({"file": str(output), "frames": frames}))
         return
     console = Terminal(stderr=True)
     console.print(f"{output}: {frames} frames", soft_wrap=True)
+    if frames and (step_s := float(np.ptp(arrived_s))) > _CLOCK_SET_S:
+        console.print(
+            f"the host's clock was set while it recorded, by up to {step_s:.0f} s: times of "
+            "captures are those of the camera's clock",
+            soft_wrap=True,
+        )
     if "pointcloud" in products and lens.source == "assumed":
         console.print(
             f"the recording does not say its lens: points, depth and calibration assume "

@@ -101,7 +101,7 @@ def import_kinect2(
                         device_time_s=time_s,
                         host_time_s=began_s + time_s,
                         capture_s=1 / FRAME_RATE_HZ,
-                        temperature_c=0.0,
+                        temperature_c=None,
                         lost_images=0,
                     )
                 )

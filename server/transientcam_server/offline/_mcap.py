@@ -51,7 +51,7 @@ def write_mcap(
     foxglove = library("foxglove", "an .mcap")
     log = _Topics(foxglove, schemas, content.columns)
     lens = lens_of(recording)
-    arrived_ns = np.round(content.columns["host_time_s"].values * 1e9).astype(np.int64)
+    captured_ns = np.round(content.columns["captured_unix_s"].values * 1e9).astype(np.int64)
     options = importlib.import_module("foxglove.mcap").MCAPWriteOptions(
         profile="ros2" if schemas == "ros2" else None
     )
@@ -62,7 +62,7 @@ def write_mcap(
     ):
         writer.write_metadata("recording", dict(content.attributes))
         writer.attach(
-            log_time=int(arrived_ns[0]) if len(arrived_ns) else 0,
+            log_time=int(captured_ns[0]) if len(captured_ns) else 0,
             create_time=round(float(content.attributes["started_s"]) * 1e9),
             name="columns.npz",
             media_type="application/x-npz",
@@ -70,7 +70,7 @@ def write_mcap(
         )
         for index, (arrays, intensity) in enumerate(_frames(recording, products)):
             for message in messages_of(arrays, lens, intensity=intensity):
-                log(message, int(arrived_ns[index]))
+                log(message, int(captured_ns[index]))
             progress(index + 1, recording.frames)
 
 

@@ -128,7 +128,7 @@ def _calibration(message: Calibration, time_ns: int) -> Any:
         height=lens.height,
         width=lens.width,
         distortion_model="plumb_bob",
-        d=np.zeros(5),
+        d=np.array(lens.coefficients),
         k=np.asarray(lens.matrix),
         r=np.eye(3).ravel(),
         p=np.asarray(lens.projection),

@@ -22,6 +22,11 @@ def columns_of(recording: Recording) -> dict[str, Column]:
         name: Column(("frame",), recording.series(name), attributes)
         for name, (_, attributes) in layout.SERIES.items()
     }
+    columns["captured_unix_s"] = Column(
+        ("frame",),
+        recording.captured_unix_s,
+        {"units": "s", "long_name": "begin of the first exposure by the device's clock, Unix time"},
+    )
     for name, size in zip(AXES[1:], recording.shape[1:], strict=True):
         columns[name] = Column((name,), np.arange(size, dtype=np.int32))
     columns |= image_columns(labels)

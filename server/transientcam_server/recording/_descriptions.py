@@ -137,8 +137,8 @@ def _read(path: Path) -> dict[str, Any]:
 def _of_recording(path: Path) -> dict[str, Any]:
     unfinished = path.name.endswith(".part")
     with Recording(path) as recording:
-        end, host_time_s = recording.end, recording.series("host_time_s")
-        between_s = float(host_time_s[-1] - host_time_s[0]) if len(host_time_s) else 0.0
+        end, captured_s = recording.end, recording.captured_unix_s
+        between_s = float(captured_s[-1] - captured_s[0]) if len(captured_s) else 0.0
         return _of_header(recording.header) | {
             "id": id_of(path),
             "state": "interrupted" if unfinished else "complete",

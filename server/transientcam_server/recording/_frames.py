@@ -78,7 +78,7 @@ class RecordedFrames:
         Problem
             ``unknown-frame``, ``recording-damaged``.
         """
-        number = len(await self.host_time_s()) if name == LATEST else int(name)
+        number = len(await self.captured_unix_s()) if name == LATEST else int(name)
         reconstruction = self._reconstruction(settings)
         key = number, reconstruction.id
         task = self._frames.get(key)
@@ -90,7 +90,7 @@ class RecordedFrames:
             self._frames.popitem(last=False)
         return await asyncio.shield(task)
 
-    async def host_time_s(self) -> NDArray[np.float64]:
+    async def captured_unix_s(self) -> NDArray[np.float64]:
         """Return when each of the frames that were written so far arrived, Unix time."""
         return await self._disk.run(_read_times, self._find)
 
@@ -147,10 +147,10 @@ def _failed(task: "asyncio.Task[Frame]") -> bool:
     return task.done() and (task.cancelled() or task.exception() is not None)
 
 
-def timeline(host_time_s: NDArray[Any]) -> dict[str, Any]:
-    """Return when the frames of a recording arrived, in at most `MAX_TIMES` numbers."""
-    count = len(host_time_s)
-    since_s = host_time_s - host_time_s[0] if count else host_time_s
+def timeline(captured_s: NDArray[Any]) -> dict[str, Any]:
+    """Return when the frames of a recording were captured, in at most `MAX_TIMES` numbers."""
+    count = len(captured_s)
+    since_s = captured_s - captured_s[0] if count else captured_s
     duration_s = float(since_s[-1]) if count else 0.0
     step = max(1, -(-count // MAX_TIMES))
     return {
@@ -159,7 +159,7 @@ def timeline(host_time_s: NDArray[Any]) -> dict[str, Any]:
         "count": count,
         "duration_s": duration_s,
         "frame_rate_hz": (count - 1) / duration_s if duration_s > 0.0 else None,
-        "host_time_s": float(host_time_s[0]) if count else None,
+        "host_time_s": float(captured_s[0]) if count else None,
         "times_s": [round(float(each), 6) for each in since_s[::step]],
         "times_step": step,
     }
@@ -175,7 +175,7 @@ def _read_header(find: Find) -> Header:
 
 def _read_times(find: Find) -> NDArray[np.float64]:
     with open_found(find) as recording:
-        return recording.series("host_time_s")
+        return recording.captured_unix_s
 
 
 def _read_frame(find: Find, number: int) -> RawFrame:

@@ -1,7 +1,9 @@
 """Reads recordings, finished or not: every frame as the camera gave it."""
 
 import contextlib
+import math
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any
@@ -10,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver import RawFrame
+from transientcam_driver.camera import capture_times
 from transientcam_server.errors import DamagedFrame, NotARecording
 from transientcam_server.recording import _layout as layout, _lock as lock, _swmr as swmr
 from transientcam_server.recording._heaps import CheckedReader, require_sound_heaps
@@ -102,6 +105,11 @@ class Recording:
         values: NDArray[Any] = self._series[name][: self.frames]
         return values
 
+    @cached_property
+    def captured_unix_s(self) -> NDArray[np.float64]:
+        """When the first exposure of each frame began, in Unix time."""
+        return capture_times(*map(self.series, ("device_time_s", "capture_s", "host_time_s")))
+
     def frame(self, index: int) -> RawFrame:
         """Return a frame, bit for bit as it was captured.
 
@@ -130,8 +138,9 @@ class Recording:
             device_time_s=value["device_time_s"],
             host_time_s=value["host_time_s"],
             capture_s=value["capture_s"],
-            temperature_c=value["temperature_c"],
+            temperature_c=None if math.isnan(value["temperature_c"]) else value["temperature_c"],
             lost_images=value["lost_images"],
+            captured_unix_s=float(self.captured_unix_s[index]),
         )
 
     def __iter__(self) -> Iterator[RawFrame]:

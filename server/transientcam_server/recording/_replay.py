@@ -103,7 +103,7 @@ class ReplayCamera:
         self._round = 0
         self._kept: dict[int, RawFrame] = {}
         self._due_s = 0.0
-        self._temperature_c = 0.0
+        self._temperature_c: float | None = None
 
     @property
     def capabilities(self) -> Capabilities:
@@ -282,6 +282,7 @@ class ReplayCamera:
             epoch=self.applied.epoch,
             number=raw.number + shift_frames,
             device_time_s=raw.device_time_s + shift_s,
+            captured_unix_s=None,
         )
 
     def _frame(self, index: int) -> RawFrame:

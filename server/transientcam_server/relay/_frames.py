@@ -73,6 +73,7 @@ def capture_of(
     pixels = capabilities.height, capabilities.width
     as_there: dict[str, Any] = {name: meta[name] for name in _AS_THERE}
     given = as_there | {
+        "captured_unix_s": meta.get("captured_unix_s"),
         "number": number,
         "epoch": applied.epoch,
         "labels": applied.labels,

@@ -63,5 +63,5 @@ def status_of(document: Mapping[str, Any], *, epoch: int) -> Status:
         dropped_images=int(document["dropped_images"]),
         fifo_bytes=int(document["fifo_bytes"]),
         fifo_high_water_bytes=int(document["fifo_high_water_bytes"]),
-        temperature_c=float(document["temperature_c"]),
+        temperature_c=document["temperature_c"],
     )

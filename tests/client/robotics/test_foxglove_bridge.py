@@ -71,7 +71,7 @@ def pixels(message: Any) -> NDArray[Any]:
 
 
 def test_a_viewer_sees_the_values_of_the_camera(served: Served) -> None:
-    topics = ("/range", "/depth", "/pointcloud", "/camera_info", "/tf_static")
+    topics = ("/range", "/depth", "/depth_rect", "/pointcloud", "/camera_info", "/tf_static")
     with bridged(served.url) as (bridge, _), viewing(bridge.url) as viewer:
         assert set(viewer.channels) == {*topics, "/direct", "/indirect", "/brightness"}
         viewer.subscribe(*topics)

@@ -282,7 +282,7 @@ def test_models_count_by_their_scores_also_around_the_turn() -> None:
     phase = np.remainder(random.normal(0, 0.2, (4, 500)), 2 * np.pi)
     square, score = random.uniform(0.01, 0.2, (2, 4, 500))
     score *= 100
-    found = [np.zeros(500)] * choice.PLANES
+    found: list[Any] = [np.zeros(500)] * choice.PLANES
     choice.nothing(phase[0], np.full(500, np.inf), found)
 
     for each in zip(phase, square, score, strict=True):

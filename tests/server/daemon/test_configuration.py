@@ -307,3 +307,23 @@ def test_a_user_without_a_home_needs_none_where_the_directories_are_set(
 
     assert settings.tokens_file == Path(tokens)
     assert settings.recordings.directory == tmp_path / "recordings"
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ("[lens]\nfield_of_view_deg = 60.0\nfx_px = 200.0", "give one of them"),
+        ("[lens]\ncx_px = 10.0", "cx_px must stand beside fx_px"),
+        ("[lens]\nfx_px = 200.0\ndistortion = [0.1, 0.2]", "5 numbers or none, not 2"),
+        ("[lens]\nlight_x_m = 300.0", "less than or equal to 10"),
+        ("[history]\nseconds = false", "not true or false"),
+        ("port = true", "not true or false"),
+        ('root_path = "lidar/"', "match pattern"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(tmp_path: Path, lines: str, said: str) -> None:
+    file = tmp_path / "lab.toml"
+    file.write_text(lines)
+
+    with pytest.raises(SettingsError, match=said):
+        load_settings({}, file=file, environment={})

@@ -24,7 +24,9 @@ from transientcam_server.offline._mcap import PRODUCTS
 from transientcam_server.recording import Recording
 
 FRAMES = 2
+K1 = -0.4
 LENS = {"fx": 20.0, "fy": 21.0, "cx": 7.25, "cy": 5.5, "width": WIDTH, "height": HEIGHT}
+BENT = LENS | {"distortion": [K1, 0.0, 0.0, 0.0, 0.0]}
 PIXELS = {"32FC1": "<f4", "16UC1": "<u2", "mono8": "|u1"}
 SHOWN = ("range", "flags", "pointcloud", "raw")
 
@@ -32,7 +34,7 @@ SHOWN = ("range", "flags", "pointcloud", "raw")
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("source") / "a.h5"
-    return record(path, FRAMES, camera={"spec": "sim:mirrors", "intrinsics": LENS})
+    return record(path, FRAMES, camera={"spec": "sim:mirrors", "intrinsics": BENT})
 
 
 @pytest.fixture(scope="module")
@@ -57,9 +59,11 @@ def expected(source: Path, index: int) -> dict[str, NDArray[Any]]:
         range_m, flags, direct = recording[index].range_m, recording[index].flags, recording[index]
         light = direct.direct
     column, row = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
-    ray = np.stack(
-        [(column - LENS["cx"]) / LENS["fx"], (row - LENS["cy"]) / LENS["fy"], np.ones_like(row)], -1
-    )
+    seen = np.stack([(column - LENS["cx"]) / LENS["fx"], (row - LENS["cy"]) / LENS["fy"]], -1)
+    slopes = seen
+    for _ in range(100):  # what the lens bends to where the pixel is
+        slopes = seen / (1.0 + K1 * np.sum(slopes**2, axis=-1, keepdims=True))
+    ray = np.concatenate([slopes, np.ones((HEIGHT, WIDTH, 1))], -1)
     points = range_m[..., None] * ray / np.linalg.norm(ray, axis=-1, keepdims=True)
     return {"range": range_m, "flags": flags, "direct": light, "points": points}
 
@@ -118,7 +122,17 @@ def test_ros_programs_read_images_lens_and_points(
         assert list(info.k) == [20.0, 0.0, 7.25, 0.0, 21.0, 5.5, 0.0, 0.0, 1.0]
         assert list(info.p) == [20.0, 0.0, 7.25, 0.0, 0.0, 21.0, 5.5, 0.0, 0.0, 0.0, 1.0, 0.0]
         assert (info.width, info.height, info.distortion_model) == (WIDTH, HEIGHT, "plumb_bob")
-        assert arrived_ns == pytest.approx(frame(index).host_time_s * 1e9, abs=1e3)
+        assert list(info.d) == BENT["distortion"]
+        # a pinhole's pixel (0, 0) looks where the lens bends light to another pixel
+        x, y = -7.25 / 20.0, -5.5 / 21.0
+        bent = 1.0 + K1 * (x * x + y * y)
+        row, column = round(21.0 * y * bent + 5.5), round(20.0 * x * bent + 7.25)
+        assert (row, column) != (0, 0)
+        rectified = pixels(found["/depth_rect"][index][1])
+        np.testing.assert_array_equal(rectified[0, 0], pixels(depth)[row, column])
+        since_s = frame(index).device_time_s - frame(0).device_time_s
+        first_ns, _ = found["/pointcloud"][0]
+        assert arrived_ns - first_ns == pytest.approx(since_s * 1e9, abs=1e3)
         stamp = info.header.stamp
         assert stamp.sec * 10**9 + stamp.nanosec == arrived_ns
         assert info.header.frame_id == cloud.header.frame_id == "camera_optical_frame"
@@ -169,9 +183,14 @@ def test_a_file_for_ros_holds_no_message_of_another_kind(ros2: Path) -> None:
 def test_foxglove_reads_images_lens_points_and_pose(foxglove: Path, source: Path) -> None:
     found = through_mcap(foxglove, ProtobufDecoders())
 
-    assert set(found) == {"/tf_static", "/camera_info", "/range", "/flags", "/depth"} | {
-        "/pointcloud"
-    } | {f"/raw/image_{index:03d}" for index in range(8)}
+    assert set(found) == {
+        "/tf_static",
+        "/camera_info",
+        "/range",
+        "/flags",
+        "/depth",
+        "/depth_rect",
+    } | {"/pointcloud"} | {f"/raw/image_{index:03d}" for index in range(8)}
     for index in range(FRAMES):
         wanted = expected(source, index)
         seen = np.isfinite(wanted["range"])

@@ -277,16 +277,16 @@ class TestMirrors:
 
 def test_a_lens_shows_points_where_browns_model_says() -> None:
     """Rays through places on the sensor, projected again by the model itself."""
-    lens = Lens((-0.12, 0.03, 0.002, -0.001), (0.02, -0.01))
+    lens = Lens((-0.12, 0.03, 0.002, -0.001, 0.01), (0.02, -0.01))
     view = Viewpoint(np.zeros(3), np.array([0.0, 1.0, 0.0]), 70.0, lens)
     rows, columns = np.divmod(np.arange(41 * 31), 41)
 
     rays = rays_through(view, columns, rows, width=41, height=31)
 
     x, y = rays[:, 0] / rays[:, 1], rays[:, 2] / rays[:, 1]
-    k1, k2, p1, p2 = lens.distortion
+    k1, k2, p1, p2, k3 = lens.distortion
     squared = x * x + y * y
-    radial = 1 + k1 * squared + k2 * squared**2
+    radial = 1 + k1 * squared + k2 * squared**2 + k3 * squared**3
     half = math.tan(math.radians(35))
     seen_x = x * radial + 2 * p1 * x * y + p2 * (squared + 2 * x * x) + 2 * half * 0.02
     seen_y = y * radial + p1 * (squared + 2 * y * y) + 2 * p2 * x * y + 2 * half * 0.01

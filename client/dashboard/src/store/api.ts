@@ -225,7 +225,7 @@ export class Api {
   /** What can be set in the document at a path, and within which limits; by its name in that document. */
   async parameters(path: string): Promise<ParameterDocument[]> {
     const { parameters } = await this.#json("GET /parameters");
-    const ours = parameters.filter(({ resource, access }) => resource === `/api/v1${path}` && access === "read-write");
+    const ours = parameters.filter(({ resource, access }) => resource.replace(/^\/api\/v1/, "") === path && access === "read-write");
     return ours.map((parameter) => ({ ...parameter, name: parameter.pointer.slice(1) }));
   }
 
@@ -319,7 +319,7 @@ export class Api {
   async #ask(method: string, path: string, { body, signal, keepalive, headers }: RequestDetails): Promise<Response> {
     const raw = body instanceof Blob;
     try {
-      return await this.#fetch(`/api/v1${path}`, {
+      return await this.#fetch(`api/v1${path}`, {
         method,
         headers: {
           ...this.credentials.headers(method !== "GET"),

@@ -340,7 +340,7 @@ export class StreamClient {
     const ticket = ++this.#tickets;
     return new Promise((resolve, reject) => {
       this.#errands.set(ticket, { resolve, reject });
-      this.#send({ type: "bring", ticket, path: `/api/v1${path}`, products });
+      this.#send({ type: "bring", ticket, path, products });
     });
   }
 

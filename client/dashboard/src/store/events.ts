@@ -121,6 +121,7 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
       return { words: `The camera stands before ${notice.scene}${chosen.length > 0 ? `, with ${chosen.join(", ")}` : ""}.`, tone: "plain" };
     }
     case "calibration-changed":
+      if (notice.warning) return { words: `The calibration may not hold: ${notice.warning}.`, tone: "bad" };
       return UNMEASURED[notice.calibration_id] !== undefined
         ? {
             words: `${UNMEASURED[notice.calibration_id]} are used from now on.${notice.reason ? ` ${notice.reason}` : ""}`,

@@ -75,6 +75,8 @@ export interface ActiveDocument {
   readonly calibration_id: string;
   /** Why it is not. */
   readonly reason: string | null;
+  /** That it was measured at another temperature, and what that may do to ranges. */
+  readonly warning: string | null;
   /** What was active before, to which `POST /calibrations/active/undo` returns. */
   readonly former: string | null;
 }
@@ -216,8 +218,8 @@ export interface CalibrationDocument {
   /** What it was measured with, and is good for; the number of takes does not matter. */
   readonly sequence: Readonly<Record<string, unknown>>;
   readonly exposure_s: number;
-  /** Of the sensor, while it was measured. */
-  readonly temperature_c: number;
+  /** Of the sensor, while it was measured; null where the camera knows none. */
+  readonly temperature_c: number | null;
   /** Size of its file. */
   readonly bytes: number;
   /** Whether it is good for this camera with its present sequence. */
@@ -428,6 +430,9 @@ export interface FrameDocument {
   readonly device_time_s: number;
   /** Arrival of the last image, Unix time. */
   readonly host_time_s: number;
+  /** Start of the first exposure, Unix time: the camera's clock, set by that of the service at its
+   * first frame. No step of the service's clock moves it. */
+  readonly captured_unix_s: number | null;
   /** Measured by the camera's clock. */
   readonly capture_s: number;
   /** Computing time spent on this frame so far; null until something was computed. */
@@ -439,7 +444,8 @@ export interface FrameDocument {
   readonly takes: number;
   readonly width: number;
   readonly height: number;
-  readonly temperature_c: number;
+  /** Of the sensor; null where the camera knows none. */
+  readonly temperature_c: number | null;
   /** Images lost or corrupt between the frame before and this one. */
   readonly lost_images: number;
   /** The relays that it came through, the first one first; none where the camera is here. */
@@ -572,6 +578,10 @@ export interface IntrinsicsDocument {
   readonly distortion: readonly number[];
   /** How far to the right of the lens the light is. */
   readonly light_x_m: number;
+  /** How far below it. */
+  readonly light_y_m: number;
+  /** How far before it. */
+  readonly light_z_m: number;
   /** Its origin: the settings `[lens]`, the camera itself, the simulated scene, the recording,
    * the origin of a relay, or none. */
   readonly source: "settings" | "camera" | "scene" | "recording" | "origin" | "assumed";
@@ -1315,9 +1325,9 @@ export interface TimelineDocument {
   readonly duration_s: number;
   /** On average; null before there are two. */
   readonly frame_rate_hz: number | null;
-  /** Arrival of the first frame, Unix time. */
+  /** Capture of the first frame, Unix time. */
   readonly host_time_s: number | null;
-  /** Arrival of every `times_step`-th frame, beginning with the first, after the first. */
+  /** Capture of every `times_step`-th frame, beginning with the first, after the first. */
   readonly times_s: readonly number[];
   /** 1 unless there are very many. */
   readonly times_step: number;
@@ -1501,6 +1511,7 @@ export type Notice =
       readonly kind: "calibration-changed";
       readonly calibration_id: string;
       readonly reason: string | null;
+      readonly warning?: string | null;
     }
   | {
       readonly type: "notice";

@@ -43,6 +43,8 @@ const GONE: readonly number[] = [404, 410];
 const scope = self as unknown as WorkerScope;
 let connection: StreamConnection | null = null;
 let token: string | null = null;
+/** Of the interface that the stream is of; a worker's own address is another one. */
+let interface_url = "";
 
 function onEvent(event: ConnectionEvent): void {
   if (event.type === "message" && event.message.type === "frame") {
@@ -57,14 +59,14 @@ function authorization(): Record<string, string> {
 }
 
 async function askForCamera(): Promise<CameraDocument> {
-  const answer = await fetch("/api/v1/camera", { headers: authorization(), signal: AbortSignal.timeout(4000) });
+  const answer = await fetch(`${interface_url}/camera`, { headers: authorization(), signal: AbortSignal.timeout(4000) });
   if (!answer.ok) throw new Error(`the service answered ${answer.status}`);
   return (await answer.json()) as CameraDocument;
 }
 
 /** What the stream announced. */
 async function requestFrame({ frame, product }: Announcement, query: string): Promise<ArrayBuffer> {
-  const answer = await fetch(`/api/v1/frames/${frame}/${product}.msgpack${query}`, { headers: authorization(), cache: "no-store" });
+  const answer = await fetch(`${interface_url}/frames/${frame}/${product}.msgpack${query}`, { headers: authorization(), cache: "no-store" });
   if (GONE.includes(answer.status)) throw new FrameGone();
   if (!answer.ok) throw new Error(`the service answered ${answer.status}`);
   return answer.arrayBuffer();
@@ -73,7 +75,7 @@ async function requestFrame({ frame, product }: Announcement, query: string): Pr
 /** One product of a frame by REST, or why it cannot be had. */
 async function fetchProduct(path: string, product: string): Promise<FrameReport | Problem> {
   try {
-    const answer = await fetch(frameUrl(path, `${product}.msgpack`), { headers: authorization() });
+    const answer = await fetch(interface_url + frameUrl(path, `${product}.msgpack`), { headers: authorization() });
     if (!answer.ok) {
       const problem: Problem = { title: `The service answered ${answer.status} ${answer.statusText}.`, status: answer.status };
       return { ...problem, ...((await answer.json().catch(() => ({}))) as Problem) };
@@ -97,6 +99,7 @@ scope.onmessage = ({ data: command }) => {
   switch (command.type) {
     case "open":
       token = command.token;
+      interface_url = command.url.replace(/^ws(.*)\/stream$/, "http$1");
       connection ??= new StreamConnection(
         command.url,
         {

@@ -15,7 +15,7 @@ export async function download(api: Api, path: string, name: string): Promise<vo
     return;
   }
   const link = document.createElement("a");
-  link.href = `/api/v1${path}`;
+  link.href = `api/v1${path}`;
   link.download = name;
   link.click();
 }

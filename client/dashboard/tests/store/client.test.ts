@@ -120,7 +120,7 @@ describe("between worker and store", () => {
     page.refreshes();
     page.store.held.value = true;
     const asked = page.sent.filter((command) => command.type === "bring");
-    expect(asked).toEqual([{ type: "bring", ticket: 1, path: "/api/v1/frames/4", products: ["range"] }]);
+    expect(asked).toEqual([{ type: "bring", ticket: 1, path: "/frames/4", products: ["range"] }]);
   });
 
   test.each(["a pause", "a pin"])("the worker is told once of %s, and that it ended", (what) => {
@@ -259,7 +259,7 @@ describe("between worker and store", () => {
 
   test("what is fetched of a recording comes before a refresh, or says why it does not", async () => {
     const bringing = page.store.replay.loader?.("/recordings/r/frames/3", ["range"]);
-    expect(page.sent.at(-1)).toEqual({ type: "bring", ticket: 1, path: "/api/v1/recordings/r/frames/3", products: ["range"] });
+    expect(page.sent.at(-1)).toEqual({ type: "bring", ticket: 1, path: "/recordings/r/frames/3", products: ["range"] });
     const brought = frame("range", 3) as FrameReport;
     page.receives({ type: "brought", ticket: 1, reports: [brought], problem: null });
     page.refreshes();

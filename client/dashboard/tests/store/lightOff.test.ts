@@ -28,7 +28,7 @@ test("a press is one request, which a page that is closed does not take back", a
   lightOff.press();
   expect(lightOff.state.value).toEqual({ kind: "sent" });
   await vi.advanceTimersByTimeAsync(60_000);
-  expect(asked).toEqual([{ url: "/api/v1/acquisition/safe-off", keepalive: true }]);
+  expect(asked).toEqual([{ url: "api/v1/acquisition/safe-off", keepalive: true }]);
   expect(seen).toEqual(["stopped"]);
   expect(lightOff.state.value).toBeNull();
 });

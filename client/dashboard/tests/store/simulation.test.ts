@@ -7,7 +7,7 @@ import { Simulation } from "../../src/store/simulation";
 function service(effects: Record<string, string>) {
   const sent: unknown[] = [];
   const api = new Api((input, init) => {
-    const path = String(input).replace("/api/v1", "");
+    const path = String(input).replace("api/v1", "");
     if (init?.method === "PUT") {
       const body = JSON.parse(String(init.body)) as { effects?: Record<string, string> };
       sent.push(body);

@@ -19,7 +19,7 @@ from transientcam_driver.camera import (
 from transientcam_driver.cameras.kinect2._abilities import capabilities_of
 from transientcam_driver.cameras.kinect2._device import Kinect2
 from transientcam_driver.cameras.kinect2._frame_queue import Arrival, FrameQueue
-from transientcam_driver.cameras.kinect2._frames import UNKNOWN_C, FrameMaker
+from transientcam_driver.cameras.kinect2._frames import FrameMaker
 from transientcam_driver.cameras.kinect2._off_switch import off_switch
 from transientcam_driver.cameras.kinect2._parameters import DepthParameters, Rows
 from transientcam_driver.cameras.kinect2._tables import P0Tables
@@ -121,7 +121,7 @@ class Kinect2Camera(HostCamera):
             self._require_connected()
             if not self._lit:
                 self._asked(self._device.check)
-            return self._status(light_on=self._lit, temperature_c=UNKNOWN_C)
+            return self._status(light_on=self._lit, temperature_c=None)
 
     # --- sequence and light ------------------------------------------------------------------
 

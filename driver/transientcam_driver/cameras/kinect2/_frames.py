@@ -11,8 +11,6 @@ from transientcam_driver.cameras.kinect2._abilities import FRAME_RATE_HZ
 from transientcam_driver.cameras.kinect2._frame_queue import Arrival
 from transientcam_driver.cameras.kinect2._packets import TICK_S
 
-UNKNOWN_C: Final = 0.0
-"""No request for a temperature is known."""
 _TICKS: Final = 1 << 32
 
 
@@ -64,7 +62,7 @@ class FrameMaker:
             device_time_s=first_s,
             host_time_s=arrival.unix_s,
             capture_s=begin_s - first_s + 1 / FRAME_RATE_HZ,
-            temperature_c=UNKNOWN_C,
+            temperature_c=None,  # no request for one is known
             lost_images=self._lost,
         )
         self._number += 1

@@ -7,6 +7,7 @@ import array
 import errno
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from typing import Any, Protocol, TypeVar
 
 import usb.backend.libusb1
@@ -103,7 +104,7 @@ class UsbTransport:
 
     def __init__(self, device: Any, serial: str) -> None:
         self._device = device
-        self.node = node_of(device)
+        self.node, self.place = node_of(device), place_of(device)
         self.serial = serial
         self._buffer = array.array("B", bytes(_SMALLEST_READ_BYTES))
         claim(device)
@@ -165,22 +166,74 @@ class UsbTransport:
             yield
 
 
-def open_transport(serial: str | None = None, *, backend: Any = None) -> UsbTransport:
-    """Find and claim a camera, by serial number or the first that can be opened.
+def open_transport(name: str | None = None, *, backend: Any = None) -> UsbTransport:
+    """Find and claim a camera: by serial number, by `place_of`, or the first that can be opened.
 
-    Parameters
-    ----------
-    serial
-        Serial number of the camera to open.
-    backend
-        A pyusb backend; the system's libusb without one.
+    ``backend`` is one of pyusb; the system's libusb without one.
 
     Raises
     ------
     CameraNotFound, PermissionDenied, CameraBusy, LibusbMissing
+    CameraError
+        Several cameras have this serial number.
     """
-    found = devices(VENDOR_ID, PRODUCT_ID, backend=backend)
-    return first_of(found, serial, serial_of, UsbTransport)
+    return SameCamera(name, backend=backend)()
+
+
+class SameCamera:
+    """Opens a camera by its name, and once that is lost no other, not even one of its number.
+
+    A camera with a serial number may come back in another place; one without, or one whose twin
+    is plugged in as it is lost, comes back where it was, since nothing else tells them apart.
+    """
+
+    def __init__(self, name: str | None, *, backend: Any = None) -> None:
+        self._name, self._backend = name, backend
+        self._had: tuple[str, str] | None = None
+        self._twins: set[str] | None = None
+
+    def __call__(self, serial: str | None = None) -> UsbTransport:
+        """Find and claim it; raises as `open_transport`."""
+        found = devices(VENDOR_ID, PRODUCT_ID, backend=self._backend)
+        if self._had is None:
+            serial = None if self._name is None or self._name.startswith("@") else self._name
+            wanted = self._named(found, serial)
+        else:
+            serial, place = self._had
+            elsewhere = {place_of(each) for each in _with_serial(found, serial or None)} - {place}
+            if self._twins is None:  # the first time after it was lost
+                self._twins = elsewhere
+            here = {place, *(elsewhere - self._twins)}
+            wanted = [each for each in found if place_of(each) in here]
+        if not wanted:
+            raise CameraNotFound(self._name)
+        transport = first_of(wanted, serial, serial_of, UsbTransport)
+        self._had, self._twins = (transport.serial, transport.place), None
+        return transport
+
+    def _named(self, found: list[Any], serial: str | None) -> list[Any]:
+        if serial is None:
+            return [each for each in found if self._name in (None, place_of(each))]
+        if len(twins := _with_serial(found, serial)) > 1:
+            places = " or ".join(f"usb:{place_of(each)}" for each in twins)
+            raise CameraError(f"several cameras have the serial number {serial}: name {places}")
+        return found
+
+
+def _with_serial(found: list[Any], serial: str | None) -> list[Any]:
+    same = []
+    for device in found if serial else ():
+        with suppress(CameraError):
+            if serial_of(device) == serial:
+                same.append(device)
+        forget(device)
+    return same
+
+
+def place_of(device: Any) -> str:
+    """Return where a device of pyusb is plugged in: bus and ports, as in ``@1-2.4``."""
+    ports = getattr(device, "port_numbers", None) or ("device", device.address)
+    return f"@{device.bus}-{'.'.join(map(str, ports))}"
 
 
 def first_of(
@@ -255,27 +308,30 @@ def list_cameras(*, backend: Any = None) -> tuple[FoundCamera, ...]:
     ------
     LibusbMissing
     """
-    return tuple(map(_described, devices(VENDOR_ID, PRODUCT_ID, backend=backend)))
+    found = devices(VENDOR_ID, PRODUCT_ID, backend=backend)
+    described = [_described(device) for device in found]
+    serials = [each.serial for each in described]
+    return tuple(
+        replace(each, spec=f"usb:{each.serial}")
+        if each.serial and serials.count(each.serial) == 1
+        else each
+        for each in described
+    )
 
 
 def _described(device: Any) -> FoundCamera:
-    node = node_of(device)
+    node, place = node_of(device), f"usb:{place_of(device)}"
     try:
         with translated("reading its strings", node):
             serial, product = (
                 usb.util.get_string(device, index, _US_ENGLISH)
                 for index in (device.iSerialNumber, device.iProduct)
             )
-            return FoundCamera(_spec(serial), serial, product, node)
+            return FoundCamera(place, serial, product, node)
     except CameraError as error:
-        return FoundCamera(_spec(None), node=node, problem=str(error))
+        return FoundCamera(place, node=node, problem=str(error))
     finally:
         usb.util.dispose_resources(device)
-
-
-def _spec(serial: str | None) -> str:
-    """Return the name by which `open_camera` opens it."""
-    return "usb" if serial is None else f"usb:{serial}"
 
 
 def devices(vendor_id: int, product_id: int, *, backend: Any = None) -> list[Any]:

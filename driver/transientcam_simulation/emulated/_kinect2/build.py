@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -18,6 +19,7 @@ from transientcam_driver.cameras.kinect2 import (
     P0Tables,
 )
 from transientcam_driver.clock import Clock
+from transientcam_simulation.base import Lens
 from transientcam_simulation.emulated._build import world_before
 from transientcam_simulation.emulated._handle import SimulationHandle
 from transientcam_simulation.emulated._kinect2.device import EmulatedKinect2
@@ -29,6 +31,8 @@ GAIN_E_PER_DN: Final = 4.0
 """A full well is then within the largest code; an assumption, as all noise is."""
 FIELD_OF_VIEW_DEG: Final = 70.0
 """Of a scene without a camera of its own; about that of the device."""
+LENS: Final = Lens((0.09, -0.27, 0.0, 0.0, 0.09))
+"""About that of the devices whose parameters are published."""
 _LARGEST_P0: Final = 0xFFFF
 
 
@@ -43,12 +47,19 @@ def build_kinect2(
         A file that the scene names cannot be read.
     """
     sensor = replace(scene.sensor, bits=BITS, gain_e_per_dn=GAIN_E_PER_DN, dark_dn=float(ZERO_DN))
-    scene = replace(scene, sensor=sensor)
+    field_deg = FIELD_OF_VIEW_DEG if scene.camera is None else scene.camera.field_of_view_deg
+    as_seen = partial(through_lens, field_deg=field_deg)
+    scene = as_seen(replace(scene, sensor=sensor))
     world, prepare = world_before(
-        scene, width=WIDTH, height=HEIGHT, seed=seed, readout_s=IMAGE_PERIOD_S - EXPOSURE_S
+        scene,
+        width=WIDTH,
+        height=HEIGHT,
+        seed=seed,
+        readout_s=IMAGE_PERIOD_S - EXPOSURE_S,
+        seen_by=as_seen,
     )
     serial = f"SIM-{scene.device.name}-{scene.device.seed}"[:32]
-    parameters, tables = lens_of(scene), p0_tables(scene.device.seed)
+    parameters, tables = reported_lens(field_deg), p0_tables(scene.device.seed)
     answers = parameters.pack(), tables.pack()
 
     def power_on() -> EmulatedFirmware:
@@ -59,12 +70,17 @@ def build_kinect2(
     return device, SimulationHandle(scene, world, device, prepare=prepare)
 
 
-def lens_of(scene: Scene) -> DepthParameters:
-    """Return the lens through which a scene is seen; pixel (0, 0) has its centre at (0.5, 0.5)."""
-    camera = scene.camera
-    field_deg = FIELD_OF_VIEW_DEG if camera is None else camera.field_of_view_deg
+def through_lens(scene: Scene, *, field_deg: float) -> Scene:
+    """Return a scene as the device's lens shows it; the light stays where the scene has it."""
+    if scene.camera is None:
+        return scene
+    return replace(scene, camera=replace(scene.camera, field_of_view_deg=field_deg, lens=LENS))
+
+
+def reported_lens(field_deg: float) -> DepthParameters:
+    """Return what the device says of its lens; pixel (0, 0) has its centre at (0.5, 0.5)."""
     focal_px = 0.5 * WIDTH / math.tan(math.radians(field_deg) / 2)
-    return DepthParameters(focal_px, focal_px, WIDTH / 2, HEIGHT / 2)
+    return DepthParameters(focal_px, focal_px, WIDTH / 2, HEIGHT / 2, *LENS.distortion)
 
 
 def p0_tables(seed: int) -> P0Tables:

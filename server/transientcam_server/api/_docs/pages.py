@@ -56,7 +56,7 @@ _SWAGGER: Final = {
 # in a file of its own, because the pages of this service run no inline script
 _START_SWAGGER: Final = """\
 window.addEventListener("load", () => SwaggerUIBundle({
-  url: "/openapi.json", dom_id: "#interface", deepLinking: true, validatorUrl: null,
+  url: "openapi.json", dom_id: "#interface", deepLinking: true, validatorUrl: null,
 }));
 """
 
@@ -84,10 +84,10 @@ async def interface() -> HTMLResponse:
     """Show the interface, with everything it needs from here and no other host."""
     return HTMLResponse(
         "<!doctype html><html lang=en><meta charset=utf-8><title>transientcam interface</title>"
-        '<link rel=icon href="data:,"><link rel=stylesheet href="/docs/swagger-ui.css">'
-        f'<p><a href="{asyncapi.PATH}">The stream, as AsyncAPI</a></p>'
-        '<div id=interface></div><script src="/docs/swagger-ui-bundle.js"></script>'
-        '<script src="/docs/start.js"></script></html>'
+        '<link rel=icon href="data:,"><link rel=stylesheet href="docs/swagger-ui.css">'
+        f'<p><a href="{asyncapi.PATH[1:]}">The stream, as AsyncAPI</a></p>'
+        '<div id=interface></div><script src="docs/swagger-ui-bundle.js"></script>'
+        '<script src="docs/start.js"></script></html>'
     )
 
 
@@ -130,7 +130,7 @@ def add_dashboard(app: FastAPI) -> None:
             "transientcam",
             "<p>The camera is served, but its dashboard was not built. In a clone, install "
             "Node.js 20 or newer and run <code>make dashboard</code>; then start again.</p>"
-            '<p><a href="/docs">The interface</a> works without it.</p>',
+            '<p><a href="docs">The interface</a> works without it.</p>',
         )
 
 

@@ -5,7 +5,7 @@ from typing import Any, Final, Literal
 from pydantic import ConfigDict, Field
 
 from transientcam_driver.calibration import DEFAULT_TAKES
-from transientcam_server.api._documents.document import Document, JsonInteger
+from transientcam_server.api._documents.document import Document, JsonInteger, RequestDocument
 
 MAX_NAME: Final = 200
 
@@ -96,8 +96,8 @@ class CalibrationDocument(Document):
     sequence: dict[str, Any]
     """What it was measured with, and is good for; the number of takes does not matter."""
     exposure_s: float
-    temperature_c: float
-    """Of the sensor, while it was measured."""
+    temperature_c: float | None
+    """Of the sensor, while it was measured; null where the camera knows none."""
     bytes: int
     """Size of its file."""
     fits: bool
@@ -126,6 +126,8 @@ class ActiveDocument(Document):
     active one is not good for the sequence."""
     reason: str | None = None
     """Why it is not."""
+    warning: str | None = None
+    """That it was measured at another temperature, and what that may do to ranges."""
     former: str | None = None
     """What was active before, to which `POST /calibrations/active/undo` returns."""
 
@@ -143,7 +145,7 @@ class CalibrationsDocument(Document):
     """The newest first."""
 
 
-class CalibrationRequest(Document):
+class CalibrationRequest(RequestDocument):
     """A calibration that is to be measured with the present sequence."""
 
     model_config = ConfigDict(
@@ -164,7 +166,7 @@ class CalibrationRequest(Document):
     if the camera can."""
 
 
-class ActivationRequest(Document):
+class ActivationRequest(RequestDocument):
     """The calibration that frames are to be calibrated by."""
 
     model_config = ConfigDict(

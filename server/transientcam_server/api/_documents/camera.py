@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict
 
-from transientcam_server.api._documents.document import Document
+from transientcam_server.api._documents.document import Document, RequestDocument
 from transientcam_server.camera import Cause, State
 
 
@@ -24,6 +24,10 @@ class CameraDocument(Document):
         """k1, k2, p1, p2, k3 of Brown and Conrady, which OpenCV has in this order; or none."""
         light_x_m: float
         """How far to the right of the lens the light is."""
+        light_y_m: float
+        """How far below it."""
+        light_z_m: float
+        """How far before it."""
         source: Literal["settings", "camera", "scene", "recording", "origin", "assumed"]
         """Its origin: the settings `[lens]`, the camera itself, the simulated scene, the recording,
         the origin of a relay, or none."""
@@ -115,7 +119,7 @@ class AcquisitionDocument(Document):
     and is asked again until it does."""
 
 
-class AcquisitionRequest(Document):
+class AcquisitionRequest(RequestDocument):
     """What the acquisition should do."""
 
     model_config = ConfigDict(

@@ -4,9 +4,17 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, GetJsonSchemaHandler
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    GetJsonSchemaHandler,
+    field_validator,
+)
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
+
+from transientcam_server.settings import no_switch_for_a_number
 
 EXAMPLES_FILE: Final = Path(__file__).with_name("examples.json")
 """What a simulated camera answered; ``python -m benchmarks examples --write`` writes it."""
@@ -38,3 +46,9 @@ class Document(BaseModel):
         if cls.__name__ in EXAMPLES:
             handler.resolve_ref_schema(schema)["examples"] = [EXAMPLES[cls.__name__]]
         return schema
+
+
+class RequestDocument(Document):
+    """What a client asks for."""
+
+    _numbers = field_validator("*", mode="before")(classmethod(no_switch_for_a_number))

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, StringConstraints
 
-from transientcam_server.api._documents.document import Document
+from transientcam_server.api._documents.document import Document, RequestDocument
 from transientcam_server.camera import DEFAULT_DURATION_S, MAX_DURATION_S, MIN_DURATION_S
 
 _Holder = Annotated[
@@ -38,7 +38,7 @@ class GrantedLeaseDocument(LeaseDocument):
     """To be sent in the header Transientcam-Lease with every change; no other client sees it."""
 
 
-class LeaseRequest(Document):
+class LeaseRequest(RequestDocument):
     """Which client is to control the camera, and on which terms."""
 
     model_config = ConfigDict(

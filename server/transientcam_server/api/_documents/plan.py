@@ -4,12 +4,12 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict, Field
 
-from transientcam_server.api._documents.document import Document
+from transientcam_server.api._documents.document import Document, RequestDocument
 from transientcam_server.api._documents.frame import FrameDocument
 from transientcam_server.api._documents.sequence import SequenceDocument
 
 
-class _StrictDocument(Document):
+class _StrictDocument(RequestDocument):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, ConfigDict, Field, JsonValue
 
-from transientcam_server.api._documents.document import Document
+from transientcam_server.api._documents.document import Document, RequestDocument
 from transientcam_server.api._documents.sequence import AppliedDocument
 
 _ANNOTATIONS_EXAMPLE: dict[str, JsonValue] = {"sample": "corner, white paint", "operator": "Åsa"}
@@ -96,14 +96,14 @@ class TimelineDocument(Document):
     frame_rate_hz: float | None = None
     """On average; null before there are two."""
     host_time_s: float | None = None
-    """Arrival of the first frame, Unix time."""
+    """Capture of the first frame, Unix time."""
     times_s: list[float]
-    """Arrival of every `times_step`-th frame, beginning with the first, after the first."""
+    """Capture of every `times_step`-th frame, beginning with the first, after the first."""
     times_step: int
     """1 unless there are very many."""
 
 
-class RecordingRequest(Document):
+class RecordingRequest(RequestDocument):
     """What should be recorded, and until when; the least of all limits ends it."""
 
     model_config = ConfigDict(
@@ -141,7 +141,7 @@ class RecordingRequest(Document):
     """Anything worth keeping with it, at most 16 KiB as JSON."""
 
 
-class RecordingChange(Document):
+class RecordingChange(RequestDocument):
     """What can be changed of a recording."""
 
     model_config = ConfigDict(

@@ -4,7 +4,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import AliasChoices, ConfigDict, Field
 
-from transientcam_server.api._documents.document import Document
+from transientcam_server.api._documents.document import Document, RequestDocument
 
 MAX_DEFINITION: Final = 65_536
 """Characters of a scene that a client sends."""
@@ -34,7 +34,7 @@ class SimulationDocument(Document):
     """What can be made to go wrong."""
 
 
-class SimulationRequest(Document):
+class SimulationRequest(RequestDocument):
     """What the camera should be put before; what is absent stays."""
 
     model_config = ConfigDict(
@@ -55,7 +55,7 @@ class SimulationRequest(Document):
     Also accepted as `diffusor`, which answers call it."""
 
 
-class FaultRequest(Document):
+class FaultRequest(RequestDocument):
     """What should go wrong."""
 
     model_config = ConfigDict(

@@ -9,7 +9,7 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import Response
+from starlette.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from transientcam_server.api._problems import problem_response
@@ -54,6 +54,34 @@ class SecurityHeaders:
             await send(message)
 
         await self._app(scope, receive, with_headers)
+
+
+class RootPath:
+    """Takes off the path below which a proxy serves this, and names it in addresses."""
+
+    def __init__(self, app: ASGIApp, *, root_path: str) -> None:
+        self._app = app
+        self._root = root_path
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer as without it; the path itself leads to the page below it."""
+        path, raw = str(scope.get("path", "")), bytes(scope.get("raw_path") or b"")
+        if path == self._root and scope["type"] == "http":
+            # what the page names is relative to it
+            await RedirectResponse(f"{self._root}/", 308)(scope, receive, send)
+            return
+        root = self._root.encode()
+        if path.startswith(f"{self._root}/") and raw.startswith(root):
+            scope = {**scope, "path": path[len(root) :], "raw_path": raw[len(root) :]}
+
+        async def below(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                if (location := headers.get("location", "")).startswith("/"):
+                    headers["location"] = self._root + location
+            await send(message)
+
+        await self._app(scope, receive, below)
 
 
 def own_names() -> tuple[str, ...]:

@@ -19,9 +19,9 @@ versions = APIRouter(tags=["info"])
 
 
 @versions.get("/api/versions", summary="Versions of the interface")
-async def read_versions() -> VersionsDocument:
+async def read_versions(service: ServiceOf) -> VersionsDocument:
     """Return which versions of the interface are served; this path itself has no version."""
-    api = [VersionsDocument.ApiDocument(name="v1", path="/api/v1")]
+    api = [VersionsDocument.ApiDocument(name="v1", path=f"{service.settings.root_path}/api/v1")]
     return VersionsDocument(name="transientcam", version=VERSION, api=api)
 
 
@@ -35,9 +35,9 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
         path=service.identity["path"],
         api="v1",
         stream=InfoDocument.StreamDocument(
-            path="/api/v1/stream",
+            path=f"{service.settings.root_path}/api/v1/stream",
             subprotocol=wire.SUBPROTOCOL,
-            asyncapi=asyncapi.PATH,
+            asyncapi=f"{service.settings.root_path}{asyncapi.PATH}",
             encodings=list(wire.encoding_names()),
         ),
         products=[_product(product) for product in service.pipeline.products.values()],

@@ -68,7 +68,7 @@ async def _chosen(
 async def read_frames(service: ServiceOf, recording: RecordingName) -> TimelineDocument:
     """Return how many frames there are, and when they were captured; also while it is recorded."""
     opened = await service.recorded_frames.opened(recording)
-    return TimelineDocument(**timeline(await opened.host_time_s()))
+    return TimelineDocument(**timeline(await opened.captured_unix_s()))
 
 
 add_frame_routes(

@@ -30,6 +30,7 @@ def frame_meta(
         "estimator": recipe.technique,
         "device_time_s": raw.device_time_s,
         "host_time_s": raw.host_time_s,
+        "captured_unix_s": raw.captured_unix_s,
         "capture_s": raw.capture_s,
         "reconstruct_s": reconstruct_s,
         "base_frequency_hz": sequence.base_frequency_hz,

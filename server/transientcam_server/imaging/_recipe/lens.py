@@ -3,7 +3,7 @@
 import contextlib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Final, Literal, Self
 
@@ -16,12 +16,13 @@ from transientcam_server.settings import LensSettings
 
 ASSUMED_FIELD_OF_VIEW_DEG: Final = 45.0
 """Of a camera whose lens is not known."""
+_LIGHT: Final = ("light_x_m", "light_y_m", "light_z_m")
 Source = Literal["settings", "camera", "scene", "recording", "origin", "assumed"]
 
 
 @dataclass(frozen=True, slots=True)
 class Intrinsics(Pinhole):
-    """A pinhole camera, and what the service computes with it.
+    """A lens as the client has it, and what the service computes with it.
 
     x points right, y down, z where the camera looks. With
     a distortion the pixel looks along the ray that the lens bends there, see `Lens`.
@@ -31,13 +32,15 @@ class Intrinsics(Pinhole):
     source
         Where they come from: the ``settings`` of the service, the ``camera`` itself, the simulated
         ``scene``, the ``recording``, the ``origin`` of a relay, or none of these (``assumed``).
-    distortion, light_x_m
+    light_x_m, light_y_m, light_z_m
         As of `Lens`.
     """
 
     source: Source = "assumed"
     distortion: tuple[float, ...] = ()
     light_x_m: float = 0.0
+    light_y_m: float = 0.0
+    light_z_m: float = 0.0
 
     @classmethod
     def of_field(
@@ -48,18 +51,26 @@ class Intrinsics(Pinhole):
         centre = (width - 1) / 2, (height - 1) / 2
         return cls(focal_px, focal_px, *centre, width, height, source)
 
-    @classmethod
-    def of_settings(cls, settings: LensSettings, *, width: int, height: int) -> Self | None:
-        """Return what the settings say, None where they say nothing."""
-        if settings.fx_px is not None:
+    def with_settings(self, settings: LensSettings) -> Self:
+        """Return these with what the settings say in the place of what is known otherwise.
+
+        A focal length or field of view takes the place of the whole lens, since principal point
+        and distortion belong to it; a light's place that of the light alone.
+        """
+        width, height, known = self.width, self.height, self
+        if settings.field_of_view_deg is not None:
+            field_deg = settings.field_of_view_deg
+            known = self.of_field(field_deg, width=width, height=height, source="settings")
+        elif settings.fx_px is not None:
             fy_px = settings.fx_px if settings.fy_px is None else settings.fy_px
             cx_px = (width - 1) / 2 if settings.cx_px is None else settings.cx_px
             cy_px = (height - 1) / 2 if settings.cy_px is None else settings.cy_px
-            return cls(settings.fx_px, fy_px, cx_px, cy_px, width, height, "settings")
-        if settings.field_of_view_deg is None:
-            return None
-        field_deg = settings.field_of_view_deg
-        return cls.of_field(field_deg, width=width, height=height, source="settings")
+            known = type(self)(settings.fx_px, fy_px, cx_px, cy_px, width, height, "settings")
+        if known is not self:
+            known = replace(known, distortion=settings.distortion)
+        given = {name: getattr(settings, name) for name in _LIGHT}
+        light = {name: getattr(self, name) if v is None else v for name, v in given.items()}
+        return replace(known, **light)
 
     @classmethod
     def of_document(cls, document: Mapping[str, Any], *, source: Source = "recording") -> Self:
@@ -72,7 +83,8 @@ class Intrinsics(Pinhole):
         """
         fx, fy, cx, cy = (float(document[name]) for name in ("fx", "fy", "cx", "cy"))
         distortion = tuple(float(each) for each in document.get("distortion", ()))
-        lens = Lens(fx, fy, cx, cy, distortion, float(document.get("light_x_m", 0.0)))
+        light_m = (float(document.get(name, 0.0)) for name in _LIGHT)
+        lens = Lens(fx, fy, cx, cy, distortion, *light_m)
         width, height = int(document["width"]), int(document["height"])
         return cls.of_lens(lens, width=width, height=height, source=source)
 
@@ -80,19 +92,21 @@ class Intrinsics(Pinhole):
     def of_lens(cls, lens: Lens, *, width: int, height: int, source: Source) -> Self:
         """Return those of a lens."""
         pinhole = lens.fx, lens.fy, lens.cx, lens.cy
-        return cls(*pinhole, width, height, source, lens.distortion, lens.light_x_m)
+        return cls(*pinhole, width, height, source, lens.distortion, *lens.light_m)
 
     def points(self, range_m: NDArray[Any]) -> NDArray[np.float32]:
         """Return the points (3, H, W) in m of a range (H, W): half of the path of the light."""
         pinhole = self.fx, self.fy, self.cx, self.cy
-        lens = Lens(*pinhole, self.distortion, self.light_x_m)
+        lens = Lens(*pinhole, self.distortion, self.light_x_m, self.light_y_m, self.light_z_m)
         x, y, z = _rays(lens, *range_m.shape)
-        if self.light_x_m:
+        if any(lens.light_m):
             # |p| + |p - light| is the path: intersect the ray with that ellipsoid
+            light_x, light_y, light_z = lens.light_m
             path_m = 2.0 * range_m
+            along = z * (light_x * x + light_y * y + light_z)
             with np.errstate(all="ignore"):  # a path shorter than the way to the light
-                around = path_m * path_m - self.light_x_m**2
-                range_m = around / (2.0 * (path_m - self.light_x_m * x * z))
+                around = path_m * path_m - (light_x**2 + light_y**2 + light_z**2)
+                range_m = around / (2.0 * (path_m - along))
                 range_m = np.where(around > 0.0, range_m, np.nan)
         points = np.empty((3, *range_m.shape), dtype=np.float32)
         np.multiply(range_m, z, out=points[2], casting="same_kind")
@@ -114,27 +128,25 @@ def known_intrinsics(
     width: int,
     height: int,
     reported: Lens | None = None,
-    scene_field_deg: float | None = None,
+    scene: Lens | None = None,
     recorded: Mapping[str, Any] | None = None,
     relayed: Mapping[str, Any] | None = None,
 ) -> Intrinsics:
     """Return the best that is known.
 
     Settings go before what the camera reports, then scene, recording or origin, then a guess.
+    Where the light of a simulated scene is, the scene knows best.
     """
-    given = Intrinsics.of_settings(settings, width=width, height=height)
-    if given is not None:
-        return given
+    if reported is not None and scene is not None:
+        x, y, z = scene.light_m
+        reported = replace(reported, light_x_m=x, light_y_m=y, light_z_m=z)
+    found = Intrinsics.of_field(ASSUMED_FIELD_OF_VIEW_DEG, width=width, height=height)
     if reported is not None:
-        return Intrinsics.of_lens(reported, width=width, height=height, source="camera")
-    if scene_field_deg is not None:
-        return Intrinsics.of_field(scene_field_deg, width=width, height=height, source="scene")
-    sources: tuple[tuple[Mapping[str, Any] | None, Source], ...] = (
-        (recorded, "recording"),
-        (relayed, "origin"),
-    )
-    for document, source in sources:
-        if document is not None:
-            with contextlib.suppress(KeyError, TypeError, ValueError):
-                return Intrinsics.of_document(document, source=source)
-    return Intrinsics.of_field(ASSUMED_FIELD_OF_VIEW_DEG, width=width, height=height)
+        found = Intrinsics.of_lens(reported, width=width, height=height, source="camera")
+    elif scene is not None:
+        found = Intrinsics.of_lens(scene, width=width, height=height, source="scene")
+    elif recorded is not None or relayed is not None:
+        source: Source = "origin" if recorded is None else "recording"
+        with contextlib.suppress(KeyError, TypeError, ValueError):
+            found = Intrinsics.of_document(recorded or relayed or {}, source=source)
+    return found.with_settings(settings)

@@ -17,7 +17,7 @@ from transientcam_driver import (
 )
 from transientcam_driver.camera import FoundCamera
 from transientcam_driver.cameras.kinect2 import UDEV_RULES
-from transientcam_driver.cameras.open_usb import UDEV_RULE, list_cameras, open_transport
+from transientcam_driver.cameras.open_usb import UDEV_RULE, _transport, list_cameras, open_transport
 from transientcam_driver.cameras.open_usb.protocol import Request
 from transientcam_driver.clock import VirtualClock
 from transientcam_driver.errors import UDEV_RULES_FILE, TransferOverflow, TransferStalled
@@ -236,7 +236,7 @@ def test_a_camera_that_may_not_be_opened_is_listed_with_its_problem(
 
     (found,) = list_cameras(backend=bus)
 
-    assert (found.serial, found.spec) == (None, "usb")
+    assert (found.serial, found.spec) == (None, "usb:@1-1")
     assert UDEV_RULE in str(found.problem)
 
 
@@ -253,3 +253,63 @@ def test_the_file_for_udev_holds_the_rules_that_errors_name() -> None:
     for rule, each in zip(rules, named, strict=True):
         assert set(each.split(", ")) <= set(rule.split(", "))
     assert UDEV_RULES_FILE in str(PermissionDenied("/dev/bus/usb/001/002", UDEV_RULE))
+
+
+class Plugged:
+    """What the transport reads of a device of pyusb."""
+
+    iSerialNumber, iProduct = 3, 2  # noqa: N815 - pyusb's names
+
+    def __init__(self, port: int, serial: str) -> None:
+        self.bus, self.address, self.port_numbers, self.serial = 1, 10 + port, (port,), serial
+
+
+@pytest.fixture
+def plugged(monkeypatch: pytest.MonkeyPatch) -> list[Plugged]:
+    there: list[Plugged] = []
+    monkeypatch.setattr(_transport, "devices", lambda *_, **__: list(there))
+    monkeypatch.setattr(usb.util, "get_string", lambda device, *_: device.serial)
+    monkeypatch.setattr(usb.util, "dispose_resources", lambda device: None)
+    monkeypatch.setattr(usb.util, "claim_interface", lambda *_: None)
+    return there
+
+
+@pytest.mark.parametrize("serial", ["0001", ""])
+def test_twins_have_names_of_their_own_and_one_is_not_taken_for_the_other(
+    plugged: list[Plugged], serial: str
+) -> None:
+    one, other = Plugged(1, serial), Plugged(2, serial)
+    plugged += [one, other]
+    assert [each.spec for each in list_cameras()] == ["usb:@1-1", "usb:@1-2"]
+
+    camera = _transport.SameCamera("@1-2")
+    assert camera().place == "@1-2"
+    plugged.remove(other)
+    for _ in range(2):
+        with pytest.raises(CameraNotFound):
+            camera(serial)
+    plugged.append(other)
+
+    assert camera(serial).place == "@1-2"
+
+
+def test_a_serial_number_of_two_cameras_is_no_name(plugged: list[Plugged]) -> None:
+    plugged += [Plugged(1, "0001"), Plugged(2, "0001")]
+
+    with pytest.raises(CameraError, match="usb:@1-1 or usb:@1-2"):
+        open_transport("0001")
+
+
+def test_a_camera_may_come_back_elsewhere_but_a_twin_that_was_there_is_not_it(
+    plugged: list[Plugged],
+) -> None:
+    plugged.append(Plugged(1, "0001"))
+    camera = _transport.SameCamera("0001")
+    camera()
+    plugged[:] = [Plugged(2, "0001")]  # its twin, plugged in while it worked
+    with pytest.raises(CameraNotFound):
+        camera("0001")
+
+    plugged.append(Plugged(3, "0001"))
+
+    assert camera("0001").place == "@1-3"

@@ -1,11 +1,20 @@
+import asyncio
+
 import httpx
 import pytest
+from starlette.responses import Response
+from starlette.types import Receive, Scope, Send
 from websockets.exceptions import InvalidStatus
 
 from tests.server.streaming import streaming
 from tests.serving import Served
 from transientcam_server.api import SECURITY_HEADERS
-from transientcam_server.api._middleware.security import MAX_BODY_BYTES, OriginCheck
+from transientcam_server.api._middleware.security import (
+    MAX_BODY_BYTES,
+    OriginCheck,
+    RootPath,
+    SecurityHeaders,
+)
 from transientcam_server.settings import Settings
 
 CHANGE = ("PUT", "/api/v1/acquisition")
@@ -133,3 +142,20 @@ def test_a_service_open_to_others_is_reached_by_address_and_configured_names_onl
     assert _allows(settings, "lab.example")
     assert not _allows(settings, "evil.example")
     assert not _allows(Settings(), "192.168.1.7")
+
+
+@pytest.mark.parametrize("path", ["/lidar/api/v1/x?y=1", "/api/v1/x?y=1"])
+def test_a_path_of_a_proxy_is_taken_off_and_named_in_addresses(path: str) -> None:
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        assert (scope["path"], scope["raw_path"]) == ("/api/v1/x", b"/api/v1/x")
+        await Response(headers={"Location": "/api/v1/jobs/j"})(scope, receive, send)
+
+    async def ask() -> tuple[httpx.Response, httpx.Response]:
+        transport = httpx.ASGITransport(app=RootPath(SecurityHeaders(app), root_path="/lidar"))
+        async with httpx.AsyncClient(transport=transport, base_url="http://here") as client:
+            return await client.get(path), await client.get("/lidar")
+
+    answer, page = asyncio.run(ask())
+
+    assert answer.headers["location"] == "/lidar/api/v1/jobs/j"
+    assert (page.status_code, page.headers["location"]) == (308, "/lidar/")

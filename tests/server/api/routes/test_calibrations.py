@@ -490,4 +490,4 @@ def test_streams_are_notified(bench: Served) -> None:
     reported = [each.details["job"]["state"] for each in notices if each.kind == "job-changed"]
     assert reported == ["running", "done"]
     (changed,) = [each.details for each in notices if each.kind == "calibration-changed"]
-    assert changed == {"calibration_id": identity, "reason": None}
+    assert changed == {"calibration_id": identity, "reason": None, "warning": None}

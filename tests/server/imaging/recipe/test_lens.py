@@ -58,9 +58,23 @@ def test_half_the_field_of_view_is_at_the_edge_of_the_frame() -> None:
 def test_what_the_settings_say_goes_before_the_scene() -> None:
     given = LensSettings(field_of_view_deg=90.0)
 
-    found = known_intrinsics(given, **SIZE, scene_field_deg=40.0)
+    found = known_intrinsics(given, **SIZE, scene=Lens(1.0, 1.0, 0.0, 0.0, light_x_m=0.3))
 
-    assert found == Intrinsics.of_field(90.0, **SIZE, source="settings")
+    assert found == replace(Intrinsics.of_field(90.0, **SIZE, source="settings"), light_x_m=0.3)
+
+
+def test_settings_state_all_that_a_lens_has_and_the_light_alone() -> None:
+    bent = (0.1, -0.2, 0.001, 0.002, 0.05)
+    reported = Lens(150.0, 150.0, 81.0, 59.5, bent, 0.045)
+    given = LensSettings(fx_px=200.0, distortion=bent[::-1], light_y_m=0.1, light_z_m=-0.02)
+
+    found = known_intrinsics(given, **SIZE, reported=reported)
+    aside = known_intrinsics(LensSettings(light_x_m=0.2), **SIZE, reported=reported)
+
+    assert (found.fx, found.distortion, found.source) == (200.0, bent[::-1], "settings")
+    assert (found.light_x_m, found.light_y_m, found.light_z_m) == (0.045, 0.1, -0.02)
+    assert (aside.fx, aside.distortion, aside.source) == (150.0, bent, "camera")
+    assert (aside.light_x_m, aside.light_y_m) == (0.2, 0.0)
 
 
 def test_a_lens_that_was_calibrated_is_given_in_pixels() -> None:
@@ -72,9 +86,49 @@ def test_a_lens_that_was_calibrated_is_given_in_pixels() -> None:
 def test_a_scene_knows_the_field_of_view_of_its_camera() -> None:
     with open_camera("sim:mirrors?noise=off") as camera:
         assert camera.simulation is not None
-        field_deg = camera.simulation.field_of_view_deg
+        lens = camera.simulation.lens(**SIZE)
 
-    assert known_intrinsics(LensSettings(), **SIZE, scene_field_deg=field_deg) == SCENE
+    found = known_intrinsics(LensSettings(), **SIZE, scene=lens)
+    assert replace(found, light_x_m=0.0, light_z_m=0.0) == SCENE
+    assert (found.light_x_m, found.light_z_m) == pytest.approx((-0.6, 0.12), abs=0.05)
+
+
+WALL = """name = "flat"
+[camera]
+position_m = [0.5, 0.2, 0.1]
+look_at_m = [0.8, 2.2, 0.3]
+field_of_view_deg = 60.0
+lens = {k1 = -0.25, k2 = 0.1, p1 = 0.01, p2 = -0.02, k3 = -0.05, centre_x = 0.1, centre_y = -0.05}
+[light]
+position_m = [0.8, 0.1, 0.5]
+aim_at_m = [0.8, 2.2, 0.3]
+electrons_per_s = 5.0e7
+[[surface]]
+name = "wall"
+kind = "diffuse"
+centre_m = [0.0, 2.2, 0.0]
+normal = [0.0, -1.0, 0.0]
+size_m = [19.0, 19.0]
+albedo = 0.8
+"""
+
+
+@pytest.mark.parametrize("choice", ["auto", "on", "off"])
+def test_a_flat_wall_is_flat_through_any_lens_and_beside_any_light(choice: str) -> None:
+    with open_camera("sim:wall?noise=off") as camera:
+        simulation = camera.simulation
+        assert simulation is not None
+        simulation.change(definition=WALL, effects={"distortion": choice, "mixed-pixels": "off"})
+        lens = simulation.lens(**SIZE)
+        points = known_intrinsics(LensSettings(), **SIZE, scene=lens).points(
+            simulation.truth().range_m
+        )
+
+    forward = np.array([0.3, 2.0, 0.2]) / np.linalg.norm([0.3, 2.0, 0.2])
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    into_room = np.stack([right, np.cross(forward, right), forward])
+    np.testing.assert_allclose(np.einsum("kyx,k->yx", points, into_room[:, 1]), 2.0, atol=2e-4)
 
 
 def test_a_recording_says_what_was_known_when_it_was_made() -> None:
@@ -97,11 +151,13 @@ def test_without_anything_that_is_known_a_usual_field_of_view_is_assumed(
 def test_a_camera_reports_its_lens_and_settings_go_before_it() -> None:
     lens = Lens(200.0, 210.0, 80.0, 60.0, (0.09, -0.27, 0.0, 0.0, 0.095), 0.045)
 
-    found = known_intrinsics(LensSettings(), **SIZE, reported=lens, scene_field_deg=40.0)
+    found = known_intrinsics(
+        LensSettings(), **SIZE, reported=lens, scene=Lens(1.0, 1.0, 0.0, 0.0, light_x_m=0.05)
+    )
 
     assert found.source == "camera"
     assert (found.fx, found.fy, found.cx, found.cy) == (200.0, 210.0, 80.0, 60.0)
-    assert (found.distortion, found.light_x_m) == (lens.distortion, 0.045)
+    assert (found.distortion, found.light_x_m) == (lens.distortion, 0.05)
     given = LensSettings(field_of_view_deg=90.0)
     assert known_intrinsics(given, **SIZE, reported=lens).source == "settings"
     assert replace(found, source="recording") == known_intrinsics(
@@ -116,12 +172,12 @@ def test_a_recorded_lens_with_part_of_a_distortion_is_not_used() -> None:
 
 
 def test_light_beside_the_lens_is_taken_into_account() -> None:
-    lens = Lens(200.0, 200.0, 81.0, 59.5, (0.05, -0.1, 0.001, 0.002, 0.03), 0.045)
+    lens = Lens(200.0, 200.0, 81.0, 59.5, (0.05, -0.1, 0.001, 0.002, 0.03), 0.045, -0.3, 0.1)
     intrinsics = Intrinsics.of_lens(lens, **SIZE, source="camera")
     x, y = lens.slopes(**SIZE)
     z = np.random.default_rng(2).uniform(0.2, 4.0, x.shape)
     points = np.stack([x * z, y * z, z])
-    light = np.array([0.045, 0.0, 0.0])[:, None, None]
+    light = np.array([0.045, -0.3, 0.1])[:, None, None]
     path_m = np.linalg.norm(points, axis=0) + np.linalg.norm(points - light, axis=0)
     path_m[0, :2] = [0.04, np.nan]  # shorter than from the light to the lens
 

@@ -18,7 +18,7 @@ export function StatusBar() {
   return (
     <header class="bar">
       <h1 class="brand">
-        <img src="/icon.svg" alt="" width="24" height="24" />
+        <img src="icon.svg" alt="" width="24" height="24" />
         <span class="wide">transientcam</span>
       </h1>
       <StateChip />

@@ -23,7 +23,7 @@ def pack_status(status: Status) -> bytes:
         status.dropped_images,
         status.fifo_bytes,
         status.fifo_high_water_bytes,
-        centidegrees(status.temperature_c),
+        centidegrees(status.temperature_c or 0.0),
     )
 
 

@@ -47,7 +47,7 @@ function summary({ cameras, left_out, reason }) {
 
 async function refresh() {
   try {
-    const answer = await fetch("/api/v1/cameras", { headers: headers() });
+    const answer = await fetch("api/v1/cameras", { headers: headers() });
     const found = await answer.json();
     if (answer.status === 401) {
       message.textContent = "This service requires a token: enter it in the dashboard, and come back in this tab.";

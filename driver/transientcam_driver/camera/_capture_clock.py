@@ -1,0 +1,50 @@
+"""When frames were captured, in Unix time, whatever happens to the clock of the host.
+
+The device's clock is set by the host's once: by the frame that came with the least delay. A step
+of the host's clock moves nothing, and intervals are the device's. Where the device's clock begins
+anew it is set once more; times go on growing all the same.
+"""
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+STEP_S: Final = 1.0
+"""By how much the delay of frames may differ; more is a step of the host's clock."""
+_AFTER_S: Final = 1e-3
+
+
+class CaptureClock:
+    """Times of a running capture; the first frames may still correct the clock."""
+
+    def __init__(self) -> None:
+        self._offset_s: float | None = None
+        self._device_time_s = self._unix_s = 0.0
+
+    def unix_s(self, *, device_time_s: float, capture_s: float, host_time_s: float) -> float:
+        """Return when the first exposure of the next frame began; times as in `RawFrame`."""
+        offset_s = host_time_s - capture_s - device_time_s
+        if self._offset_s is None:
+            self._offset_s = offset_s
+        elif device_time_s <= self._device_time_s or 0.0 < self._offset_s - offset_s < STEP_S:
+            self._offset_s = max(offset_s, self._unix_s + _AFTER_S - device_time_s)
+        self._device_time_s, self._unix_s = device_time_s, device_time_s + self._offset_s
+        return self._unix_s
+
+
+def capture_times(
+    device_time_s: NDArray[Any], capture_s: NDArray[Any], host_time_s: NDArray[Any]
+) -> NDArray[np.float64]:
+    """Return when the first exposure of each recorded frame began; times as in `RawFrame`."""
+    offset_s = host_time_s - capture_s - device_time_s
+    times_s = np.empty(len(offset_s))
+    begins = np.flatnonzero(np.diff(device_time_s) <= 0.0) + 1
+    after_s = -np.inf
+    for run in np.split(np.arange(len(offset_s)), begins):
+        if len(run):
+            near = offset_s[run][np.abs(offset_s[run] - offset_s[run[0]]) < STEP_S]
+            set_s = max(near.min(), after_s - device_time_s[run[0]])
+            times_s[run] = device_time_s[run] + set_s
+            after_s = times_s[run[-1]] + _AFTER_S
+    return times_s

@@ -1,0 +1,42 @@
+"""Times of captures, under clocks that are set."""
+
+import numpy as np
+import pytest
+
+from transientcam_driver.camera import CaptureClock, capture_times
+
+DEVICE_S = 5.0 + 0.1 * np.arange(12)
+CAPTURE_S = np.full(12, 0.09)
+DELAY_S = np.array([0.12, 0.03, 0.004, *[0.02] * 9])
+"""From the last read-out to the arrival."""
+BEGUN_S = 1.8e9 + DEVICE_S
+STEPPED_S = np.repeat([0.0, 7200.0, -7200.0], 4)
+
+
+def live(device_s: np.ndarray, host_s: np.ndarray) -> np.ndarray:
+    clock = CaptureClock()
+    rows = zip(device_s.tolist(), CAPTURE_S.tolist(), host_s.tolist(), strict=True)
+    return np.array([clock.unix_s(device_time_s=d, capture_s=c, host_time_s=h) for d, c, h in rows])
+
+
+def test_recorded_times_keep_the_devices_intervals_under_any_step_of_the_hosts_clock() -> None:
+    found = capture_times(DEVICE_S, CAPTURE_S, BEGUN_S + CAPTURE_S + DELAY_S + STEPPED_S)
+
+    np.testing.assert_allclose(found, BEGUN_S + 0.004, atol=1e-6)
+
+
+def test_live_times_come_close_with_the_first_frames_and_stay_there() -> None:
+    found = live(DEVICE_S, BEGUN_S + CAPTURE_S + DELAY_S + STEPPED_S)
+
+    np.testing.assert_allclose(found[2:], BEGUN_S[2:] + 0.004, atol=1e-6)
+    assert (np.diff(found) > 0).all()
+
+
+@pytest.mark.parametrize("step_s", [0.0, -3600.0])
+def test_times_go_on_growing_where_the_device_begins_anew(step_s: float) -> None:
+    device_s = np.concatenate([DEVICE_S[:6], DEVICE_S[:6]])
+    host_s = BEGUN_S + CAPTURE_S + np.repeat([0.0, step_s], 6)
+
+    for found in (live(device_s, host_s), capture_times(device_s, CAPTURE_S, host_s)):
+        assert (np.diff(found) > 0).all()
+        np.testing.assert_allclose(np.diff(found)[6:], 0.1, atol=1e-6)
