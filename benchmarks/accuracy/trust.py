@@ -14,6 +14,7 @@ from benchmarks.accuracy.capturing import CAPTURE_SEED, SETTINGS
 from benchmarks.common.tables import Table, heads
 from transientcam.wire import Trust
 from transientcam_driver import Camera, Sequence
+from transientcam_driver.camera import Simulation
 from transientcam_experiments.tradeoff import camera_before
 from transientcam_experiments.tradeoff.capture import capture
 from transientcam_server.camera import sensor_of
@@ -75,8 +76,7 @@ def judged(scene: str) -> Judged:
     with camera_before(scene, seed=CAPTURE_SEED) as camera:
         simulation = camera.simulation
         assert simulation is not None
-        recipe = _recipe(camera, simulation.field_of_view_deg or 45.0)
-        recipe = replace(recipe, lamp=simulation.lamp)
+        recipe = replace(_recipe(camera, simulation), lamp=simulation.lamp)
         (frame,) = capture(camera, 1, middle=True)
         found = recipe.reconstruct(frame.raw)
         accuracy: RangeAccuracy = range_accuracy(recipe, found, 1, frame.raw)
@@ -86,10 +86,13 @@ def judged(scene: str) -> Judged:
         return Judged(*(plane[kept] for plane in planes))
 
 
-def _recipe(camera: Camera, field_deg: float) -> Recipe:
+def _recipe(camera: Camera, simulation: Simulation) -> Recipe:
     applied, sensor = camera.configure(Sequence()), sensor_of(camera, SensorSettings())
     width, height = camera.capabilities.width, camera.capabilities.height
-    lens = Intrinsics.of_field(field_deg, width=width, height=height)
+    seen = simulation.lens(width=width, height=height)
+    lens = None
+    if seen is not None:
+        lens = Intrinsics.of_lens(seen, width=width, height=height, source="scene")
     highest = float(sensor.highest_dn)
     return Recipe(applied, SETTINGS, highest, sensor=sensor, intrinsics=lens)
 

@@ -58,9 +58,9 @@ class TrustCountsDocument(TypedDict):
     later_light: int
     """A return found close behind the first one may have moved it by much."""
     drift: int
-    """The camera is much warmer or colder than at its calibration."""
+    """The camera is far from its calibration's temperature, or moments contradict each other."""
     noise: int
-    """The noise leaves the range open."""
+    """The noise leaves the range open, or threw it off all around."""
 
 
 class RangeAccuracyDocument(TypedDict):

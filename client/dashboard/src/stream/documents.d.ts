@@ -1011,11 +1011,11 @@ export interface ReconstructionDocument {
   /** Weight from which a return counts as the first, over the pixel's strongest return. */
   readonly return_threshold: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
-   * least over the scenes of docs/likelihood.md together; each frame names its `estimator`. The paper's are `pisarenko` and
-   * `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
-   * frequencies; for those with gaps `automatic` is `two-returns`, or `unwrapped-phase` where there
-   * are but two. The others are there for comparison. Until its kernel is compiled the same
-   * estimator runs in NumPy, more slowly. */
+   * least over the scenes of docs/likelihood.md together; each frame names its `estimator`. The
+   * paper's are `pisarenko` and `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase`
+   * serve any set of frequencies; for those with gaps `automatic` is `two-returns`, or
+   * `unwrapped-phase` where there are but two. The others are there for comparison. Until its kernel
+   * is compiled the same estimator runs in NumPy, more slowly. */
   readonly estimator:
     | "automatic"
     | "pisarenko"
@@ -1060,11 +1060,11 @@ export interface ReconstructionRequest {
   /** Weight from which a return counts as the first, over the pixel's strongest return. */
   readonly return_threshold?: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
-   * least over the scenes of docs/likelihood.md together; each frame names its `estimator`. The paper's are `pisarenko` and
-   * `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase` serve any set of
-   * frequencies; for those with gaps `automatic` is `two-returns`, or `unwrapped-phase` where there
-   * are but two. The others are there for comparison. Until its kernel is compiled the same
-   * estimator runs in NumPy, more slowly. */
+   * least over the scenes of docs/likelihood.md together; each frame names its `estimator`. The
+   * paper's are `pisarenko` and `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase`
+   * serve any set of frequencies; for those with gaps `automatic` is `two-returns`, or
+   * `unwrapped-phase` where there are but two. The others are there for comparison. Until its kernel
+   * is compiled the same estimator runs in NumPy, more slowly. */
   readonly estimator?:
     | "automatic"
     | "pisarenko"
@@ -1372,9 +1372,9 @@ export interface TrustCountsDocument {
   readonly later_light_unresolved: number;
   /** A return found close behind the first one may have moved it by much. */
   readonly later_light: number;
-  /** The camera is much warmer or colder than at its calibration. */
+  /** The camera is far from its calibration's temperature, or moments contradict each other. */
   readonly drift: number;
-  /** The noise leaves the range open. */
+  /** The noise leaves the range open, or threw it off all around. */
   readonly noise: number;
 }
 

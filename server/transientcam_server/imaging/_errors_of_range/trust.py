@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam.wire import Trust
 from transientcam_driver import RawFrame
+from transientcam_driver.calibration import TemperatureDrift
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_server.imaging._errors_of_range.evidence import (
     SHADOW,
@@ -30,10 +31,8 @@ LATER_BIAS: Final = 0.12
 HALF_LOSS: Final = 0.02
 """Of the range of a radian at the highest frequency, by which later light may move a range that
 nothing shows, and such as is seen to be spread; the lost modulation that shows half of that."""
-DRIFT_M_PER_C: Final = 0.6e-3
-"""Drift of the range for each degree, where nothing else is known: 4 ps of delay."""
-FAR_FROM_CALIBRATION_C: Final = 10.0
-"""Warmer or colder by more than this, a camera is not the one that was calibrated."""
+FAR_FROM_CALIBRATION_M: Final = 0.015
+"""A camera whose temperature may move ranges by more is not the one that was calibrated."""
 _UNRESOLVED: Final = 0.5
 """Of that radian: estimators that disagree by more do not tell later light from the first."""
 _LATER: Final = 0.1
@@ -57,14 +56,14 @@ def judged(
     length_m = float(tm.range_m(1.0, recipe.base_frequency_hz * sequence.multiples[-1]))
     loss = _loss(recipe, found, range_m)
     then_c = None if recipe.gains is None else recipe.gains.temperature_c
-    now_c = None if raw is None else raw.temperature_c
-    warmer_c = 0.0 if then_c is None or now_c is None else now_c - then_c  # else not known
+    drift = TemperatureDrift.between(then_c, None if raw is None else raw.temperature_c)
+    drift_m = 0.0 if drift is None else drift.range_m
     parts_m = (
         NOISE * std_m,
         BIAS * np.sqrt(np.maximum(bias_m**2 - (NOISE_IN_BIAS * std_m) ** 2, 0.0)),
         LEAST_BIAS * length_m,
         LATER_BIAS * loss / (loss + HALF_LOSS) * length_m,
-        DRIFT_M_PER_C * warmer_c,
+        drift_m,
     )
     error_m = np.sqrt(sum(np.square(part) for part in parts_m))
     edge, stray = edges_and_strays(range_m, std_m, brightness_dn)
@@ -90,8 +89,7 @@ def judged(
         Trust.EDGE: edge,
         Trust.LATER_LIGHT_UNRESOLVED: (disagree & ~later) | (flags & tm.Flags.UNEXPLAINED > 0),
         Trust.LATER_LIGHT: disagree,
-        Trust.DRIFT: (flags & tm.Flags.CONTRADICTORY > 0)
-        | (abs(warmer_c) > FAR_FROM_CALIBRATION_C),
+        Trust.DRIFT: (flags & tm.Flags.CONTRADICTORY > 0) | (drift_m > FAR_FROM_CALIBRATION_M),
         Trust.NOISE: stray | (std_m > _OPEN * tm.range_m(2 * np.pi, recipe.base_frequency_hz)),
     }
     trust = np.select(list(reasons.values()), list(reasons), Trust.TRUSTED).astype(np.uint8)

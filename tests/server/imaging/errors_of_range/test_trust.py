@@ -10,10 +10,11 @@ import transientcam_moments as tm
 from transientcam.documents import TrustCountsDocument
 from transientcam.wire import Trust
 from transientcam_driver import AppliedSequence, RawFrame, Sequence, open_camera
+from transientcam_driver.calibration import TemperatureDrift
 from transientcam_driver.camera import Lamp
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.imaging import Gains, Recipe
-from transientcam_server.imaging._errors_of_range.trust import DRIFT_M_PER_C, judged
+from transientcam_server.imaging._errors_of_range.trust import judged
 from transientcam_server.settings import ReconstructionSettings
 
 F_HZ, M = 23e6, 4
@@ -133,7 +134,7 @@ def test_a_camera_far_from_its_calibrations_temperature_is_not_trusted() -> None
     for now_c, reason in ((31.0, Trust.TRUSTED), (38.0, Trust.DRIFT), (12.0, Trust.DRIFT)):
         error_m, trust = trust_of(recipe, image, capture(now_c))
         assert (trust == reason).all()
-        drift_m = DRIFT_M_PER_C * abs(now_c - 25.0)
+        drift_m = TemperatureDrift(25.0, now_c).range_m
         np.testing.assert_allclose(error_m, np.hypot(as_then_m, drift_m), rtol=1e-5)
 
 
