@@ -188,9 +188,8 @@ class LikelihoodEstimate(Estimate):
 
 def gamma_share(time: Real, shape: ArrayLike) -> Real:
     """Return the share of a gamma distribution of mean 1 until `time`, for whole shapes."""
-    y = np.maximum(time, 0) * shape
-    rest: Real = np.zeros_like(y)
-    term: Real = np.ones_like(y)
+    y = np.maximum(time, 0) * np.asarray(shape)
+    rest, term = np.zeros(np.shape(y)), np.ones(np.shape(y))
     for k in range(int(np.max(shape, initial=0))):
         rest = rest + np.where(k < np.asarray(shape), term, 0)
         term = term * y / (k + 1)

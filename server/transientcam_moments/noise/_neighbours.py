@@ -1,5 +1,7 @@
 """Averaging moments over neighbouring pixels, but not across edges: adaptive weights."""
 
+from functools import reduce
+from operator import add
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -182,7 +184,7 @@ def _flattened(off: Array, current: Array, weight: Array, multiples: tuple[int, 
     found, both = xp.zeros_like(known), _padded(xp.stack([late, known]))
     for row, column in LINES:
         along = range(-REACH, REACH + 1)
-        shift, together = sum(_shifted(both, i * row, i * column) for i in along)
+        shift, together = reduce(add, (_shifted(both, i * row, i * column) for i in along))
         together = xp.maximum(together, np.finfo(weight.dtype).tiny)
         found = xp.maximum(found, xp.maximum(shift**2 / together - EXPECTED, 0) * known / together)
     return found

@@ -99,7 +99,7 @@ class BoundedConnection(HttpToolsProtocol):
         self._beside_bytes = 0
         self._body_left = _length(self.headers)
         self._expect_within(self._limits.body_s)
-        self.scope["state"]["offs"] = self.transport.offs
+        self.scope.setdefault("state", {})["offs"] = self.transport.offs
         super().on_headers_complete()
         self.transport.account.begun()
         if self.transport.beyond:

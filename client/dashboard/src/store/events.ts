@@ -129,7 +129,10 @@ export function inWords(notice: Notice): { words: string; tone: EventTone } | nu
           }
         : { words: `The calibration ${notice.calibration_id} is used from now on.`, tone: "good" };
     case "noise-differs":
-      return { words: notice.reason ? `${notice.reason}.` : "The images are as noisy as stated again.", tone: notice.reason ? "bad" : "good" };
+      return {
+        words: notice.reason ? `${notice.reason}.` : "The images are as noisy as stated again.",
+        tone: notice.reason ? "bad" : "good",
+      };
     case "lease-changed":
       return { words: leaseWords(notice), tone: "plain" };
     case "recording-started":

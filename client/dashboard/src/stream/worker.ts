@@ -66,7 +66,10 @@ async function askForCamera(): Promise<CameraDocument> {
 
 /** What the stream announced. */
 async function requestFrame({ frame, product }: Announcement, query: string): Promise<ArrayBuffer> {
-  const answer = await fetch(`${interface_url}/frames/${frame}/${product}.msgpack${query}`, { headers: authorization(), cache: "no-store" });
+  const answer = await fetch(`${interface_url}/frames/${frame}/${product}.msgpack${query}`, {
+    headers: authorization(),
+    cache: "no-store",
+  });
   if (GONE.includes(answer.status)) throw new FrameGone();
   if (!answer.ok) throw new Error(`the service answered ${answer.status}`);
   return answer.arrayBuffer();

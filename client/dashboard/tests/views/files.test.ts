@@ -50,7 +50,7 @@ describe("a file that is given to the page", () => {
   test("is put before a simulated camera, and not before a real one", async () => {
     const page = store(true);
     await openFile(page, file("own.toml", "name = 'own'"));
-    expect(asked).toContain("PUT /api/v1/simulation");
+    expect(asked).toContain("PUT api/v1/simulation");
     expect(said(page)).toContain("before the scene of own.toml");
     const real = store(false);
     await openFile(real, file("own.toml", "name = 'own'"));

@@ -121,7 +121,7 @@ describe("stems of returns", () => {
     }
     const { found, truth } = stemsOf(
       { returns: [at(10.5, 300), at(30, 100)] },
-      { kind: "paths", range_m: 1.5, direct: 100, brightness: 400, returns: [at(10, 100)] },
+      { kind: "paths", range_m: 1.5, direct_share: 1, direct: 100, brightness: 400, returns: [at(10, 100)] },
       history,
     );
     expect(found.map(({ share }) => share)).toEqual([0.75, 0.25]);
