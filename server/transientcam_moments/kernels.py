@@ -249,9 +249,9 @@ def settled(names: Sequence[str], harmonics: int) -> bool:
     ParameterError
         For another order or kernel.
     """
+    keys = _named(names, harmonics)
     return not KERNELS.automatic or all(
-        lookup(key.name, key.harmonics, LEAST_PIXELS) or key in KERNELS.failed
-        for key in _named(names, harmonics)
+        lookup(key.name, key.harmonics, LEAST_PIXELS) or key in KERNELS.failed for key in keys
     )
 
 

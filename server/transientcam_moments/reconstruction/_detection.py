@@ -95,9 +95,9 @@ def undetected_pixels(
     size = size.reshape((planes, -1))
     size = size if size.shape[1] == 1 else size[:, doubtful]
     found = np.zeros(brightness.size, dtype=bool)
-    found[doubtful] = undetected(
-        moments.reshape((planes, -1))[:, doubtful], MomentNoise(noise / size)
-    )
+    with np.errstate(divide="ignore", invalid="ignore"):  # of pixels without a gain
+        noise = noise / size
+    found[doubtful] = undetected(moments.reshape((planes, -1))[:, doubtful], MomentNoise(noise))
     return found.reshape(brightness.shape) if found.any() else None
 
 
