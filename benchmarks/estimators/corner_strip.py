@@ -28,7 +28,7 @@ def draw(figures: Path) -> None:
     gains = bench.calibration(SEQUENCE, options=WITHOUT_OUTLIERS).gains.planes
     settings = replace(shot.found.settings, sensor=tm.noise.Sensor())
     found = ranges(shot.found.measured, settings, calibration=gains)
-    truth = np.where(shot.lit, shot.truth.range_m, np.nan)
+    truth = np.where(shot.truth.lit, shot.truth.range_m, np.nan)
     lens = Intrinsics.of_field(FIELD_DEG, width=truth.shape[1], height=truth.shape[0])
     true, middle = lens.points(truth), truth.shape[0] // 2
     with style.style():

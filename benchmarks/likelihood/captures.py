@@ -137,7 +137,7 @@ def _row(
     base_hz = shot.base_frequency_hz
     settings = replace(shot.found.settings, sensor=tm.noise.Sensor())
     found = ranges(shot.found.measured, settings, calibration=gains)
-    truth = np.where(shot.lit, shot.truth.range_m, np.nan)
+    truth = np.where(shot.truth.lit, shot.truth.range_m, np.nan)
     if scene == SOFT:
         truth = with_maxima(shot, truth)
     errors = {
@@ -147,12 +147,12 @@ def _row(
     model = tm.Reconstruction(
         shot.found.measured, replace(settings, estimator="likelihood"), calibration=gains
     )
-    std_mm = 1e3 * np.asarray(model.range_std_m)[shot.lit]
+    std_mm = 1e3 * np.asarray(model.range_std_m)[shot.truth.lit]
     return (
         f"{m}, {takes}" + (", no b_0" if zeroth == "estimated" else ""),
         f"{1e3 * shot.applied.capture_s:.0f}",
         *(str(each) for each in errors.values()),
-        f"{model.likelihood.explained()[shot.lit].mean():.0%}",
+        f"{model.likelihood.explained()[shot.truth.lit].mean():.0%}",
         f"{np.nanmedian(std_mm):.1f}",
     )
 
@@ -160,7 +160,7 @@ def _row(
 def with_maxima(shot: ReconstructedShot, range_m: Array) -> Array:
     """Return true ranges (H, W), without direct light those of the first maximum of the light."""
     found = range_m.copy()
-    for y, x in zip(*np.nonzero(shot.lit), strict=True):
+    for y, x in zip(*np.nonzero(shot.truth.lit), strict=True):
         maximum = _without_direct(shot.truth, int(x), int(y))
         if maximum is not None:
             found[y, x] = maximum

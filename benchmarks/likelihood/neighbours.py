@@ -42,7 +42,10 @@ def _errors(bench: Bench, scene: str, takes: int) -> Iterator[str]:
     shot = bench.shot(scene, sequence, options=WITHOUT_OUTLIERS)
     gains = bench.calibration(sequence, options=WITHOUT_OUTLIERS).gains.planes
     usual = replace(shot.found.settings, sensor=tm.noise.Sensor(), estimator="likelihood")
-    truth, turn = np.where(shot.lit, shot.truth.range_m, np.nan), turn_m(shot.base_frequency_hz)
+    truth, turn = (
+        np.where(shot.truth.lit, shot.truth.range_m, np.nan),
+        turn_m(shot.base_frequency_hz),
+    )
     found = {
         name: tm.Reconstruction(
             shot.found.measured, replace(usual, neighbours=name), calibration=gains

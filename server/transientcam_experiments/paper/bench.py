@@ -7,6 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
@@ -57,8 +58,8 @@ class ReconstructedShot:
 
     @property
     def lit(self) -> _Array:
-        """Pixels (H, W) whose surface has direct light."""
-        return self.truth.lit
+        """Pixels (H, W) that light comes back to, directly or not."""
+        return np.isfinite(self.truth.first_return_m) & (self.truth.brightness > 0)
 
 
 class Bench:

@@ -77,7 +77,7 @@ def capture(bench: Bench) -> CodedCapture:
         np.repeat([0.0, np.pi / 2], SEQUENCE.harmonics),
         np.tile(multiples, 2),
         Code(odd),
-        truth.range_m,
+        truth.first_return_m,
     )
 
 

@@ -108,7 +108,7 @@ def ranged_by(entry: Contender, shot: ReconstructedShot, step: int) -> Ranged:
     b = np.asarray(shot.found.smoothed)[: entry.m + 1, ::step, ::step].astype(np.complex128)
     phase_rad = entry.estimate(b).first_phase_rad()
     range_m = tm.range_m(phase_rad, shot.base_frequency_hz)
-    return Ranged(entry, np.asarray(range_m), shot.truth.range_m[::step, ::step])
+    return Ranged(entry, np.asarray(range_m), shot.truth.first_return_m[::step, ::step])
 
 
 def _coded(entry: Contender, bench: Bench, step: int) -> Ranged:
