@@ -21,6 +21,10 @@ os.environ["TRANSIENTCAM_KERNELS"] = "manual"
 # before NumPy is imported: a product of matrices would begin a thread a core in every worker, and
 # these wait for each other busily, which doubles the processor time of what computes most
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
+# JAX computes little here, and its compiler takes most of the time to make that quick
+os.environ["XLA_FLAGS"] = (
+    "--xla_backend_optimization_level=0 --xla_llvm_disable_expensive_passes=true"
+)
 # every process that a test starts would compile all modules anew, which takes it a second
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # httpx gives up after 5 s, which a laden machine may take to answer; what hangs is ended by the

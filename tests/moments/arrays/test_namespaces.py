@@ -36,7 +36,11 @@ STAGES: dict[str, Callable[[Any], Any]] = {
     "smooth": lambda b: tm.smooth(b.reshape(b.shape[0], 4, 5)),
     "calibrate": lambda b: tm.calibrate(b, gains(b.shape[0] - 1)),
     "range_m": lambda b: tm.range_m(b[0].real, 23e6),
-    "reconstruct": lambda b: tm.reconstruct(b.reshape(b.shape[0], 4, 5), tm.Settings(23e6)).range_m,
+    "reconstruct": lambda b: (
+        tm.reconstruct(
+            b.reshape(b.shape[0], 4, 5), tm.Settings(23e6, estimator="pisarenko")
+        ).range_m
+    ),
     "average_takes": lambda b: tm.average_takes(abs(b)[None].repeat(4, axis=0)),
     "measure": lambda b: low(abs(b)[np.array([0, 1, 2, 3, 1, 2, 3, 0])]),
 }
