@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -30,8 +30,11 @@ STORED: Final = ROOT / "tests" / "driver" / "cameras" / "kinect2" / "libfreenect
 
 
 def spec(scene: str) -> str:
-    """Return the name of the camera in front of a scene; its frames are all the same."""
-    return f"kinect2:emulated?scene={scene}&noise=off"
+    """Return the name of the camera in front of a scene; its frames are all the same.
+
+    libfreenect2 knows nothing of its lens, whose distortion is left out.
+    """
+    return f"kinect2:emulated?scene={scene}&noise=off&distortion=off"
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,7 @@ class ObservedFrame:
             camera.start()
             images = camera.read_frame(timeout_s=600.0).images[:, *EVERY]
             assert camera.simulation is not None
-            true_m = camera.simulation.truth().range_m[EVERY]
+            true_m = camera.simulation.truth().first_return_m[EVERY]
             assert camera.factory is not None
             gains, lens = camera.factory.gains, camera.factory.lens
             assert gains is not None
@@ -71,7 +74,8 @@ class ObservedFrame:
         measured = tm.measure(images, zeroth="estimated", phases_rad=SAMPLING.phases_rad)
         moments = np.asarray(tm.calibrate(measured, gains[:, *EVERY]))[1:]
         # the principal point is in the middle, so that rows may be counted from either end
-        x, y = (each[EVERY] for each in lens.slopes(WIDTH, HEIGHT))
+        straight = replace(lens, distortion=())  # as the device reported it then
+        x, y = (each[EVERY] for each in straight.slopes(WIDTH, HEIGHT))
         return cls(moments, (images == SATURATED_DN).any(axis=0), true_m, (x, y))
 
     def infrared(self) -> Array:

@@ -132,7 +132,7 @@ def test_the_sequence_is_judged_as_it_is_typed_and_set(
     expect(harmonics).to_have_attribute("aria-invalid", "true")
     expect(page.get_by_role("button", name="Apply")).to_be_disabled()
     harmonics.fill("")
-    expect(page.locator(".refusal")).to_have_text("Every field needs a number.")
+    expect(page.locator(".refusal")).to_have_text("Harmonics m needs a number.")
     harmonics.fill("4")
     page.get_by_role("textbox", name="Exposure").fill("0.5")
     expect(page.locator(".verdict [data-field=images]")).to_have_text("20")

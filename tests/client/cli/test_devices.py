@@ -175,9 +175,9 @@ def test_each_kind_says_how_its_names_are_written(capsys: pytest.CaptureFixture[
     kinds = {kind["name"]: kind for kind in listed(capsys)["kinds"]}
 
     assert kinds.keys() >= {"usb", "sim", "recording"}
-    assert kinds["usb"]["usage"] == "usb[:SERIAL]"
+    assert kinds["usb"]["usage"] == "usb[:SERIAL], usb:@BUS-PORTS"
     assert "noise" in kinds["sim"]["options"]
-    assert "usb[:SERIAL] a camera on USB" in printed_by(capsys)
+    assert "usb[:SERIAL], usb:@BUS-PORTS a camera on USB" in printed_by(capsys)
 
 
 @pytest.mark.parametrize(

@@ -1,3 +1,4 @@
+from functools import partial
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -8,7 +9,7 @@ from tests.driver.conftest import OpenCamera
 from transientcam_driver import CameraName, CameraNotFound, PluginError, SceneError, SpecError
 from transientcam_driver.camera import _opening as opening, check_camera, open_camera
 from transientcam_driver.camera._plugin import GROUP
-from transientcam_driver.cameras.open_usb import open_transport
+from transientcam_driver.cameras.open_usb._transport import SameCamera
 from transientcam_simulation.emulated._open_usb.bus import SimulatedBus
 from transientcam_simulation.entries.sim import SimulatedScene, scene_of
 
@@ -94,8 +95,8 @@ def test_an_absent_file_is_named(tmp_path: Path) -> None:
 
 def test_without_a_camera_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "transientcam_driver.cameras.open_usb._plugin.open_transport",
-        lambda serial: open_transport(serial, backend=SimulatedBus([])),
+        "transientcam_driver.cameras.open_usb._plugin.SameCamera",
+        partial(SameCamera, backend=SimulatedBus([])),
     )
 
     with pytest.raises(CameraNotFound, match="A-17"):

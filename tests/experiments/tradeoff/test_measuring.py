@@ -19,7 +19,7 @@ def test_a_scene_that_moves_is_held_against_the_truth_of_each_frame(tmp_path: Pa
     tradeoff.measure(points, records, scene="visitor", seed=1, progress=lambda kind: None)
 
     (found,) = records
-    assert 0 < (found.values["range_median_m"] or 0) < 0.02
+    assert 0 < (found.values["range_median_m"] or 0) < 0.03
 
 
 class StoppedError(Exception):

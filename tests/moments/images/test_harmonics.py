@@ -289,7 +289,7 @@ def test_a_reconstruction_says_of_how_many_pixels_they_were_taken_out() -> None:
 
 def test_the_compiled_pass_follows_the_correction() -> None:
     b, gains, _ = frame()
-    settings_ = tm.Settings(base_frequency_hz=23e6, zeroth="on-off", takes=1)
+    settings_ = tm.Settings(base_frequency_hz=23e6, zeroth="on-off", takes=1, estimator="pisarenko")
     raw = (b * gains).astype(np.complex64)
     with without_kernels():
         staged = tm.reconstruct(raw, settings_, calibration=gains, waveform=columns(KNOWN, 3, 4))

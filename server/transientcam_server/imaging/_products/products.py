@@ -328,7 +328,7 @@ PRODUCTS: Final[dict[str, Product]] = {
             over_time=True,
             of_noise=True,
             of_toeplitz=True,
-            reads=("smoothed", "ambient"),
+            reads=("smoothed", "ambient", "settings", "variance_share"),
         ),
         Product(
             _WIRE["cumulative"],
