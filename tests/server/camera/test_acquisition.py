@@ -65,7 +65,9 @@ class ScriptedCamera:
         self.gone = False
 
     def deliver(self, number: int, *, epoch: int = 1) -> None:
-        self.script.put(cast("RawFrame", SimpleNamespace(number=number, epoch=epoch)))
+        self.script.put(
+            cast("RawFrame", SimpleNamespace(number=number, epoch=epoch, captured_unix_s=0.0))
+        )
 
     def read_frame(self, *, timeout_s: float) -> RawFrame:
         try:

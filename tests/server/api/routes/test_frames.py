@@ -382,8 +382,11 @@ def test_a_pointcloud_is_as_far_away_as_the_range_and_says_whose_rays(
     cloud = product(still, "pointcloud")
     range_m = product(still, "range").array
 
-    np.testing.assert_allclose(np.linalg.norm(cloud.array, axis=0), range_m, rtol=1e-5)
-    assert cloud.extra["intrinsics"] == still.get("/api/v1/camera").json()["intrinsics"]
+    lens = cloud.extra["intrinsics"]
+    lamp_m = np.array([lens[f"light_{axis}_m"] for axis in "xyz"])[:, None, None]
+    back_m, forth_m = (np.linalg.norm(cloud.array - at, axis=0) for at in (0.0, lamp_m))
+    np.testing.assert_allclose((back_m + forth_m) / 2, range_m, rtol=1e-5)
+    assert lens == still.get("/api/v1/camera").json()["intrinsics"]
     assert cloud.extra["intrinsics"]["source"] == "scene"
 
 

@@ -70,7 +70,8 @@ def test_xarray_opens_all_that_is_in_the_file_and_reads_what_is_indexed(
     assert requested == [f"{STORE}/raw/2.0.0.0"]
     with h5py.File(directory / "kept.h5") as file:
         np.testing.assert_array_equal(images, file["raw"][2])
-        for name, variable in dataset.variables.items():
+        assert (np.diff(dataset["captured_unix_s"]) > 0).all()  # by the clock of the camera
+        for name, variable in dataset.drop_vars("captured_unix_s").variables.items():
             np.testing.assert_array_equal(variable.to_numpy(), file[str(name)][()])
             assert variable.dtype == file[str(name)].dtype
         assert dataset["raw"].dims == ("frame", "image", "y", "x")
