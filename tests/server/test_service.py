@@ -23,6 +23,7 @@ HEALTHY: dict[str, Any] = {
     "frame_age_s": 0.05,
     "reason": None,
     "stalled": False,
+    "offs": 0,
 }
 
 

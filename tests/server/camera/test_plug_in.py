@@ -23,7 +23,7 @@ DISTANCE_M = 2.5
 FAR_M = 12.5
 PROJECT = Path(__file__).parents[3] / "pyproject.toml"
 OF_CONSECUTIVE_MULTIPLES = (
-    *("validity", "range_bias", "range_error", "coefficients", "transient", "density_std"),
+    *("validity", "range_bias", "range_error", "trust", "coefficients", "transient", "density_std"),
     *("cumulative", "streak", "bounds"),
 )
 # the others record, replay, or wait for long; they do not depend on the camera

@@ -19,7 +19,7 @@ from transientcam_server.settings import ReconstructionSettings
 
 F_HZ = 23e6
 LIGHT_M_S = 299_792_458.0
-PLAIN = ReconstructionSettings(smoothing_px=0.0)
+PLAIN = ReconstructionSettings(smoothing_px=0.0, estimator="pisarenko")
 
 
 def written(path: Path, **arrays: Any) -> Path:

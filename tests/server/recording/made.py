@@ -1,7 +1,7 @@
 """Recordings for tests: small frames of any values, and the header that goes with them."""
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 from transientcam_driver import Capabilities, RawFrame, Sequence, open_camera
+from transientcam_driver.camera import Sensor
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.recording import Header, RecordingWriter
 
@@ -37,7 +38,7 @@ def header(**changes: Any) -> Header:
         "started_s": 1795161600.25,
         "applied": APPLIED,
         "capabilities": CAPABILITIES,
-        "camera": {"spec": "sim:mirrors", "scene": "mirrors"},
+        "camera": {"spec": "sim:mirrors", "scene": "mirrors", "sensor": asdict(Sensor())},
         "calibration": {"id": "nominal"},
         "reconstruction": {"bias": 0.004},
     }

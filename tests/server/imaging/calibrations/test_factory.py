@@ -103,7 +103,9 @@ def test_noise_grows_where_they_are_small() -> None:
     sensor = tm.noise.Sensor()
     brightness = np.full((HEIGHT, WIDTH), 500.0)
     smoothed = np.stack([brightness + 0j] * 3)
-    found = cast("tm.Reconstruction", SimpleNamespace(ambient=None, smoothed=smoothed))
+    planes = {"ambient": None, "smoothed": smoothed, "variance_share": None}
+    plain = SimpleNamespace(gaussian_px=0.0)
+    found = cast("tm.Reconstruction", SimpleNamespace(settings=plain, **planes))
     settings = ReconstructionSettings(smoothing_px=0.0)
     nominal = Recipe(APPLIED, settings, 4095.0, sensor=sensor)
 

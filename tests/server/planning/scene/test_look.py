@@ -39,7 +39,7 @@ def test_a_look_counts_lit_pixels_alone(tmp_path: Any) -> None:
 
     with open_camera(f"sim:{path}", clock=VirtualClock()) as camera:
         assert camera.simulation is not None
-        lit_share = np.isfinite(camera.simulation.truth().range_m).mean()
+        lit_share = np.isfinite(camera.simulation.truth().first_return_m).mean()
     assert scene.lit_share == pytest.approx(lit_share, rel=0.02)
 
 
