@@ -270,6 +270,10 @@ class Acceptor:
                     limiter.refuse()
             return limiter
 
+        if candidate is not None and candidate.refused and self._tls is None:
+            counted.close()
+            self._refuse(connection, candidate.problem)
+            return
         within_s = self._limits.head_s if candidate is None else min(LOOK_S, self._limits.head_s)
         try:
             await self._loop.connect_accepted_socket(

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from rosbags.typesys import Stores, get_typestore
 
 import transientcam
 from tests.server.recording.made import HEIGHT, WIDTH, frame, record
+from transientcam_driver.camera import Sensor
 from transientcam_server.errors import InputError
 from transientcam_server.offline import convert_recording
 from transientcam_server.offline._mcap import PRODUCTS
@@ -34,7 +36,9 @@ SHOWN = ("range", "flags", "pointcloud", "raw")
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("source") / "a.h5"
-    return record(path, FRAMES, camera={"spec": "sim:mirrors", "intrinsics": BENT})
+    return record(
+        path, FRAMES, camera={"spec": "sim:mirrors", "intrinsics": BENT, "sensor": asdict(Sensor())}
+    )
 
 
 @pytest.fixture(scope="module")

@@ -70,7 +70,12 @@ def test_raw_images_are_read_as_they_are_indexed(path: Path) -> None:
 def test_products_are_those_of_the_arithmetic_with_the_recorded_settings(path: Path) -> None:
     sequence = APPLIED.sequence
     settings = tm.Settings(
-        sequence.base_frequency_hz, "estimated", 1, epsilon=0.01, smoothing_sigma_px=0.0
+        sequence.base_frequency_hz,
+        "estimated",
+        1,
+        epsilon=0.01,
+        smoothing_sigma_px=0.0,
+        sensor=tm.noise.Sensor(),
     )
     expected = tm.reconstruct(frame(2).images, settings, calibration=nominal_gains(sequence))
     with transientcam.open(path) as recording:

@@ -159,6 +159,8 @@ def test_every_value_is_that_of_the_file_also_while_it_is_written(
 
     with h5py.File(path) as file:
         for name, array in group.arrays():
+            if name == "captured_unix_s":  # which follows from others
+                continue
             np.testing.assert_array_equal(np.asarray(array), file[name][()], err_msg=name)
 
 
