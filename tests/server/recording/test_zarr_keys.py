@@ -51,7 +51,7 @@ def test_consolidated_metadata_has_every_other_document(source: Path) -> None:
 
     assert {*GROUP_KEYS[:2]} <= consolidated["metadata"].keys()
     with h5py.File(source) as file:
-        # two are attributes of the group, and one is an axis without values; one follows from others
+        # two are attributes of the group, one is an axis without values; one follows from others
         assert arrays - {"captured_unix_s"} == file.keys() - {"annotations", "end", "sub_phase"}
 
 
