@@ -17,7 +17,7 @@ OF_A_FRAME = re.compile(r"GET .*/api/v1/frames/([0-9]+)/(\w+)\.msgpack")
 
 
 def requested(watch: Watch) -> set[tuple[int, str]]:
-    """Frames and their products that the page requested by number, but for what ranges are worth."""
+    """Frames and products that the page requested by number, but for what ranges are worth."""
     found = (OF_A_FRAME.fullmatch(each) for each in watch.requests)
     numbered = {(int(each[1]), each[2]) for each in found if each is not None}
     return {each for each in numbered if not each[1].startswith(("range_", "trust"))}
