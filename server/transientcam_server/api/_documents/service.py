@@ -70,7 +70,7 @@ class InfoDocument(Document):
     """Which frames can be had, as in `GET /frames`."""
     clients: int
     """Streams open now."""
-    kernels: KernelsDocument | None
+    kernels: KernelsDocument | None = None
     """What frames are computed without until it is compiled: more slowly, with the same results;
     null where nothing is being prepared."""
     reconstruction: dict[str, float | str]
