@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.server.recording.made import APPLIED, record
+from tests.server.recording.made import APPLIED, header, record
 from transientcam_server.recording import Recording
 from transientcam_server.recording._columns import as_json, attributes_of, columns_of
 

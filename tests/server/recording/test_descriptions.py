@@ -19,8 +19,7 @@ OF_HEADER: dict[str, Any] = {
     "camera": {
         "model": CAPABILITIES.model,
         "serial": CAPABILITIES.serial,
-        "spec": "sim:mirrors",
-        "scene": "mirrors",
+        **header().camera,
     },
     "calibration": {"id": "nominal"},
     "width": 16,
