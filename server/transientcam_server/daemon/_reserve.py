@@ -6,6 +6,7 @@ that a flood from one address takes nothing from another, and the newest comes f
 """
 
 import asyncio
+import contextlib
 import socket
 from collections import Counter
 from collections.abc import Callable
@@ -173,6 +174,9 @@ class Reserve:
             self._speaking.remove(candidate)
         if candidate.limiter is not None:
             candidate.limiter.refuse()
+            if not self._tls:
+                with contextlib.suppress(OSError):  # unread, it would reset the connection
+                    candidate.connection.recv(PORTION_BYTES)
         elif candidate.handed_on:
             candidate.refused = True
         else:
