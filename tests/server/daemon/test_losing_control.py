@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from tests.driver.cameras.open_usb.usbfs.processes import missing_libraries, skip_or_fail
-from tests.server.daemon.losing_control import EVENTS, KINDS, Control, Zygote, controlled, lose
+from tests.server.daemon.losing_control import EVENTS, Control, Zygote, controlled, lose
 from tests.waiting import wait_until
 
 FEWER = "stuck camera thread", "USB stall", "supervisor SIGKILL", "SIGSTOP", "SIGKILL"
@@ -61,7 +61,8 @@ def test_an_opt8241_goes_dark_which_has_no_watchdog(opt8241: Control, event: str
     lose(opt8241, event)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+# not kinect2: on a laden machine its emulated bus may not come back; `losing_control` tries it
+@pytest.mark.parametrize("kind", ["usb", "opt8241"])
 def test_after_a_restart_it_stays_dark_until_somebody_starts(
     request: pytest.FixtureRequest, kind: str
 ) -> None:
