@@ -1,5 +1,6 @@
 """The panel of sequence and accuracy: the front, the slider along it, plans, and the way back."""
 
+import math
 import re
 import threading
 from importlib import import_module
@@ -85,11 +86,11 @@ def test_the_front_fills_and_its_slider_sets_a_sequence_that_can_be_undone(
     # the header states shares of the picture, of which the panel has the median pixel
     page.wait_for_function("() => transientcam.store.rangeErrors.of('range_error').value !== null")
     stated = page.locator(f"{PANEL} [data-field=now_range_error_m]")
-    expect(stated).to_have_attribute("title", re.compile("90 % interval, of noise and bias"))
+    expect(stated).to_have_attribute("title", re.compile("1 σ of noise and bias together"))
     shown = page.evaluate("() => transientcam.store.rangeErrors.of('range_error').value.meta")
     worth = shown["accuracy"]
     assert number(text(page, PANEL, "now_range_error_m").removeprefix("\u00b1 ")) == pytest.approx(
-        worth["range_error_m"], rel=0.05
+        math.hypot(worth["range_std_m"], worth["range_bias_m"]), rel=0.05  # as plans have it
     )
     share, within = text(page, ".bar", "deviation").split(" % \u00b1 ")
     assert float(share) == round(100 * worth["trusted_share"])

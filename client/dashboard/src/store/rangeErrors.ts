@@ -13,10 +13,17 @@ export interface RangeErrorFigure {
   readonly error_m: number;
   /** Half of the 90 % interval, of noise and bias; or 1 σ of the noise alone where the bias is unknown. */
   readonly of: "interval" | "noise";
+  /** 1 σ of noise and bias together, which plans predict: what this is held against them by. */
+  readonly planned_m: number;
   /** Share of the picture that is trusted; null where that is not known. */
   readonly trusted_share: number | null;
   /** Half of the interval that 9 of 10 trusted pixels have, or less. */
   readonly within_m: number | null;
+}
+
+/** Noise and bias of a frame's median pixel together, as plans state them: half of an interval is more. Null if unknown. */
+export function plannedError_m(accuracy: FrameMeta["accuracy"] | null): number | null {
+  return accuracy?.range_std_m == null || accuracy.range_bias_m == null ? null : Math.hypot(accuracy.range_std_m, accuracy.range_bias_m);
 }
 
 /** What is requested of a frame; the first one is its error. */
@@ -67,9 +74,10 @@ export class RangeErrors {
       const meta = status.newest.value;
       const accuracy = this.of(PRODUCTS[0]).value?.meta.accuracy ?? meta?.accuracy;
       const share = { trusted_share: accuracy?.trusted_share ?? null, within_m: accuracy?.within_m ?? null };
-      if (accuracy?.range_error_m != null) return { error_m: accuracy.range_error_m, of: "interval", ...share };
+      const planned_m = plannedError_m(accuracy ?? null) ?? NaN;
+      if (accuracy?.range_error_m != null) return { error_m: accuracy.range_error_m, of: "interval", planned_m, ...share };
       const noise_m = accuracy?.range_std_m ?? meta?.predicted_range_std_m?.median;
-      return noise_m == null ? null : { error_m: noise_m, of: "noise", ...share };
+      return noise_m == null ? null : { error_m: noise_m, of: "noise", planned_m: noise_m, ...share };
     });
     const shown = computed(() => {
       const meta = status.newest.value;

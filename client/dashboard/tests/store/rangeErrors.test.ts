@@ -17,7 +17,7 @@ const meta = (sequence_id: number, range_error_m: number | null = null, frame = 
     sequence_id,
     frame,
     predicted_range_std_m: { median: 1e-3, p90: 2e-3 },
-    accuracy: range_error_m === null ? null : { range_error_m, trusted_share: 0.82, within_m: 4e-3 },
+    accuracy: range_error_m === null ? null : { range_error_m, range_std_m: 3e-4, range_bias_m: 4e-4, trusted_share: 0.82, within_m: 4e-3 },
   }) as FrameMeta;
 
 /** Maps of 2 x 1 pixels: 5 mm and nothing, trusted and in shadow. */
@@ -38,8 +38,8 @@ function bench(answer: () => FrameMeta) {
   return { status, replaying, held, requests, errors };
 }
 
-const noise = { error_m: 1e-3, of: "noise", trusted_share: null, within_m: null };
-const interval = (error_m: number) => ({ error_m, of: "interval", trusted_share: 0.82, within_m: 4e-3 });
+const noise = { error_m: 1e-3, of: "noise", planned_m: 1e-3, trusted_share: null, within_m: null };
+const interval = (error_m: number) => ({ error_m, of: "interval", planned_m: 5e-4, trusted_share: 0.82, within_m: 4e-3 });
 
 describe("the error of the range", () => {
   test("is noise alone until the service was asked, once a sequence has stayed, and again", async () => {
@@ -124,6 +124,6 @@ test("a picture's ranges are stated as shares of it", () => {
     "82 % ± 4.0 mm",
     "82 % of the picture ± 4.0 mm (90 % intervals), 18 % not trusted",
   ]);
-  expect(words({ error_m: 1e-3, of: "noise", trusted_share: 0.5, within_m: null })[0]).toBe("50 % trusted");
+  expect(words({ error_m: 1e-3, of: "noise", planned_m: 1e-3, trusted_share: 0.5, within_m: null })[0]).toBe("50 % trusted");
   expect(words({ ...noise, of: "noise" })[0]).toBe("± 1.0 mm noise");
 });

@@ -12,14 +12,14 @@ const choice = (capture_s: number, median: number): ChoiceDocument =>
   }) as unknown as ChoiceDocument;
 const TRADEOFF = {
   front: [choice(0.05, 0.04), choice(5, 0.0004)],
-  current: { capture_s: 0.09, meta: { accuracy: { range_error_m: 0.011 } } },
+  current: { capture_s: 0.09, meta: { accuracy: { range_error_m: 0.03, range_std_m: 0.011, range_bias_m: 0 } } },
 } as unknown as TradeoffDocument;
 
 describe("the plot of accuracy against time", () => {
   test("holds the front with its uncertainty and where the camera stands", () => {
     const ends = endsOf({
       ...TRADEOFF,
-      current: { capture_s: 20, meta: { accuracy: { range_error_m: 0.2 } } },
+      current: { capture_s: 20, meta: { accuracy: { range_error_m: 0.5, range_std_m: 0.2, range_bias_m: 0 } } },
     } as unknown as TradeoffDocument);
     for (const [capture_s, range_error_m] of [
       [0.05, 0.044],
@@ -48,8 +48,9 @@ describe("the plot of accuracy against time", () => {
 });
 
 describe("where the camera stands", () => {
-  const meta = (sequence_id: number, range_error_m: number | null): FrameMeta =>
-    ({ sequence_id, accuracy: { range_error_m } }) as unknown as FrameMeta;
+  /** As plans have it: noise and bias together; half of the interval is another figure. */
+  const meta = (sequence_id: number, planned_m: number | null): FrameMeta =>
+    ({ sequence_id, accuracy: { range_error_m: 1, range_std_m: planned_m, range_bias_m: 0 } }) as unknown as FrameMeta;
   const inUse = (sequence_id: number, takes = 3): AppliedDocument => ({ sequence_id, takes, capture_s: 0.2 }) as AppliedDocument;
   const tradeoff = { ...TRADEOFF, current: { capture_s: 0.09, meta: meta(1, 0.011) } } as unknown as TradeoffDocument;
 

@@ -86,8 +86,11 @@ function NowFigures({ applied, truth_m }: { applied: AppliedDocument; truth_m: n
   const error = status.newest.value?.sequence_id === applied.sequence_id ? rangeErrors.now.value : null;
   return (
     <>
-      <strong data-field="now_range_error_m" title={`Of the range in the median pixel: ${errorWords(error)}`}>
-        ± {engineering(error?.error_m, "m", 2)}
+      <strong
+        data-field="now_range_error_m"
+        title={`Of the range in the median pixel: ${error?.of === "interval" ? "1 σ of noise and bias together" : errorWords(error)}`}
+      >
+        ± {engineering(error?.planned_m, "m", 2)}
       </strong>{" "}
       {error?.of === "noise" && <span class="quiet">noise</span>} <span>{engineering(applied.capture_s, "s")}</span>{" "}
       <span>{fixed(applied.frame_rate_hz, 1, "Hz")}</span>{" "}

@@ -1,6 +1,7 @@
 /** Where choices of sequences stand in the plot of accuracy against time, both logarithmic. */
 
 import { fraction, type Scale, ticks } from "../../scales/scale";
+import { plannedError_m } from "../../store/rangeErrors";
 import type { AppliedDocument, ChoiceDocument, FrameMeta, TradeoffDocument } from "../../stream/documents";
 
 export interface Ends {
@@ -24,7 +25,7 @@ export function endsOf({ front, current }: TradeoffDocument): Ends {
     predicted.range_error_m.high,
     predicted.range_error_m.median,
   ]);
-  const then = current.meta.accuracy?.range_error_m ?? null;
+  const then = plannedError_m(current.meta.accuracy);
   if (then !== null) errors.push(then);
   const scale = (values: readonly number[]): Scale => ({
     low: Math.min(...values) / ROOM,
@@ -36,9 +37,9 @@ export function endsOf({ front, current }: TradeoffDocument): Ends {
 
 /** Where the camera stands with a sequence: by the frame on screen, or by that which the front was predicted beside, or as predicted. */
 export function standingOf(meta: FrameMeta | null, sequence: AppliedDocument, { current, front }: TradeoffDocument): Standing | null {
-  const ofIt = [meta, current.meta].find((each) => each?.sequence_id === sequence.sequence_id && each.accuracy?.range_error_m != null);
+  const ofIt = [meta, current.meta].find((each) => each?.sequence_id === sequence.sequence_id && plannedError_m(each.accuracy) !== null);
   const predicted = front.find((choice) => FIELDS.every((field) => choice.sequence[field] === sequence[field]));
-  const range_error_m = ofIt?.accuracy?.range_error_m ?? predicted?.predicted.range_error_m.median ?? null;
+  const range_error_m = plannedError_m(ofIt?.accuracy ?? null) ?? predicted?.predicted.range_error_m.median ?? null;
   return range_error_m === null ? null : { capture_s: sequence.capture_s, range_error_m };
 }
 
