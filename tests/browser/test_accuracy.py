@@ -90,7 +90,8 @@ def test_the_front_fills_and_its_slider_sets_a_sequence_that_can_be_undone(
     shown = page.evaluate("() => transientcam.store.rangeErrors.of('range_error').value.meta")
     worth = shown["accuracy"]
     assert number(text(page, PANEL, "now_range_error_m").removeprefix("\u00b1 ")) == pytest.approx(
-        math.hypot(worth["range_std_m"], worth["range_bias_m"]), rel=0.05  # as plans have it
+        math.hypot(worth["range_std_m"], worth["range_bias_m"]),
+        rel=0.05,  # as plans have it
     )
     share, within = text(page, ".bar", "deviation").split(" % \u00b1 ")
     assert float(share) == round(100 * worth["trusted_share"])
