@@ -12,7 +12,7 @@ from tests.conftest import ROOT
 from tests.server.fuzzing.damage import lookup3
 from tests.server.fuzzing.recordings import KINDS, MEMORY_BYTES, in_memory
 
-CASES = 70 * len(KINDS)
+CASES = 40 * len(KINDS)
 """`python -m benchmarks fuzz_recordings` tries as many as there is time for."""
 
 
