@@ -26,7 +26,7 @@ from transientcam_server.recording._product_stores import (
     ProductStores,
 )
 from transientcam_server.recording._reader import Recording
-from transientcam_server.recording._recipe import recorded_recipe
+from transientcam_server.recording._frames import recorded_recipe
 from transientcam_server.recording._recorder import Limits
 from transientcam_server.recording._recovery import recover
 from transientcam_server.recording._replay import ReplayCamera
