@@ -13,6 +13,7 @@ from transientcam_server.recording._frames import (
     RecordedFramesCache,
     SettingsChoice,
     open_found,
+    recorded_recipe,
     timeline,
 )
 from transientcam_server.recording._heaps import require_sound_heaps
@@ -26,7 +27,6 @@ from transientcam_server.recording._product_stores import (
     ProductStores,
 )
 from transientcam_server.recording._reader import Recording
-from transientcam_server.recording._frames import recorded_recipe
 from transientcam_server.recording._recorder import Limits
 from transientcam_server.recording._recovery import recover
 from transientcam_server.recording._replay import ReplayCamera
