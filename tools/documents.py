@@ -3,7 +3,8 @@
 The models of `transientcam_server.api._documents` state each document once. OpenAPI and AsyncAPI
 documents follow from them, and of these the types of the Python client and of the dashboard: run
 ``python tools/documents.py --write``. Without ``--write`` it says which file is not as it
-would be written, and fails where one is.
+would be written, and fails where one is. The types of the dashboard are always written: only its
+compiler's check reads them, and the repository does not keep them.
 
 No published generator serves: openapi-typescript needs the compiler of TypeScript 5, and
 json-schema-to-typescript states a document anew wherever a field that refers to it is described.
@@ -13,7 +14,7 @@ import argparse
 import json
 import subprocess
 import sys
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
 from textwrap import indent
 from typing import Any
@@ -28,9 +29,9 @@ from transientcam_server.api._docs.asyncapi import asyncapi
 from transientcam_server.settings import Settings
 
 _ROOT = Path(__file__).parents[1]
-_DASHBOARD = _ROOT / "client/dashboard"
 PYTHON = _ROOT / "client/transientcam/documents.py"
-TYPESCRIPT = _DASHBOARD / "src/stream/documents.d.ts"
+TYPESCRIPT = _ROOT / "client/dashboard/src/stream/documents.d.ts"
+"""Which git ignores."""
 OPERATIONS = _ROOT / "docs/operations.md"
 _WRITTEN = "`python tools/documents.py --write` writes this file"
 _OF_A_FRAME = (
@@ -65,7 +66,7 @@ def files() -> dict[Path, str]:
     stated = {"Answers": answers, "Bodies": bodies, **schemas}
     typescript = "\n".join(
         (
-            f"/** The documents; {_WRITTEN}. */\n",
+            "/** The documents; `python tools/documents.py` writes this file. */\n",
             *(_interface(name, each, name in complete) for name, each in sorted(stated.items())),
             f"export type Notice = {_typescript(streamed['notice'])};",
         )
@@ -77,11 +78,9 @@ def files() -> dict[Path, str]:
             *(_typed_dict(name, schemas[name]) for name in _OF_A_FRAME),
         )
     )
-    ruff = (sys.executable, "-m", "ruff", "format", f"--stdin-filename={PYTHON}", "-")
-    biome = (_DASHBOARD / "node_modules/.bin/biome", "format", f"--stdin-file-path={TYPESCRIPT}")
     return {
-        PYTHON: _formatted(python, ruff),
-        TYPESCRIPT: _formatted(typescript, biome),
+        PYTHON: _formatted(python),
+        TYPESCRIPT: typescript + "\n",
         OPERATIONS: with_table(OPERATIONS.read_text(encoding="utf-8")),
     }
 
@@ -146,10 +145,10 @@ def _references(found: object) -> Iterator[str]:
 
 def _interface(name: str, schema: _Schema, complete: bool) -> str:
     """Return a document as an interface; one that is ``complete`` has all that it may have."""
-    base = f"extends {schema['extends']}" if "extends" in schema else ""
+    base = f"extends {schema['extends']} " if "extends" in schema else ""
     required = schema["properties"] if complete else schema.get("required", ())
     fields = _fields(schema, required)
-    return f"{_comment(schema)}export interface {_identifier(name)} {base} {fields}\n"
+    return f"{_comment(schema)}export interface {_identifier(name)} {base}{fields}\n"
 
 
 def _fields(schema: _Schema, required: Container[str]) -> str:
@@ -157,7 +156,7 @@ def _fields(schema: _Schema, required: Container[str]) -> str:
         f'{_comment(each)}readonly "{name}"{"" if name in required else "?"}: {_typescript(each)};'
         for name, each in schema["properties"].items()
     )
-    return "{\n" + "\n".join(fields) + "\n}"
+    return "{\n" + indent("\n".join(fields), "  ") + "\n}"
 
 
 def _comment(schema: _Schema) -> str:
@@ -232,12 +231,10 @@ def _python(schema: _Schema) -> str:
     return names[schema["type"]]
 
 
-def _formatted(source: str, formatter: Sequence[str | Path]) -> str:
-    """Return a source as the project's formatter of its language has it."""
-    done = subprocess.run(formatter, input=source, capture_output=True, text=True, cwd=_DASHBOARD)
-    if done.returncode:
-        raise SystemExit(f"{formatter[0]}: {done.stderr}")
-    return done.stdout
+def _formatted(source: str) -> str:
+    """Return a Python source as ruff has it."""
+    ruff = (sys.executable, "-m", "ruff", "format", f"--stdin-filename={PYTHON}", "-")
+    return subprocess.run(ruff, input=source, stdout=subprocess.PIPE, text=True, check=True).stdout
 
 
 def main() -> None:
@@ -246,11 +243,15 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="write what differs")
     write = parser.parse_args().write
     differing = [(path, text) for path, text in files().items() if _written(path) != text]
+    wrong = []
     for path, text in differing:
-        print(f"{path.relative_to(_ROOT)} {'is written' if write else 'differs'}")
-        if write:
+        if write or path == TYPESCRIPT:
             path.write_text(text, encoding="utf-8")
-    sys.exit(bool(differing) and not write)
+            print(f"{path.relative_to(_ROOT)} is written")
+        else:
+            wrong.append(path)
+            print(f"{path.relative_to(_ROOT)} differs")
+    sys.exit(bool(wrong))
 
 
 def _written(path: Path) -> str | None:

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from benchmarks.accuracy.capturing import SEED, captured, short
+from benchmarks.common.picture import blank, saved
 from benchmarks.common.tables import Cell, Column, Table, heads
 from transientcam_driver import Sequence
 from transientcam_experiments.tradeoff import camera_before
-from transientcam_experiments.tradeoff.picture import blank, saved
 from transientcam_server.imaging import typical_deviation
 from transientcam_server.imaging._errors_of_range.accuracy import range_accuracy
 from transientcam_server.imaging._errors_of_range.noise import moment_noise, range_noise

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.accuracy.capturing import dimmest_dn_per_s, looked, measured
+from benchmarks.common.picture import blank, error_picture, errors_m, saved
 from benchmarks.common.tables import Table
 from transientcam_driver import Sequence as Capture
-from transientcam_experiments.tradeoff.picture import blank, error_picture, errors_m, saved
 from transientcam_server.planning import Goal, flat_from
 
 SCENES: Final = ("wall", "corner", "corner-left", "mirrors", "translucent")

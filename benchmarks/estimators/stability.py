@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from benchmarks.common.picture import blank, saved
 from benchmarks.common.tables import Table, heads
 from benchmarks.common.timing import measure
 from tests.moments import oracles
 from tests.stability import exact
 from tests.stability.cases import ORDERS, PRECISIONS, Signal, dense_signals, sparse_signals
-from transientcam_experiments.tradeoff.picture import blank, saved
 from transientcam_moments.arrays import by_blocks
 from transientcam_moments.moment_problem import first_returns
 from transientcam_moments.moment_problem._polishing import residual, size

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
+from benchmarks.common.picture import blank, saved
 from benchmarks.common.tables import Table, heads
 from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import TOO_LONG
@@ -15,7 +16,6 @@ from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array
 from transientcam_driver.camera import CameraName
 from transientcam_driver.cameras.kinect2 import SAMPLING
 from transientcam_driver.clock import VirtualClock
-from transientcam_experiments.tradeoff.picture import blank, saved
 from transientcam_server.camera import sensor_of
 from transientcam_server.imaging import Intrinsics
 from transientcam_server.settings import SensorSettings

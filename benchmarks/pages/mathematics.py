@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import transientcam_moments as tm
-from transientcam_experiments.tradeoff.picture import blank, saved
+from benchmarks.common.picture import blank, saved
 
 BASE_FREQUENCY_HZ: Final = 23e6
 RETURNS_S: Final = np.array([10e-9, 17e-9])

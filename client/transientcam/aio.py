@@ -24,9 +24,7 @@ from transientcam.requests import (
     document,
     ended,
     problem,
-    recording_file,
-    set_reconstruction,
-    set_sequence,
+    recording_path,
 )
 from transientcam.stream import BaseStream
 from transientcam.stream_state import (
@@ -98,11 +96,12 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
 
     async def set_sequence(self, settings: Mapping[str, Any]) -> dict[str, Any]:
         """Set the sequence, absent fields to their defaults, and return what was really set."""
-        return await self._ask(set_sequence(settings))
+        return await self._ask(document("sequence", method="PUT", body=settings))
 
     async def configure(self, **changes: object) -> dict[str, Any]:
         """Change some fields of the sequence, keep the others, and return what was really set."""
-        return await self._ask(set_sequence({**await self.sequence(), **changes}))
+        wanted = {**await self.sequence(), **changes}
+        return await self._ask(document("sequence", method="PUT", body=wanted))
 
     async def reconstruction(self) -> dict[str, Any]:
         """Return how frames are computed: smoothing, biasing, estimator and thresholds."""
@@ -110,7 +109,7 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
 
     async def set_reconstruction(self, settings: Mapping[str, Any]) -> dict[str, Any]:
         """Change how frames are computed, absent fields to their defaults."""
-        return await self._ask(set_reconstruction(settings))
+        return await self._ask(document("reconstruction", method="PUT", body=settings))
 
     async def parameters(self) -> dict[str, Any]:
         """Return all parameters, with their values, units and limits."""
@@ -168,7 +167,7 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
     ) -> None:
         """Download a recording's file; see `Camera.download_recording`."""
         part = output.with_name(output.name + ".part")
-        url = f"{self._address.api}/{recording_file(recording_id)}"
+        url = f"{self._address.api}/{recording_path(recording_id)}/file"
         with translated(self.url):
             async with self._http.stream("GET", url) as response:
                 if response.status_code != httpx.codes.OK:

@@ -2,23 +2,29 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, Generic, TypeVar, overload
+from typing import Any, Final, Generic, TypeVar, overload
 
 from transientcam.frame import Frame
+from transientcam.lease import GIVE_BACK
 from transientcam.requests import (
     Calibrations,
     Jobs,
     Part,
     Request,
     Which,
-    changes,
+    document,
     frames,
-    give_lease_back,
-    planning,
-    recordings,
+    given,
+    recording_path,
 )
 from transientcam.transport import parse_address
 
+_PLANNED_S: Final = 120.0
+"""How much longer than usual it takes to look at a scene and weigh all sequences, when busy."""
+_SCENE_BUILT_S: Final = 60.0
+"""The same of building a simulated scene."""
+_WRITTEN_S: Final = 60.0
+"""The same until all of a recording is on the disk."""
 _Document = TypeVar("_Document")
 _Frame = TypeVar("_Frame")
 _Bytes = TypeVar("_Bytes")
@@ -61,7 +67,7 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
 
     def validate(self, settings: Mapping[str, Any]) -> _Document:
         """Return what a sequence would really be set to, without setting it."""
-        return self._ask(changes.validate_sequence(settings))
+        return self._ask(document("sequence/validate", method="POST", body=settings))
 
     def plan(
         self,
@@ -96,9 +102,8 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         ProblemError
             ``target-unreachable`` where nothing reaches the target; it says what limits.
         """
-        return self._ask(
-            planning.plan(target=target, budget=budget, fixed=fixed, estimator=estimator)
-        )
+        body = given(target=target, budget=budget, fixed=fixed, estimator=estimator)
+        return self._ask(document("plan", method="POST", body=body, extra_timeout_s=_PLANNED_S))
 
     def start_plan(
         self,
@@ -115,17 +120,16 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
             job = camera.start_plan({"range_error_m": 0.005})
             plan = camera.wait_for(job["id"], on_progress=print)["result"]
         """
-        return self._ask(
-            planning.start_plan(target=target, budget=budget, fixed=fixed, estimator=estimator)
-        )
+        body = given(target=target, budget=budget, fixed=fixed, estimator=estimator)
+        return self._ask(document("plan/jobs", method="POST", body=body))
 
     def tradeoff(self, by: str = "range_error_m") -> _Document:
         """Return what accuracy costs in time: the sequences that no other beats, in ``front``."""
-        return self._ask(planning.tradeoff(by))
+        return self._ask(document("tradeoff", params=[("by", by)], extra_timeout_s=_PLANNED_S))
 
     def start_tradeoff(self, by: str = "range_error_m") -> _Document:
         """Begin what `tradeoff` returns as a job, and return that; see `start_plan`."""
-        return self._ask(planning.start_tradeoff(by))
+        return self._ask(document("tradeoff/jobs", method="POST", body={"by": by}))
 
     @property
     def calibrations(self) -> Calibrations[_Document, _Bytes]:
@@ -139,23 +143,23 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
 
     def start(self, *, offs: int | None = None) -> _Document:
         """Start the capture; not where the acquisition's ``offs`` is another than this by now."""
-        return self._ask(changes.set_running(True, offs=offs))
+        return self._ask(document("acquisition", method="PUT", body=given(running=True, offs=offs)))
 
     def stop(self) -> _Document:
         """Stop the capture."""
-        return self._ask(changes.set_running(False))
+        return self._ask(document("acquisition", method="PUT", body={"running": False}))
 
     def safe_off(self) -> _Document:
         """Switch the light off, whichever client holds the lease."""
-        return self._ask(changes.safe_off())
+        return self._ask(document("acquisition/safe-off", method="POST"))
 
     def give_lease_back(self) -> _Document:
         """End the lease whose id the requests of this object carry."""
-        return self._ask(give_lease_back())
+        return self._ask(GIVE_BACK)
 
     def timeline(self, recording: str) -> _Document:
         """Return which frames a recording has, and when they were captured."""
-        return self._ask(recordings.timeline(recording))
+        return self._ask(document(f"{recording_path(recording)}/frames"))
 
     def meta(
         self,
@@ -282,15 +286,15 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         filter and diffuser before the lens, to measure a calibration, or takes them away; it may
         also be called ``diffusor``.
         """
+        before_lens = diffuser if diffusor is None else diffusor
+        body = given(scene=scene, definition=definition, effects=effects, diffusor=before_lens)
         return self._ask(
-            changes.set_simulation(
-                scene, definition, effects, diffuser if diffusor is None else diffusor
-            )
+            document("simulation", method="PUT", body=body, extra_timeout_s=_SCENE_BUILT_S)
         )
 
     def cause(self, fault: str) -> _Document:
         """Inject a fault into the simulation: unplug, replug, corrupt-image or drop-image."""
-        return self._ask(changes.inject_fault(fault))
+        return self._ask(document("simulation/faults", method="POST", body={"fault": fault}))
 
     def record(
         self,
@@ -306,24 +310,24 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         With ``history_s`` the recording begins with the frames of the last seconds. Returns its
         description.
         """
-        return self._ask(
-            recordings.record(
-                name=name,
-                duration_s=duration_s,
-                frames=frames,
-                history_s=history_s,
-                annotations=annotations,
-            )
+        body = given(
+            name=name,
+            duration_s=duration_s,
+            frames=frames,
+            history_s=history_s,
+            annotations=annotations,
         )
+        return self._ask(document("recordings", method="POST", body=body))
 
     def recordings(self) -> _Document:
         """Return all recordings of the daemon, the newest first."""
-        return self._ask(recordings.all_recordings())
+        return self._ask(document("recordings"))
 
     def recording(self, recording_id: str) -> _Document:
         """Return the description of a recording."""
-        return self._ask(recordings.describe(recording_id))
+        return self._ask(document(recording_path(recording_id)))
 
     def stop_recording(self, recording_id: str) -> _Document:
         """End a recording, wait until it is on the disk, and return its description."""
-        return self._ask(recordings.stop(recording_id))
+        path = f"{recording_path(recording_id)}/stop"
+        return self._ask(document(path, method="POST", extra_timeout_s=_WRITTEN_S))

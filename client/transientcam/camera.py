@@ -21,9 +21,7 @@ from transientcam.requests import (
     document,
     ended,
     problem,
-    recording_file,
-    set_reconstruction,
-    set_sequence,
+    recording_path,
 )
 from transientcam.stream import Stream
 from transientcam.stream_state import (
@@ -111,11 +109,11 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
 
     @sequence.setter
     def sequence(self, settings: Mapping[str, Any]) -> None:
-        self._ask(set_sequence(settings))
+        self._ask(document("sequence", method="PUT", body=settings))
 
     def configure(self, **changes: object) -> dict[str, Any]:
         """Change some fields of the sequence, keep the others, and return what was really set."""
-        return self._ask(set_sequence({**self.sequence, **changes}))
+        return self._ask(document("sequence", method="PUT", body={**self.sequence, **changes}))
 
     @property
     def reconstruction(self) -> dict[str, Any]:
@@ -127,7 +125,7 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
 
     @reconstruction.setter
     def reconstruction(self, settings: Mapping[str, Any]) -> None:
-        self._ask(set_reconstruction(settings))
+        self._ask(document("reconstruction", method="PUT", body=settings))
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -215,7 +213,7 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
             If the file cannot be written.
         """
         part = output.with_name(output.name + ".part")
-        url = f"{self._address.api}/{recording_file(recording_id)}"
+        url = f"{self._address.api}/{recording_path(recording_id)}/file"
         with translated(self.url), self._http.stream("GET", url) as response:
             if response.status_code != httpx.codes.OK:
                 raise problem(read(response, most_bytes=MOST_DOCUMENT_BYTES))

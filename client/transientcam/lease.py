@@ -5,13 +5,15 @@ import threading
 from collections.abc import Awaitable, Callable
 from typing import Any, Final, Literal
 
-from transientcam.errors import ProblemError, TransientcamError
-from transientcam.requests import Request, give_lease_back, lease_id, renew_lease, take_lease
+from transientcam.errors import ProblemError, ProtocolError, TransientcamError
+from transientcam.requests import Request, document
 
 OnLapse = Literal["stop", "keep"]
 _RENEWALS: Final = 3.0
 """How often a lease is renewed in its duration, so that one renewal may fail."""
 _LOST: Final = "/problems/lease-lost"
+_RENEW: Final = document("lease", method="PUT", body={})
+GIVE_BACK: Final = document("lease", method="DELETE")
 
 
 class BaseLease:
@@ -27,7 +29,7 @@ class BaseLease:
 
     def __init__(self, show: Callable[[str | None], None], terms: dict[str, Any]) -> None:
         self._show = show
-        self._terms = terms
+        self._take = document("lease", method="POST", body=terms)
         self._renewed_every_s = terms["duration_s"] / _RENEWALS
         self._lost: ProblemError | None = None
         self.holder: str = terms["holder"]
@@ -39,7 +41,10 @@ class BaseLease:
         return self._lost is not None
 
     def _begin(self, granted: dict[str, Any]) -> None:
-        self.id = lease_id(granted)
+        value = granted.get("lease_id")
+        if not isinstance(value, str):
+            raise ProtocolError("lease_id", value, "a string")
+        self.id = value
         self._show(self.id)
         self._lost = None
 
@@ -67,7 +72,7 @@ class Lease(BaseLease):
         self._thread: threading.Thread | None = None
 
     def __enter__(self) -> "Lease":
-        self._begin(self._ask(take_lease(self._terms)))
+        self._begin(self._ask(self._take))
         self._end.clear()
         self._thread = threading.Thread(target=self._keep, name="transientcam-lease", daemon=True)
         self._thread.start()
@@ -84,7 +89,7 @@ class Lease(BaseLease):
             self._thread.join()
         try:
             if not self.lost:
-                self._ask(give_lease_back())
+                self._ask(GIVE_BACK)
         except TransientcamError:
             # an error of the block says more, and a lease that is not given back lapses
             if error is None:
@@ -95,7 +100,7 @@ class Lease(BaseLease):
     def _keep(self) -> None:
         while not self.lost and not self._end.wait(self._renewed_every_s):
             try:
-                self._ask(renew_lease())
+                self._ask(_RENEW)
             except TransientcamError as error:
                 self._renewal_failed(error)
 
@@ -114,7 +119,7 @@ class AsyncLease(BaseLease):
         self._task: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> "AsyncLease":
-        self._begin(await self._ask(take_lease(self._terms)))
+        self._begin(await self._ask(self._take))
         self._task = asyncio.create_task(self._keep(), name="transientcam-lease")
         return self
 
@@ -124,7 +129,7 @@ class AsyncLease(BaseLease):
             await asyncio.gather(self._task, return_exceptions=True)
         try:
             if not self.lost:
-                await self._ask(give_lease_back())
+                await self._ask(GIVE_BACK)
         except TransientcamError:
             if error is None:  # as above
                 raise
@@ -135,6 +140,6 @@ class AsyncLease(BaseLease):
         while not self.lost:
             await asyncio.sleep(self._renewed_every_s)
             try:
-                await self._ask(renew_lease())
+                await self._ask(_RENEW)
             except TransientcamError as error:
                 self._renewal_failed(error)

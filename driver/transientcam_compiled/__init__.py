@@ -26,27 +26,3 @@ from transientcam_compiled._spread import (
     use_all_cores,
     use_one_thread,
 )
-
-__all__ = [
-    "BLOCK",
-    "THREAD",
-    "Cache",
-    "ChildProcess",
-    "Kernels",
-    "NotKept",
-    "Part",
-    "ProcessEnded",
-    "Spread",
-    "Tell",
-    "at_once",
-    "blocks",
-    "cores",
-    "empty",
-    "on_threads",
-    "only_from_cache",
-    "over",
-    "over_all_cores",
-    "python",
-    "use_all_cores",
-    "use_one_thread",
-]

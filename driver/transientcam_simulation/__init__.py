@@ -13,14 +13,3 @@ from transientcam_simulation.emulated import (
     world_of,
 )
 from transientcam_simulation.scene import SceneInfo, list_scenes
-
-__all__ = [
-    "SceneInfo",
-    "SimulationHandle",
-    "build",
-    "find_scene",
-    "list_scenes",
-    "measured_scene",
-    "without_noise",
-    "world_of",
-]

@@ -18,17 +18,3 @@ from transientcam_supervisor._switch import (
     UsbSetting,
     UsbWrite,
 )
-
-__all__ = [
-    "OffSwitch",
-    "Step",
-    "Supervisor",
-    "SupervisorEnded",
-    "TcpMessage",
-    "UsbClaim",
-    "UsbControl",
-    "UsbRead",
-    "UsbReset",
-    "UsbSetting",
-    "UsbWrite",
-]

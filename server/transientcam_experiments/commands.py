@@ -51,7 +51,9 @@ def paper(
     Everything is captured from the simulated camera over its emulated USB, calibration included.
     `--workers` and `--dask` make figures on a cluster, each worker another one.
     """
-    _require_matplotlib()
+    from transientcam_server.offline import plot
+
+    plot.require("transientcam paper")
     from transientcam_experiments.paper import FIGURES, Bench, making
     from transientcam_experiments.paper.page import Page
 
@@ -111,15 +113,6 @@ def _print_statements(console: Terminal, document: dict[str, Any]) -> None:
             console.print(f"  differs: {each['says']} ({each['shown']})", soft_wrap=True)
 
 
-def _require_matplotlib() -> None:
-    from transientcam_server.errors import MissingExtra
-
-    try:
-        import matplotlib  # noqa: F401 - only whether it is there
-    except ModuleNotFoundError as error:
-        raise MissingExtra("transientcam paper", "matplotlib", "plot") from error
-
-
 def tradeoff(
     output: Annotated[
         Path,
@@ -153,9 +146,9 @@ def tradeoff(
     the same command goes on where it stopped.
     """
     from transientcam_experiments import tradeoff as experiment
-    from transientcam_experiments.tradeoff import plots
+    from transientcam_server.offline import plot
 
-    plots.require()
+    plot.require("transientcam tradeoff")
     grid = experiment.load_grid(sequence_grid)
     scenes = scene or ["mirrors"]
     points = {

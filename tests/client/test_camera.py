@@ -251,6 +251,21 @@ def test_a_diffuser_may_be_spelt_as_it_was_before(spelling: str, daemon: _Daemon
     assert daemon.last == ("PUT", "/api/v1/simulation", "", {"diffusor": True})
 
 
+def test_parts_of_the_simulation_that_are_not_given_are_left_out(daemon: _Daemon) -> None:
+    with Camera(_URL, transport=httpx.MockTransport(daemon)) as camera:
+        for parts in ({"scene": "corner"}, {"diffusor": False}, {"effects": {"blur": "on"}}):
+            camera.simulate(**parts)
+            assert daemon.last == ("PUT", "/api/v1/simulation", "", parts)
+
+
+def test_a_sequence_that_was_read_is_sent_as_it_is(daemon: _Daemon) -> None:
+    applied = {"harmonics": 3, "sub_phases": {"scheme": "arccos", "n": 8}, "sampling": None}
+    with Camera(_URL, transport=httpx.MockTransport(daemon)) as camera:
+        camera.sequence = applied
+
+    assert daemon.last == ("PUT", "/api/v1/sequence", "", applied)
+
+
 def test_every_request_carries_token_and_user_agent(daemon: _Daemon) -> None:
     with Camera(_URL, token="secret", transport=httpx.MockTransport(daemon)) as camera:
         camera.info  # noqa: B018 - reading it sends a request

@@ -3,51 +3,17 @@
 A `Request` holds what to send and how to read the `Answer`; `Camera` and `AsyncCamera` send it.
 """
 
-from transientcam.requests import (
-    _changes as changes,
-    _frames as frames,
-    _planning as planning,
-    _recordings as recordings,
-)
+from transientcam.requests import _frames as frames
 from transientcam.requests._calibrations import Calibrations
-from transientcam.requests._changes import set_reconstruction, set_sequence
 from transientcam.requests._frames import Part, Which
 from transientcam.requests._jobs import PROGRESS_EVERY_S, WAIT_S, Jobs, OnProgress, ended
-from transientcam.requests._lease import give_lease_back, lease_id, renew_lease, take_lease
-from transientcam.requests._recordings import recording_file
 from transientcam.requests._request import (
     MOST_DOCUMENT_BYTES,
     Answer,
     Request,
     document,
+    given,
     problem,
     problem_error,
+    recording_path,
 )
-
-__all__ = [
-    "MOST_DOCUMENT_BYTES",
-    "PROGRESS_EVERY_S",
-    "WAIT_S",
-    "Answer",
-    "Calibrations",
-    "Jobs",
-    "OnProgress",
-    "Part",
-    "Request",
-    "Which",
-    "changes",
-    "document",
-    "ended",
-    "frames",
-    "give_lease_back",
-    "lease_id",
-    "planning",
-    "problem",
-    "problem_error",
-    "recording_file",
-    "recordings",
-    "renew_lease",
-    "set_reconstruction",
-    "set_sequence",
-    "take_lease",
-]

@@ -9,8 +9,14 @@ import numpy as np
 
 from transientcam.errors import ParameterError
 from transientcam.frame import Frame
-from transientcam.requests._recordings import recording_path
-from transientcam.requests._request import Request, body_of, document, query, segment
+from transientcam.requests._request import (
+    Request,
+    body_of,
+    document,
+    query,
+    recording_path,
+    segment,
+)
 from transientcam.wire import MAX_SERVER_MESSAGE_BYTES, MEDIA_TYPE, parse_frame
 
 _MEDIA_TYPES: Final = {

@@ -30,16 +30,12 @@ class Jobs(Generic[_Document]):
 
     def get(self, job_id: str, *, wait_s: float = 0.0) -> _Document:
         """Return a job once it has ended, or after ``wait_s``, at most 30 s."""
-        return self._ask(waiting(job_id, wait_s=wait_s))
+        params = [("wait_s", wait_s)]
+        return self._ask(document(_path(job_id), params=params, extra_timeout_s=wait_s))
 
     def cancel(self, job_id: str) -> _Document:
         """Cancel a job; it ends as soon as it can."""
         return self._ask(document(f"{_path(job_id)}/cancel", method="POST"))
-
-
-def waiting(job_id: str, *, wait_s: float) -> Request[dict[str, Any]]:
-    """Build the request for a job, answered when it has ended or after ``wait_s``."""
-    return document(_path(job_id), params=[("wait_s", wait_s)], extra_timeout_s=wait_s)
 
 
 def ended(job: Mapping[str, Any]) -> bool:

@@ -188,6 +188,22 @@ def query(params: Iterable[tuple[str, object]]) -> tuple[tuple[str, str], ...]:
     return tuple((key, str(value)) for key, value in params if value is not None)
 
 
+def given(**parts: object) -> dict[str, Any]:
+    """Return the parts of a document that are not None: the others are left to the server."""
+    return {name: part for name, part in parts.items() if part is not None}
+
+
+def recording_path(recording_id: str) -> str:
+    """Return the path of a recording.
+
+    Raises
+    ------
+    ParameterError
+        If ``recording_id`` is no id.
+    """
+    return f"recordings/{segment(recording_id)}"
+
+
 def segment(name: str) -> str:
     """Return a name that may be a part of a path.
 

@@ -26,26 +26,3 @@ from transientcam.transport._options import (
     set_lease,
     stream_options,
 )
-
-__all__ = [
-    "QUIET",
-    "Deadline",
-    "DownloadProgress",
-    "Progress",
-    "answer_of",
-    "bounded",
-    "exchange",
-    "exchange_async",
-    "http_options",
-    "media_type",
-    "parse_address",
-    "read",
-    "read_async",
-    "require_direct",
-    "require_plain",
-    "set_lease",
-    "stream_options",
-    "translated",
-    "within",
-    "without_secrets",
-]

@@ -12,15 +12,3 @@ from transientcam_driver.calibration._file import (
     CalibrationSubject,
 )
 from transientcam_driver.calibration._sweep import LEAST_TAKES, SWEEP_STEPS
-
-__all__ = [
-    "DEFAULT_TAKES",
-    "DEVICE_FIELDS",
-    "LEAST_TAKES",
-    "SWEEP_STEPS",
-    "CalibrationCapture",
-    "CalibrationSubject",
-    "TemperatureDrift",
-    "capture_calibration",
-    "mean_of_takes",
-]

@@ -9,14 +9,14 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.calibration._file import CalibrationCapture
 from transientcam_driver.calibration._sweep import PhaseSweep, Waveform
-from transientcam_driver.camera import AppliedSequence, Capabilities, RawFrame
+from transientcam_driver.camera import Camera, RawFrame
 from transientcam_driver.errors import CameraError, FrameTimeout, SequenceError
 from transientcam_driver.sequence import Sequence
 
@@ -34,43 +34,13 @@ Progress = Callable[[int, int], None]
 it raises ends the measurement."""
 
 
-class CalibratedCamera(Protocol):
-    """What a measurement requires of a camera; `Camera` has it."""
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """What it can do."""
-        ...
-
-    @property
-    def applied(self) -> AppliedSequence:
-        """What is really set."""
-        ...
-
-    def configure(self, sequence: Sequence) -> AppliedSequence:
-        """Set a sequence."""
-        ...
-
-    def start(self) -> None:
-        """Capture frames back to back."""
-        ...
-
-    def stop(self) -> None:
-        """Capture nothing more."""
-        ...
-
-    def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
-        """Wait for the next frame."""
-        ...
-
-
 def mean_of_takes(takes: NDArray[np.uint16]) -> tuple[NDArray[Any], NDArray[np.bool_]]:
     """Average takes (takes, N, H, W), keeping every image."""
     return takes.mean(axis=0), np.ones(takes.shape[:2], dtype=bool)
 
 
 def capture_calibration(
-    camera: CalibratedCamera,
+    camera: Camera,
     *,
     takes: int = DEFAULT_TAKES,
     average: Averaging = mean_of_takes,
@@ -153,7 +123,7 @@ def capture_calibration(
 
 
 def _steps(
-    camera: CalibratedCamera,
+    camera: Camera,
     sweep: PhaseSweep,
     single: Sequence,
     report: Callable[[int], None],
@@ -171,7 +141,7 @@ def _steps(
 
 
 def _frames(
-    camera: CalibratedCamera, sequence: Sequence, takes: int, report: Callable[[int], None]
+    camera: Camera, sequence: Sequence, takes: int, report: Callable[[int], None]
 ) -> list[RawFrame]:
     applied = camera.configure(sequence)
     timeout_s = max(_LEAST_TIMEOUT_S, _TIMEOUT_FRAMES / applied.frame_rate_hz)
@@ -184,9 +154,7 @@ def _frames(
     return frames
 
 
-def _frame(
-    camera: CalibratedCamera, timeout_s: float, still_waiting: Callable[[], None]
-) -> RawFrame:
+def _frame(camera: Camera, timeout_s: float, still_waiting: Callable[[], None]) -> RawFrame:
     for _ in range(math.ceil(timeout_s / _POLL_S) - 1):
         with suppress(FrameTimeout):
             return camera.read_frame(timeout_s=_POLL_S)

@@ -13,8 +13,7 @@ from transientcam_driver.camera._capabilities import (
 )
 from transientcam_driver.camera._capture_clock import CaptureClock, capture_times
 from transientcam_driver.camera._factory import FactoryCalibration, Lamp, Lens
-from transientcam_driver.camera._frame import Counters, RawFrame
-from transientcam_driver.camera._hop import Hop
+from transientcam_driver.camera._frame import Counters, Hop, RawFrame
 from transientcam_driver.camera._host_camera import HostCamera
 from transientcam_driver.camera._light import has_light, light_warning
 from transientcam_driver.camera._opening import check_camera, kinds, open_camera, plugin_of
@@ -29,39 +28,3 @@ from transientcam_driver.camera._simulation import (
     Truth,
 )
 from transientcam_driver.camera._status import DeviceState, Status, StatusFlag
-
-__all__ = [
-    "IMAGE_HEADER_BYTES",
-    "AppliedSequence",
-    "Camera",
-    "CameraName",
-    "CameraPlugin",
-    "CameraState",
-    "Capabilities",
-    "CaptureClock",
-    "Counters",
-    "DeviceState",
-    "ExplainedEffect",
-    "Explanation",
-    "FactoryCalibration",
-    "FoundCamera",
-    "Hop",
-    "HostCamera",
-    "Lamp",
-    "Lens",
-    "RawFrame",
-    "Response",
-    "Sensor",
-    "Simulation",
-    "Status",
-    "StatusFlag",
-    "SurfaceSeen",
-    "Truth",
-    "capture_times",
-    "check_camera",
-    "has_light",
-    "kinds",
-    "light_warning",
-    "open_camera",
-    "plugin_of",
-]

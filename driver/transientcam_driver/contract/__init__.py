@@ -47,22 +47,9 @@ class Clause:
             raise ContractBroken(str(error)) from error
 
 
-def _of(*functions: Callable[[Bench], None]) -> tuple[Clause, ...]:
-    return tuple(
-        Clause(each.__name__.replace("_", "-"), inspect.getdoc(each) or "", each)
-        for each in functions
-    )
-
-
-CLAUSES: Final = _of(
-    clauses.an_opened_camera_is_idle_and_dark,
-    clauses.frames_are_whole_labelled_and_in_order,
-    clauses.stop_is_dark_and_start_goes_on,
-    clauses.stop_releases_a_waiting_reader,
-    clauses.a_timeout_is_no_failure,
-    clauses.an_impossible_sequence_is_refused_by_name,
-    clauses.a_new_sequence_has_a_new_epoch,
-    clauses.lost_images_are_counted,
-    clauses.an_unplugged_camera_is_lost_and_comes_back,
-    clauses.a_closed_camera_is_dark_and_free,
+CLAUSES: Final = tuple(
+    Clause(name.replace("_", "-"), inspect.getdoc(each) or "", each)
+    for name, each in vars(clauses).items()
+    if inspect.isfunction(each) and each.__module__ == clauses.__name__ and name[0] != "_"
 )
+"""Every public function of the file of clauses, in the order in which they stand there."""

@@ -13,19 +13,3 @@ from transientcam_driver.sequence._sequence import (
     TakeOrder,
     Zeroth,
 )
-
-__all__ = [
-    "DERIVED_FIELDS",
-    "FOUR_PHASES_RAD",
-    "LOW_FREQUENCY_HZ",
-    "MAX_HARMONICS",
-    "READ_ONLY_FIELDS",
-    "SPEED_OF_LIGHT_M_S",
-    "ImageLabel",
-    "Sampling",
-    "Scheme",
-    "Sequence",
-    "SubPhases",
-    "TakeOrder",
-    "Zeroth",
-]

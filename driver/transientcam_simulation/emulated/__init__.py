@@ -21,26 +21,3 @@ from transientcam_simulation.emulated._open_usb import Fault, SimulatedBus, prot
 from transientcam_simulation.emulated._plugged_camera import PluggedCamera
 from transientcam_simulation.emulated._tofcam660 import build_tofcam660
 from transientcam_simulation.emulated._two_taps import ZERO_DN, DifferentialPixels, with_bits
-
-__all__ = [
-    "DEFAULT_HEIGHT",
-    "DEFAULT_WIDTH",
-    "MEASURED",
-    "RESOLUTIONS",
-    "ZERO_DN",
-    "DifferentialPixels",
-    "Fault",
-    "PluggedCamera",
-    "SimulatedBus",
-    "SimulationHandle",
-    "build",
-    "build_kinect2",
-    "build_tofcam660",
-    "find_scene",
-    "measured_scene",
-    "prototype",
-    "with_bits",
-    "without_noise",
-    "world_before",
-    "world_of",
-]

@@ -2,8 +2,3 @@
 
 from transientcam_simulation.imaging._switchable_world import SwitchableWorld
 from transientcam_simulation.imaging._world import World
-
-__all__ = [
-    "SwitchableWorld",
-    "World",
-]

@@ -8,15 +8,3 @@ from transientcam_conformance._check import Check
 from transientcam_conformance._device import Device
 from transientcam_conformance._report import Report, Result
 from transientcam_conformance._running import CHECKS, GROUPS, SLOW, chosen, run
-
-__all__ = [
-    "CHECKS",
-    "GROUPS",
-    "SLOW",
-    "Check",
-    "Device",
-    "Report",
-    "Result",
-    "chosen",
-    "run",
-]

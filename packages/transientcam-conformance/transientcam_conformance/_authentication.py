@@ -4,7 +4,6 @@ from typing import Any
 
 from transientcam.errors import PromiseBroken
 from transientcam.wire import CloseCode
-from transientcam_conformance._check import checks
 from transientcam_conformance._device import API, Device
 from transientcam_conformance._expecting import equal, expect, skip_unless
 
@@ -71,14 +70,3 @@ def _require_tokens(device: Device) -> None:
 def _subscribe(token: str | None) -> dict[str, Any]:
     subscriptions = [{"product": "flags"}]
     return {"type": "subscribe", "v": 1, "token": token, "subscriptions": subscriptions}
-
-
-CHECKS = checks(
-    "authentication",
-    health_is_open,
-    a_wrong_token_is_refused,
-    a_stream_with_a_wrong_token_is_closed,
-    no_request_is_served_without_a_token,
-    a_token_in_the_address_is_none,
-    the_token_given_is_let_in,
-)

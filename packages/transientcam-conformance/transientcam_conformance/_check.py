@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 from transientcam_conformance._device import Device
@@ -29,10 +30,15 @@ class Check:
     run: Callable[[Device], None]
 
 
-def checks(group: str, *functions: Callable[[Device], None]) -> tuple[Check, ...]:
-    """Return functions as checks: the name of one is its name, its docstring the promise."""
+def checks(group: str, module: ModuleType) -> tuple[Check, ...]:
+    """Return the public functions of a module as checks, in the order in which they stand.
+
+    The name of one is its name, its docstring the promise.
+    """
     return tuple(
-        Check(group, each.__name__.replace("_", "-"), _sentence(each), each) for each in functions
+        Check(group, name.replace("_", "-"), _sentence(each), each)
+        for name, each in vars(module).items()
+        if inspect.isfunction(each) and each.__module__ == module.__name__ and name[0] != "_"
     )
 
 

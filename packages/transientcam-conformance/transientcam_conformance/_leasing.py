@@ -1,6 +1,5 @@
 """The lease: one client in control, known to the others, and readers that are never blocked."""
 
-from transientcam_conformance._check import checks
 from transientcam_conformance._device import API, HOLDER, Device
 from transientcam_conformance._expecting import equal, expect
 
@@ -103,16 +102,3 @@ def every_client_can_switch_the_light_off(device: Device) -> None:
 def _expect_dark(device: Device, when: str) -> None:
     status = device.camera["status"]
     expect(status is None or not status["light_on"], f"the light is on {when}")
-
-
-CHECKS = checks(
-    "lease",
-    a_second_writer_learns_who_holds_the_lease,
-    watchers_are_never_blocked,
-    the_holder_changes_things,
-    a_renewed_lease_lasts_on,
-    a_lease_given_back_is_over,
-    a_lease_that_is_not_renewed_lapses_and_the_light_goes_off,
-    a_takeover_is_notified,
-    every_client_can_switch_the_light_off,
-)

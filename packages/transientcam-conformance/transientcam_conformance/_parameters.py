@@ -5,7 +5,6 @@ from typing import Any, Final
 
 from transientcam.requests import problem
 from transientcam.transport import answer_of
-from transientcam_conformance._check import checks
 from transientcam_conformance._device import API, Device
 from transientcam_conformance._expecting import equal, expect
 
@@ -146,15 +145,3 @@ def _with(document: Mapping[str, Any], pointer: str, value: object) -> dict[str,
     first, *rest = _steps(pointer)
     changed = _with(document[first], "/" + "/".join(rest), value) if rest else value
     return {**document, first: changed}
-
-
-CHECKS = checks(
-    "parameters",
-    every_value_is_within_its_limits,
-    every_parameter_has_unit_and_meaning,
-    parameters_are_what_their_resources_say,
-    a_sequence_out_of_range_is_refused_and_changes_nothing,
-    a_parameter_out_of_range_is_refused_and_changes_nothing,
-    the_limits_of_a_sequence_are_taken,
-    a_checked_sequence_is_not_set,
-)

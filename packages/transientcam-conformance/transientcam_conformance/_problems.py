@@ -2,7 +2,6 @@
 
 import httpx
 
-from transientcam_conformance._check import checks
 from transientcam_conformance._device import API, Device
 from transientcam_conformance._expecting import equal, expect
 
@@ -91,18 +90,3 @@ def every_answer_names_its_request(device: Device) -> None:
         first.headers.get("x-request-id"),
         "`request_id` in the problem",
     )
-
-
-CHECKS = checks(
-    "problems",
-    an_unknown_path_is_a_problem,
-    a_wrong_method_is_a_problem,
-    a_broken_body_is_a_problem,
-    a_wrong_value_is_named,
-    an_unknown_field_is_named,
-    an_unknown_product_is_a_problem,
-    an_unknown_recording_is_a_problem,
-    a_body_that_is_too_large_is_a_problem,
-    every_problem_has_a_page,
-    every_answer_names_its_request,
-)

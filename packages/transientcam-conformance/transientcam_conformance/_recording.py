@@ -9,7 +9,6 @@ from typing import Any, Final
 import numpy as np
 
 from transientcam.wire import Frame, Notice
-from transientcam_conformance._check import checks
 from transientcam_conformance._device import API, Device
 from transientcam_conformance._expecting import equal, expect, skip_unless
 from transientcam_conformance._replaying import can_replay, replayed
@@ -147,13 +146,3 @@ def _deletable(device: Device) -> Iterator[list[str]]:
                 device.document(device.send("DELETE", f"{_RECORDINGS}/{each}"))
                 gone = device.send("GET", f"{_RECORDINGS}/{each}")
                 device.refusal(gone, 404, "unknown-recording")
-
-
-CHECKS = checks(
-    "recording",
-    a_recording_is_announced_and_described,
-    one_recording_runs_at_a_time,
-    a_file_can_be_fetched_in_parts,
-    recorded_frames_are_those_that_were_streamed,
-    a_replay_is_those_frames_again,
-)

@@ -1,7 +1,6 @@
 """Resuming a stream: missed frames are sent, or reported as missing."""
 
 from transientcam.wire import Frame, Notice, ServerMessage
-from transientcam_conformance._check import checks
 from transientcam_conformance._device import Device
 from transientcam_conformance._expecting import equal, expect
 
@@ -50,6 +49,3 @@ def _after(notice: Notice, due: int) -> int:
     equal(notice.details.get("from"), due, "`from` of a gap")
     expect(notice.details.get("reason"), "a gap has no reason")
     return int(notice.details["to"]) + 1
-
-
-CHECKS = checks("resume", a_stream_goes_on_where_it_stopped, a_gap_is_stated)

@@ -8,7 +8,6 @@ import httpx
 
 from transientcam.requests import problem
 from transientcam.transport import answer_of, media_type
-from transientcam_conformance._check import checks
 from transientcam_conformance._device import API, Device
 from transientcam_conformance._expecting import expect, skip_unless
 
@@ -186,14 +185,3 @@ def _type(response: httpx.Response) -> str:
 
 def _name(response: httpx.Response) -> str:
     return f"{response.request.method} {response.request.url.path}"
-
-
-CHECKS = checks(
-    "routes",
-    every_route_of_the_contract_is_described,
-    versions_are_stated,
-    every_route_answers_as_documented,
-    every_document_fits_its_schema,
-    head_is_get_without_its_body,
-    a_body_that_is_no_json_is_refused,
-)

@@ -20,24 +20,24 @@ from transientcam_conformance import (
     _tags as tags,
     _unplugging as unplugging,
 )
-from transientcam_conformance._check import Check
+from transientcam_conformance._check import Check, checks
 from transientcam_conformance._device import API, Device
 from transientcam_conformance._rate import Rate, measured_rate
 from transientcam_conformance._report import Outcome, Report, Result
 
 CHECKS: Final[tuple[Check, ...]] = (
-    *routes.CHECKS,
-    *problems.CHECKS,
-    *parameters.CHECKS,
-    *tags.CHECKS,
-    *leasing.CHECKS,
-    *streaming.CHECKS,
-    *slow_readers.CHECKS,
-    *resuming.CHECKS,
-    *sizes.CHECKS,
-    *recording.CHECKS,
-    *unplugging.CHECKS,
-    *authentication.CHECKS,
+    *checks("routes", routes),
+    *checks("problems", problems),
+    *checks("parameters", parameters),
+    *checks("tags", tags),
+    *checks("lease", leasing),
+    *checks("stream", streaming),
+    *checks("slow-readers", slow_readers),
+    *checks("resume", resuming),
+    *checks("sizes", sizes),
+    *checks("recording", recording),
+    *checks("unplug", unplugging),
+    *checks("authentication", authentication),
 )
 """Every check, in the order they are run."""
 GROUPS: Final = tuple(dict.fromkeys(each.group for each in CHECKS))

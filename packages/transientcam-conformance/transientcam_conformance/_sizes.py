@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-from transientcam_conformance._check import checks
 from transientcam_conformance._conversation import Conversation
 from transientcam_conformance._device import API, Device
 from transientcam_conformance._expecting import equal, expect, skip_unless
@@ -102,13 +101,3 @@ def _expect_message(stream: Conversation, size_bytes: int) -> None:
     frame = stream.frame(lambda each: each.product == "raw" and each.array.nbytes > size_bytes)
     equal(frame.array.shape, stream.channels[0].shape, "the shape of the frame")
     equal(len(frame.labels), frame.array.shape[0], "the number of labels")
-
-
-CHECKS = checks(
-    "sizes",
-    an_answer_over_1_mib_arrives_whole,
-    an_answer_over_16_mib_arrives_whole,
-    a_message_over_1_mib_arrives_whole,
-    a_message_over_16_mib_arrives_whole,
-    an_answer_without_measure_is_refused,
-)

@@ -9,7 +9,6 @@ import numpy as np
 
 from transientcam.errors import PromiseBroken
 from transientcam.wire import Channel
-from transientcam_conformance._check import checks
 from transientcam_conformance._conversation import Conversation
 from transientcam_conformance._device import Device
 from transientcam_conformance._expecting import equal, expect, skip_unless
@@ -135,12 +134,3 @@ def _bytes(channel: Channel) -> int:
 
 def _channel(conversation: Conversation) -> int:
     return conversation.channels[0].channel
-
-
-CHECKS = checks(
-    "slow-readers",
-    drops_are_reported,
-    who_does_not_acknowledge_gets_no_more_than_its_credits,
-    a_client_that_never_reads_delays_no_other,
-    who_never_reads_loses_frames,
-)

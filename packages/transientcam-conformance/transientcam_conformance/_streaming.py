@@ -3,7 +3,6 @@
 import numpy as np
 
 from transientcam.wire import PRODUCTS, SUBPROTOCOL, CloseCode
-from transientcam_conformance._check import checks
 from transientcam_conformance._device import API, Device
 from transientcam_conformance._expecting import equal, expect
 
@@ -139,18 +138,3 @@ def a_rate_limit_is_kept(device: Device) -> None:
             1 <= names.count("range") <= 5,
             f"{names.count('range')} of 15 messages are of the product limited to a quarter",
         )
-
-
-CHECKS = checks(
-    "stream",
-    a_handshake_without_the_subprotocol_is_refused,
-    the_greeting_says_what_frames_look_like,
-    the_products_of_a_frame_come_together,
-    frames_are_counted_and_announced,
-    a_streamed_frame_is_the_one_that_is_asked_for,
-    a_bad_first_message_ends_the_stream,
-    a_bad_later_message_disturbs_nothing,
-    a_subscription_can_be_replaced,
-    a_change_of_the_sequence_is_notified,
-    a_rate_limit_is_kept,
-)

@@ -4,7 +4,6 @@ from typing import Any
 
 import httpx
 
-from transientcam_conformance._check import checks
 from transientcam_conformance._device import API, Device
 from transientcam_conformance._expecting import equal, expect
 
@@ -81,12 +80,3 @@ def _other(device: Device) -> dict[str, Any]:
     exposure_s = present["exposure_s"]
     longer = exposure_s * 1.25 if exposure_s * 1.25 <= most else max(least, exposure_s / 2.0)
     return device.accepted(present | {"exposure_s": longer})
-
-
-CHECKS = checks(
-    "tags",
-    what_can_be_changed_has_a_tag,
-    what_is_known_is_not_sent_again,
-    a_stale_tag_changes_nothing,
-    the_right_tag_changes_it,
-)

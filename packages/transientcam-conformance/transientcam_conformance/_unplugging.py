@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from transientcam_conformance._check import checks
 from transientcam_conformance._conversation import Conversation
 from transientcam_conformance._device import API, Device
 from transientcam_conformance._expecting import equal, expect
@@ -75,12 +74,3 @@ def _unplugged(device: Device) -> Iterator[None]:
 
 def _inject_fault(device: Device, fault: str) -> None:
     device.document(device.send("POST", f"{API}/simulation/faults", json={"fault": fault}))
-
-
-CHECKS = checks(
-    "unplug",
-    an_unplugged_camera_is_reported,
-    a_lost_camera_refuses_and_remembers,
-    a_camera_that_is_back_goes_on,
-    spoilt_images_are_counted,
-)

@@ -20,24 +20,3 @@ from transientcam_opt8241._link import Link, Request
 from transientcam_opt8241._pll import CLOCK_HZ, PllSetting
 from transientcam_opt8241._registers import REGISTER_BYTES, Field
 from transientcam_opt8241._usb_link import list_cameras, open_link
-
-__all__ = [
-    "BITS",
-    "CLOCK_HZ",
-    "COLUMNS",
-    "DUTY_S",
-    "MOST_DUTY",
-    "PRODUCT",
-    "QUADS",
-    "QUAD_S",
-    "REGISTER_BYTES",
-    "ROWS",
-    "Field",
-    "Link",
-    "Opt8241",
-    "PllSetting",
-    "Request",
-    "list_cameras",
-    "open_link",
-    "registers",
-]

@@ -43,5 +43,3 @@ FIGURES: Final[dict[int, PaperFigure]] = {
     )
 }
 """Every figure by its number."""
-
-__all__ = ["FIGURES", "Bench", "FigureResult", "PaperFigure", "Statement", "Table"]

@@ -200,8 +200,7 @@ def _statements(
             "Sec. 5.2",
             "We can give specific bounds on possible locations of local maxima.",
             "width of the interval in which a maximum must be, around the highest lower bound, "
-            "over "
-            f"2 π / m (the true one, at {float(phase[truth.argmax()]):.2f} rad, is in "
+            f"over 2 π / m (the true one, at {float(phase[truth.argmax()]):.2f} rad, is in "
             f"[{begin:.2f}, {end:.2f}])",
             (end - begin) / (2 * np.pi / _M),
             at_most=0.5,

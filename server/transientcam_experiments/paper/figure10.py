@@ -119,8 +119,7 @@ def _statements(shot: ReconstructedShot, walls: dict[str, _Wall]) -> list[Statem
         check(
             "Fig. 10",
             "Thanks to the measurement of the zeroth moment directly lit parts get a sharp peak "
-            "and "
-            "indirectly lit parts a smooth one.",
+            "and indirectly lit parts a smooth one.",
             "on the right wall: time of the middle half of the light over the true one",
             right.width_ns / right.true_width_ns,
             at_least=0.67,
@@ -133,8 +132,7 @@ def _statements(shot: ReconstructedShot, walls: dict[str, _Wall]) -> list[Statem
             "Sec. 6.1",
             "The measurement of the zeroth moment helps us to adequately reconstruct the image.",
             "error of the cumulative density on the right wall, with b_0 measured over b_0 "
-            "estimated "
-            "for a sparse response",
+            "estimated for a sparse response",
             right.error / right.error_without,
             at_most=0.8,
             form="{:.2f}",

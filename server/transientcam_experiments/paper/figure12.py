@@ -189,15 +189,13 @@ def _statements(ranged: list[Ranged], shot: ReconstructedShot) -> list[Statement
             at_most=0.01,
             form="{:.2%}",
             otherwise="where the indirect light is close behind the direct the three frequencies "
-            "see one "
-            "broad peak, and in some of these pixels it tips over",
+            "see one broad peak, and in some of these pixels it tips over",
         ),
         check(
             "Sec. 6.2",
             "The Pisarenko estimate suffers from severe outliers on the corner.",
             f"share of pixels off by more than {OUTLIER_M:g} m (m = 4), over that of maximum "
-            f"entropy "
-            "(m = 3), in percentage points",
+            "entropy (m = 3), in percentage points",
             100 * (pisarenko.outliers - maximum.outliers),
             at_least=1.0,
             form="{:.2f}",

@@ -96,16 +96,14 @@ def _statements(shots: list[ReconstructedShot], daylight: ReconstructedShot) -> 
             at_most=0.1,
             form="{:.1%}",
             otherwise="at 0.5 ms noise splits a return in two in some pixels, and those of the "
-            "actor "
-            "see different depths from image to image while it walks: where it stands still "
+            "actor see different depths from image to image while it walks: where it stands still "
             f"(t = {MOMENTS_S[1]:g} s) it is {_outliers(shots[1]):.1%}",
         ),
         check(
             "Sec. 6.3",
             "The time of flight for the direct return is free of multipath interference.",
             "median error of the time in pixels with light over both mirrors, over that of a "
-            "single "
-            "frequency",
+            "single frequency",
             float(np.nanmedian(ours) / np.nanmedian(single)),
             at_most=0.1,
             form="{:.3f}",
@@ -188,7 +186,6 @@ FIGURE: Final = PaperFigure(
     14,
     "Direct and indirect light in a transient video",
     "The frames of Figure 13, separated by the Pisarenko estimate: the first return with a tenth "
-    "of "
-    "the strongest one's weight is direct.",
+    "of the strongest one's weight is direct.",
     make,
 )

@@ -202,9 +202,7 @@ FIGURE: Final = PaperFigure(
     15,
     "A streak image",
     "(a) One scanline of the capture of Figures 8b and 9b (m = 4, f = 23 MHz, 20 takes) over time "
-    "of "
-    "flight. (b) The same for a scene of two returns, 2 : 1, that are 0.05 ns further apart in "
-    "each "
-    "column (dotted: where they are).",
+    "of flight. (b) The same for a scene of two returns, 2 : 1, that are 0.05 ns further apart in "
+    "each column (dotted: where they are).",
     make,
 )

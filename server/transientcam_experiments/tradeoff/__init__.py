@@ -15,16 +15,3 @@ from transientcam_experiments.tradeoff.measuring import (
 )
 from transientcam_experiments.tradeoff.records import Record, Records
 from transientcam_experiments.tradeoff.report import file_name, report
-
-__all__ = [
-    "Grid",
-    "Point",
-    "Record",
-    "Records",
-    "camera_before",
-    "file_name",
-    "load_grid",
-    "measure",
-    "points_of",
-    "report",
-]

@@ -6,7 +6,6 @@ from io import BytesIO
 from typing import Any, Final
 
 from transientcam_experiments.tradeoff.records import Record
-from transientcam_server.errors import MissingExtra
 from transientcam_server.planning import front
 
 
@@ -101,20 +100,6 @@ PLOTS: Final[dict[str, Axes]] = {
     ),
 }
 """Every plot by the name of its file."""
-
-
-def require() -> None:
-    """Check that plots can be made, before the minutes that a measurement takes.
-
-    Raises
-    ------
-    MissingExtra
-        If matplotlib is not installed.
-    """
-    try:
-        import matplotlib  # noqa: F401 - only whether it is there
-    except ModuleNotFoundError as error:
-        raise MissingExtra("transientcam tradeoff", "matplotlib", "plot") from error
 
 
 def draw(axes: Axes, scene: str, records: Iterable[Record]) -> dict[str, bytes] | None:

@@ -6,18 +6,20 @@ import numpy as np
 
 from transientcam_moments.arrays import (
     Array,
+    bank,
     flat_planes,
     namespace,
+    parts,
     phases,
     squared,
     to_complex,
 )
+from transientcam_moments.moment_problem import _maxima as maxima
 from transientcam_moments.moment_problem._levinson import (
     Coefficients,
     from_reflection,
     moments_of,
 )
-from transientcam_moments.moment_problem._roots import disc_roots
 
 _BLOCK_VALUES = 1 << 16
 _TOLERANCE = 1e-11  # of the closed form, relative to b_0, before quadrature takes over
@@ -193,3 +195,23 @@ def _panels(a: Array, knots: Array) -> Array:
             value = value * z + plane
         total = total + weight / squared(value)
     return total * half
+
+
+def disc_roots(a: Array) -> list[Array]:
+    """Find the roots of z^m + a_1 z^{m-1} + ... + a_m: the poles of a maximum entropy density.
+
+    Parameters
+    ----------
+    a : complex array, shape (m + 1, P)
+        a_0 = 1, a_1 .. a_m of predictor polynomials; all roots lie inside the unit circle.
+
+    Returns
+    -------
+    list of m complex planes
+    """
+    order = (0,) * (a.shape[0] - 1)
+    re, im = parts(a)
+    real, imag = bank(re[0], order, 0), bank(re[0], order, 0)
+    with np.errstate(all="ignore"):
+        maxima.poles(order, maxima.start_angles(len(order), re[0].dtype), re, im, real, imag)
+    return [to_complex(x, y) for x, y in zip(real, imag, strict=True)]

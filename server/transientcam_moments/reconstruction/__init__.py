@@ -13,21 +13,3 @@ from transientcam_moments.reconstruction._settings import (
     automatic,
     least_harmonics,
 )
-
-__all__ = [
-    "ESTIMATORS",
-    "INVALID",
-    "NEIGHBOURS",
-    "OF_ANY_MULTIPLES",
-    "SPEED_OF_LIGHT_M_S",
-    "Flags",
-    "Labels",
-    "Reconstruction",
-    "Reconstructor",
-    "Settings",
-    "automatic",
-    "flags",
-    "least_harmonics",
-    "range_m",
-    "reconstruct",
-]

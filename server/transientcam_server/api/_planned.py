@@ -20,6 +20,17 @@ FRAME_WITHIN_S: Final = 10.0
 """How long what is planned for the current frame waits for one."""
 LOOKED: Final = 0.5
 """Share of the progress after which the scene was looked at."""
+REFUSALS: Final = (
+    kinds.INVALID_REQUEST,
+    kinds.TARGET_UNREACHABLE,
+    kinds.ONLY_MOMENTS,
+    kinds.NO_FRAME_YET,
+    kinds.SHUTTING_DOWN,
+    kinds.PLANNING_BUSY,
+    kinds.PLANNING_ENDED,
+    kinds.PLAN_TOO_LONG,
+)
+"""What any of it may be answered with."""
 _ASK_EVERY_S: Final = 0.5
 _Answer = TypeVar("_Answer", bound=Document)
 Work = Callable[[Progress], Coroutine[Any, Any, _Answer]]

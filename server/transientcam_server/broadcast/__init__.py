@@ -7,5 +7,3 @@ The `Hub` hands each frame to the `Outbox` of every client, which holds few of t
 from transientcam_server.broadcast._channel import UNNUMBERED, Channel, DroppedFrames
 from transientcam_server.broadcast._hub import Hub
 from transientcam_server.broadcast._outbox import Close, Delivery, Item, Outbox
-
-__all__ = ["UNNUMBERED", "Channel", "Close", "Delivery", "DroppedFrames", "Hub", "Item", "Outbox"]

@@ -109,7 +109,7 @@ def reconstruct(
 
     if plot is not None:
         require_suffix(plot, ".png", hint="--plot")
-        pictures.require()
+        pictures.require("--plot")
     options: dict[str, float | str | None] = {"smoothing_px": smoothing_px, "bias": bias}
     options["return_threshold"] = threshold
     options["neighbours"] = neighbours or (None if smoothing_px is None else "gaussian")

@@ -19,10 +19,12 @@ from transientcam_driver import (
 from transientcam_moments import ParameterError
 from transientcam_server.errors import _kinds as kinds
 from transientcam_server.errors._exceptions import OriginRefused, Problem
+from transientcam_server.errors._kinds import ProblemKind
 
 _SHOWN_CHARACTERS = 200
 _SHOWN_LEVELS = 8
 _SHOWN_BITS = 128
+_FieldError = SequenceError | EffectError | ParameterError | ProtocolError
 _OF_ANY_PROBLEM = frozenset(("type", "title", "status", "detail", "instance", "request_id"))
 
 
@@ -69,13 +71,7 @@ def problem_of(error: Exception) -> Problem:
         case OriginRefused():
             return _of_origin(error)
         case SequenceError():
-            return Problem(
-                kinds.INVALID_SEQUENCE,
-                str(error),
-                field=error.field,
-                value=error.value,
-                limit=error.limit,
-            )
+            return _of_field(kinds.INVALID_SEQUENCE, error)
         case CalibrationMismatch():
             return Problem(
                 kinds.CALIBRATION_MISFIT,
@@ -87,13 +83,7 @@ def problem_of(error: Exception) -> Problem:
         case CameraLost() | CameraNotFound():
             return Problem(kinds.CAMERA_LOST, str(error))
         case ParameterError() | EffectError():
-            return Problem(
-                kinds.INVALID_REQUEST,
-                str(error),
-                field=error.field,
-                value=error.value,
-                limit=error.limit,
-            )
+            return _of_field(kinds.INVALID_REQUEST, error)
         case SceneError():
             return Problem(
                 kinds.INVALID_REQUEST,
@@ -107,15 +97,13 @@ def problem_of(error: Exception) -> Problem:
         case CameraError() | DriverError():
             return Problem(kinds.CAMERA_FAILED, str(error))
         case ProtocolError():
-            return Problem(
-                kinds.BAD_MESSAGE,
-                str(error),
-                field=error.field,
-                value=error.value,
-                limit=error.limit,
-            )
+            return _of_field(kinds.BAD_MESSAGE, error)
         case _:
             return Problem(kinds.INTERNAL_ERROR, "The service failed; its log has the details.")
+
+
+def _of_field(kind: ProblemKind, error: _FieldError) -> Problem:
+    return Problem(kind, str(error), field=error.field, value=error.value, limit=error.limit)
 
 
 def _of_origin(error: OriginRefused) -> Problem:

@@ -27,28 +27,3 @@ from transientcam_server.offline._recording import (
     default_products,
     reconstruct_recording,
 )
-
-__all__ = [
-    "KNOWN_PRODUCTS",
-    "BatchOptions",
-    "BatchReconstructor",
-    "Measurement",
-    "TransientCube",
-    "completed",
-    "convert_recording",
-    "default_products",
-    "import_kinect2",
-    "installed",
-    "is_tal",
-    "lens_of",
-    "load_kernels",
-    "load_measurement",
-    "plot",
-    "read_lens",
-    "reconstruct_measurement",
-    "reconstruct_on",
-    "reconstruct_recording",
-    "recording_at",
-    "require_versions",
-    "save_cube",
-]

@@ -12,8 +12,8 @@ from transientcam_server.offline._measurement import TransientCube
 _FRAMES: Final = 6
 
 
-def require() -> None:
-    """Check that pictures can be made, before the hours that a reconstruction may take.
+def require(what: str) -> None:
+    """Check that ``what`` can make pictures, before the hours that it may take.
 
     Raises
     ------
@@ -23,7 +23,7 @@ def require() -> None:
     try:
         import matplotlib  # noqa: F401 - only whether it is there
     except ModuleNotFoundError as error:
-        raise MissingExtra("--plot", "matplotlib", "plot") from error
+        raise MissingExtra(what, "matplotlib", "plot") from error
 
 
 def save_picture(path: Path, cube: TransientCube) -> None:

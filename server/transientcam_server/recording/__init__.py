@@ -13,6 +13,7 @@ from transientcam_server.recording._frames import (
     RecordedFramesCache,
     SettingsChoice,
     open_found,
+    recorded_recipe,
     timeline,
 )
 from transientcam_server.recording._heaps import require_sound_heaps
@@ -26,7 +27,6 @@ from transientcam_server.recording._product_stores import (
     ProductStores,
 )
 from transientcam_server.recording._reader import Recording
-from transientcam_server.recording._recipe import recorded_recipe
 from transientcam_server.recording._recorder import Limits
 from transientcam_server.recording._recovery import recover
 from transientcam_server.recording._replay import ReplayCamera
@@ -34,41 +34,3 @@ from transientcam_server.recording._salvage import salvage
 from transientcam_server.recording._storage import Storage, open_unknown
 from transientcam_server.recording._writer import RecordingWriter
 from transientcam_server.recording._zarr_keys import ZarrKeys, is_of_chunk
-
-__all__ = [
-    "AXES",
-    "DISK_THREADS",
-    "EVERY_CHUNK",
-    "FORMAT",
-    "METADATA",
-    "DiskFile",
-    "DiskThreads",
-    "Find",
-    "Header",
-    "Library",
-    "Limits",
-    "ProductStore",
-    "ProductStores",
-    "RecordedFramesCache",
-    "Recording",
-    "RecordingOptions",
-    "RecordingWriter",
-    "ReplayCamera",
-    "SettingsChoice",
-    "Storage",
-    "ZarrKeys",
-    "as_json",
-    "attributes_of",
-    "columns_of",
-    "is_of_chunk",
-    "open_found",
-    "open_to_write",
-    "open_unknown",
-    "recorded_recipe",
-    "recover",
-    "recovery",
-    "require_sound_heaps",
-    "salvage",
-    "swmr",
-    "timeline",
-]

@@ -15,16 +15,16 @@ from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
+import transientcam_moments as tm
 from transientcam_driver import Capabilities, RawFrame
 from transientcam_server.errors import DamagedFrame, NotARecording, Problem, kinds
-from transientcam_server.imaging import Frame, Pipeline, SettingsVersion
+from transientcam_server.imaging import Frame, Pipeline, Recipe, SettingsVersion, known_intrinsics
 from transientcam_server.recording._disk_threads import DiskThreads
 from transientcam_server.recording._layout import Header
 from transientcam_server.recording._library import Library
 from transientcam_server.recording._reader import Recording
-from transientcam_server.recording._recipe import recorded_recipe, recorded_sensor
 from transientcam_server.settings import LensSettings, ReconstructionSettings
 
 LATEST: Final = "latest"
@@ -216,4 +216,35 @@ def _unknown_frame(number: int, last: int) -> Problem:
         limit=f"from 1 to {last}" if last else None,
         first=1 if last else None,
         last=last or None,
+    )
+
+
+_SENSOR: Final = TypeAdapter(tm.noise.Sensor)
+
+
+def recorded_sensor(header: Header) -> tm.noise.Sensor | None:
+    """Return the sensor whose noise a recording's images have; None where it says none."""
+    with contextlib.suppress(ValueError):
+        return _SENSOR.validate_python(header.camera.get("sensor"))
+    return None
+
+
+def recorded_recipe(
+    header: Header, reconstruction: SettingsVersion, *, lens: LensSettings | None = None
+) -> Recipe:
+    """Return the recipe that reconstructs a recording's frames."""
+    capabilities = header.capabilities
+    return Recipe(
+        header.applied,
+        reconstruction.settings,
+        2.0**capabilities.bits - 1.0,
+        header.gains,
+        reconstruction.id,
+        known_intrinsics(
+            lens or LensSettings(),
+            width=capabilities.width,
+            height=capabilities.height,
+            recorded=header.camera.get("intrinsics"),
+        ),
+        recorded_sensor(header),
     )

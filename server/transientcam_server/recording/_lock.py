@@ -11,7 +11,6 @@ import fcntl
 import logging
 import os
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from transientcam_server.errors import RecordingInUse
@@ -39,12 +38,7 @@ class Lock:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

@@ -11,13 +11,10 @@ import numpy as np
 from transientcam_driver import (
     AppliedSequence,
     Camera,
-    CameraClosed,
     CameraLost,
     CameraName,
     CameraPlugin,
     CameraState,
-    Capabilities,
-    Counters,
     FactoryCalibration,
     FrameTimeout,
     NotStreaming,
@@ -27,6 +24,7 @@ from transientcam_driver import (
     SpecError,
     Status,
 )
+from transientcam_driver.camera import HostCamera
 from transientcam_driver.clock import Clock, RealClock
 from transientcam_server.imaging import FACTORY_ID
 from transientcam_server.recording._reader import Recording
@@ -71,7 +69,7 @@ def _speed(name: CameraName) -> float:
     return speed
 
 
-class ReplayCamera:
+class ReplayCamera(HostCamera):
     """Has the methods of `transientcam_driver.Camera`, and frames that were captured before.
 
     Frames come at the times of the device's clock; without ``loop`` the camera is lost after the
@@ -85,20 +83,19 @@ class ReplayCamera:
         If the file cannot be replayed.
     """
 
-    simulation: None = None
-    off_switch: None = None
-
     def __init__(
         self, path: Path, *, speed: float = 1.0, loop: bool = False, clock: Clock | None = None
     ) -> None:
+        super().__init__(clock or RealClock(), None)
         self._recording = Recording(path)
+        header = self._recording.header
+        self._capabilities, self._applied = header.capabilities, header.applied
+        if header.gains is not None and header.gains.id == FACTORY_ID:
+            self.factory = FactoryCalibration(header.gains.planes.astype(np.complex64, copy=False))
         self._speed = speed
         self._loop = loop
-        self._clock = clock or RealClock()
-        self._changed = threading.Condition()
+        self._changed = threading.Condition(self._control)
         self._state = CameraState.IDLE
-        self._closed = False
-        self.counters = Counters()
         self._index = 0
         self._round = 0
         self._kept: dict[int, RawFrame] = {}
@@ -106,32 +103,14 @@ class ReplayCamera:
         self._temperature_c: float | None = None
 
     @property
-    def capabilities(self) -> Capabilities:
-        """Those of the camera that was recorded."""
-        return self._recording.header.capabilities
-
-    @property
-    def factory(self) -> FactoryCalibration | None:
-        """What that camera reported of its pixels, if they were recorded with it."""
-        gains = self._recording.header.gains
-        if gains is None or gains.id != FACTORY_ID:
-            return None
-        return FactoryCalibration(gains.planes.astype(np.complex64, copy=False))
+    def off_switch(self) -> None:
+        """None: there is no light."""
+        return
 
     @property
     def intrinsics(self) -> Mapping[str, Any] | None:
         """Where the pixels of that camera look, if it was recorded."""
         return self._recording.header.camera.get("intrinsics")
-
-    @property
-    def state(self) -> CameraState:
-        """The state of the replay."""
-        return self._state
-
-    @property
-    def applied(self) -> AppliedSequence:
-        """The sequence that was recorded."""
-        return self._recording.header.applied
 
     def validate(self, sequence: Sequence) -> AppliedSequence:
         """Return the sequence that was recorded, if it is the requested one.
@@ -167,10 +146,6 @@ class ReplayCamera:
             self._require_open()
             self._pause()
 
-    def safe_off(self) -> None:
-        """Pause; there is no light."""
-        self.stop()
-
     def status(self) -> Status:
         """Return the status that a device would report.
 
@@ -182,14 +157,8 @@ class ReplayCamera:
         with self._changed:
             self._require_open()
             self._require_more()
-            return Status.of_host(
-                streaming=self._state is CameraState.STREAMING,
-                light_on=False,
-                epoch=self.applied.epoch,
-                next_image=self._index * self.applied.images,
-                device_time_s=self.device_time_s(),
-                temperature_c=self._temperature_c,
-            )
+            now = self._status(light_on=False, temperature_c=self._temperature_c)
+            return replace(now, next_image=self._index * self.applied.images)
 
     def device_time_s(self) -> float:
         """Return the time of the next frame by the device's clock."""
@@ -249,12 +218,6 @@ class ReplayCamera:
             self._changed.notify_all()
             self._recording.close()
 
-    def __enter__(self) -> "ReplayCamera":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     # --- under _changed --------------------------------------------------------------------
 
     @property
@@ -311,10 +274,6 @@ class ReplayCamera:
         if self._state is CameraState.STREAMING:
             self._state = CameraState.IDLE
         self._changed.notify_all()
-
-    def _require_open(self) -> None:
-        if self._closed:
-            raise CameraClosed
 
     def _require_more(self) -> None:
         if self._index >= self._recording.frames:

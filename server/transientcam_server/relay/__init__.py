@@ -7,5 +7,3 @@
 from transientcam_server.relay._camera import RelayCamera
 from transientcam_server.relay._origin import Described, Origin
 from transientcam_server.relay._plugin import PLUGIN, uses_token
-
-__all__ = ["PLUGIN", "Described", "Origin", "RelayCamera", "uses_token"]

@@ -8,7 +8,7 @@ import pytest
 from tests.moments import oracles
 from transientcam_moments.moment_problem import half_turns
 from transientcam_moments.moment_problem._circle import circle_roots, doubled
-from transientcam_moments.moment_problem._roots import disc_roots
+from transientcam_moments.moment_problem._cumulative import disc_roots
 
 
 def coefficients(roots: np.ndarray) -> np.ndarray:

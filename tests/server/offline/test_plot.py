@@ -34,4 +34,4 @@ def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setitem(sys.modules, "matplotlib", None)
 
     with pytest.raises(MissingExtra, match=r"pip install 'transientcam\[plot\]'"):
-        plot.require()
+        plot.require("--plot")

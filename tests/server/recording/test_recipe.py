@@ -9,7 +9,7 @@ import transientcam_moments as tm
 from tests.server.recording.made import CAPABILITIES, header
 from transientcam_server.imaging import SettingsVersion
 from transientcam_server.recording import recorded_recipe
-from transientcam_server.recording._recipe import recorded_sensor
+from transientcam_server.recording._frames import recorded_sensor
 from transientcam_server.settings import ReconstructionSettings
 
 SENSOR = tm.noise.Sensor(gain_e_per_dn=8.0, full_well_e=33e3, read_noise_e=21.0, dark_dn=50.0)

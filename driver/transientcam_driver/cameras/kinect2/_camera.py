@@ -1,5 +1,6 @@
 """A Kinect v2 as a `Camera`: a stream that is on or off, and nothing else to choose."""
 
+import threading
 import time
 import warnings
 import weakref
@@ -23,7 +24,6 @@ from transientcam_driver.cameras.kinect2._frames import FrameMaker
 from transientcam_driver.cameras.kinect2._off_switch import off_switch
 from transientcam_driver.cameras.kinect2._parameters import DepthParameters, Rows
 from transientcam_driver.cameras.kinect2._tables import P0Tables
-from transientcam_driver.cameras.kinect2._watch import Watch
 from transientcam_driver.clock import Clock, RealClock
 from transientcam_driver.errors import (
     CameraError,
@@ -308,3 +308,39 @@ def _left_open(device: Kinect2) -> None:
     """Light off when the interpreter ends without close()."""
     warnings.warn("a camera was left open; use close() or `with`", ResourceWarning, stacklevel=2)
     device.close()
+
+
+class Watch:
+    """Calls a function where nothing was noted for a time.
+
+    Parameters
+    ----------
+    interval_s
+        After one to two of these without a note.
+    idle
+        Called on a thread of its own, again and again until something is noted.
+    """
+
+    def __init__(self, interval_s: float, idle: Callable[[], None]) -> None:
+        self._interval_s = interval_s
+        self._idle = idle
+        self._notes = 0
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="kinect2-watch", daemon=True)
+        self._thread.start()
+
+    def note(self) -> None:
+        """Note that it still goes on."""
+        self._notes += 1
+
+    def close(self) -> None:
+        """End the thread; the function is not called any more once this returns."""
+        self._ended.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        notes = -1
+        while not self._ended.wait(self._interval_s):
+            if notes == self._notes:
+                self._idle()
+            notes = self._notes

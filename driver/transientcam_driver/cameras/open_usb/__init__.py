@@ -22,23 +22,3 @@ from transientcam_driver.cameras.open_usb._transport import (
     translated,
     udev_rule,
 )
-
-__all__ = [
-    "UDEV_RULE",
-    "VENDOR_IN",
-    "VENDOR_OUT",
-    "UsbCamera",
-    "claim",
-    "devices",
-    "first_of",
-    "forget",
-    "give_back",
-    "list_cameras",
-    "node_of",
-    "open_transport",
-    "read_bulk",
-    "serial_of",
-    "system_libusb",
-    "translated",
-    "udev_rule",
-]

@@ -1,7 +1,6 @@
 """A camera behind docs/usb-protocol.md: configure it, start it, take its frames."""
 
 import math
-import threading
 import warnings
 import weakref
 from collections.abc import Callable, Iterator
@@ -11,9 +10,8 @@ from transientcam_driver.camera import (
     IMAGE_HEADER_BYTES,
     AppliedSequence,
     CameraState,
-    Capabilities,
-    Counters,
     DeviceState,
+    HostCamera,
     RawFrame,
     Simulation,
     Status,
@@ -35,7 +33,6 @@ from transientcam_driver.cameras.open_usb.protocol import (
 )
 from transientcam_driver.clock import Clock, RealClock
 from transientcam_driver.errors import (
-    CameraClosed,
     CameraError,
     CameraFault,
     CameraLost,
@@ -55,7 +52,7 @@ _BEATS_PER_TIMEOUT = 4
 _PERIOD_RTOL = 0.01  # of the time from image to image, which capabilities give to the nanosecond
 
 
-class UsbCamera:
+class UsbCamera(HostCamera):
     """An AMCW lidar on USB, real or simulated, owned by this process: a `Camera`.
 
     Methods may be called from any thread, ``read_frame`` from one at a time. Images are read on
@@ -78,8 +75,6 @@ class UsbCamera:
         What to configure first; by default the nearest that the camera can do to ``Sequence()``.
     """
 
-    factory: None = None
-
     def __init__(
         self,
         connect: Callable[[str | None], Transport],
@@ -88,54 +83,21 @@ class UsbCamera:
         simulation: Simulation | None = None,
         sequence: Sequence | None = None,
     ) -> None:
+        super().__init__(clock or RealClock(), simulation)
         self._connect = connect
-        self._clock = clock or RealClock()
-        self.simulation = simulation
-        self.counters = Counters()
-        self._control = threading.RLock()  # requests and the state
-        self._reading = threading.Lock()  # held by the reader
         self._requested = sequence
-        self._resume = False
-        self._closed = False
         self._heartbeat_s = -math.inf
         self._stalled = False
-        self._state = CameraState.CONNECTING
-        self._applied: AppliedSequence | None = None
+        self._epoch = 0
         self._open(None)
 
     # --- state and methods -------------------------------------------------------------------
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """What the camera can do, by its own answer."""
-        return self._capabilities
 
     @property
     def off_switch(self) -> OffSwitch:
         """The request that is never refused; else a reset of the port (usb-protocol 9)."""
         steps = UsbControl(VENDOR_OUT, Request.SAFE_OFF), UsbReset()
         return OffSwitch(self._transport.node, steps)
-
-    @property
-    def state(self) -> CameraState:
-        """Where the camera stands."""
-        return self._state
-
-    @property
-    def applied(self) -> AppliedSequence:
-        """What is really set."""
-        assert self._applied is not None  # noqa: S101  (set before the constructor returns)
-        return self._applied
-
-    def validate(self, sequence: Sequence) -> AppliedSequence:
-        """Return what would be set, without a request to the device; the epoch is 0.
-
-        Raises
-        ------
-        SequenceError
-            Naming the field, its value and the limit of this camera.
-        """
-        return self._capabilities.apply(sequence)
 
     def configure(self, sequence: Sequence) -> AppliedSequence:
         """Set a sequence; while streaming, the next frame is the new sequence's.
@@ -243,12 +205,6 @@ class UsbCamera:
         with self._reading:  # the device must not be closed while a thread reads
             self._close_transport()
 
-    def __enter__(self) -> "UsbCamera":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     # --- connection ------------------------------------------------------------------------
 
     def _open(self, serial: str | None) -> None:
@@ -284,10 +240,6 @@ class UsbCamera:
         self._release.detach()
         self._transport.close()
 
-    def _require_open(self) -> None:
-        if self._closed:
-            raise CameraClosed
-
     # --- requests (under _control) ---------------------------------------------------------
 
     def _request_in(self, request: Request, *, value: int = 0, length: int) -> bytes:
@@ -301,9 +253,7 @@ class UsbCamera:
     @contextmanager
     def _translated(self, request: Request) -> Iterator[None]:
         """Around a request: a stall becomes DeviceRefused, a loss disconnects the camera."""
-        self._require_open()
-        if self._state is CameraState.DISCONNECTED:
-            raise CameraLost("it is disconnected")
+        self._require_connected()
         try:
             try:
                 yield
@@ -329,19 +279,19 @@ class UsbCamera:
         self._request_out(Request.SET_SEQUENCE, words.pack())  # usb-protocol 5.1: staged
         with self._receiver.lock:
             # usb-protocol 3.1: the new epoch is above this one, also after a power cycle
-            above = 0 if self._applied is None else self._applied.epoch
             answer = Commitment.unpack(
-                self._request_in(Request.COMMIT, value=above, length=Commitment.MOST_BYTES)
+                self._request_in(Request.COMMIT, value=self._epoch, length=Commitment.MOST_BYTES)
             )
             really_set = answer.words.sequence(self._capabilities)
             # usb-protocol 8.4, 10.12
             period_s = really_set.exposure_s + self._capabilities.streaming_readout_s
             if (
                 answer.images != really_set.images
-                or answer.epoch <= above
+                or answer.epoch <= self._epoch
                 or not math.isclose(answer.image_period_ns / 1e9, period_s, rel_tol=_PERIOD_RTOL)
             ):
                 raise ProtocolError(f"COMMIT answered with {answer}")
+            self._epoch = answer.epoch
             self._applied = self._capabilities.describe(really_set, epoch=answer.epoch)
             self._receiver.switch(self._applied, first_image=answer.first_image)
         return self._applied
@@ -369,10 +319,8 @@ class UsbCamera:
     def _keep_alive(self) -> None:
         """Send the heartbeat when it is due; start again when it was missed (usb-protocol 3.2)."""
         with self._control:
-            self._require_open()
+            self._require_connected()
             if self._state is not CameraState.STREAMING:
-                if self._state is CameraState.DISCONNECTED:
-                    raise CameraLost("it is disconnected")
                 raise NotStreaming(self._state)
             silent_s = self._clock.now_s() - self._heartbeat_s
             if silent_s >= self._capabilities.heartbeat_s:

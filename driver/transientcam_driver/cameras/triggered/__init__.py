@@ -6,5 +6,3 @@ expose, and to hand images over.
 
 from transientcam_driver.cameras.triggered._camera import TriggeredCamera
 from transientcam_driver.cameras.triggered._device import Group, Images, TriggeredDevice
-
-__all__ = ["Group", "Images", "TriggeredCamera", "TriggeredDevice"]

@@ -7,5 +7,3 @@ the cable: it hands over packets, loses them, and is pulled.
 from transientcam_simulation.emulated._kinect2.build import build_kinect2
 from transientcam_simulation.emulated._kinect2.device import EmulatedKinect2
 from transientcam_simulation.emulated._kinect2.firmware import EmulatedFirmware
-
-__all__ = ["EmulatedFirmware", "EmulatedKinect2", "build_kinect2"]

@@ -9,13 +9,3 @@ from transientcam_simulation.emulated._open_usb.faults import Fault, PendingFaul
 from transientcam_simulation.emulated._open_usb.firmware import Firmware, Renderer
 from transientcam_simulation.emulated._open_usb.prototype import prototype
 from transientcam_simulation.emulated._open_usb.usb_device import EmulatedDevice
-
-__all__ = [
-    "EmulatedDevice",
-    "Fault",
-    "Firmware",
-    "PendingFaults",
-    "Renderer",
-    "SimulatedBus",
-    "prototype",
-]

@@ -6,5 +6,3 @@
 from transientcam_simulation.emulated._tofcam660.build import build_tofcam660
 from transientcam_simulation.emulated._tofcam660.firmware import EmulatedFirmware
 from transientcam_simulation.emulated._tofcam660.network import EmulatedTofcam660
-
-__all__ = ["EmulatedFirmware", "EmulatedTofcam660", "build_tofcam660"]

@@ -7,5 +7,3 @@ are those of ``two_taps``.
 from transientcam_opt8241.emulated._build import build_opt8241
 from transientcam_opt8241.emulated._device import EmulatedOpt8241
 from transientcam_opt8241.emulated._firmware import EmulatedRegisters
-
-__all__ = ["EmulatedOpt8241", "EmulatedRegisters", "build_opt8241"]

@@ -2,7 +2,7 @@
 
 from typing import Any, Final, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from transientcam_driver.calibration import DEFAULT_TAKES
 from transientcam_server.api._documents.document import Document, JsonInteger, RequestDocument
@@ -145,14 +145,12 @@ class CalibrationsDocument(Document):
     """The newest first."""
 
 
-class CalibrationRequest(RequestDocument):
+class CalibrationRequest(
+    RequestDocument,
+    strict=True,
+    json_schema_extra={"examples": [{"name": "after warm-up", "frames": 40}]},
+):
     """A calibration that is to be measured with the present sequence."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        strict=True,
-        json_schema_extra={"examples": [{"name": "after warm-up", "frames": 40}]},
-    )
 
     name: str = Field(default="", max_length=MAX_NAME)
     frames: JsonInteger = Field(default=DEFAULT_TAKES, ge=2, le=10_000)
@@ -166,14 +164,12 @@ class CalibrationRequest(RequestDocument):
     if the camera can."""
 
 
-class ActivationRequest(RequestDocument):
+class ActivationRequest(
+    RequestDocument,
+    strict=True,
+    json_schema_extra={"examples": [{"id": "SIM-prototype-0-3f9c2a71b04e"}, {"id": "nominal"}]},
+):
     """The calibration that frames are to be calibrated by."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        strict=True,
-        json_schema_extra={"examples": [{"id": "SIM-prototype-0-3f9c2a71b04e"}, {"id": "nominal"}]},
-    )
 
     id: str = Field(max_length=200)
     """`nominal` for none."""

@@ -2,8 +2,6 @@
 
 from typing import Any, Literal
 
-from pydantic import ConfigDict
-
 from transientcam_server.api._documents.document import Document, RequestDocument
 from transientcam_server.camera import Cause, State
 
@@ -119,12 +117,10 @@ class AcquisitionDocument(Document):
     and is asked again until it does."""
 
 
-class AcquisitionRequest(RequestDocument):
+class AcquisitionRequest(
+    RequestDocument, strict=True, json_schema_extra={"examples": [{"running": False}]}
+):
     """What the acquisition should do."""
-
-    model_config = ConfigDict(
-        extra="forbid", strict=True, json_schema_extra={"examples": [{"running": False}]}
-    )
 
     running: bool
     """Whether frames are captured; the light is off while they are not, and starts with a delay

@@ -51,4 +51,6 @@ class Document(BaseModel):
 class RequestDocument(Document):
     """What a client asks for."""
 
+    model_config = ConfigDict(extra="forbid")
+
     _numbers = field_validator("*", mode="before")(classmethod(no_switch_for_a_number))

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, StringConstraints
+from pydantic import Field, StringConstraints
 
 from transientcam_server.api._documents.document import Document, RequestDocument
 from transientcam_server.camera import DEFAULT_DURATION_S, MAX_DURATION_S, MIN_DURATION_S
@@ -38,13 +38,11 @@ class GrantedLeaseDocument(LeaseDocument):
     """To be sent in the header Transientcam-Lease with every change; no other client sees it."""
 
 
-class LeaseRequest(RequestDocument):
+class LeaseRequest(
+    RequestDocument,
+    json_schema_extra={"examples": [{"holder": "alignment on bench 2", "duration_s": 30.0}]},
+):
     """Which client is to control the camera, and on which terms."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"holder": "alignment on bench 2", "duration_s": 30.0}]},
-    )
 
     holder: _Holder
     """What to call you, for others to read."""
@@ -56,10 +54,8 @@ class LeaseRequest(RequestDocument):
     """Take it from the client that has it, which is notified with all others."""
 
 
-class LeaseRenewal(Document):
+class LeaseRenewal(Document, extra="forbid", json_schema_extra={"examples": [{}]}):
     """New terms of a lease; what is absent stays as it is."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})
 
     duration_s: _Duration | None = None
     on_lapse: Literal["stop", "keep"] | None = None

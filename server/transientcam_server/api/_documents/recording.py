@@ -3,7 +3,7 @@
 import re
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, ConfigDict, Field, JsonValue
+from pydantic import AfterValidator, Field, JsonValue
 
 from transientcam_server.api._documents.document import Document, RequestDocument
 from transientcam_server.api._documents.sequence import AppliedDocument
@@ -103,22 +103,16 @@ class TimelineDocument(Document):
     """1 unless there are very many."""
 
 
-class RecordingRequest(RequestDocument):
+class RecordingRequest(
+    RequestDocument,
+    json_schema_extra={
+        "examples": [
+            {"name": "corner at 3 m", "duration_s": 30.0, "annotations": _ANNOTATIONS_EXAMPLE},
+            {},
+        ]
+    },
+):
     """What should be recorded, and until when; the least of all limits ends it."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {
-                    "name": "corner at 3 m",
-                    "duration_s": 30.0,
-                    "annotations": _ANNOTATIONS_EXAMPLE,
-                },
-                {},
-            ]
-        },
-    )
 
     name: (
         Annotated[
@@ -141,12 +135,10 @@ class RecordingRequest(RequestDocument):
     """Anything worth keeping with it, at most 16 KiB as JSON."""
 
 
-class RecordingChange(RequestDocument):
+class RecordingChange(
+    RequestDocument, json_schema_extra={"examples": [{"annotations": _ANNOTATIONS_EXAMPLE}]}
+):
     """What can be changed of a recording."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"annotations": _ANNOTATIONS_EXAMPLE}]}
-    )
 
     annotations: dict[str, Any]
     """Replace those it has."""

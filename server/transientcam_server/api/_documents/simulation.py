@@ -2,7 +2,7 @@
 
 from typing import Annotated, Final, Literal
 
-from pydantic import AliasChoices, ConfigDict, Field
+from pydantic import AliasChoices, Field
 
 from transientcam_server.api._documents.document import Document, RequestDocument
 
@@ -34,13 +34,11 @@ class SimulationDocument(Document):
     """What can be made to go wrong."""
 
 
-class SimulationRequest(RequestDocument):
+class SimulationRequest(
+    RequestDocument,
+    json_schema_extra={"examples": [{"scene": "corner", "effects": {"ambient": "on"}}]},
+):
     """What the camera should be put before; what is absent stays."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"scene": "corner", "effects": {"ambient": "on"}}]},
-    )
 
     scene: Annotated[str, Field(max_length=64)] | None = None
     definition: Annotated[str, Field(max_length=MAX_DEFINITION)] | None = None
@@ -55,11 +53,7 @@ class SimulationRequest(RequestDocument):
     Also accepted as `diffusor`, which answers call it."""
 
 
-class FaultRequest(RequestDocument):
+class FaultRequest(RequestDocument, json_schema_extra={"examples": [{"fault": "corrupt-image"}]}):
     """What should go wrong."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"fault": "corrupt-image"}]}
-    )
 
     fault: Literal["unplug", "replug", "corrupt-image", "drop-image"]

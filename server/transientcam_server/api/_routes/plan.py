@@ -21,24 +21,12 @@ from transientcam_server.service import Service
 router = APIRouter(tags=["accuracy"])
 KIND: Final = "plan"
 """Of the jobs that make a plan."""
-_REFUSALS: Final = (
-    kinds.BAD_REQUEST,
-    kinds.INVALID_REQUEST,
-    kinds.INVALID_SEQUENCE,
-    kinds.TARGET_UNREACHABLE,
-    kinds.ONLY_MOMENTS,
-    kinds.NO_FRAME_YET,
-    kinds.SHUTTING_DOWN,
-    kinds.PLANNING_BUSY,
-    kinds.PLANNING_ENDED,
-    kinds.PLAN_TOO_LONG,
-)
 
 
 @router.post(
     "/plan",
     summary="A sequence for a target accuracy or a budget of time",
-    responses=documented(*_REFUSALS),
+    responses=documented(kinds.BAD_REQUEST, *planned.REFUSALS, kinds.INVALID_SEQUENCE),
 )
 @needs(Role.VIEWER, lease=False)
 async def make_plan(service: ServiceOf, request: PlanRequest, http: Request) -> PlanDocument:
@@ -59,7 +47,8 @@ async def make_plan(service: ServiceOf, request: PlanRequest, http: Request) -> 
     "/plan/jobs",
     status_code=status.HTTP_202_ACCEPTED,
     summary="Make a plan as a job, with progress",
-    responses=ACCEPTED | documented(*_REFUSALS, kinds.TOO_MANY_JOBS),
+    responses=ACCEPTED
+    | documented(kinds.BAD_REQUEST, *planned.REFUSALS, kinds.INVALID_SEQUENCE, kinds.TOO_MANY_JOBS),
 )
 @needs(Role.VIEWER, lease=False)
 async def start_plan(

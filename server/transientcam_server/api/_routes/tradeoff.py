@@ -24,22 +24,12 @@ from transientcam_server.service import Service
 router = APIRouter(tags=["accuracy"])
 KIND: Final = "tradeoff"
 """Of the jobs that compute the front."""
-_REFUSALS: Final = (
-    kinds.INVALID_REQUEST,
-    kinds.TARGET_UNREACHABLE,
-    kinds.ONLY_MOMENTS,
-    kinds.NO_FRAME_YET,
-    kinds.SHUTTING_DOWN,
-    kinds.PLANNING_BUSY,
-    kinds.PLANNING_ENDED,
-    kinds.PLAN_TOO_LONG,
-)
 
 
 @router.get(
     "/tradeoff",
     summary="What accuracy costs on this scene",
-    responses=documented(*_REFUSALS),
+    responses=documented(*planned.REFUSALS),
 )
 async def read_tradeoff(
     service: ServiceOf,
@@ -61,7 +51,7 @@ async def read_tradeoff(
     "/tradeoff/jobs",
     status_code=status.HTTP_202_ACCEPTED,
     summary="Compute what accuracy costs as a job, with progress",
-    responses=ACCEPTED | documented(*_REFUSALS, kinds.BAD_REQUEST, kinds.TOO_MANY_JOBS),
+    responses=ACCEPTED | documented(*planned.REFUSALS, kinds.BAD_REQUEST, kinds.TOO_MANY_JOBS),
 )
 @needs(Role.VIEWER, lease=False)
 async def start_tradeoff(

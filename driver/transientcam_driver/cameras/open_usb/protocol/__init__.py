@@ -38,32 +38,3 @@ from transientcam_driver.cameras.open_usb.protocol._status import (
     unpack_time,
 )
 from transientcam_driver.cameras.open_usb.protocol._units import phase_word
-
-__all__ = [
-    "CAPS_ROOM_BYTES",
-    "IMAGE_ENDPOINT",
-    "IMAGE_MAGIC",
-    "LAST_ERROR_BYTES",
-    "PRODUCT_ID",
-    "STATUS_BYTES",
-    "TIME_BYTES",
-    "VENDOR_CLASS",
-    "VENDOR_ID",
-    "VERSION",
-    "Commitment",
-    "ErrorCode",
-    "ImageFlag",
-    "ImageHeader",
-    "Request",
-    "SequenceWords",
-    "pack_capabilities",
-    "pack_last_error",
-    "pack_status",
-    "pack_time",
-    "payload_checksum",
-    "phase_word",
-    "unpack_capabilities",
-    "unpack_last_error",
-    "unpack_status",
-    "unpack_time",
-]
