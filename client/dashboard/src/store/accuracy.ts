@@ -30,7 +30,7 @@ export class Accuracy {
   async predict(): Promise<void> {
     const scene = this.#scene.peek();
     await this.#ask(
-      () => this.#api.startTradeoff(),
+      () => this.#api.ask("POST /tradeoff/jobs", { body: { by: "range_error_m" } }),
       ({ result }) => {
         const soFar = result as TradeoffDocument | null;
         if (soFar === null || soFar.front.length === 0) return;
@@ -44,7 +44,7 @@ export class Accuracy {
   async plan(goal: PlanRequest): Promise<void> {
     this.looked.value = null; // it would seem to answer this question
     await this.#ask(
-      () => this.#api.startPlan(goal),
+      () => this.#api.ask("POST /plan/jobs", { body: goal }),
       ({ result }) => {
         if (result !== null) this.looked.value = result as unknown as ChoiceDocument;
       },
@@ -53,7 +53,7 @@ export class Accuracy {
 
   async cancel(): Promise<void> {
     const job = this.job.peek();
-    if (job !== null) await this.#answer(() => this.#api.cancelJob(job.id));
+    if (job !== null) await this.#answer(() => this.#api.ask("POST /jobs/{job}/cancel", { of: job.id }));
   }
 
   /** The camera stands before another scene: what was predicted is of the one before. */

@@ -31,7 +31,7 @@ export class Calibrations {
 
   async refresh(): Promise<void> {
     try {
-      this.document.value = await this.#api.calibrations();
+      this.document.value = await this.#api.ask("GET /calibrations");
       this.trouble.value = null;
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;
@@ -41,33 +41,33 @@ export class Calibrations {
 
   async measure(wanted: CalibrationRequest): Promise<void> {
     this.outcome.value = null;
-    void this.#follow(await this.#api.measureCalibration(wanted));
+    void this.#follow(await this.#api.ask("POST /calibrations", { body: wanted }));
   }
 
   async cancel(): Promise<void> {
     const job = this.job.peek();
-    if (job !== null) await this.#api.cancelJob(job.id);
+    if (job !== null) await this.#api.ask("POST /jobs/{job}/cancel", { of: job.id });
   }
 
   async activate(id: string, force = false): Promise<void> {
-    await this.#api.activateCalibration(id, force);
+    await this.#api.ask("PUT /calibrations/active", { body: { id, force } });
     await this.refresh();
   }
 
   /** Returns to the calibration that was active before. */
   async restore(): Promise<void> {
-    await this.#api.restoreCalibration();
+    await this.#api.ask("POST /calibrations/active/undo");
     this.outcome.value = null;
     await this.refresh();
   }
 
   async take(file: Blob): Promise<void> {
-    await this.#api.importCalibration(file);
+    await this.#api.ask("POST /calibrations/import", { body: file });
     await this.refresh();
   }
 
   async remove(id: string): Promise<void> {
-    await this.#api.deleteCalibration(id);
+    await this.#api.ask("DELETE /calibrations/{calibration}", { of: id });
     await this.refresh();
   }
 
@@ -75,7 +75,8 @@ export class Calibrations {
   async #findJob(): Promise<void> {
     if (this.job.peek() !== null) return;
     try {
-      const running = (await this.#api.jobs()).find((each) => each.kind === "calibration" && !hasEnded(each));
+      const { jobs } = await this.#api.ask("GET /jobs");
+      const running = jobs.find((each) => each.kind === "calibration" && !hasEnded(each));
       if (running !== undefined) void this.#follow(running);
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;

@@ -28,7 +28,7 @@ export class Caller {
   async look(): Promise<void> {
     clearTimeout(this.#timer);
     try {
-      this.#info.value = await this.#api.info();
+      this.#info.value = await this.#api.ask("GET /info");
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;
       this.forget();

@@ -276,7 +276,7 @@ export class StreamClient {
     if (this.#asking) return;
     this.#asking = true;
     try {
-      this.#takeCamera(await this.#store.api.camera());
+      this.#takeCamera(await this.#store.api.ask("GET /camera"));
     } catch {
       // Asked again when there is a connection again; the stream itself says that there is none.
     } finally {
@@ -288,7 +288,8 @@ export class StreamClient {
   async learnAbsent(): Promise<void> {
     const { api, frames } = this.#store;
     try {
-      const absent = await api.absentProducts();
+      const { absent_products } = await api.ask("GET /info");
+      const absent = Object.fromEntries(absent_products.map(({ name, reason }) => [name, reason]));
       if (JSON.stringify(absent) !== JSON.stringify(frames.absent.peek())) frames.absent.value = absent;
     } catch (error) {
       if (!(error instanceof RequestError)) throw error; // the stream says what is wrong

@@ -1,6 +1,7 @@
 import { batch, effect, type ReadonlySignal, signal, untracked } from "@preact/signals";
 
 import type { PixelDocument } from "../stream/documents";
+import { frameUrl } from "../stream/frameUrl";
 import { type Api, LIVE, liveFrame, RequestError } from "./api";
 import type { Frame } from "./frames";
 import type { Pixel } from "./pixel";
@@ -79,13 +80,18 @@ export class Details {
 
   /** Asks about the very frame that is shown, as long as the service keeps it: it may be held here. */
   async #ask({ x, y }: Pixel, { origin, meta }: Frame): Promise<PixelDocument> {
-    if (origin !== LIVE) return this.#api.pixel(x, y, origin);
+    if (origin !== LIVE) return this.#pixel(x, y, origin);
     try {
-      return await this.#api.pixel(x, y, liveFrame(meta.frame));
+      return await this.#pixel(x, y, liveFrame(meta.frame));
     } catch (error) {
       if (!(error instanceof RequestError) || !error.isGone) throw error;
-      return this.#api.pixel(x, y);
+      return this.#pixel(x, y, LIVE);
     }
+  }
+
+  /** Everything about one pixel of a frame but its curves, which the page computes itself. */
+  #pixel(x: number, y: number, frame: string): Promise<PixelDocument> {
+    return this.#api.ask("GET /frames/{frame}/pixel", { at: frameUrl(frame, `pixel?x=${x}&y=${y}&bins=1`) });
   }
 
   /** Whether it is too soon to ask again; if so, it is asked when it is not: no other frame may come. */

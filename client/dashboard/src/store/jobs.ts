@@ -21,7 +21,7 @@ export async function followed(api: Api, started: JobDocument, seen: (job: JobDo
   while (!hasEnded(job)) {
     await new Promise((done) => setTimeout(done, 1000 * LOOK_S));
     try {
-      job = await api.job(job.id);
+      job = await api.ask("GET /jobs/{job}", { of: job.id });
       seen(job);
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;

@@ -52,7 +52,7 @@ export class Lease {
   /** Takes the lease, from its holder if `takeover` says so. Raises RequestError. */
   async take(holder: string, takeover: boolean): Promise<void> {
     await this.#alone(async () => {
-      const granted = await this.#api.takeLease({ holder, duration_s: DURATION_S, on_lapse: "stop", takeover });
+      const granted = await this.#api.ask("POST /lease", { body: { holder, duration_s: DURATION_S, on_lapse: "stop", takeover } });
       this.#api.credentials.leaseId.value = granted.lease_id;
       this.lost.value = null;
       this.#orphaned = false;
@@ -64,7 +64,7 @@ export class Lease {
   async release(): Promise<void> {
     await this.#alone(async () => {
       try {
-        const after = await this.#api.releaseLease();
+        const after = await this.#api.ask("DELETE /lease");
         this.#api.credentials.leaseId.value = null;
         this.#take(after);
       } catch (error) {
@@ -75,7 +75,7 @@ export class Lease {
 
   /** Gives the lease back from a page that is being closed; the answer is ignored. */
   abandon(): void {
-    if (this.#api.credentials.leaseId.peek() !== null) this.#api.releaseLease(true).catch(() => undefined);
+    if (this.#api.credentials.leaseId.peek() !== null) this.#api.ask("DELETE /lease", { keepalive: true }).catch(() => undefined);
   }
 
   /** Looks who controls the camera, and renews what this page holds. */
@@ -86,7 +86,7 @@ export class Lease {
     }
     const ours = this.#api.credentials.leaseId.peek();
     try {
-      const found = await (ours === null ? this.#api.lease() : this.#api.renewLease());
+      const found = await (ours === null ? this.#api.ask("GET /lease") : this.#api.ask("PUT /lease", { body: {} }));
       if (this.#api.credentials.leaseId.peek() === ours) this.#take(found);
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;

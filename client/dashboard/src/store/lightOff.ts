@@ -44,7 +44,7 @@ export class LightOff {
   async #send(press: number): Promise<void> {
     let next: LightOffState | null = null;
     try {
-      const { state } = await this.#api.safeOff(AbortSignal.timeout(ANSWER_MS));
+      const { state } = await this.#api.ask("POST /acquisition/safe-off", { signal: AbortSignal.timeout(ANSWER_MS), keepalive: true });
       if (press === this.#press) this.#done(state);
     } catch (error) {
       const refused = error instanceof RequestError && [401, 403].includes(error.problem.status ?? 0);

@@ -16,9 +16,11 @@ export class Reconstruction {
 
   async refresh(): Promise<void> {
     try {
-      const [current, parameters] = await Promise.all([this.#api.reconstruction(), this.#api.parameters("/reconstruction")]);
+      const [current, { parameters }] = await Promise.all([this.#api.reconstruction(), this.#api.ask("GET /parameters")]);
       this.current.value = current;
-      this.parameters.value = parameters;
+      this.parameters.value = parameters
+        .filter(({ resource, access }) => resource === "/api/v1/reconstruction" && access === "read-write")
+        .map((parameter) => ({ ...parameter, name: parameter.pointer.slice(1) })); // by its name in that document
       this.trouble.value = null;
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;

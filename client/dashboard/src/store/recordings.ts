@@ -35,7 +35,7 @@ export class Recordings {
   /** Reads the list anew. */
   async refresh(): Promise<void> {
     try {
-      this.document.value = await this.#api.recordings();
+      this.document.value = await this.#api.ask("GET /recordings");
       this.trouble.value = null;
     } catch (error) {
       if (!(error instanceof RequestError)) throw error;
@@ -44,7 +44,7 @@ export class Recordings {
   }
 
   async start(wanted: RecordingRequest): Promise<RecordingDocument> {
-    const started = await this.#api.startRecording(wanted);
+    const started = await this.#api.ask("POST /recordings", { body: wanted });
     await this.refresh();
     return started;
   }
@@ -56,22 +56,22 @@ export class Recordings {
   }
 
   async stop(id: string): Promise<void> {
-    this.#put(await this.#api.stopRecording(id));
+    this.#put(await this.#api.ask("POST /recordings/{recording}/stop", { of: id }));
     await this.refresh();
   }
 
   async annotate(id: string, annotations: Readonly<Record<string, unknown>>): Promise<void> {
-    this.#put(await this.#api.annotateRecording(id, annotations));
+    this.#put(await this.#api.ask("PATCH /recordings/{recording}", { of: id, body: { annotations } }));
   }
 
   async remove(id: string): Promise<void> {
-    await this.#api.deleteRecording(id);
+    await this.#api.ask("DELETE /recordings/{recording}", { of: id });
     await this.refresh();
   }
 
   async #look(id: string): Promise<void> {
     try {
-      const document = await this.#api.recording(id);
+      const document = await this.#api.ask("GET /recordings/{recording}", { of: id });
       if (document.state === "recording") this.#put(document);
       else await this.refresh();
     } catch (error) {

@@ -69,7 +69,7 @@ export class Replay {
 
   /** Shows a recording from a frame on, by default its first. Raises RequestError. */
   async open(id: string, frame?: number): Promise<void> {
-    const [recording, document] = await Promise.all([this.#api.recording(id), this.#api.timeline(id)]);
+    const [recording, document] = await this.#read(id);
     const timeline = timelineOf(document);
     if (timeline === null) throw new RequestError({ detail: `${recording.name} holds no frames.` });
     batch(() => {
@@ -187,6 +187,10 @@ export class Replay {
     });
   }
 
+  #read(of: string): Promise<[RecordingDocument, TimelineDocument]> {
+    return Promise.all([this.#api.ask("GET /recordings/{recording}", { of }), this.#api.ask("GET /recordings/{recording}/frames", { of })]);
+  }
+
   /** A recording that is still being written has more frames by and by. */
   #watchGrowth(): void {
     clearTimeout(this.#timer);
@@ -198,7 +202,7 @@ export class Replay {
     const id = this.recording.peek()?.id;
     if (id === undefined) return;
     try {
-      const [recording, document] = await Promise.all([this.#api.recording(id), this.#api.timeline(id)]);
+      const [recording, document] = await this.#read(id);
       const timeline = timelineOf(document) ?? this.timeline.peek();
       if (this.recording.peek()?.id !== id) return;
       batch(() => {

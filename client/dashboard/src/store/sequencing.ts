@@ -57,7 +57,7 @@ export class Sequencing {
 
   async #set(sequence: SequenceRequest, estimator: string | null): Promise<void> {
     const before = this.#current.peek();
-    const applied = await this.#api.setSequence(sequence);
+    const applied = await this.#api.ask("PUT /sequence", { body: sequence });
     this.#current.value = applied;
     const { sequence_id } = applied;
     this.#before.value = before === null ? null : { sequence_id, sequence: before, estimator: null };

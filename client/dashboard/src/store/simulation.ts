@@ -20,7 +20,7 @@ export class Simulation {
 
   async refresh(): Promise<void> {
     try {
-      const [world, explanation] = await Promise.all([this.#api.simulation(), this.#api.explanation()]);
+      const [world, explanation] = await Promise.all([this.#api.ask("GET /simulation"), this.#api.ask("GET /simulation/explain")]);
       this.world.value = world;
       this.explanation.value = explanation;
       this.trouble.value = null;
@@ -34,7 +34,7 @@ export class Simulation {
   async follow(): Promise<void> {
     if (this.explanation.peek() !== null) return this.refresh();
     try {
-      this.world.value = await this.#api.simulation();
+      this.world.value = await this.#api.ask("GET /simulation");
     } catch (error) {
       if (!(error instanceof RequestError)) throw error; // read again with the next change
     }
@@ -42,36 +42,36 @@ export class Simulation {
 
   /** Puts the camera before another scene; effects that were chosen stay chosen. */
   async stage(scene: string): Promise<void> {
-    await this.#api.setSimulation({ scene });
+    await this.#api.ask("PUT /simulation", { body: { scene } });
     await this.refresh();
   }
 
   /** Puts the camera before a scene of one's own: the text of its file. */
   async stageOwn(definition: string): Promise<void> {
-    await this.#api.setSimulation({ definition });
+    await this.#api.ask("PUT /simulation", { body: { definition } });
     await this.refresh();
   }
 
   /** Puts filter and diffuser before the lens, or takes them away. */
   async putDiffuser(diffuser: boolean): Promise<void> {
-    await this.#api.setSimulation({ diffuser });
+    await this.#api.ask("PUT /simulation", { body: { diffuser } });
     await this.refresh();
   }
 
   /** Forces an effect on or off, or leaves it to the scene. */
   async choose(effect: string, choice: EffectChoice | null): Promise<void> {
     const { [effect]: _, ...others } = this.world.peek()?.effects ?? {};
-    await this.#api.setSimulation({ effects: choice === null ? others : { ...others, [effect]: choice } });
+    await this.#api.ask("PUT /simulation", { body: { effects: choice === null ? others : { ...others, [effect]: choice } } });
     await this.refresh();
   }
 
   /** Leaves all effects to the scene. */
   async chooseNothing(): Promise<void> {
-    await this.#api.setSimulation({ effects: {} });
+    await this.#api.ask("PUT /simulation", { body: { effects: {} } });
     await this.refresh();
   }
 
   async cause(fault: Fault): Promise<void> {
-    this.world.value = await this.#api.cause(fault);
+    this.world.value = await this.#api.ask("POST /simulation/faults", { body: { fault } });
   }
 }

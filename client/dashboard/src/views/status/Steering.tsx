@@ -42,7 +42,7 @@ function Capture() {
   const toggle = (): Promise<void> =>
     run("Switching", async () => {
       store.lightOff.withdraw();
-      const { state } = await store.api.setAcquisition(running !== true);
+      const { state } = await store.api.ask("PUT /acquisition", { body: { running: running !== true } });
       store.status.cameraIs(state, Date.now() / 1000);
     });
   const single = (): Promise<void> =>
