@@ -23,6 +23,12 @@ export class RequestError extends Error {
   }
 }
 
+/** The refusal that was caught; raises what is none. */
+export function refusalIn(error: unknown): RequestError {
+  if (!(error instanceof RequestError)) throw error;
+  return error;
+}
+
 /** A problem as a sentence for the person at the screen. */
 export function plainWords(problem: Problem): string {
   return problem.detail ?? problem.title ?? "The service refused without giving a reason.";
@@ -62,14 +68,15 @@ export const LIVE = "/frames/latest";
 export const liveFrame = (number: number): string => `/frames/${number}`;
 
 export class Api {
-  readonly credentials: Credentials;
   /** Called with every refusal, before the request rejects. */
   onRefusal: ((problem: Problem) => void) | null = null;
   readonly #fetch: Fetch;
 
-  constructor(fetcher: Fetch = (input, init) => fetch(input, init), credentials = new Credentials()) {
+  constructor(
+    fetcher: Fetch = (input, init) => fetch(input, init),
+    readonly credentials = new Credentials(),
+  ) {
     this.#fetch = fetcher;
-    this.credentials = credentials;
   }
 
   /** What the service answers an operation of its interface; no more is checked than that it did not refuse: raises RequestError. */

@@ -3,6 +3,7 @@ import { signal } from "@preact/signals";
 import { engineering, fixed, grouped } from "../scales/format";
 import type { AppliedDocument, SamplingDocument } from "../stream/documents";
 import type { Notice } from "../stream/protocol";
+import { refusalIn } from "./api";
 
 export type EventTone = "plain" | "good" | "bad";
 
@@ -32,13 +33,10 @@ const BURST_S = 30;
 
 export class Events {
   readonly all = signal<readonly Happening[]>([]);
-  readonly #now_s: () => number;
   readonly #bursts = new Map<string, { readonly number: number; count: number }>();
   #number = 0;
 
-  constructor(now_s: () => number = () => Date.now() / 1000) {
-    this.#now_s = now_s;
-  }
+  constructor(private readonly now_s: () => number = () => Date.now() / 1000) {}
 
   /**
    * Shows events that come in bursts: those within `BURST_S` of the first are shown as one.
@@ -48,7 +46,7 @@ export class Events {
   tally(kind: string, count: number, words: (count: number) => string, tone: EventTone): void {
     const burst = this.#bursts.get(kind);
     const happening = burst && this.all.peek().find(({ number }) => number === burst.number);
-    if (burst === undefined || happening === undefined || this.#now_s() - happening.at_s > BURST_S) {
+    if (burst === undefined || happening === undefined || this.now_s() - happening.at_s > BURST_S) {
       this.tell(words(count), tone);
       this.#bursts.set(kind, { number: this.#number, count });
       return;
@@ -60,14 +58,23 @@ export class Events {
   /** Shows an event; one of the same key that was shown just before stays in its place, with the remedy of either. */
   tell(words: string, tone: EventTone = "plain", more: Pick<Happening, "key" | "remedy"> = {}): void {
     const shown =
-      more.key === undefined ? undefined : this.all.peek().find(({ key, at_s }) => key === more.key && this.#now_s() - at_s < BURST_S);
+      more.key === undefined ? undefined : this.all.peek().find(({ key, at_s }) => key === more.key && this.now_s() - at_s < BURST_S);
     if (shown !== undefined) {
       this.all.value = this.all.peek().map((each) => (each === shown ? { ...each, ...more } : each));
       return;
     }
     this.#number += 1;
-    const happening = { number: this.#number, at_s: this.#now_s(), words, tone, ...more };
+    const happening = { number: this.#number, at_s: this.now_s(), words, tone, ...more };
     this.all.value = [...this.all.peek().slice(1 - MOST), happening];
+  }
+
+  /** Does something, and shows why it was refused where it was. */
+  async reported(work: () => Promise<unknown>): Promise<void> {
+    try {
+      await work();
+    } catch (error) {
+      this.tell(refusalIn(error).message, "bad");
+    }
   }
 }
 

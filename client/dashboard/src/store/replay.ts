@@ -3,7 +3,7 @@ import { batch, computed, effect, signal, untracked } from "@preact/signals";
 import type { RecordingDocument, TimelineDocument } from "../stream/documents";
 import { LEAST_PRODUCTS } from "../stream/protocol";
 import type { FrameReport } from "../stream/summary";
-import { type Api, RequestError, recordingPath } from "./api";
+import { type Api, RequestError, recordingPath, refusalIn } from "./api";
 import { type Frames, frameOf } from "./frames";
 import type { Status } from "./status";
 
@@ -45,9 +45,6 @@ export class Replay {
   readonly active = computed(() => this.recording.value !== null);
   /** Set by what talks to the worker. */
   loader: FrameLoader | null = null;
-  readonly #api: Api;
-  readonly #frames: Frames;
-  readonly #status: Status;
   /** Where playing has come to, in s since the recording began. */
   #at_s = 0;
   #loading = false;
@@ -56,13 +53,14 @@ export class Replay {
   #recomputed = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(api: Api, frames: Frames, status: Status) {
-    this.#api = api;
-    this.#frames = frames;
-    this.#status = status;
+  constructor(
+    private readonly api: Api,
+    private readonly frames: Frames,
+    private readonly status: Status,
+  ) {
     effect(() => {
       if (this.recording.value === null || this.timeline.value === null) return;
-      void [this.frame.value, this.settings.value, this.#frames.wanted.value];
+      void [this.frame.value, this.settings.value, this.frames.wanted.value];
       untracked(() => void this.#load());
     });
   }
@@ -94,7 +92,7 @@ export class Replay {
       this.timeline.value = null;
       this.shown.value = null;
       this.trouble.value = null;
-      this.#status.newest.value = null; // a frame of the camera may have the same number
+      this.status.newest.value = null; // a frame of the camera may have the same number
     });
   }
 
@@ -149,7 +147,7 @@ export class Replay {
   /** One frame at a time: what is wanted meanwhile replaces what was. */
   async #load(): Promise<void> {
     const recording = this.recording.peek();
-    const wantedByViews = this.#frames.wanted.peek();
+    const wantedByViews = this.frames.wanted.peek();
     const products = wantedByViews.length === 0 ? LEAST_PRODUCTS : wantedByViews;
     if (recording === null || this.loader === null || this.#loading) return;
     const frame = this.frame.peek();
@@ -161,9 +159,9 @@ export class Replay {
       const reports = await this.loader(path, products);
       if (this.recording.peek()?.id === recording.id) this.#show(frame, path, reports);
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
+      const { message } = refusalIn(error);
       if (this.recording.peek()?.id === recording.id) {
-        this.trouble.value = error.message;
+        this.trouble.value = message;
         this.playing.value = false;
       }
     } finally {
@@ -176,11 +174,11 @@ export class Replay {
   #show(frame: number, path: string, reports: readonly FrameReport[]): void {
     batch(() => {
       this.trouble.value = null;
-      for (const report of reports) this.#frames.put(frameOf(report, path));
+      for (const report of reports) this.frames.put(frameOf(report, path));
       this.shown.value = frame;
       const meta = reports.at(-1)?.message.meta;
       if (meta !== undefined)
-        this.#status.frameReplayed(
+        this.status.frameReplayed(
           meta,
           reports.reduce((sum, { message }) => sum + message.encode_s, 0),
         );
@@ -188,7 +186,7 @@ export class Replay {
   }
 
   #read(of: string): Promise<[RecordingDocument, TimelineDocument]> {
-    return Promise.all([this.#api.ask("GET /recordings/{recording}", { of }), this.#api.ask("GET /recordings/{recording}/frames", { of })]);
+    return Promise.all([this.api.ask("GET /recordings/{recording}", { of }), this.api.ask("GET /recordings/{recording}/frames", { of })]);
   }
 
   /** A recording that is still being written has more frames by and by. */
@@ -210,7 +208,7 @@ export class Replay {
         this.timeline.value = timeline;
       });
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
+      refusalIn(error);
     }
     this.#watchGrowth();
   }

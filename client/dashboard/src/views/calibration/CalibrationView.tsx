@@ -135,7 +135,7 @@ function Diffuser({ task }: { task: Task }) {
     <Steer
       title={`${words} of the simulated camera`}
       disabled={task.busy.value !== null}
-      onClick={() => void task.run(`${words}…`, () => simulation.putDiffuser(!world.diffusor))}
+      onClick={() => void task.run(`${words}…`, () => simulation.set({ diffuser: !world.diffusor }))}
     >
       {words}
     </Steer>

@@ -4,7 +4,7 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import { LightPainter } from "../../gl/paintLight";
 import type { Backdrop } from "../../gl/renderer";
 import { grouped } from "../../scales/format";
-import { LIVE, RequestError } from "../../store/api";
+import { LIVE, refusalIn } from "../../store/api";
 import { drawnOf, type Frame } from "../../store/frames";
 import type { TransientLook } from "../../store/lightLook";
 import { aBoolean, aNumber, oneOf, type Setting } from "../../store/settings";
@@ -161,8 +161,7 @@ export function PointsView() {
     try {
       await download(store.api, frameUrl(place, "pointcloud.ply"), `pointcloud-${frame.meta.frame}.ply`);
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
-      store.status.unreadable.value = error.message;
+      store.status.unreadable.value = refusalIn(error).message;
     }
   };
 

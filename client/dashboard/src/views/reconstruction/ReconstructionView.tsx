@@ -15,8 +15,8 @@ export function ReconstructionView() {
   /** What was typed, and the version that it began with; null while nothing was. */
   const typed = useSignal<{ readonly draft: Draft; readonly tag: string | null } | null>(null);
   useEffect(() => void reconstruction.refresh(), [reconstruction]);
-  const current = reconstruction.current.value;
-  const parameters = reconstruction.parameters.value;
+  const current = reconstruction.document.value;
+  const parameters = current?.parameters ?? [];
   const draft = typed.value?.draft ?? draftOf(parameters);
   const reading = readingOf(parameters, draft);
   const wrong = "wrong" in reading ? reading : null;

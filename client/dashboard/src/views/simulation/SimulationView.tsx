@@ -71,7 +71,7 @@ function ScenePicker({ task }: { task: Task }) {
         disabled={task.busy.value !== null || obstacle.value !== null}
         onChange={(event) => {
           const scene = event.currentTarget.value;
-          void task.run(`Preparing ${scene}…`, () => simulation.stage(scene));
+          void task.run(`Preparing ${scene}…`, () => simulation.set({ scene }));
         }}
       >
         {!known && <option value={world.scene}>{world.scene}</option>}
@@ -104,7 +104,7 @@ function Effects({ task }: { task: Task }) {
           {chosen && (
             <Steer
               disabled={task.busy.value !== null}
-              onClick={() => void task.run("Leaving all effects to the scene…", () => simulation.chooseNothing())}
+              onClick={() => void task.run("Leaving all effects to the scene…", () => simulation.set({ effects: {} }))}
             >
               Leave all to the scene
             </Steer>
