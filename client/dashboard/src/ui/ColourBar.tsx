@@ -1,10 +1,10 @@
-import { computed, type ReadonlySignal, useSignal } from "@preact/signals";
-import { useMemo, useRef } from "preact/hooks";
+import { type ReadonlySignal, useSignal } from "@preact/signals";
+import { useRef } from "preact/hooks";
 
 import { beyond, type ColourMapName, colourTable, LEVELS, levelOf } from "../scales/colourMaps";
 import { fixed, significant, withUnit } from "../scales/format";
 import { decimalsFor, fraction, histogram, niceStep, type Scale, type Span, ticks, valueAt } from "../scales/scale";
-import { useDrawing } from "./hooks";
+import { useComputedOf, useDrawing } from "./hooks";
 import "./ColourBar.css";
 
 /** Share of the scale's length that the bar goes on beyond either end: for what lies there, and for handles to be drawn to. */
@@ -61,14 +61,10 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
     if (context) paintBar(context, base, scale, colours, values?.value?.values ?? null);
   }, [base, scale, colours, values]);
 
-  const marker = useMemo(
-    () =>
-      computed(() => {
-        const place = onBar(base, marked?.value ?? NaN);
-        return Number.isNaN(place) ? null : `${100 * Math.min(1, Math.max(0, place))}%`;
-      }),
-    [base, marked],
-  );
+  const marker = useComputedOf([base, marked], () => {
+    const place = onBar(base, marked?.value ?? NaN);
+    return Number.isNaN(place) ? null : `${100 * Math.min(1, Math.max(0, place))}%`;
+  });
   const numbers = ticks(base, 6);
   const decimals = decimalsFor(niceStep(base.high - base.low, 6));
   const write = (value: number): string => (base.kind === "linear" ? fixed(value, decimals) : significant(value, 1));

@@ -1,10 +1,8 @@
-import { computed } from "@preact/signals";
-import { useMemo } from "preact/hooks";
-
 import { PIN_COLOURS } from "../store/measures";
 import type { Pixel } from "../store/pixel";
 import { useStore } from "../store/store";
 import { type Point, seenAt } from "../store/viewport";
+import { useComputedOf } from "./hooks";
 import "./Marks.css";
 
 /** What is marked in a picture of the sensor of this size: over the picture, as large at any zoom. */
@@ -29,17 +27,13 @@ const percent = (share: number): string => `${100 * share}%`;
 /** The crosshair of the pointed or the selected pixel; moves without rendering anything else. */
 function Crosshair({ of, width, height }: SizeProps & { of: "selected" | "pointed" }) {
   const store = useStore();
-  const style = useMemo(
-    () =>
-      computed(() => {
-        const pixel = store[of].value;
-        if (pixel === null) return null;
-        const view = store.viewport.view.value;
-        const at = seenAt(view, centreOf(pixel, width, height));
-        return { "--x": percent(at.x), "--y": percent(at.y), "--w": percent(view.zoom / width), "--h": percent(view.zoom / height) };
-      }),
-    [store, of, width, height],
-  );
+  const style = useComputedOf([store, of, width, height], () => {
+    const pixel = store[of].value;
+    if (pixel === null) return null;
+    const view = store.viewport.view.value;
+    const at = seenAt(view, centreOf(pixel, width, height));
+    return { "--x": percent(at.x), "--y": percent(at.y), "--w": percent(view.zoom / width), "--h": percent(view.zoom / height) };
+  });
   if (style.value === null) return null;
   return (
     <div class={`mark mark-${of}`} style={style.value} aria-hidden="true">

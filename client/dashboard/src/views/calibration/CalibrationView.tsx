@@ -4,7 +4,7 @@ import { fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
 import type { CalibrationDocument, JobDocument } from "../../stream/documents";
 import { Confirm } from "../../ui/Confirm";
-import { NumberField } from "../../ui/controls";
+import { Check, Form, NumberField, TextField } from "../../ui/controls";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
@@ -76,25 +76,8 @@ function MeasureForm({ task }: { task: Task }) {
   const measure = (): Promise<boolean> =>
     task.run("Starting…", () => calibrations.measure({ name: name.peek().trim(), frames: count, activate: activate.peek() }));
   return (
-    <form
-      class="record-form measure-form"
-      onSubmit={(event) => {
-        event.preventDefault();
-        void measure();
-      }}
-    >
-      <label class="field record-name">
-        <span>Name</span>
-        <input
-          type="text"
-          name="name"
-          maxLength={200}
-          autocomplete="off"
-          placeholder="after warm-up"
-          value={name.value}
-          onInput={(event) => (name.value = event.currentTarget.value)}
-        />
-      </label>
+    <Form class="record-form measure-form" onSubmit={() => void measure()}>
+      <TextField label="Name" class="field record-name" name="name" maxLength={200} placeholder="after warm-up" text={name} />
       <NumberField
         label="Frames, with and without light"
         unit=""
@@ -115,12 +98,11 @@ function MeasureForm({ task }: { task: Task }) {
       </div>
       <p class="quiet form-wide">
         Put filter and diffuser before the lens first, so that the light shines at the sensor. <Diffuser task={task} />{" "}
-        <label class="check">
-          <input type="checkbox" checked={activate.value} onChange={(event) => (activate.value = event.currentTarget.checked)} /> Use it at
-          once
-        </label>
+        <Check checked={activate.value} onChange={(checked) => (activate.value = checked)}>
+          Use it at once
+        </Check>
       </p>
-    </form>
+    </Form>
   );
 }
 

@@ -174,18 +174,8 @@ export function PointsView() {
       title={<h2>Points in space</h2>}
       tools={
         <PopoverButton face="Look" label="Look of the points" title="What the points are coloured by, and their size" kind="look">
-          <Choice
-            label="Colour by"
-            value={colouring.value}
-            options={COLOURINGS.map((each) => ({ value: each, text: each === "light" ? ofLight : NAMES[each] }))}
-            onChange={(each) => (colouring.value = each)}
-          />
-          <Choice
-            label="Size of a point"
-            value={pointSize.value}
-            options={[1, 2, 3, 4, 6].map((each) => ({ value: each, text: `${each} px` }))}
-            onChange={(each) => (pointSize.value = each)}
-          />
+          <Choice label="Colour by" chosen={colouring} of={COLOURINGS} text={(each) => (each === "light" ? ofLight : NAMES[each])} />
+          <Choice label="Size of a point" chosen={pointSize} of={[1, 2, 3, 4, 6]} text={(each) => `${each} px`} />
         </PopoverButton>
       }
       downloads={[
@@ -234,17 +224,12 @@ export function PointsView() {
           </span>
           <FieldOfView />
           <span class="panel-tools">
-            <Toggle
-              pressed={surrounded.value}
-              title="Floor with a grid in metres, the camera's axes (x red, y green, z blue) and its field of view"
-              onToggle={() => (surrounded.value = !surrounded.peek())}
-            >
+            <Toggle on={surrounded} title="Floor with a grid in metres, the camera's axes (x red, y green, z blue) and its field of view">
               Grid
             </Toggle>
             <Toggle
-              pressed={shaded.value}
+              on={shaded}
               title="Eye-dome lighting: what stands behind its neighbours is darker. Without it colours are exactly those of the colour bar"
-              onToggle={() => (shaded.value = !shaded.peek())}
             >
               Shading
             </Toggle>

@@ -2,6 +2,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { useStore } from "../../store/store";
 import type { ParameterDocument } from "../../stream/documents";
+import { Form } from "../../ui/controls";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
@@ -41,10 +42,9 @@ export function ReconstructionView() {
         </Steer>
       }
     >
-      <form
+      <Form
         class="panel-body fades"
-        onSubmit={(event) => {
-          event.preventDefault();
+        onSubmit={() => {
           if ("settings" in reading) void apply(reading.settings, typed.peek()?.tag ?? current?.tag ?? null);
         }}
       >
@@ -79,7 +79,7 @@ export function ReconstructionView() {
             </Steer>
           </div>
         )}
-      </form>
+      </Form>
     </Panel>
   );
 }

@@ -1,6 +1,6 @@
 import { useEffect } from "preact/hooks";
 import { fixed, grouped } from "../../scales/format";
-import { REPLAY_SPEEDS, type Replay, type ReplaySettings, type Timeline } from "../../store/replay";
+import { REPLAY_SPEEDS, type Replay, type Timeline } from "../../store/replay";
 import { useStore } from "../../store/store";
 import { Choice } from "../../ui/controls";
 import { PauseIcon, PlayIcon, StepIcon } from "../../ui/icons";
@@ -38,20 +38,12 @@ export function ReplayBar() {
         <button type="button" class="play" aria-label="One frame on" title="One frame on (])" onClick={() => replay.step(1)}>
           <StepIcon />
         </button>
-        <Choice
-          label="Speed of the recording"
-          value={replay.speed.value}
-          options={REPLAY_SPEEDS.map((speed) => ({ value: speed, text: `${speed} ×` }))}
-          onChange={(speed) => (replay.speed.value = speed)}
-        />
+        <Choice label="Speed of the recording" chosen={replay.speed} of={REPLAY_SPEEDS} text={(speed) => `${speed} ×`} />
         <Choice
           label="Computed with"
-          value={replay.settings.value}
-          options={[
-            { value: "recorded" as ReplaySettings, text: "recorded settings" },
-            { value: "current", text: "present settings" },
-          ]}
-          onChange={(settings) => (replay.settings.value = settings)}
+          chosen={replay.settings}
+          of={["recorded", "current"]}
+          text={(settings) => (settings === "recorded" ? "recorded settings" : "present settings")}
         />
       </div>
       <Scrubber replay={replay} timeline={timeline} />

@@ -1,4 +1,4 @@
-import { computed, effect, type ReadonlySignal, type Signal, signal, untracked, useComputed, useSignal } from "@preact/signals";
+import { effect, type ReadonlySignal, type Signal, signal, untracked, useComputed, useSignal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import "uplot/dist/uPlot.min.css";
 
@@ -15,7 +15,7 @@ import { type Store, useStore } from "../../store/store";
 import { Tabs, Toggle } from "../../ui/controls";
 import { save } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
-import { useDrawing, useProducts, useSize } from "../../ui/hooks";
+import { useComputedOf, useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { litOf, steady } from "../transient/arrivals";
 import { csvOf, drawnOf, type Subject } from "./curves";
@@ -52,19 +52,15 @@ export function ResponseView() {
   const looked = useComputed(() => store.details.frame.value ?? frame.value);
   useEffect(() => selectFirst(store, frame), [store, frame]);
   const side = store.settings.of(SIDE);
-  const shown = useMemo(
-    () =>
-      computed(() => {
-        const coefficients = looked.value?.coefficients;
-        const pixel = store.selected.value;
-        if (!coefficients || pixel === null) return null;
-        if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return null;
-        if (looked.value !== null && !wasSent(looked.value, pixel)) return null;
-        const index = pixel.y * coefficients.width + pixel.x;
-        return { pixel, coefficients, index };
-      }),
-    [looked, store],
-  );
+  const shown = useComputedOf([looked, store], () => {
+    const coefficients = looked.value?.coefficients;
+    const pixel = store.selected.value;
+    if (!coefficients || pixel === null) return null;
+    if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return null;
+    if (looked.value !== null && !wasSent(looked.value, pixel)) return null;
+    const index = pixel.y * coefficients.width + pixel.x;
+    return { pixel, coefficients, index };
+  });
   const levinson = useComputed(() => (shown.value === null ? null : pixelOf(shown.value.coefficients, shown.value.index)));
   const logarithmic = store.settings.of(LOGARITHMIC);
   const pointed = useSignal("");
@@ -244,15 +240,11 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
             asinh
           </em>
         )}
-        <Toggle
-          pressed={lit.value}
-          title="Only the time between the first and the last light of the picture, instead of the whole period"
-          onToggle={() => (lit.value = !lit.peek())}
-        >
+        <Toggle on={lit} title="Only the time between the first and the last light of the picture, instead of the whole period">
           lit
         </Toggle>
         {aspect === "density" && (
-          <Toggle pressed={logarithmic} title="Logarithmic density" onToggle={() => (wanted.value = !wanted.peek())}>
+          <Toggle on={wanted} title="Logarithmic density">
             log
           </Toggle>
         )}

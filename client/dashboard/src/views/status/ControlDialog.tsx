@@ -1,5 +1,6 @@
 import type { Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
+import { Form, TextField } from "../../ui/controls";
 import { SwitchedDialog } from "../../ui/Dialog";
 import { useNow } from "../../ui/hooks";
 import { TaskLine } from "../../ui/Steer";
@@ -32,10 +33,9 @@ function Control({ onDone }: { onDone: () => void }) {
   };
   const take = (takeover: boolean): Promise<void> => act("Taking control…", () => lease.take(name.peek().trim(), takeover));
   return (
-    <form
+    <Form
       class="control"
-      onSubmit={(event) => {
-        event.preventDefault();
+      onSubmit={() => {
         if (control.kind !== "us") void take(control.kind === "other");
       }}
     >
@@ -58,17 +58,7 @@ function Control({ onDone }: { onDone: () => void }) {
         )}
       </p>
       {control.kind !== "us" && (
-        <label class="field">
-          <span>What others should call you</span>
-          <input
-            type="text"
-            name="holder"
-            autocomplete="nickname"
-            maxLength={LONGEST_NAME}
-            value={name.value}
-            onInput={(event) => (name.value = event.currentTarget.value)}
-          />
-        </label>
+        <TextField label="What others should call you" name="holder" autocomplete="nickname" maxLength={LONGEST_NAME} text={name} />
       )}
       <TaskLine task={task} field="control-status" />
       {control.kind === "other" && task.refusal.value !== null && (
@@ -98,7 +88,7 @@ function Control({ onDone }: { onDone: () => void }) {
           </button>
         )}
       </div>
-    </form>
+    </Form>
   );
 }
 

@@ -2,6 +2,7 @@ import { useSignal } from "@preact/signals";
 import { LAYOUTS } from "../../store/layout";
 import { LONGEST_NAME } from "../../store/layouts";
 import { useStore } from "../../store/store";
+import { Form, TextField } from "../../ui/controls";
 import { SwitchedDialog } from "../../ui/Dialog";
 import "./LayoutDialog.css";
 
@@ -21,26 +22,14 @@ function Saved({ onDone }: { onDone: () => void }) {
   const taken = name in LAYOUTS;
   const names = Object.keys(layouts.named.value);
   return (
-    <form
+    <Form
       class="control"
-      onSubmit={(event) => {
-        event.preventDefault();
+      onSubmit={() => {
         layouts.save(name);
         onDone();
       }}
     >
-      <label class="field">
-        <span>Name of the present layout</span>
-        <input
-          type="text"
-          name="layout"
-          autocomplete="off"
-          maxLength={LONGEST_NAME}
-          value={text.value}
-          aria-invalid={taken}
-          onInput={(event) => (text.value = event.currentTarget.value)}
-        />
-      </label>
+      <TextField label="Name of the present layout" name="layout" maxLength={LONGEST_NAME} aria-invalid={taken} text={text} />
       <p class={taken ? "refusal" : "quiet"} role="status">
         {taken
           ? `${name} is a layout of the page's own: choose another name.`
@@ -67,6 +56,6 @@ function Saved({ onDone }: { onDone: () => void }) {
           Save
         </button>
       </div>
-    </form>
+    </Form>
   );
 }

@@ -17,11 +17,7 @@ export function Steering() {
       <RecordingSign />
       <ControlButton />
       {!store.replay.active.value && (
-        <Toggle
-          pressed={store.held.value}
-          title="Hold this frame while the camera goes on (H)"
-          onToggle={() => (store.held.value = !store.held.peek())}
-        >
+        <Toggle on={store.held} title="Hold this frame while the camera goes on (H)">
           <HoldIcon /> <span class="wide">Hold</span>
         </Toggle>
       )}

@@ -1,6 +1,7 @@
 import { useSignal } from "@preact/signals";
 
 import { useStore } from "../../store/store";
+import { Form, TextField } from "../../ui/controls";
 import { SwitchedDialog } from "../../ui/Dialog";
 import { tokenWords } from "./words";
 
@@ -20,10 +21,9 @@ function TokenForm({ onDone }: { onDone: () => void }) {
   const known = credentials.token.value !== null;
   const recognised = caller.document.value;
   return (
-    <form
+    <Form
       class="control"
-      onSubmit={(event) => {
-        event.preventDefault();
+      onSubmit={() => {
         credentials.use(text.peek());
         onDone();
       }}
@@ -31,17 +31,7 @@ function TokenForm({ onDone }: { onDone: () => void }) {
       <p class={known && credentials.refused.value !== null ? "refusal" : ""} data-field="token-words">
         {tokenWords(credentials)}
       </p>
-      <label class="field">
-        <span>Token</span>
-        <input
-          type="password"
-          name="token"
-          autocomplete="off"
-          spellcheck={false}
-          value={text.value}
-          onInput={(event) => (text.value = event.currentTarget.value)}
-        />
-      </label>
+      <TextField label="Token" type="password" name="token" spellcheck={false} text={text} />
       {known && recognised !== null && (
         <p data-field="caller">
           The service knows this page as <strong>{recognised.name}</strong>, {recognised.role}.
@@ -68,6 +58,6 @@ function TokenForm({ onDone }: { onDone: () => void }) {
           Use this token
         </button>
       </div>
-    </form>
+    </Form>
   );
 }

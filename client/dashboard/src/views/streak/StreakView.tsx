@@ -1,4 +1,4 @@
-import { computed, useComputed, useSignal } from "@preact/signals";
+import { useComputed, useSignal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 import { rangeOfTime_m } from "../../physics/constants";
 import { COLOUR_MAPS, type ColourMapName } from "../../scales/colourMaps";
@@ -8,12 +8,12 @@ import { scaleOf, TONES, type ToneKind } from "../../scales/tone";
 import { oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
-import { ColourChoice } from "../../ui/ColourChoice";
 import { npy, save, savePicture } from "../../ui/download";
-import { useDrawing, useProducts } from "../../ui/hooks";
+import { useDrawing, usePictureSize, useProducts } from "../../ui/hooks";
+import { ColourChoice, ToneChoice } from "../../ui/LookChoices";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
-import { ToneChoice } from "../../ui/ToneChoice";
+import { draw } from "../../ui/paint";
 import { BINS, paintStreak, Streak, whiteOf } from "./streak";
 import "./StreakView.css";
 
@@ -31,26 +31,17 @@ export function StreakView() {
   const canvas = useRef<HTMLCanvasElement>(null);
   const bright = useSignal(NaN);
   const pointed = useSignal<{ x: number; bin: number } | null>(null);
-  const size = useMemo(
-    () => computed(() => `${frame.value?.coefficients?.width ?? 163}x${frame.value?.coefficients?.height ?? 120}`),
-    [frame],
-  );
-  const [width, height] = size.value.split("x").map(Number);
+  const [width, height] = usePictureSize(frame);
   const row = useComputed(() => Math.min(height - 1, store.selected.value?.y ?? height >> 1));
 
   useDrawing(() => {
     const coefficients = frame.value?.coefficients;
     const [y, toneNow, coloursNow] = [row.value, tone.value, colours.value];
-    const context = canvas.current?.getContext("2d");
-    if (!coefficients || canvas.current === null || !context || y >= coefficients.height) return;
+    if (!coefficients || canvas.current === null || y >= coefficients.height) return;
     streak.compute(coefficients, y);
     const white = whiteOf(streak.values);
     if (!(Math.abs(Math.log(white / bright.peek())) < 0.2)) bright.value = white; // not with every frame's noise
-    if (canvas.current.width !== streak.width || canvas.current.height !== BINS)
-      [canvas.current.width, canvas.current.height] = [streak.width, BINS];
-    const image = context.createImageData(streak.width, BINS);
-    paintStreak(streak.values, bright.peek(), toneNow, coloursNow, image.data);
-    context.putImageData(image, 0, 0);
+    draw(canvas.current, streak.width, BINS, (rgba) => paintStreak(streak.values, bright.peek(), toneNow, coloursNow, rgba));
     Object.assign(canvas.current.dataset, { frame: frame.peek()?.meta.frame, row: y, white: bright.peek(), colours: coloursNow });
   }, [frame, row]);
 
