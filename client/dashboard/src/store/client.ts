@@ -65,13 +65,13 @@ export class StreamClient {
       const wanted = this.store.frames.wanted.value;
       if (wanted === known) return;
       known = wanted;
-      this.#send({ type: "want", products: wanted });
+      this.#send({ type: "want", value: wanted });
     });
-    effect(() => this.#send({ type: "adapt", adapts: this.store.adapts.value }));
+    effect(() => this.#send({ type: "adapt", value: this.store.adapts.value }));
     effect(() => {
       const sight = this.store.sight.value;
       clearTimeout(this.#looking);
-      this.#looking = setTimeout(() => this.#send({ type: "look", sight }), 1000 * SETTLED_S);
+      this.#looking = setTimeout(() => this.#send({ type: "look", value: sight }), 1000 * SETTLED_S);
     });
     effect(() => {
       if (this.store.held.value) void untracked(() => this.#complete());
@@ -81,7 +81,7 @@ export class StreamClient {
     effect(() => {
       const active = this.store.replay.active.value;
       // Frames that waited meanwhile are old: ask for new ones.
-      if (replayed && !active) this.#send({ type: "want", products: known });
+      if (replayed && !active) this.#send({ type: "want", value: known });
       replayed = active;
       this.loop.wake();
     });
@@ -314,7 +314,7 @@ export class StreamClient {
     this.#pending.clear();
     // Another client may have started the camera; or this frame was on its way when it stopped: read the state.
     if (this.store.status.cameraState.peek() !== "streaming") void this.#readCamera();
-    this.#send({ type: "acknowledge", frame: newest });
+    this.#send({ type: "acknowledge", value: newest });
   }
 
   /** Counts how fluently the light of the stream moves; true while each refresh of the screen is to be counted. */
@@ -322,14 +322,14 @@ export class StreamClient {
     const { player, frames, held, replay, measures } = this.store;
     const measured = measures.pins.peek().length > 0 || measures.region.peek() !== null;
     const rests = !(player.playing.peek() || player.scrubbed.peek()) || measured || held.peek() || replay.active.peek();
-    if (rests !== this.#rests) this.#send({ type: "rest", rests });
+    if (rests !== this.#rests) this.#send({ type: "rest", value: rests });
     this.#rests = rests;
     if (rests || frames.of("coefficients").peek() === null) {
       this.#fluency.restart();
       return false;
     }
     const pictures_hz = this.#fluency.refreshed(this.now_s());
-    if (pictures_hz !== null) this.#send({ type: "moved", pictures_hz });
+    if (pictures_hz !== null) this.#send({ type: "moved", value: pictures_hz });
     return true;
   }
 

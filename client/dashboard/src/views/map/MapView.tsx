@@ -8,9 +8,9 @@ import { useStore } from "../../store/store";
 import type { ViewName } from "../../store/viewNames";
 import { ColourBar } from "../../ui/ColourBar";
 import { Check, Tabs } from "../../ui/controls";
-import { saveNumbers, savePicture } from "../../ui/download";
+import { saveNumbers } from "../../ui/download";
 import { captionOf } from "../../ui/figure";
-import { saveFigure } from "../../ui/figureFiles";
+import { type FigureParts, pictureFiles } from "../../ui/figureFiles";
 import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
 import { LimitFields } from "../../ui/LimitFields";
 import { ColourChoice } from "../../ui/LookChoices";
@@ -43,26 +43,27 @@ function MapPanel({ name, choice }: MapPanelProps) {
   const shown = MAP_PRODUCTS.find((each) => each.product === choice.value && obstacleOf(each) === undefined) ?? MAP_PRODUCTS[0];
   const look = store.looks.of(shown.product);
   const canvas = useRef<HTMLCanvasElement>(null);
-  const figure = (kind: "png" | "svg"): void => {
+  const parts = (): FigureParts | null => {
     const meta = look.frame.peek()?.meta;
-    if (meta === undefined) return;
-    const parts = {
+    if (meta === undefined) return null;
+    return {
       title: shown.name,
       caption: captionOf(meta, store.sequence.peek()),
       scale: look.scale.peek(),
       colours: look.colours.peek(),
       unit: shown.unit,
       ground: "white",
-    } as const;
-    void saveFigure(`${shown.product}-${meta.frame}`, canvas.current, parts, kind);
+    };
   };
   return (
     <Panel
       name={name}
       downloads={[
-        { text: "Picture (PNG)", run: () => savePicture(`${shown.product}-${look.frame.peek()?.meta.frame ?? 0}`, canvas.current) },
-        { text: "Figure (PNG)", run: () => figure("png") },
-        { text: "Figure (SVG)", run: () => figure("svg") },
+        ...pictureFiles(
+          () => `${shown.product}-${look.frame.peek()?.meta.frame ?? 0}`,
+          () => canvas.current,
+          parts,
+        ),
         { text: `${shown.name} in ${shown.unit} (NPY)`, run: () => saveNumbers(store.api, look.frame.peek()) },
       ]}
       title={

@@ -1,6 +1,5 @@
-import { effect, type ReadonlySignal, type Signal, signal, untracked, useComputed, useSignal } from "@preact/signals";
+import { effect, type ReadonlySignal, type Signal, untracked, useComputed, useSignal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
-import "uplot/dist/uPlot.min.css";
 
 import { rangeOfTime_m } from "../../physics/constants";
 import { pixelOf } from "../../physics/reflection";
@@ -15,8 +14,9 @@ import { type Store, useStore } from "../../store/store";
 import { Tabs, Toggle } from "../../ui/controls";
 import { save } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
-import { useComputedOf, useDrawing, useProducts, useSize } from "../../ui/hooks";
+import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
+import { usePlot } from "../plots/page";
 import { litOf, steady } from "../transient/arrivals";
 import { csvOf, drawnOf, type Subject } from "./curves";
 import { PixelFigures } from "./Figures";
@@ -146,18 +146,14 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
   const logarithmic = aspect === "density" && wanted.value;
   const { measures } = store;
   const box = useRef<HTMLDivElement>(null);
-  const size = useMemo(() => signal({ width: 0, height: 0 }), []);
-  useSize(box, size);
-  const plot = useSignal<ResponsePlot | null>(null);
   const dark = store.theme.dark.value;
   const held = useRef(0);
   const heldFor = useRef<Pixel | null>(null);
   const top = useRef<Span | null>(null);
   const lit = store.settings.of(LIT);
   const part = useSignal(PERIOD);
-  useEffect(() => {
-    if (box.current === null) return undefined;
-    const made = responsePlot(box.current, {
+  const form = (place: HTMLElement): ResponsePlot =>
+    responsePlot(place, {
       aspect,
       logarithmic,
       top: () => top.current?.high ?? 1,
@@ -168,17 +164,7 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
       },
       point: (sample) => (pointed.value = sample === null ? "" : sampleText(sample.time_ns, sample.value, aspect)),
     });
-    plot.value = made;
-    return () => {
-      plot.value = null;
-      made.plot.destroy();
-    };
-  }, [store, dark, logarithmic, aspect]);
-
-  useDrawing(() => {
-    const { width, height } = size.value;
-    if (width > 0 && height > 0) plot.value?.plot.setSize({ width, height });
-  }, [plot, size]);
+  const { made: plot, size } = usePlot(box, form, [store, dark, logarithmic, aspect]);
 
   useDrawing(() => {
     const now = shown.value;

@@ -12,7 +12,7 @@ import { type Store, useStore } from "../../store/store";
 import { Choice, Tabs } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
 import { captionOf, timeWords } from "../../ui/figure";
-import { type FigureParts, saveFigure } from "../../ui/figureFiles";
+import { type FigureParts, pictureFiles } from "../../ui/figureFiles";
 import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
@@ -64,9 +64,7 @@ export function TransientView() {
       name="transient"
       title={<h2>Light</h2>}
       downloads={[
-        { text: "Picture (PNG)", run: () => savePicture(figureName(), look.snapshot()) },
-        { text: "Figure (PNG)", run: () => void saveFigure(figureName(), look.snapshot(), subject.parts(), "png") },
-        { text: "Figure (SVG)", run: () => void saveFigure(figureName(), look.snapshot(), subject.parts(), "svg") },
+        ...pictureFiles(figureName, subject.snapshot, subject.parts),
         {
           text: "Strip of 8 times (PNG)",
           run: () => {
