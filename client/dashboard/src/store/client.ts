@@ -204,65 +204,56 @@ export class StreamClient {
   }
 
   #notice(notice: Notice): void {
-    const { status } = this.store;
+    const { events, sequence } = this.store;
     const shown = inWords(notice);
     // A calibration sets the sequence anew although it stays as it is.
-    const unchanged = notice.kind === "sequence-changed" && sameSequence(notice.sequence, this.store.sequence.peek());
+    const unchanged = notice.kind === "sequence-changed" && sameSequence(notice.sequence, sequence.peek());
     const key = notice.kind === "sequence-changed" ? { key: sequenceKey(notice.sequence) } : {};
-    if (shown !== null && !unchanged) this.store.events.tell(shown.words, shown.tone, key);
-    switch (notice.kind) {
-      case "dropped":
-        status.dropNotice(notice.channel, notice.total);
-        break;
-      case "lost-images":
-        status.lostImages.value += notice.count;
-        this.store.events.tally("lost-images", notice.count, lossWords, "plain");
-        break;
-      case "camera-lost":
-        status.cameraIs("lost", this.now_s(), notice.reason);
-        void this.store.simulation.keepUp();
-        break;
-      case "light-arming":
-        status.cameraIs("arming", this.now_s());
-        break;
-      case "light-off":
-        status.cameraIs("stopped", this.now_s());
-        break;
-      case "camera-back":
-        status.cameraIs("streaming", this.now_s());
-        void this.#readCamera();
-        void this.store.simulation.keepUp();
-        break;
-      case "sequence-changed":
-        this.#takeSequence(notice.sequence);
-        void this.store.caller.look(); // kernels may have to be prepared for it
-        // A calibration is good for some sequences only.
-        void this.store.calibrations.keepUp();
-        break;
-      case "lease-changed":
-        void this.store.lease.look();
-        break;
-      case "reconstruction-changed":
-        this.store.replay.recompute();
-        void this.store.caller.look();
-        void this.store.reconstruction.keepUp();
-        break;
-      case "calibration-changed":
-        void this.store.calibrations.keepUp();
-        break;
-      case "simulation-changed":
-        this.store.frames.sceneSince_s = status.serviceTime_s(this.now_s());
-        this.store.accuracy.sceneChanged();
-        this.store.rangeErrors.sceneChanged();
-        this.store.details.forget();
-        void this.store.simulation.keepUp();
-        break;
-      case "recording-started":
-      case "recording-stopped":
-        void this.store.recordings.refresh();
-        break;
-    }
+    if (shown !== null && !unchanged) events.tell(shown.words, shown.tone, key);
+    (this.#told[notice.kind] as ((notice: Notice) => void) | undefined)?.(notice);
   }
+
+  /** What the notices of the service change on the page, besides being told. */
+  readonly #told: { readonly [Kind in Notice["kind"]]?: (notice: Extract<Notice, { kind: Kind }>) => void } = {
+    dropped: ({ channel, total }) => this.store.status.dropNotice(channel, total),
+    "lost-images": ({ count }) => {
+      this.store.status.lostImages.value += count;
+      this.store.events.tally("lost-images", count, lossWords, "plain");
+    },
+    "camera-lost": ({ reason }) => {
+      this.store.status.cameraIs("lost", this.now_s(), reason);
+      void this.store.simulation.keepUp();
+    },
+    "light-arming": () => this.store.status.cameraIs("arming", this.now_s()),
+    "light-off": () => this.store.status.cameraIs("stopped", this.now_s()),
+    "camera-back": () => {
+      this.store.status.cameraIs("streaming", this.now_s());
+      void this.#readCamera();
+      void this.store.simulation.keepUp();
+    },
+    "sequence-changed": ({ sequence }) => {
+      this.#takeSequence(sequence);
+      void this.store.caller.look(); // kernels may have to be prepared for it
+      void this.store.calibrations.keepUp(); // which are good for some sequences only
+    },
+    "lease-changed": () => void this.store.lease.look(),
+    "reconstruction-changed": () => {
+      this.store.replay.recompute();
+      void this.store.caller.look();
+      void this.store.reconstruction.keepUp();
+    },
+    "calibration-changed": () => void this.store.calibrations.keepUp(),
+    "simulation-changed": () => {
+      const { frames, status, accuracy, rangeErrors, details, simulation } = this.store;
+      frames.sceneSince_s = status.serviceTime_s(this.now_s());
+      accuracy.sceneChanged();
+      rangeErrors.sceneChanged();
+      details.forget();
+      void simulation.keepUp();
+    },
+    "recording-started": () => void this.store.recordings.refresh(),
+    "recording-stopped": () => void this.store.recordings.refresh(),
+  };
 
   #takeSequence(sequence: AppliedDocument | null): void {
     if (sequence !== null) this.store.sequence.value = sequence;
