@@ -4,6 +4,8 @@ import { useRef } from "preact/hooks";
 import { beyond, type ColourMapName, colourTable, LEVELS, levelOf } from "../scales/colourMaps";
 import { fixed, significant, withUnit } from "../scales/format";
 import { decimalsFor, fraction, histogram, niceStep, type Scale, type Span, ticks, valueAt } from "../scales/scale";
+import type { Look } from "../store/looks";
+import { useStore } from "../store/store";
 import { useComputedOf, useDrawing } from "./hooks";
 import "./ColourBar.css";
 
@@ -75,7 +77,7 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
       role="group"
       aria-label={`Colour scale from ${write(scale.low)} to ${withUnit(write(scale.high), unit)}`}
     >
-      <p class="colour-bar-unit">{unit === "1" ? "" : unit}</p>
+      <p class="colour-bar-unit small quiet">{unit === "1" ? "" : unit}</p>
       <div
         class="colour-bar-body"
         title={onLimit === undefined ? undefined : "Drag the handles; double click lets the ends follow the data"}
@@ -83,7 +85,7 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
       >
         <canvas ref={canvas} width={COLOURS_PX + (values === undefined ? 0 : HISTOGRAM_PX)} height={ROWS} aria-hidden="true" />
         {numbers.map((value) => (
-          <span key={value} class="colour-bar-tick" style={{ bottom: `${100 * onBar(base, value)}%` }}>
+          <span key={value} class="colour-bar-tick small quiet" style={{ bottom: `${100 * onBar(base, value)}%` }}>
             {write(value)}
           </span>
         ))}
@@ -93,6 +95,22 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
         ))}
       </div>
     </div>
+  );
+}
+
+/** The colour bar of a map, which sets its limits; as wide without one. */
+export function MapBar({ look, marked }: { look: Look | null; marked?: ReadonlySignal<number> }) {
+  const { looks } = useStore();
+  if (look === null) return <div class="colour-bar" />;
+  return (
+    <ColourBar
+      scale={look.scale.value}
+      colours={look.colours.value}
+      unit={look.product.unit}
+      values={look.frame}
+      {...(marked === undefined ? {} : { marked })}
+      onLimit={(limits) => looks.limit(look, limits)}
+    />
   );
 }
 

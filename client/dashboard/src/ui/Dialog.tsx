@@ -40,7 +40,7 @@ export function Dialog({ open, title, onClose, children }: DialogProps) {
     >
       {open && (
         <>
-          <div class="dialog-inside">
+          <div class="dialog-inside column">
             <h2>{title}</h2>
             {children}
           </div>

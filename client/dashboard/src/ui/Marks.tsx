@@ -36,7 +36,7 @@ function Crosshair({ of, width, height }: SizeProps & { of: "selected" | "pointe
   });
   if (style.value === null) return null;
   return (
-    <div class={`mark mark-${of}`} style={style.value} aria-hidden="true">
+    <div class={`mark cover mark-${of}`} style={style.value} aria-hidden="true">
       <i class="mark-column" />
       <i class="mark-row" />
       <i class="mark-pixel" />
@@ -56,7 +56,7 @@ function RegionMark({ width, height }: SizeProps) {
     seenAt(view, { x: (region.x1 + 1) / width, y: (region.y1 + 1) / height }),
   ];
   return (
-    <div class="mark" aria-hidden="true">
+    <div class="mark cover" aria-hidden="true">
       <i
         class="mark-region"
         style={{ left: percent(from.x), top: percent(from.y), width: percent(to.x - from.x), height: percent(to.y - from.y) }}
@@ -68,8 +68,8 @@ function RegionMark({ width, height }: SizeProps) {
 /** A polygon, its corners in shares of the picture; each corner is marked, so that the first ones are seen too. */
 function PolygonMark({ corners }: { corners: readonly Point[] }) {
   return (
-    <div class="mark" aria-hidden="true">
-      <svg class="mark-polygon" viewBox="0 0 1 1" preserveAspectRatio="none">
+    <div class="mark cover" aria-hidden="true">
+      <svg class="mark-polygon cover" viewBox="0 0 1 1" preserveAspectRatio="none">
         <polygon points={corners.map(({ x, y }) => `${x},${y}`).join(" ")} />
       </svg>
       {corners.map(({ x, y }, n) => (
@@ -82,7 +82,7 @@ function PolygonMark({ corners }: { corners: readonly Point[] }) {
 function Pins({ width, height }: SizeProps) {
   const { measures, viewport } = useStore();
   return (
-    <div class="mark" aria-hidden="true">
+    <div class="mark cover" aria-hidden="true">
       {measures.pins.value.map((pin) => {
         const at = seenAt(viewport.view.value, centreOf(pin, width, height));
         return (

@@ -147,7 +147,7 @@ export function Stage({ label, frame, children }: StageProps) {
         onDblClick={() => viewport.reset()}
         onKeyDown={onKeyDown}
       >
-        <div class="stage-zoom" style={style.value}>
+        <div class="stage-zoom cover" style={style.value}>
           {children}
           {frameless && <FirstFrame />}
         </div>

@@ -13,7 +13,7 @@ interface ChoiceProps<T extends string | number> {
 /** One of several, as a drop-down. */
 export function Choice<T extends string | number>({ label, chosen, of, text }: ChoiceProps<T>) {
   return (
-    <label class="choice">
+    <label class="choice inline-row">
       <span class="quiet choice-label unseen">{label}</span>
       <select
         value={String(chosen.value)}

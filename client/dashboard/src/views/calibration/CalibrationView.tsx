@@ -27,7 +27,7 @@ export function CalibrationView() {
   const doomed = deleting.value;
   return (
     <Panel name="calibration" title={<h2>Calibration</h2>} tools={<Import task={task} />}>
-      <div class="panel-body fades">
+      <div class="panel-body column fades">
         {job === null ? <MeasureForm task={task} /> : <Measuring job={job} task={task} />}
         <Obstacle />
         <TaskLine task={task} field="calibration-status" />
@@ -41,7 +41,7 @@ export function CalibrationView() {
         )}
         {calibrations.trouble.value !== null && <p class="refusal">{calibrations.trouble.value}</p>}
         {known !== null && (
-          <ul class="recording-list" aria-label="Calibrations">
+          <ul class="recording-list column" aria-label="Calibrations">
             <NominalRow active={known.active === "nominal"} task={task} />
             {known.calibrations.map((calibration) => (
               <CalibrationRow key={calibration.id} calibration={calibration} task={task} onDelete={() => (deleting.value = calibration)} />
@@ -87,12 +87,7 @@ function MeasureForm({ task }: { task: Task }) {
         onType={(text) => (frames.value = text)}
       />
       <div class="record-actions">
-        <Steer
-          submit
-          primary
-          title="Measure with the present sequence; no frames come meanwhile"
-          disabled={!sensible || task.busy.value !== null}
-        >
+        <Steer submit primary title="Measure with the present sequence; no frames come meanwhile" disabled={!sensible} task={task}>
           Measure
         </Steer>
       </div>
@@ -116,7 +111,7 @@ function Diffuser({ task }: { task: Task }) {
   return (
     <Steer
       title={`${words} of the simulated camera`}
-      disabled={task.busy.value !== null}
+      task={task}
       onClick={() => void task.run(`${words}…`, () => simulation.set({ diffuser: !world.diffusor }))}
     >
       {words}
@@ -132,7 +127,7 @@ function Undo({ former, calibrations: all, task }: { former: string; calibration
     <p class="calibration-undo">
       <Steer
         title="Calibrate frames by what was active before"
-        disabled={task.busy.value !== null}
+        task={task}
         onClick={() => void task.run("Switching…", () => calibrations.restore())}
       >
         Return to {called}
@@ -145,7 +140,7 @@ function Undo({ former, calibrations: all, task }: { former: string; calibration
 function Measuring({ job, task }: { job: JobDocument; task: Task }) {
   const { calibrations } = useStore();
   return (
-    <div class="measuring">
+    <div class="measuring wrapped">
       <span>
         Measuring: <span data-field="job-step">{job.step}</span>
       </span>

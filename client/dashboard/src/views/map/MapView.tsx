@@ -6,7 +6,7 @@ import type { Look } from "../../store/looks";
 import { MAP_PRODUCTS, type MapProduct } from "../../store/mapCatalogue";
 import { useStore } from "../../store/store";
 import type { ViewName } from "../../store/viewNames";
-import { ColourBar } from "../../ui/ColourBar";
+import { MapBar } from "../../ui/ColourBar";
 import { Check, Tabs } from "../../ui/controls";
 import { saveNumbers } from "../../ui/download";
 import { captionOf } from "../../ui/figure";
@@ -137,20 +137,9 @@ function MapPicture({ look, canvas }: MapProps) {
           <canvas ref={canvas} />
           {shown.unit === "m" && <Hatch />}
         </Stage>
-        {waiting.value ? (
-          <div class="colour-bar" />
-        ) : (
-          <ColourBar
-            scale={look.scale.value}
-            colours={look.colours.value}
-            unit={shown.unit}
-            values={frame}
-            marked={marked}
-            onLimit={(limits) => store.looks.limit(look, limits)}
-          />
-        )}
+        <MapBar look={waiting.value ? null : look} marked={marked} />
       </div>
-      <footer class="panel-foot">
+      <footer class="panel-foot column">
         <Readout key={shown.product} look={look} />
         <Measured look={look} />
       </footer>
@@ -172,5 +161,5 @@ function Hatch() {
       if (frame !== null) hatch(frame.values, columns, HATCH, new Uint32Array(buffer));
     });
   }, [trust]);
-  return <canvas ref={canvas} class="stage-hatch" title="Hatched: the range is not trusted" />;
+  return <canvas ref={canvas} class="stage-hatch cover" title="Hatched: the range is not trusted" />;
 }

@@ -38,7 +38,7 @@ function Search({ onDone }: { onDone: () => void }) {
     event.preventDefault();
   };
   return (
-    <div class="palette">
+    <div class="palette column">
       <input
         type="text"
         role="combobox"

@@ -10,7 +10,7 @@ import type { TransientLook } from "../../store/lightLook";
 import { aBoolean, aNumber, oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { frameUrl } from "../../stream/frameUrl";
-import { ColourBar } from "../../ui/ColourBar";
+import { MapBar } from "../../ui/ColourBar";
 import { Choice, Toggle } from "../../ui/controls";
 import { save, savePicture } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
@@ -165,7 +165,6 @@ export function PointsView() {
     }
   };
 
-  const bar = useComputed(() => ({ range: rangeLook, light: lightLook, validity: null, flight: null })[colouring.value]);
   const frameless = useComputed(() => range.value === null);
   const loading = useComputed(() => scene.value === null);
   return (
@@ -203,21 +202,11 @@ export function PointsView() {
         </div>
         {colouring.value === "flight" ? (
           <LightBar look={light} play="density" />
-        ) : bar.value === null ? (
-          <div class="colour-bar" />
         ) : (
-          <ColourBar
-            scale={bar.value.scale.value}
-            colours={bar.value.colours.value}
-            unit={bar.value.product.unit}
-            values={bar.value.frame}
-            onLimit={(limits) => {
-              if (bar.value !== null) store.looks.limit(bar.value, limits);
-            }}
-          />
+          <MapBar look={{ range: rangeLook, light: lightLook, validity: null }[colouring.value]} />
         )}
       </div>
-      <footer class="panel-foot">
+      <footer class="panel-foot column">
         <div class="panel-row">
           <span>
             <span data-field="points">{grouped(count.value)}</span> <span class="quiet">points</span>

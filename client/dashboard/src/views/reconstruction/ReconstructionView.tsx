@@ -35,7 +35,8 @@ export function ReconstructionView() {
       tools={
         <Steer
           title="Smoothing, bias and all else as the daemon has them by default"
-          disabled={task.busy.value !== null || current === null}
+          task={task}
+          disabled={current === null}
           onClick={() => void apply({}, current?.tag ?? null)}
         >
           The defaults
@@ -43,7 +44,7 @@ export function ReconstructionView() {
       }
     >
       <Form
-        class="panel-body fades"
+        class="panel-body column fades"
         onSubmit={() => {
           if ("settings" in reading) void apply(reading.settings, typed.peek()?.tag ?? current?.tag ?? null);
         }}
@@ -74,7 +75,7 @@ export function ReconstructionView() {
             >
               Undo
             </button>
-            <Steer submit primary disabled={wrong !== null || task.busy.value !== null}>
+            <Steer submit primary disabled={wrong !== null} task={task}>
               Apply
             </Steer>
           </div>

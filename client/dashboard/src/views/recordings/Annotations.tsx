@@ -22,8 +22,8 @@ export function Annotations({ recording, onClose }: { recording: RecordingDocume
   };
   return (
     <Dialog open title={`Notes on ${recording.name}`} onClose={onClose}>
-      <Form class="control" onSubmit={() => void write()}>
-        <div class="lines">
+      <Form class="control column" onSubmit={() => void write()}>
+        <div class="lines column">
           {lines.value.map(({ name, text }, at) => (
             <div key={at} class="line">
               <input

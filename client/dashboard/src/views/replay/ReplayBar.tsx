@@ -15,10 +15,12 @@ export function ReplayBar() {
   if (recording === null || timeline === null) return null;
   const playing = replay.playing.value;
   return (
-    <section class="replay" aria-label="Replay" data-frame={replay.shown.value ?? undefined}>
-      <div class="replay-name">
-        <strong title={recording.id}>{recording.name}</strong>
-        <span class={replay.trouble.value === null ? "quiet" : "refusal"} role="status" data-field="replay-status">
+    <section class="replay wrapped" aria-label="Replay" data-frame={replay.shown.value ?? undefined}>
+      <div class="replay-name column">
+        <strong class="clipped" title={recording.id}>
+          {recording.name}
+        </strong>
+        <span class={`small clipped ${replay.trouble.value === null ? "quiet" : "refusal"}`} role="status" data-field="replay-status">
           {replay.trouble.value ?? <CapturedAt started_s={timeline.started_s ?? recording.started_s} replay={replay} />}
         </span>
       </div>

@@ -102,7 +102,7 @@ export function ResponseView() {
           <Plot key={side.value} aspect={side.value} logarithmic={logarithmic} shown={shown} returns={returns} pointed={pointed} />
         )}
         {place.value !== null && (
-          <aside class="response-side fades" aria-label="What was found at the pixel" tabIndex={0}>
+          <aside class="response-side column fades" aria-label="What was found at the pixel" tabIndex={0}>
             <Found flags={flags} returns={returns} details={store.details.document.value} of={looked.value?.meta.frame ?? null} />
             <PixelFigures details={store.details.document.value} />
             <FlagWords flags={flags} looked={store.details.document.value !== null} />
@@ -196,9 +196,9 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
 
   const simulated = store.details.document.value?.truth != null;
   return (
-    <div class="response-plot-box">
+    <div class="response-plot-box column">
       <div class="response-plot" ref={box} data-empty={shown.value === null} data-aspect={aspect} />
-      <div class="key">
+      <div class="key wrapped small">
         {aspect === "bounds" && (
           <span class="key-band" title="Any light with these moments lies within them">
             bounds

@@ -69,7 +69,7 @@ interface AlertProps {
 
 function Alert({ about, mild = false, word, onClick, children }: AlertProps) {
   return (
-    <div class={mild ? "banner banner-mild" : "banner"} role="alert" data-banner={about}>
+    <div class={mild ? "wrapped banner banner-mild" : "wrapped banner"} role="alert" data-banner={about}>
       <p>{children}</p>
       {word !== undefined && (
         <button type="button" onClick={onClick}>

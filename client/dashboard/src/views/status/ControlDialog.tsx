@@ -34,7 +34,7 @@ function Control({ onDone }: { onDone: () => void }) {
   const take = (takeover: boolean): Promise<void> => act("Taking control…", () => lease.take(name.peek().trim(), takeover));
   return (
     <Form
-      class="control"
+      class="control column"
       onSubmit={() => {
         if (control.kind !== "us") void take(control.kind === "other");
       }}

@@ -23,7 +23,7 @@ function Saved({ onDone }: { onDone: () => void }) {
   const names = Object.keys(layouts.named.value);
   return (
     <Form
-      class="control"
+      class="control column"
       onSubmit={() => {
         layouts.save(name);
         onDone();
@@ -36,9 +36,9 @@ function Saved({ onDone }: { onDone: () => void }) {
           : "It is kept in this browser; a copied link shows it to others."}
       </p>
       {names.length > 0 && (
-        <ul class="saved-layouts" aria-label="Saved layouts">
+        <ul class="saved-layouts column" aria-label="Saved layouts">
           {names.map((each) => (
-            <li key={each}>
+            <li key={each} class="row">
               {each}
               <button type="button" aria-label={`Remove ${each}`} onClick={() => layouts.remove(each)}>
                 Remove

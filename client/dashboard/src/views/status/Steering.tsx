@@ -13,7 +13,7 @@ import "./Steering.css";
 export function Steering() {
   const store = useStore();
   return (
-    <div class="steering">
+    <div class="steering row">
       <RecordingSign />
       <ControlButton />
       {!store.replay.active.value && (
@@ -110,7 +110,7 @@ function Other({ holder, expires_s }: { holder: string; expires_s: number }) {
   const left_s = Math.max(0, Math.ceil(expires_s - useNow(1)));
   return (
     <>
-      <span class="control-holder">{holder}</span> <span class="quiet">{left_s} s</span>
+      <span class="control-holder clipped">{holder}</span> <span class="quiet">{left_s} s</span>
     </>
   );
 }
@@ -121,7 +121,7 @@ function RecordingSign() {
   const active = recordings.active.value;
   if (active === null) return null;
   return (
-    <span class="recording-sign" title={`${active.name} is being recorded`} data-field="recording-sign">
+    <span class="recording-sign inline-row" title={`${active.name} is being recorded`} data-field="recording-sign">
       <i aria-hidden="true" /> {fixed(active.duration_s, 0, "s")}
     </span>
   );

@@ -22,7 +22,7 @@ function TokenForm({ onDone }: { onDone: () => void }) {
   const recognised = caller.document.value;
   return (
     <Form
-      class="control"
+      class="control column"
       onSubmit={() => {
         credentials.use(text.peek());
         onDone();

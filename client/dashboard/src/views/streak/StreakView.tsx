@@ -78,7 +78,7 @@ export function StreakView() {
       ]}
     >
       <div class="streak">
-        <div class="streak-axis" aria-hidden="true">
+        <div class="streak-axis small quiet" aria-hidden="true">
           {ticks({ low: 0, high: period_ns, kind: "linear" }, 6).map((time_ns) => (
             <span key={time_ns} style={{ top: `${(100 * time_ns) / period_ns}%` }}>
               {fixed(time_ns, 0, "ns")}
@@ -98,16 +98,16 @@ export function StreakView() {
             if (event.button === 0) choose(event);
           }}
         >
-          <canvas ref={canvas} data-product="streak" />
+          <canvas ref={canvas} class="cover" data-product="streak" />
           <Marks width={width} />
         </div>
         {bright.value > 0 && (
           <ColourBar scale={scaleOf(tone.value, Number((bright.value * 1e-9).toPrecision(3)))} colours={colours.value} unit="DN/ns" />
         )}
       </div>
-      <footer class="panel-foot">
+      <footer class="panel-foot column">
         <div class="panel-row">
-          <label class="scanline">
+          <label class="scanline row">
             <span class="quiet">Scanline</span>
             <input
               type="range"
@@ -143,7 +143,11 @@ function Readout({ frame, streak, pointed, width, period_ns }: ReadoutProps) {
     const density = streak.values[at.bin * width + at.x] * 1e-9;
     return `column ${at.x} · ${fixed(time_ns, 1, "ns")} · ${fixed(rangeOfTime_m(time_ns * 1e-9), 2, "m")} · ${significant(density, 3, "DN/ns")}`;
   });
-  return <span data-field="streak">{text}</span>;
+  return (
+    <span class="clipped" data-field="streak">
+      {text}
+    </span>
+  );
 }
 
 /** The player's time and the selected column. */

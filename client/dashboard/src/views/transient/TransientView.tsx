@@ -92,7 +92,7 @@ export function TransientView() {
         {play === "density" ? <Picture look={look} /> : <LightSoFar look={look} />}
         <LightBar look={look} play={play} />
       </div>
-      <footer class="panel-foot">
+      <footer class="panel-foot column">
         <FilmProgress filming={filming} />
         <Timeline />
         <div class="panel-row">
