@@ -32,17 +32,7 @@ export class Poles {
     this.start = new Float64Array(area);
   }
 
-  /** Whether this room fits a picture. */
-  fits(c: Coefficients): boolean {
-    return this.harmonics === c.harmonics && this.area === c.width * c.height;
-  }
-
-  /** Finds the poles of every pixel of `c`, beginning at those found before. */
-  find(c: Coefficients): void {
-    for (let pixel = 0; pixel < this.area; pixel++) this.findOne(c, pixel, pixel);
-  }
-
-  /** Finds the poles of one pixel of `c` and keeps them in the place `at`. */
+  /** Finds the poles of one pixel of `c`, beginning at those found before in the place `at`, and keeps them there. */
   findOne(c: Coefficients, pixel: number, at: number): void {
     const { harmonics: m, values } = this;
     const area = c.width * c.height;

@@ -10,16 +10,8 @@ import type { Status } from "./status";
 /** Brings products of the frame at a path of the service; raises RequestError. */
 export type FrameLoader = (path: string, products: readonly string[]) => Promise<readonly FrameReport[]>;
 
-/** A recording's frames by number, and when each was captured after the first. */
-export interface Timeline {
-  readonly first: number;
-  readonly last: number;
-  readonly count: number;
-  readonly started_s: number | null;
-  /** Of every `step`-th frame. */
-  readonly times_s: readonly number[];
-  readonly step: number;
-}
+/** A recording's frames by number, and when each was captured after the first; of one that has frames. */
+export type Timeline = TimelineDocument & { readonly first: number; readonly last: number };
 
 /** Which settings a recorded frame is computed with: those it was recorded with, or those the service has now. */
 export type ReplaySettings = "recorded" | "current";
@@ -67,9 +59,8 @@ export class Replay {
 
   /** Shows a recording from a frame on, by default its first. Raises RequestError. */
   async open(id: string, frame?: number): Promise<void> {
-    const [recording, document] = await this.#read(id);
-    const timeline = timelineOf(document);
-    if (timeline === null) throw new RequestError({ detail: `${recording.name} holds no frames.` });
+    const [recording, timeline] = await this.#read(id);
+    if (!hasFrames(timeline)) throw new RequestError({ detail: `${recording.name} holds no frames.` });
     batch(() => {
       this.trouble.value = null;
       this.playing.value = false;
@@ -100,7 +91,7 @@ export class Replay {
   timeOf(frame: number): number {
     const timeline = this.timeline.peek();
     if (timeline === null) return 0;
-    const place = (frame - timeline.first) / timeline.step;
+    const place = (frame - timeline.first) / timeline.times_step;
     const [before, after] = [timeline.times_s[Math.floor(place)], timeline.times_s[Math.floor(place) + 1]];
     return after === undefined ? (before ?? timeline.times_s.at(-1) ?? 0) : before + (place % 1) * (after - before);
   }
@@ -200,12 +191,11 @@ export class Replay {
     const id = this.recording.peek()?.id;
     if (id === undefined) return;
     try {
-      const [recording, document] = await this.#read(id);
-      const timeline = timelineOf(document) ?? this.timeline.peek();
+      const [recording, timeline] = await this.#read(id);
       if (this.recording.peek()?.id !== id) return;
       batch(() => {
         this.recording.value = recording;
-        this.timeline.value = timeline;
+        if (hasFrames(timeline)) this.timeline.value = timeline;
       });
     } catch (error) {
       refusalIn(error);
@@ -214,6 +204,6 @@ export class Replay {
   }
 }
 
-function timelineOf({ first, last, count, host_time_s, times_s, times_step }: TimelineDocument): Timeline | null {
-  return first === null || last === null ? null : { first, last, count, started_s: host_time_s, times_s, step: times_step };
+function hasFrames(timeline: TimelineDocument): timeline is Timeline {
+  return timeline.first !== null && timeline.last !== null;
 }

@@ -157,11 +157,6 @@ export class StreamConnection {
     this.#connect();
   }
 
-  close(): void {
-    this.#clear();
-    this.#drop();
-  }
-
   #connect(): void {
     this.emit({ type: "connecting" });
     const socket = this.around.openSocket(this.url, SUBPROTOCOL);

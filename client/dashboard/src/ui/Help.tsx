@@ -1,16 +1,6 @@
-import { useStore } from "../store/store";
-import { SwitchedDialog } from "./Dialog";
+import type { Done } from "./Dialog";
 import { SHORTCUTS } from "./shortcuts";
 import "./Help.css";
-
-/** The keys of the page, over the page. */
-export function Help() {
-  return (
-    <SwitchedDialog open={useStore().help} title="Keys">
-      {(close) => <KeyList onDone={close} />}
-    </SwitchedDialog>
-  );
-}
 
 /** What pointer and keys do together in pictures. Words between ` are keys. */
 const TOGETHER: readonly (readonly [keys: string, words: string])[] = [
@@ -22,7 +12,8 @@ const TOGETHER: readonly (readonly [keys: string, words: string])[] = [
   ["arrows, + −", "in the points: turn, come nearer, go"],
 ];
 
-function KeyList({ onDone }: { onDone: () => void }) {
+/** The keys of the page, over the page. */
+export function Help({ onDone }: Done) {
   const keys = [...SHORTCUTS.map(({ shown, words }) => [`\`${shown}\``, words] as const), ...TOGETHER];
   return (
     <>

@@ -147,7 +147,17 @@ describe("a recording on the page", () => {
   });
 
   test("of very many frames tells the time of some, and the others lie between", () => {
-    screen.replay.timeline.value = { first: 1, last: 7, count: 7, started_s: 0, times_s: [0, 0.3, 0.9], step: 3 };
+    const times_s = [0, 0.3, 0.9];
+    screen.replay.timeline.value = {
+      first: 1,
+      last: 7,
+      count: 7,
+      duration_s: 0.9,
+      frame_rate_hz: null,
+      host_time_s: 0,
+      times_s,
+      times_step: 3,
+    };
     expect([1, 2, 4, 5, 6, 7].map((frame) => screen.replay.timeOf(frame))).toEqual(
       [0, 0.1, 0.3, 0.5, 0.7, 0.9].map((time) => expect.closeTo(time, 9)),
     );

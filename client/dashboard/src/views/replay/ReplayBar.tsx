@@ -21,7 +21,7 @@ export function ReplayBar() {
           {recording.name}
         </strong>
         <span class={`small clipped ${replay.trouble.value === null ? "quiet" : "refusal"}`} role="status" data-field="replay-status">
-          {replay.trouble.value ?? <CapturedAt started_s={timeline.started_s ?? recording.started_s} replay={replay} />}
+          {replay.trouble.value ?? <CapturedAt started_s={timeline.host_time_s ?? recording.started_s} replay={replay} />}
         </span>
       </div>
       <div class="replay-controls">

@@ -1,7 +1,7 @@
 import type { Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { Form, TextField } from "../../ui/controls";
-import { SwitchedDialog } from "../../ui/Dialog";
+import type { Done } from "../../ui/Dialog";
 import { useNow } from "../../ui/hooks";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
@@ -11,15 +11,7 @@ import "./ControlDialog.css";
 const LONGEST_NAME = 80;
 
 /** Who controls the camera, and the way to take control or give it back. */
-export function ControlDialog() {
-  return (
-    <SwitchedDialog open={useStore().asksForControl} title="Control">
-      {(close) => <Control onDone={close} />}
-    </SwitchedDialog>
-  );
-}
-
-function Control({ onDone }: { onDone: () => void }) {
+export function ControlDialog({ onDone }: Done) {
   const store = useStore();
   const { lease } = store;
   const name = store.settings.of(HOLDER);

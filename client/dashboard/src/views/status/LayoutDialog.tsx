@@ -3,19 +3,11 @@ import { LAYOUTS } from "../../store/layout";
 import { LONGEST_NAME } from "../../store/layouts";
 import { useStore } from "../../store/store";
 import { Form, TextField } from "../../ui/controls";
-import { SwitchedDialog } from "../../ui/Dialog";
+import type { Done } from "../../ui/Dialog";
 import "./LayoutDialog.css";
 
 /** Saves the present layout under a name, and removes saved ones. */
-export function LayoutDialog() {
-  return (
-    <SwitchedDialog open={useStore().asksForLayout} title="Layouts">
-      {(close) => <Saved onDone={close} />}
-    </SwitchedDialog>
-  );
-}
-
-function Saved({ onDone }: { onDone: () => void }) {
+export function LayoutDialog({ onDone }: Done) {
   const { layouts } = useStore();
   const text = useSignal("");
   const name = text.value.trim();

@@ -2,19 +2,11 @@ import { useSignal } from "@preact/signals";
 
 import { useStore } from "../../store/store";
 import { Form, TextField } from "../../ui/controls";
-import { SwitchedDialog } from "../../ui/Dialog";
+import type { Done } from "../../ui/Dialog";
 import { tokenWords } from "./words";
 
 /** Asks for the token that the service lets people in with. */
-export function TokenDialog() {
-  return (
-    <SwitchedDialog open={useStore().asksForToken} title="Authentication required">
-      {(close) => <TokenForm onDone={close} />}
-    </SwitchedDialog>
-  );
-}
-
-function TokenForm({ onDone }: { onDone: () => void }) {
+export function TokenDialog({ onDone }: Done) {
   const { api, caller } = useStore();
   const { credentials } = api;
   const text = useSignal("");
