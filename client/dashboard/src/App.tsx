@@ -2,6 +2,7 @@ import { effect } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 
 import { useStore } from "./store/store";
+import { SwitchedDialog } from "./ui/Dialog";
 import { Help } from "./ui/Help";
 import { shortcuts } from "./ui/shortcuts";
 import { Arrangement } from "./views/Arrangement";
@@ -31,11 +32,11 @@ export function App({ onRetry }: { onRetry: () => void }) {
       <Banner onRetry={onRetry} />
       <Arrangement />
       <ReplayBar />
-      <Help />
-      <Palette />
-      <LayoutDialog />
-      <ControlDialog />
-      <TokenDialog />
+      <SwitchedDialog open={store.help} title="Keys" inside={Help} />
+      <SwitchedDialog open={store.palette} title="All commands" inside={Palette} />
+      <SwitchedDialog open={store.asksForLayout} title="Layouts" inside={LayoutDialog} />
+      <SwitchedDialog open={store.asksForControl} title="Control" inside={ControlDialog} />
+      <SwitchedDialog open={store.asksForToken} title="Authentication required" inside={TokenDialog} />
       <FileDrop />
     </>
   );

@@ -5,15 +5,13 @@ import type { DensityRenderer, Exposure } from "./renderer";
 /** Draws with typed arrays on a 2D canvas, for browsers that refuse WebGL2 or emulate it. */
 export class TypedArrayRenderer implements DensityRenderer {
   readonly kind = "typed-array";
-  readonly #canvas: HTMLCanvasElement;
   readonly #context: CanvasRenderingContext2D;
   readonly #painter = new LightPainter();
   #image: ImageData | null = null;
 
-  constructor(canvas: HTMLCanvasElement) {
+  constructor(private readonly canvas: HTMLCanvasElement) {
     const context = canvas.getContext("2d", { alpha: false });
     if (context === null) throw new Error("This browser grants neither WebGL2 nor a 2D canvas.");
-    this.#canvas = canvas;
     this.#context = context;
   }
 
@@ -38,8 +36,8 @@ export class TypedArrayRenderer implements DensityRenderer {
 
   #imageOf(width: number, height: number): ImageData {
     if (this.#image?.width !== width || this.#image.height !== height) {
-      this.#canvas.width = width;
-      this.#canvas.height = height;
+      this.canvas.width = width;
+      this.canvas.height = height;
       this.#image = this.#context.createImageData(width, height);
     }
     return this.#image;

@@ -16,8 +16,6 @@ const APART = 1e-7;
 
 /** Poles and shares of every pixel of a picture. Eight numbers would do for two poles: (p, C) each as a pair. */
 export class Poles {
-  readonly harmonics: number;
-  readonly area: number;
   /** For each pixel m times: Re p, Im p, Re C, Im C. */
   readonly values: Float64Array;
   /** b_0 of each pixel; NaN where it has no density. */
@@ -25,25 +23,16 @@ export class Poles {
   /** S(0) of each pixel: 2 Im S(0). */
   readonly start: Float64Array;
 
-  constructor(harmonics: number, area: number) {
-    this.harmonics = harmonics;
-    this.area = area;
+  constructor(
+    readonly harmonics: number,
+    readonly area: number,
+  ) {
     this.values = new Float64Array(4 * harmonics * area);
     this.brightness = new Float64Array(area).fill(NaN);
     this.start = new Float64Array(area);
   }
 
-  /** Whether this room fits a picture. */
-  fits(c: Coefficients): boolean {
-    return this.harmonics === c.harmonics && this.area === c.width * c.height;
-  }
-
-  /** Finds the poles of every pixel of `c`, beginning at those found before. */
-  find(c: Coefficients): void {
-    for (let pixel = 0; pixel < this.area; pixel++) this.findOne(c, pixel, pixel);
-  }
-
-  /** Finds the poles of one pixel of `c` and keeps them in the place `at`. */
+  /** Finds the poles of one pixel of `c`, beginning at those found before in the place `at`, and keeps them there. */
   findOne(c: Coefficients, pixel: number, at: number): void {
     const { harmonics: m, values } = this;
     const area = c.width * c.height;

@@ -62,12 +62,15 @@ export function colourTable(name: ColourMapName): ColourTable {
   return table;
 }
 
-/** The colours of what lies beyond a scale, as RGBA bytes in one number (little endian, as all browsers are). */
+/** A colour as "1c0029", in RGBA bytes of one number (little endian, as all browsers are). */
+export function rgbaOf(hex: string): number {
+  const rgb = parseInt(hex, 16);
+  return (0xff000000 | ((rgb & 0xff) << 16) | (rgb & 0xff00) | (rgb >> 16)) >>> 0;
+}
+
+/** The colours of what lies beyond a scale, as `rgbaOf` has them. */
 export function beyond(name: ColourMapName): { readonly under: number; readonly over: number } {
-  const [under, over] = BEYOND[name].map((hex) => {
-    const rgb = parseInt(hex, 16);
-    return (0xff000000 | ((rgb & 0xff) << 16) | (rgb & 0xff00) | (rgb >> 16)) >>> 0;
-  });
+  const [under, over] = BEYOND[name].map(rgbaOf);
   return { under, over };
 }
 

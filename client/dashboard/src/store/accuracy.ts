@@ -2,7 +2,7 @@ import { computed, signal } from "@preact/signals";
 
 import type { ChoiceDocument, JobDocument, PlanRequest, TradeoffDocument } from "../stream/documents";
 import type { Problem } from "../stream/protocol";
-import { type Api, RequestError } from "./api";
+import { type Api, refusalIn } from "./api";
 import { followed } from "./jobs";
 
 /** What accuracy costs in time on the scene before the camera, and the choice that is looked at; null while there is none. */
@@ -20,17 +20,14 @@ export class Accuracy {
   /** Counts the scenes, and which of them the front is of. */
   readonly #scene = signal(0);
   readonly #predicted = signal(0);
-  readonly #api: Api;
 
-  constructor(api: Api) {
-    this.#api = api;
-  }
+  constructor(private readonly api: Api) {}
 
   /** Predicts the front; a page asks one question at a time. */
   async predict(): Promise<void> {
     const scene = this.#scene.peek();
     await this.#ask(
-      () => this.#api.startTradeoff(),
+      () => this.api.ask("POST /tradeoff/jobs", { body: { by: "range_error_m" } }),
       ({ result }) => {
         const soFar = result as TradeoffDocument | null;
         if (soFar === null || soFar.front.length === 0) return;
@@ -44,7 +41,7 @@ export class Accuracy {
   async plan(goal: PlanRequest): Promise<void> {
     this.looked.value = null; // it would seem to answer this question
     await this.#ask(
-      () => this.#api.startPlan(goal),
+      () => this.api.ask("POST /plan/jobs", { body: goal }),
       ({ result }) => {
         if (result !== null) this.looked.value = result as unknown as ChoiceDocument;
       },
@@ -53,7 +50,7 @@ export class Accuracy {
 
   async cancel(): Promise<void> {
     const job = this.job.peek();
-    if (job !== null) await this.#answer(() => this.#api.cancelJob(job.id));
+    if (job !== null) await this.#answer(() => this.api.ask("POST /jobs/{job}/cancel", { of: job.id }));
   }
 
   /** The camera stands before another scene: what was predicted is of the one before. */
@@ -66,7 +63,7 @@ export class Accuracy {
     this.problem.value = null;
     const started = await this.#answer(start);
     if (started === null) return;
-    const ended = await followed(this.#api, started, (job) => {
+    const ended = await followed(this.api, started, (job) => {
       this.job.value = job;
       seen(job);
     });
@@ -79,8 +76,7 @@ export class Accuracy {
     try {
       return await question();
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
-      this.problem.value = error.problem;
+      this.problem.value = refusalIn(error).problem;
       return null;
     }
   }

@@ -9,13 +9,10 @@ export type Step = (elapsed_s: number) => boolean;
  */
 export class AnimationLoop {
   readonly #steps: Step[] = [];
-  readonly #request: (callback: (now_ms: number) => void) => number;
   #asleep = true;
   #last_ms: number | null = null;
 
-  constructor(request: (callback: (now_ms: number) => void) => number) {
-    this.#request = request;
-  }
+  constructor(private readonly request: (callback: (now_ms: number) => void) => number) {}
 
   add(step: Step): void {
     this.#steps.push(step);
@@ -25,7 +22,7 @@ export class AnimationLoop {
   wake(): void {
     if (!this.#asleep) return;
     this.#asleep = false;
-    this.#request(this.#refresh);
+    this.request(this.#refresh);
   }
 
   readonly #refresh = (now_ms: number): void => {

@@ -1,24 +1,21 @@
 import { signal } from "@preact/signals";
 import type { CalibrationRequest, CalibrationsDocument, JobDocument, VerdictDocument } from "../stream/documents";
-import { type Api, plainWords, RequestError } from "./api";
+import { type Api, plainWords, refusalIn } from "./api";
 import { followed, hasEnded } from "./jobs";
+import { Known } from "./known";
 
 /** How often drift is looked at while the list is in sight. */
 const DRIFT_S = 15;
 
 /** The calibrations of the service, and the measurement of one. */
-export class Calibrations {
-  readonly document = signal<CalibrationsDocument | null>(null);
-  /** Why the list cannot be had; null if it can. */
-  readonly trouble = signal<string | null>(null);
+export class Calibrations extends Known<CalibrationsDocument> {
   /** The measurement that runs; null while none does. */
   readonly job = signal<JobDocument | null>(null);
   /** How the last measurement that this page followed ended, in words. */
   readonly outcome = signal<{ readonly words: string; readonly good: boolean } | null>(null);
-  readonly #api: Api;
 
-  constructor(api: Api) {
-    this.#api = api;
+  constructor(private readonly api: Api) {
+    super(() => api.ask("GET /calibrations"));
   }
 
   /** Keeps the list as it is at the service while it is looked at; the answer ends it. */
@@ -29,61 +26,48 @@ export class Calibrations {
     return () => clearInterval(timer);
   }
 
-  async refresh(): Promise<void> {
-    try {
-      this.document.value = await this.#api.calibrations();
-      this.trouble.value = null;
-    } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
-      this.trouble.value = error.message;
-    }
-  }
-
   async measure(wanted: CalibrationRequest): Promise<void> {
     this.outcome.value = null;
-    void this.#follow(await this.#api.measureCalibration(wanted));
+    void this.#follow(await this.api.ask("POST /calibrations", { body: wanted }));
   }
 
   async cancel(): Promise<void> {
     const job = this.job.peek();
-    if (job !== null) await this.#api.cancelJob(job.id);
+    if (job !== null) await this.api.ask("POST /jobs/{job}/cancel", { of: job.id });
   }
 
   async activate(id: string, force = false): Promise<void> {
-    await this.#api.activateCalibration(id, force);
-    await this.refresh();
+    await this.after(this.api.ask("PUT /calibrations/active", { body: { id, force } }));
   }
 
   /** Returns to the calibration that was active before. */
   async restore(): Promise<void> {
-    await this.#api.restoreCalibration();
+    await this.after(this.api.ask("POST /calibrations/active/undo"));
     this.outcome.value = null;
-    await this.refresh();
   }
 
   async take(file: Blob): Promise<void> {
-    await this.#api.importCalibration(file);
-    await this.refresh();
+    await this.after(this.api.ask("POST /calibrations/import", { body: file }));
   }
 
   async remove(id: string): Promise<void> {
-    await this.#api.deleteCalibration(id);
-    await this.refresh();
+    await this.after(this.api.ask("DELETE /calibrations/{calibration}", { of: id }));
   }
 
   /** Another client may have begun to measure. */
   async #findJob(): Promise<void> {
     if (this.job.peek() !== null) return;
     try {
-      const running = (await this.#api.jobs()).find((each) => each.kind === "calibration" && !hasEnded(each));
+      const { jobs } = await this.api.ask("GET /jobs");
+      const running = jobs.find((each) => each.kind === "calibration" && !hasEnded(each));
       if (running !== undefined) void this.#follow(running);
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
+      refusalIn(error); // the list says what is wrong
     }
   }
 
   async #follow(started: JobDocument): Promise<void> {
-    const ended = await followed(this.#api, started, (job) => (this.job.value = job));
+    const ended = await followed(this.api, started, (job) => (this.job.value = job));
     this.job.value = null;
     if (ended === null) return;
     this.outcome.value = outcomeOf(ended);

@@ -1,6 +1,6 @@
 import { computed, signal } from "@preact/signals";
 import type { InfoDocument } from "../stream/documents";
-import { type Api, RequestError } from "./api";
+import { type Api, refusalIn } from "./api";
 
 /** How often a service is looked at that prepares its kernels. */
 const PREPARING_MS = 1000;
@@ -17,20 +17,17 @@ export class Caller {
     const caller = this.document.value;
     return caller?.role === "viewer" ? `The token ${caller.name} is a viewer's` : null;
   });
-  readonly #api: Api;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(api: Api) {
-    this.#api = api;
-  }
+  constructor(private readonly api: Api) {}
 
   /** Asks the service, and again while it prepares its kernels. */
   async look(): Promise<void> {
     clearTimeout(this.#timer);
     try {
-      this.#info.value = await this.#api.info();
+      this.#info.value = await this.api.ask("GET /info");
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
+      refusalIn(error);
       this.forget();
     }
     clearTimeout(this.#timer);

@@ -6,7 +6,7 @@ import type { ErrorMessage, Hello, Notice, Problem } from "../stream/protocol";
 import type { FrameReport } from "../stream/summary";
 import type { Command, Report } from "../stream/worker";
 import type { AnimationLoop } from "./animation";
-import { kindOf, LIVE, liveFrame, RequestError } from "./api";
+import { kindOf, LIVE, liveFrame, RequestError, refusalIn } from "./api";
 import { inWords, lossWords, sequenceKey } from "./events";
 import { frameOf, isWhole } from "./frames";
 import type { Store } from "./store";
@@ -21,10 +21,6 @@ export interface WorkerPort {
 type Clock = () => number;
 
 export class StreamClient {
-  readonly #store: Store;
-  readonly #worker: WorkerPort;
-  readonly #loop: AnimationLoop;
-  readonly #now_s: Clock;
   /** Newest frame a product that is not drawn yet: what comes faster than the display replaces it. */
   readonly #pending = new Map<string, FrameReport>();
   /** Frames of recordings that are asked for, by their tickets. */
@@ -39,11 +35,12 @@ export class StreamClient {
   /** The worker knows that light stands or is measured. */
   #rests = false;
 
-  constructor(store: Store, worker: WorkerPort, loop: AnimationLoop, now_s: Clock = () => Date.now() / 1000) {
-    this.#store = store;
-    this.#worker = worker;
-    this.#loop = loop;
-    this.#now_s = now_s;
+  constructor(
+    private readonly store: Store,
+    private readonly worker: WorkerPort,
+    private readonly loop: AnimationLoop,
+    private readonly now_s: Clock = () => Date.now() / 1000,
+  ) {
     worker.onmessage = ({ data }) => this.#receive(data);
     loop.add(() => {
       this.#draw();
@@ -55,8 +52,8 @@ export class StreamClient {
 
   /** Connects, and keeps streaming what the store's views need. */
   open(url: string): void {
-    const { token } = this.#store.api.credentials;
-    let known = this.#store.frames.wanted.peek();
+    const { token } = this.store.api.credentials;
+    let known = this.store.frames.wanted.peek();
     let shown = token.peek();
     this.#send({ type: "open", url, products: known, token: shown });
     effect(() => {
@@ -65,28 +62,28 @@ export class StreamClient {
       this.#send({ type: "authenticate", token: shown });
     });
     effect(() => {
-      const wanted = this.#store.frames.wanted.value;
+      const wanted = this.store.frames.wanted.value;
       if (wanted === known) return;
       known = wanted;
-      this.#send({ type: "want", products: wanted });
+      this.#send({ type: "want", value: wanted });
     });
-    effect(() => this.#send({ type: "adapt", adapts: this.#store.adapts.value }));
+    effect(() => this.#send({ type: "adapt", value: this.store.adapts.value }));
     effect(() => {
-      const sight = this.#store.sight.value;
+      const sight = this.store.sight.value;
       clearTimeout(this.#looking);
-      this.#looking = setTimeout(() => this.#send({ type: "look", sight }), 1000 * SETTLED_S);
+      this.#looking = setTimeout(() => this.#send({ type: "look", value: sight }), 1000 * SETTLED_S);
     });
     effect(() => {
-      if (this.#store.held.value) void untracked(() => this.#complete());
-      this.#loop.wake();
+      if (this.store.held.value) void untracked(() => this.#complete());
+      this.loop.wake();
     });
     let replayed = false;
     effect(() => {
-      const active = this.#store.replay.active.value;
+      const active = this.store.replay.active.value;
       // Frames that waited meanwhile are old: ask for new ones.
-      if (replayed && !active) this.#send({ type: "want", products: known });
+      if (replayed && !active) this.#send({ type: "want", value: known });
       replayed = active;
-      this.#loop.wake();
+      this.loop.wake();
     });
   }
 
@@ -100,11 +97,11 @@ export class StreamClient {
   }
 
   #send(command: Command): void {
-    this.#worker.postMessage(command);
+    this.worker.postMessage(command);
   }
 
   #receive(report: Report): void {
-    const { status } = this.#store;
+    const { status } = this.store;
     switch (report.type) {
       case "connecting":
         status.connection.value = { kind: "connecting" };
@@ -114,11 +111,11 @@ export class StreamClient {
         break;
       case "refused":
         status.connection.value = { kind: "refused" };
-        this.#store.caller.forget();
-        this.#store.asksForToken.value = true;
+        this.store.caller.forget();
+        this.store.asksForToken.value = true;
         break;
       case "waiting":
-        status.connectionLost(report.reason, this.#now_s() + report.retry_s);
+        status.connectionLost(report.reason, this.now_s() + report.retry_s);
         break;
       case "camera":
         this.#takeCamera(report.document);
@@ -132,7 +129,7 @@ export class StreamClient {
         break;
       case "frame":
         this.#pending.set(report.message.product, report);
-        this.#loop.wake();
+        this.loop.wake();
         break;
       case "brought":
         this.#deliver(report.ticket, report.reports, report.problem);
@@ -146,19 +143,19 @@ export class StreamClient {
   }
 
   #greet(hello: Hello): void {
-    const { status } = this.#store;
+    const { status } = this.store;
     this.#takeSequence(hello.sequence);
     if (hello.session === this.#session) {
       status.subscribedAnew();
-      status.cameraIs(hello.camera.state, this.#now_s());
+      status.cameraIs(hello.camera.state, this.now_s());
     } else {
       this.#session = hello.session;
-      status.sessionOpened(hello.camera.state, this.#now_s());
+      status.sessionOpened(hello.camera.state, this.now_s());
       void this.#readCamera();
       void this.learnAbsent();
-      void this.#store.caller.look();
-      void this.#store.lease.look();
-      void this.#store.recordings.refresh();
+      void this.store.caller.look();
+      void this.store.lease.look();
+      void this.store.recordings.refresh();
     }
     clearTimeout(this.#filling);
     const soon = hello.camera.state === "streaming" && (hello.sequence?.capture_s ?? 0) < SOON_S;
@@ -167,7 +164,7 @@ export class StreamClient {
 
   /** A camera that stands still, or takes seconds for a frame, is shown by the newest frame there is. */
   async #fillIn(): Promise<void> {
-    const { api, frames, replay, status } = this.#store;
+    const { api, frames, replay, status } = this.store;
     const missing = (): string[] => frames.wanted.peek().filter((product) => frames.of(product).peek()?.origin !== LIVE);
     if (replay.active.peek() || missing().length === 0) return;
     try {
@@ -177,16 +174,16 @@ export class StreamClient {
       for (const report of reports) {
         if (!missing().includes(report.message.product)) continue; // the stream was quicker
         frames.put(frameOf(report));
-        status.frameDrawn(report.message.meta, this.#now_s());
+        status.frameDrawn(report.message.meta, this.now_s());
       }
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error; // the stream says what is wrong
+      refusalIn(error); // the stream says what is wrong
     }
   }
 
   /** Fetches all pixels of frames that are held and were sent in part. */
   async #complete(): Promise<void> {
-    const { frames, held } = this.#store;
+    const { frames, held } = this.store;
     for (const product of frames.wanted.peek()) {
       const shown = frames.of(product).peek();
       if (shown === null || shown.origin !== LIVE || isWhole(shown.meta)) continue;
@@ -194,81 +191,72 @@ export class StreamClient {
         const [report] = await this.#bring(liveFrame(shown.meta.frame), [product]);
         if (held.peek() && frames.of(product).peek() === shown) frames.put(frameOf(report));
       } catch (error) {
-        if (!(error instanceof RequestError)) throw error; // the service has it no more: it stays as it is
+        refusalIn(error); // the service has it no more: it stays as it is
       }
     }
   }
 
   #complain({ problem }: ErrorMessage): void {
     // A refused user is asked for a token; an error beside that would say nothing more.
-    if (TOKEN_PROBLEMS.includes(kindOf(problem))) this.#store.api.credentials.refused.value = problem;
+    if (TOKEN_PROBLEMS.includes(kindOf(problem))) this.store.api.credentials.refused.value = problem;
     else if (kindOf(problem) === UNKNOWN_PRODUCT) void this.learnAbsent();
-    else this.#store.status.unreadable.value = problem.detail ?? problem.title ?? null;
+    else this.store.status.unreadable.value = problem.detail ?? problem.title ?? null;
   }
 
   #notice(notice: Notice): void {
-    const { status } = this.#store;
+    const { events, sequence } = this.store;
     const shown = inWords(notice);
     // A calibration sets the sequence anew although it stays as it is.
-    const unchanged = notice.kind === "sequence-changed" && sameSequence(notice.sequence, this.#store.sequence.peek());
+    const unchanged = notice.kind === "sequence-changed" && sameSequence(notice.sequence, sequence.peek());
     const key = notice.kind === "sequence-changed" ? { key: sequenceKey(notice.sequence) } : {};
-    if (shown !== null && !unchanged) this.#store.events.tell(shown.words, shown.tone, key);
-    switch (notice.kind) {
-      case "dropped":
-        status.dropNotice(notice.channel, notice.total);
-        break;
-      case "lost-images":
-        status.lostImages.value += notice.count;
-        this.#store.events.tally("lost-images", notice.count, lossWords, "plain");
-        break;
-      case "camera-lost":
-        status.cameraIs("lost", this.#now_s(), notice.reason);
-        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
-        break;
-      case "light-arming":
-        status.cameraIs("arming", this.#now_s());
-        break;
-      case "light-off":
-        status.cameraIs("stopped", this.#now_s());
-        break;
-      case "camera-back":
-        status.cameraIs("streaming", this.#now_s());
-        void this.#readCamera();
-        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
-        break;
-      case "sequence-changed":
-        this.#takeSequence(notice.sequence);
-        void this.#store.caller.look(); // kernels may have to be prepared for it
-        // A calibration is good for some sequences only.
-        if (this.#store.calibrations.document.peek() !== null) void this.#store.calibrations.refresh();
-        break;
-      case "lease-changed":
-        void this.#store.lease.look();
-        break;
-      case "reconstruction-changed":
-        this.#store.replay.recompute();
-        void this.#store.caller.look();
-        if (this.#store.reconstruction.current.peek() !== null) void this.#store.reconstruction.refresh();
-        break;
-      case "calibration-changed":
-        if (this.#store.calibrations.document.peek() !== null) void this.#store.calibrations.refresh();
-        break;
-      case "simulation-changed":
-        this.#store.frames.sceneSince_s = status.serviceTime_s(this.#now_s());
-        this.#store.accuracy.sceneChanged();
-        this.#store.rangeErrors.sceneChanged();
-        this.#store.details.forget();
-        if (this.#store.simulation.world.peek() !== null) void this.#store.simulation.follow();
-        break;
-      case "recording-started":
-      case "recording-stopped":
-        void this.#store.recordings.refresh();
-        break;
-    }
+    if (shown !== null && !unchanged) events.tell(shown.words, shown.tone, key);
+    (this.#told[notice.kind] as ((notice: Notice) => void) | undefined)?.(notice);
   }
 
+  /** What the notices of the service change on the page, besides being told. */
+  readonly #told: { readonly [Kind in Notice["kind"]]?: (notice: Extract<Notice, { kind: Kind }>) => void } = {
+    dropped: ({ channel, total }) => this.store.status.dropNotice(channel, total),
+    "lost-images": ({ count }) => {
+      this.store.status.lostImages.value += count;
+      this.store.events.tally("lost-images", count, lossWords, "plain");
+    },
+    "camera-lost": ({ reason }) => {
+      this.store.status.cameraIs("lost", this.now_s(), reason);
+      void this.store.simulation.keepUp();
+    },
+    "light-arming": () => this.store.status.cameraIs("arming", this.now_s()),
+    "light-off": () => this.store.status.cameraIs("stopped", this.now_s()),
+    "camera-back": () => {
+      this.store.status.cameraIs("streaming", this.now_s());
+      void this.#readCamera();
+      void this.store.simulation.keepUp();
+    },
+    "sequence-changed": ({ sequence }) => {
+      this.#takeSequence(sequence);
+      void this.store.caller.look(); // kernels may have to be prepared for it
+      void this.store.calibrations.keepUp(); // which are good for some sequences only
+    },
+    "lease-changed": () => void this.store.lease.look(),
+    "reconstruction-changed": () => {
+      this.store.replay.recompute();
+      void this.store.caller.look();
+      void this.store.reconstruction.keepUp();
+    },
+    "calibration-changed": () => void this.store.calibrations.keepUp(),
+    "simulation-changed": () => {
+      const { frames, status, accuracy, rangeErrors, details, simulation } = this.store;
+      frames.sceneSince_s = status.serviceTime_s(this.now_s());
+      accuracy.sceneChanged();
+      rangeErrors.sceneChanged();
+      details.forget();
+      void simulation.keepUp();
+    },
+    "recording-started": () => void this.store.recordings.refresh(),
+    "recording-stopped": () => void this.store.recordings.refresh(),
+  };
+
   #takeSequence(sequence: AppliedDocument | null): void {
-    if (sequence !== null) this.#store.sequence.value = sequence;
+    if (sequence !== null) this.store.sequence.value = sequence;
   }
 
   /** What the stream does not say: what the camera is and can do. */
@@ -276,7 +264,7 @@ export class StreamClient {
     if (this.#asking) return;
     this.#asking = true;
     try {
-      this.#takeCamera(await this.#store.api.camera());
+      this.#takeCamera(await this.store.api.ask("GET /camera"));
     } catch {
       // Asked again when there is a connection again; the stream itself says that there is none.
     } finally {
@@ -286,52 +274,53 @@ export class StreamClient {
 
   /** Reads which products the camera does not have: before the first subscription, which asks for no other. */
   async learnAbsent(): Promise<void> {
-    const { api, frames } = this.#store;
+    const { api, frames } = this.store;
     try {
-      const absent = await api.absentProducts();
+      const { absent_products } = await api.ask("GET /info");
+      const absent = Object.fromEntries(absent_products.map(({ name, reason }) => [name, reason]));
       if (JSON.stringify(absent) !== JSON.stringify(frames.absent.peek())) frames.absent.value = absent;
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error; // the stream says what is wrong
+      refusalIn(error); // the stream says what is wrong
     }
   }
 
   #takeCamera(document: CameraDocument): void {
-    this.#store.camera.value = document;
-    if (document.simulated && this.#store.simulation.world.peek() === null) void this.#store.simulation.follow();
-    this.#store.status.cameraIs(document.state, this.#now_s(), document.reason);
+    this.store.camera.value = document;
+    if (document.simulated && this.store.simulation.world.peek() === null) void this.store.simulation.follow();
+    this.store.status.cameraIs(document.state, this.now_s(), document.reason);
   }
 
   #draw(): void {
-    if (this.#store.held.peek() || this.#store.replay.active.peek() || this.#pending.size === 0) return;
+    if (this.store.held.peek() || this.store.replay.active.peek() || this.#pending.size === 0) return;
     let newest = 0;
     let encode_s = 0;
     for (const report of this.#pending.values()) {
-      this.#store.frames.put(frameOf(report));
+      this.store.frames.put(frameOf(report));
       const { meta } = report.message;
       newest = Math.max(newest, meta.frame);
       encode_s += report.message.encode_s;
-      this.#store.status.frameDrawn(meta, this.#now_s());
+      this.store.status.frameDrawn(meta, this.now_s());
     }
-    this.#store.status.encode_s.value = encode_s;
+    this.store.status.encode_s.value = encode_s;
     this.#pending.clear();
     // Another client may have started the camera; or this frame was on its way when it stopped: read the state.
-    if (this.#store.status.cameraState.peek() !== "streaming") void this.#readCamera();
-    this.#send({ type: "acknowledge", frame: newest });
+    if (this.store.status.cameraState.peek() !== "streaming") void this.#readCamera();
+    this.#send({ type: "acknowledge", value: newest });
   }
 
   /** Counts how fluently the light of the stream moves; true while each refresh of the screen is to be counted. */
   #count(): boolean {
-    const { player, frames, held, replay, measures } = this.#store;
+    const { player, frames, held, replay, measures } = this.store;
     const measured = measures.pins.peek().length > 0 || measures.region.peek() !== null;
     const rests = !(player.playing.peek() || player.scrubbed.peek()) || measured || held.peek() || replay.active.peek();
-    if (rests !== this.#rests) this.#send({ type: "rest", rests });
+    if (rests !== this.#rests) this.#send({ type: "rest", value: rests });
     this.#rests = rests;
     if (rests || frames.of("coefficients").peek() === null) {
       this.#fluency.restart();
       return false;
     }
-    const pictures_hz = this.#fluency.refreshed(this.#now_s());
-    if (pictures_hz !== null) this.#send({ type: "moved", pictures_hz });
+    const pictures_hz = this.#fluency.refreshed(this.now_s());
+    if (pictures_hz !== null) this.#send({ type: "moved", value: pictures_hz });
     return true;
   }
 
@@ -353,7 +342,7 @@ export class StreamClient {
       return;
     }
     this.#brought.push(() => errand.resolve(reports));
-    this.#loop.wake();
+    this.loop.wake();
   }
 }
 

@@ -16,10 +16,8 @@ export class Credentials {
   readonly leaseId = signal<string | null>(null);
   /** Why the service refused the credentials; null while it accepts them. */
   readonly refused = signal<Problem | null>(null);
-  readonly #shelf: Shelf | null;
 
-  constructor(shelf: Shelf | null = null) {
-    this.#shelf = shelf;
+  constructor(private readonly shelf: Shelf | null = null) {
     try {
       this.token.value = shelf?.getItem(KEY) || null;
     } catch {
@@ -33,7 +31,7 @@ export class Credentials {
     this.refused.value = null;
     this.token.value = shown;
     try {
-      this.#shelf?.setItem(KEY, shown ?? "");
+      this.shelf?.setItem(KEY, shown ?? "");
     } catch {
       // It is asked for again after a reload, nothing else.
     }

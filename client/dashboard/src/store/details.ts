@@ -1,7 +1,8 @@
 import { batch, effect, type ReadonlySignal, signal, untracked } from "@preact/signals";
 
 import type { PixelDocument } from "../stream/documents";
-import { type Api, LIVE, liveFrame, RequestError } from "./api";
+import { frameUrl } from "../stream/frameUrl";
+import { type Api, LIVE, liveFrame, refusalIn } from "./api";
 import type { Frame } from "./frames";
 import type { Pixel } from "./pixel";
 
@@ -15,8 +16,6 @@ export class Details {
   readonly document = signal<PixelDocument | null>(null);
   /** The frame on screen that it was asked of, so that all that is shown of the pixel is of one frame. */
   readonly frame = signal<Frame | null>(null);
-  readonly #api: Api;
-  readonly #now_s: () => number;
   #place: Pixel | null = null;
   #newest: Frame | null = null;
   /** Where the frame is that the document is about, or that was last asked for. */
@@ -25,10 +24,10 @@ export class Details {
   #asked_s = -Infinity;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(api: Api, now_s: () => number = () => performance.now() / 1000) {
-    this.#api = api;
-    this.#now_s = now_s;
-  }
+  constructor(
+    private readonly api: Api,
+    private readonly now_s: () => number = () => performance.now() / 1000,
+  ) {}
 
   /** Keeps what is known of `pixel` as new as `frame`; the answer ends it. */
   follow(pixel: ReadonlySignal<Pixel | null>, frame: ReadonlySignal<Frame | null>): () => void {
@@ -61,7 +60,7 @@ export class Details {
       if (!isOld || this.#waits()) return;
     }
     this.#asking = true;
-    this.#asked_s = this.#now_s();
+    this.#asked_s = this.now_s();
     this.#origin = newest.origin;
     try {
       const answer = await this.#ask(place, newest);
@@ -69,7 +68,7 @@ export class Details {
       if (asked && this.#newest?.meta.sequence_id === answer.meta.sequence_id)
         batch(() => ([this.document.value, this.frame.value] = [answer, newest]));
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
+      refusalIn(error);
       this.forget(); // asked again with the next frame
     } finally {
       this.#asking = false;
@@ -79,18 +78,23 @@ export class Details {
 
   /** Asks about the very frame that is shown, as long as the service keeps it: it may be held here. */
   async #ask({ x, y }: Pixel, { origin, meta }: Frame): Promise<PixelDocument> {
-    if (origin !== LIVE) return this.#api.pixel(x, y, origin);
+    if (origin !== LIVE) return this.#pixel(x, y, origin);
     try {
-      return await this.#api.pixel(x, y, liveFrame(meta.frame));
+      return await this.#pixel(x, y, liveFrame(meta.frame));
     } catch (error) {
-      if (!(error instanceof RequestError) || !error.isGone) throw error;
-      return this.#api.pixel(x, y);
+      if (!refusalIn(error).isGone) throw error;
+      return this.#pixel(x, y, LIVE);
     }
+  }
+
+  /** Everything about one pixel of a frame but its curves, which the page computes itself. */
+  #pixel(x: number, y: number, frame: string): Promise<PixelDocument> {
+    return this.api.ask("GET /frames/{frame}/pixel", { at: frameUrl(frame, `pixel?x=${x}&y=${y}&bins=1`) });
   }
 
   /** Whether it is too soon to ask again; if so, it is asked when it is not: no other frame may come. */
   #waits(): boolean {
-    const left_s = PAUSE_S - (this.#now_s() - this.#asked_s);
+    const left_s = PAUSE_S - (this.now_s() - this.#asked_s);
     clearTimeout(this.#timer);
     if (left_s <= 0) return false;
     this.#timer = setTimeout(() => void this.#look(), 1000 * left_s);

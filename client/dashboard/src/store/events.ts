@@ -3,6 +3,7 @@ import { signal } from "@preact/signals";
 import { engineering, fixed, grouped } from "../scales/format";
 import type { AppliedDocument, SamplingDocument } from "../stream/documents";
 import type { Notice } from "../stream/protocol";
+import { refusalIn } from "./api";
 
 export type EventTone = "plain" | "good" | "bad";
 
@@ -32,13 +33,10 @@ const BURST_S = 30;
 
 export class Events {
   readonly all = signal<readonly Happening[]>([]);
-  readonly #now_s: () => number;
   readonly #bursts = new Map<string, { readonly number: number; count: number }>();
   #number = 0;
 
-  constructor(now_s: () => number = () => Date.now() / 1000) {
-    this.#now_s = now_s;
-  }
+  constructor(private readonly now_s: () => number = () => Date.now() / 1000) {}
 
   /**
    * Shows events that come in bursts: those within `BURST_S` of the first are shown as one.
@@ -48,7 +46,7 @@ export class Events {
   tally(kind: string, count: number, words: (count: number) => string, tone: EventTone): void {
     const burst = this.#bursts.get(kind);
     const happening = burst && this.all.peek().find(({ number }) => number === burst.number);
-    if (burst === undefined || happening === undefined || this.#now_s() - happening.at_s > BURST_S) {
+    if (burst === undefined || happening === undefined || this.now_s() - happening.at_s > BURST_S) {
       this.tell(words(count), tone);
       this.#bursts.set(kind, { number: this.#number, count });
       return;
@@ -60,14 +58,23 @@ export class Events {
   /** Shows an event; one of the same key that was shown just before stays in its place, with the remedy of either. */
   tell(words: string, tone: EventTone = "plain", more: Pick<Happening, "key" | "remedy"> = {}): void {
     const shown =
-      more.key === undefined ? undefined : this.all.peek().find(({ key, at_s }) => key === more.key && this.#now_s() - at_s < BURST_S);
+      more.key === undefined ? undefined : this.all.peek().find(({ key, at_s }) => key === more.key && this.now_s() - at_s < BURST_S);
     if (shown !== undefined) {
       this.all.value = this.all.peek().map((each) => (each === shown ? { ...each, ...more } : each));
       return;
     }
     this.#number += 1;
-    const happening = { number: this.#number, at_s: this.#now_s(), words, tone, ...more };
+    const happening = { number: this.#number, at_s: this.now_s(), words, tone, ...more };
     this.all.value = [...this.all.peek().slice(1 - MOST), happening];
+  }
+
+  /** Does something, and shows why it was refused where it was. */
+  async reported(work: () => Promise<unknown>): Promise<void> {
+    try {
+      await work();
+    } catch (error) {
+      this.tell(refusalIn(error).message, "bad");
+    }
   }
 }
 
@@ -97,62 +104,50 @@ export function lossReason(reason: string): string {
   return reason.replace(/^the camera was lost: /i, "");
 }
 
-/** A notice as a sentence; null for those that are shown otherwise. */
-export function inWords(notice: Notice): { words: string; tone: EventTone } | null {
-  switch (notice.kind) {
-    case "camera-lost":
-      return { words: notice.reason ? `The camera was lost: ${lossReason(notice.reason)}` : "The camera was lost.", tone: "bad" };
-    case "camera-back":
-      return { words: "The camera is back.", tone: "good" };
-    case "light-arming":
-      return { words: `The camera's light goes on in ${fixed(notice.in_s, 1, "s")}.`, tone: "bad" };
-    case "light-off":
-      return { words: `The light is off: ${notice.reason}.`, tone: "plain" };
-    case "light-unconfirmed":
-      return { words: `${notice.reason.charAt(0).toUpperCase()}${notice.reason.slice(1)}.`, tone: "bad" };
-    case "light-confirmed":
-      return { words: "Whether the light is off is known again.", tone: "plain" };
-    case "sequence-changed":
-      return { words: sequenceWords(notice.sequence), tone: "plain" };
-    case "reconstruction-changed":
-      return { words: "The settings of the reconstruction changed.", tone: "plain" };
-    case "simulation-changed": {
-      const chosen = Object.entries(notice.effects).map(([effect, choice]) => `${effect.replaceAll("-", " ")} ${choice}`);
-      return { words: `The camera stands before ${notice.scene}${chosen.length > 0 ? `, with ${chosen.join(", ")}` : ""}.`, tone: "plain" };
-    }
-    case "calibration-changed":
-      if (notice.warning) return { words: `The calibration may not hold: ${notice.warning}.`, tone: "bad" };
-      return UNMEASURED[notice.calibration_id] !== undefined
-        ? {
-            words: `${UNMEASURED[notice.calibration_id]} are used from now on.${notice.reason ? ` ${notice.reason}` : ""}`,
-            tone: notice.reason ? "bad" : "plain",
-          }
-        : { words: `The calibration ${notice.calibration_id} is used from now on.`, tone: "good" };
-    case "noise-differs":
-      return {
-        words: notice.reason ? `${notice.reason}.` : "The images are as noisy as stated again.",
-        tone: notice.reason ? "bad" : "good",
-      };
-    case "lease-changed":
-      return { words: leaseWords(notice), tone: "plain" };
-    case "recording-started":
-      return { words: "A recording began.", tone: "plain" };
-    case "recording-dropped":
-      return {
-        words: `The disk was too slow for ${grouped(notice.count)} ${notice.count === 1 ? "frame" : "frames"} of the recording.`,
-        tone: "bad",
-      };
-    case "disk-stalled":
-      return { words: "The disk of the recordings does not answer. Frames may be dropped.", tone: "bad" };
-    case "recording-stopped": {
-      const why = END_REASONS[notice.reason ?? ""] ?? "ended";
-      const tone = notice.problem ? "bad" : "good";
-      return { words: `The recording ${why}.${notice.problem ? ` ${notice.problem}` : ""}`, tone };
-    }
-    default:
-      return null; // drops and lost images have their figures
-  }
+/** A notice as a sentence; null for those that are shown otherwise: drops and lost images have their figures. */
+export function inWords(notice: Notice): Sentence | null {
+  return (WORDS[notice.kind] as ((notice: Notice) => Sentence) | undefined)?.(notice) ?? null;
 }
+
+interface Sentence {
+  readonly words: string;
+  readonly tone: EventTone;
+}
+
+const plain = (words: string): Sentence => ({ words, tone: "plain" });
+const good = (words: string): Sentence => ({ words, tone: "good" });
+const bad = (words: string): Sentence => ({ words, tone: "bad" });
+
+const WORDS: { readonly [Kind in Notice["kind"]]?: (notice: Extract<Notice, { kind: Kind }>) => Sentence } = {
+  "camera-lost": ({ reason }) => bad(reason ? `The camera was lost: ${lossReason(reason)}` : "The camera was lost."),
+  "camera-back": () => good("The camera is back."),
+  "light-arming": ({ in_s }) => bad(`The camera's light goes on in ${fixed(in_s, 1, "s")}.`),
+  "light-off": ({ reason }) => plain(`The light is off: ${reason}.`),
+  "light-unconfirmed": ({ reason }) => bad(`${reason.charAt(0).toUpperCase()}${reason.slice(1)}.`),
+  "light-confirmed": () => plain("Whether the light is off is known again."),
+  "sequence-changed": ({ sequence }) => plain(sequenceWords(sequence)),
+  "reconstruction-changed": () => plain("The settings of the reconstruction changed."),
+  "simulation-changed": ({ scene, effects }) => {
+    const chosen = Object.entries(effects).map(([effect, choice]) => `${effect.replaceAll("-", " ")} ${choice}`);
+    return plain(`The camera stands before ${scene}${chosen.length > 0 ? `, with ${chosen.join(", ")}` : ""}.`);
+  },
+  "calibration-changed": ({ warning, calibration_id, reason }) => {
+    if (warning) return bad(`The calibration may not hold: ${warning}.`);
+    const unmeasured = UNMEASURED[calibration_id];
+    if (unmeasured === undefined) return good(`The calibration ${calibration_id} is used from now on.`);
+    return reason ? bad(`${unmeasured} are used from now on. ${reason}`) : plain(`${unmeasured} are used from now on.`);
+  },
+  "noise-differs": ({ reason }) => (reason ? bad(`${reason}.`) : good("The images are as noisy as stated again.")),
+  "lease-changed": (notice) => plain(leaseWords(notice)),
+  "recording-started": () => plain("A recording began."),
+  "recording-dropped": ({ count }) =>
+    bad(`The disk was too slow for ${grouped(count)} ${count === 1 ? "frame" : "frames"} of the recording.`),
+  "disk-stalled": () => bad("The disk of the recordings does not answer. Frames may be dropped."),
+  "recording-stopped": ({ reason, problem }) => {
+    const words = `The recording ${END_REASONS[reason ?? ""] ?? "ended"}.`;
+    return problem ? bad(`${words} ${problem}`) : good(words);
+  },
+};
 
 /** Which multiples of the base frequency are measured: 1 to m, or others that a camera has of its own. */
 export function multiplesWords(harmonics: number, sampling: SamplingDocument | null | undefined): string {

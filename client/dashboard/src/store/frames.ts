@@ -1,9 +1,10 @@
 import { computed, type Signal, signal } from "@preact/signals";
 
 import type { Coefficients } from "../physics/maximumEntropy";
+import type { Span } from "../scales/scale";
 import { type Cut, has, type Numbers, spread } from "../stream/compact";
 import type { FrameDocument, FrameMeta } from "../stream/documents";
-import { coefficientsOf, type FrameReport, type LightSummary, type MapSummary } from "../stream/summary";
+import { coefficientsOf, type FrameReport, type LightSummary } from "../stream/summary";
 import { LIVE } from "./api";
 import type { Pixel } from "./pixel";
 
@@ -16,7 +17,8 @@ export interface Frame {
   readonly meta: FrameMeta;
   readonly shape: readonly number[];
   readonly values: Numbers;
-  readonly map: MapSummary | null;
+  /** Where most of the values of a map lie. */
+  readonly map: Span | null;
   readonly light: LightSummary | null;
   /** The same values as coefficients of Eq. (2), where they are that. */
   readonly coefficients: Coefficients | null;

@@ -1,7 +1,7 @@
 /** Long work of the service, followed to its end. */
 
 import type { JobDocument } from "../stream/documents";
-import { type Api, RequestError } from "./api";
+import { type Api, refusalIn } from "./api";
 
 /** How often a job is asked how far it is. */
 const LOOK_S = 0.4;
@@ -21,11 +21,10 @@ export async function followed(api: Api, started: JobDocument, seen: (job: JobDo
   while (!hasEnded(job)) {
     await new Promise((done) => setTimeout(done, 1000 * LOOK_S));
     try {
-      job = await api.job(job.id);
+      job = await api.ask("GET /jobs/{job}", { of: job.id });
       seen(job);
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
-      if (error.problem.status === 404) return null;
+      if (refusalIn(error).problem.status === 404) return null;
     }
   }
   return job;

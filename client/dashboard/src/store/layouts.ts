@@ -15,12 +15,13 @@ export class Layouts {
   /** By their names, in the order in which they were saved. */
   readonly named: Signal<Named>;
   readonly undoable = computed(() => this.#former.value.length > 0);
-  readonly #current: Signal<Layout>;
   readonly #former = signal<readonly Layout[]>([]);
   #last: Layout;
 
-  constructor(settings: Settings, current: Signal<Layout>) {
-    this.#current = current;
+  constructor(
+    settings: Settings,
+    private readonly current: Signal<Layout>,
+  ) {
     this.#last = current.peek();
     this.named = settings.of<Named>({ key: "layouts", initial: {}, accepts: isNamed });
     effect(() => {
@@ -32,7 +33,7 @@ export class Layouts {
 
   /** Keeps the present layout under a name; one that had it is replaced. */
   save(name: string): void {
-    this.named.value = { ...this.named.peek(), [name]: this.#current.peek() };
+    this.named.value = { ...this.named.peek(), [name]: this.current.peek() };
   }
 
   remove(name: string): void {
@@ -46,7 +47,7 @@ export class Layouts {
     if (former === undefined) return;
     this.#last = former; // this change itself is none that can be undone
     this.#former.value = others;
-    this.#current.value = former;
+    this.current.value = former;
   }
 
   #keep(before: Layout, now: Layout): void {

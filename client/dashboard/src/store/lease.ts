@@ -1,6 +1,6 @@
 import { computed, effect, signal, untracked } from "@preact/signals";
 import type { LeaseDocument } from "../stream/documents";
-import { type Api, RequestError } from "./api";
+import { type Api, refusalIn } from "./api";
 
 /** Who controls the camera; times are of this page's clock. */
 export type Control =
@@ -31,8 +31,6 @@ export class Lease {
   });
   /** How the page lost the lease without giving it back; null if it did not. */
   readonly lost = signal<string | null>(null);
-  readonly #api: Api;
-  readonly #now_s: () => number;
   #changing = false;
   /** Another read was requested meanwhile. */
   #missed = false;
@@ -40,9 +38,10 @@ export class Lease {
   #orphaned = false;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(api: Api, now_s: () => number = () => Date.now() / 1000) {
-    this.#api = api;
-    this.#now_s = now_s;
+  constructor(
+    private readonly api: Api,
+    private readonly now_s: () => number = () => Date.now() / 1000,
+  ) {
     effect(() => {
       const control = this.control.value;
       untracked(() => this.#arm(control));
@@ -52,8 +51,8 @@ export class Lease {
   /** Takes the lease, from its holder if `takeover` says so. Raises RequestError. */
   async take(holder: string, takeover: boolean): Promise<void> {
     await this.#alone(async () => {
-      const granted = await this.#api.takeLease({ holder, duration_s: DURATION_S, on_lapse: "stop", takeover });
-      this.#api.credentials.leaseId.value = granted.lease_id;
+      const granted = await this.api.ask("POST /lease", { body: { holder, duration_s: DURATION_S, on_lapse: "stop", takeover } });
+      this.api.credentials.leaseId.value = granted.lease_id;
       this.lost.value = null;
       this.#orphaned = false;
       this.#take(granted);
@@ -64,18 +63,18 @@ export class Lease {
   async release(): Promise<void> {
     await this.#alone(async () => {
       try {
-        const after = await this.#api.releaseLease();
-        this.#api.credentials.leaseId.value = null;
+        const after = await this.api.ask("DELETE /lease");
+        this.api.credentials.leaseId.value = null;
         this.#take(after);
       } catch (error) {
-        if (!(error instanceof RequestError) || error.kind !== "lease-lost") throw error;
+        if (refusalIn(error).kind !== "lease-lost") throw error;
       }
     });
   }
 
   /** Gives the lease back from a page that is being closed; the answer is ignored. */
   abandon(): void {
-    if (this.#api.credentials.leaseId.peek() !== null) this.#api.releaseLease(true).catch(() => undefined);
+    if (this.api.credentials.leaseId.peek() !== null) this.api.ask("DELETE /lease", { keepalive: true }).catch(() => undefined);
   }
 
   /** Looks who controls the camera, and renews what this page holds. */
@@ -84,13 +83,12 @@ export class Lease {
       this.#missed = true;
       return;
     }
-    const ours = this.#api.credentials.leaseId.peek();
+    const ours = this.api.credentials.leaseId.peek();
     try {
-      const found = await (ours === null ? this.#api.lease() : this.#api.renewLease());
-      if (this.#api.credentials.leaseId.peek() === ours) this.#take(found);
+      const found = await (ours === null ? this.api.ask("GET /lease") : this.api.ask("PUT /lease", { body: {} }));
+      if (this.api.credentials.leaseId.peek() === ours) this.#take(found);
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
-      if (error.kind === "lease-lost" && ours !== null) await this.#forget();
+      if (refusalIn(error).kind === "lease-lost" && ours !== null) await this.#forget();
       else this.#arm(this.control.peek(), RETRY_S);
     }
   }
@@ -116,14 +114,14 @@ export class Lease {
   }
 
   async #forget(): Promise<void> {
-    if (this.#api.credentials.leaseId.peek() === null) return;
-    this.#api.credentials.leaseId.value = null;
+    if (this.api.credentials.leaseId.peek() === null) return;
+    this.api.credentials.leaseId.value = null;
     this.#orphaned = true;
     await this.look();
   }
 
   #take({ held, holder, expires_in_s }: LeaseDocument): void {
-    const expires_s = this.#now_s() + (expires_in_s ?? 0);
+    const expires_s = this.now_s() + (expires_in_s ?? 0);
     if (this.#orphaned) {
       this.#orphaned = false;
       this.lost.value = held ? `${holder} has taken over control.` : "This page's control has lapsed.";
@@ -133,7 +131,7 @@ export class Lease {
     if (!held) this.control.value = { kind: "free" };
     else
       this.control.value = {
-        kind: this.#api.credentials.leaseId.peek() === null ? "other" : "us",
+        kind: this.api.credentials.leaseId.peek() === null ? "other" : "us",
         holder: holder ?? "Another client",
         expires_s,
       };
@@ -142,7 +140,7 @@ export class Lease {
   #arm(control: Control, within_s = Infinity): void {
     clearTimeout(this.#timer);
     if (control.kind !== "us" && control.kind !== "other") return;
-    const left_s = Math.max(0.5, control.expires_s - this.#now_s() + 0.2);
+    const left_s = Math.max(0.5, control.expires_s - this.now_s() + 0.2);
     const wait_s = Math.min(within_s, control.kind === "us" ? RENEW_S : Math.min(LOOK_S, left_s));
     this.#timer = setTimeout(() => void this.look(), 1000 * wait_s);
   }

@@ -17,16 +17,14 @@ export type LightOffState =
 /** Switches the light off, and does not give up before the service has confirmed it. */
 export class LightOff {
   readonly state = signal<LightOffState | null>(null);
-  readonly #api: Api;
-  readonly #done: (state: CameraState) => void;
   /** Counts presses: an answer to an earlier one changes nothing. */
   #press = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(api: Api, done: (state: CameraState) => void) {
-    this.#api = api;
-    this.#done = done;
-  }
+  constructor(
+    private readonly api: Api,
+    private readonly done: (state: CameraState) => void,
+  ) {}
 
   press(): void {
     this.withdraw();
@@ -44,8 +42,8 @@ export class LightOff {
   async #send(press: number): Promise<void> {
     let next: LightOffState | null = null;
     try {
-      const { state } = await this.#api.safeOff(AbortSignal.timeout(ANSWER_MS));
-      if (press === this.#press) this.#done(state);
+      const { state } = await this.api.ask("POST /acquisition/safe-off", { signal: AbortSignal.timeout(ANSWER_MS), keepalive: true });
+      if (press === this.#press) this.done(state);
     } catch (error) {
       const refused = error instanceof RequestError && [401, 403].includes(error.problem.status ?? 0);
       next = {

@@ -8,7 +8,8 @@ export interface MapProduct {
   readonly hint: string;
   readonly unit: string;
   readonly colours: ColourMapName;
-  readonly scale: ScaleKind;
+  /** Linear where it is absent. */
+  readonly scale?: ScaleKind;
   readonly decimals: number;
   /** Zero means something: limits lie evenly around it. */
   readonly signed?: boolean;
@@ -16,41 +17,16 @@ export interface MapProduct {
 
 /** The maps on offer, in the order of their tabs. */
 export const MAP_PRODUCTS: readonly MapProduct[] = [
-  {
-    product: "range",
-    name: "Range",
-    hint: "Distance to what the first light came from",
-    unit: "m",
-    colours: "viridis",
-    scale: "linear",
-    decimals: 3,
-  },
-  { product: "direct", name: "Direct", hint: "Light of the first return", unit: "DN", colours: "grey", scale: "linear", decimals: 1 },
-  {
-    product: "indirect",
-    name: "Indirect",
-    hint: "Light that took a longer way",
-    unit: "DN",
-    colours: "grey",
-    scale: "linear",
-    decimals: 1,
-  },
-  {
-    product: "brightness",
-    name: "Brightness",
-    hint: "All light: the zeroth moment",
-    unit: "DN",
-    colours: "grey",
-    scale: "linear",
-    decimals: 1,
-  },
+  { product: "range", name: "Range", hint: "Distance to what the first light came from", unit: "m", colours: "viridis", decimals: 3 },
+  { product: "direct", name: "Direct", hint: "Light of the first return", unit: "DN", colours: "grey", decimals: 1 },
+  { product: "indirect", name: "Indirect", hint: "Light that took a longer way", unit: "DN", colours: "grey", decimals: 1 },
+  { product: "brightness", name: "Brightness", hint: "All light: the zeroth moment", unit: "DN", colours: "grey", decimals: 1 },
   {
     product: "validity",
     name: "Validity",
     hint: "Smallest eigenvalue of the moments over b₀; below zero no light could have made them",
     unit: "1",
     colours: "coolwarm",
-    scale: "linear",
     decimals: 4,
     signed: true,
   },

@@ -1,6 +1,7 @@
 /** What is measured in the pictures by hand: pixels that are kept, and a region. */
 import type { Signal } from "@preact/signals";
 
+import { statistics } from "../physics/statistics";
 import { type Pixel, pixelOf, pixelText } from "./pixel";
 import type { Settings } from "./settings";
 
@@ -148,9 +149,5 @@ export function figuresOf(map: ArrayLike<number>, width: number, height: number,
       if (Number.isFinite(value)) values.push(value);
     }
   }
-  const count = values.length;
-  const mean = count === 0 ? NaN : values.reduce((sum, value) => sum + value, 0) / count;
-  // Two passes: the squares of ranges that differ by millimetres would cancel.
-  const squares = values.reduce((sum, value) => sum + (value - mean) ** 2, 0);
-  return { mean, std: count > 1 ? Math.sqrt(squares / (count - 1)) : NaN, count, pixels, values: Float64Array.from(values) };
+  return { ...statistics(values), count: values.length, pixels, values: Float64Array.from(values) };
 }

@@ -68,22 +68,19 @@ const SQUARED_WEIGHTS = (() => {
 
 /** The noise of products, each measured from when it is first asked for, as frames come. */
 export class Noises {
-  readonly #frames: Frames;
   readonly #all = new Map<string, Noise>();
 
-  constructor(frames: Frames) {
-    this.#frames = frames;
-  }
+  constructor(private readonly frames: Frames) {}
 
   of(product: string): Noise {
     const known = this.#all.get(product);
     if (known !== undefined) return known;
     const noise = new Noise();
     this.#all.set(product, noise);
-    const newest = this.#frames.of(product);
+    const newest = this.frames.of(product);
     effect(() => {
       const frame = newest.value;
-      if (frame !== null) untracked(() => noise.take(frame, this.#frames.sceneOf(frame.meta)));
+      if (frame !== null) untracked(() => noise.take(frame, this.frames.sceneOf(frame.meta)));
     });
     return noise;
   }

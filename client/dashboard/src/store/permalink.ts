@@ -1,7 +1,7 @@
 /** What is looked at, as the part of the address behind #: it can be kept, sent and typed. */
 import { effect } from "@preact/signals";
 
-import { RequestError } from "./api";
+import { refusalIn } from "./api";
 import type { LinkPart } from "./settings";
 import type { Store } from "./store";
 
@@ -91,13 +91,13 @@ async function open(store: Store, recording: string, frame: number | undefined):
     if (replay.recording.peek()?.id !== recording) await replay.open(recording, frame);
     else if (frame !== undefined) replay.seek(frame);
   } catch (error) {
-    if (!(error instanceof RequestError)) throw error;
-    if (error.problem.status === 401) {
+    const { problem, message } = refusalIn(error);
+    if (problem.status === 401) {
       await tokenOf(store);
       await open(store, recording, frame);
       return;
     }
-    status.unreadable.value = `The recording of this link cannot be shown: ${error.message}`;
+    status.unreadable.value = `The recording of this link cannot be shown: ${message}`;
   }
 }
 

@@ -2,7 +2,7 @@
 import { computed, effect, type ReadonlySignal, type Signal, signal } from "@preact/signals";
 
 import type { FrameMeta } from "../stream/documents";
-import { LIVE, liveFrame, RequestError } from "./api";
+import { LIVE, liveFrame, refusalIn } from "./api";
 import { type Frame, type Frames, frameOf } from "./frames";
 import type { Pixel } from "./pixel";
 import type { FrameLoader } from "./replay";
@@ -50,11 +50,14 @@ export class RangeErrors {
   readonly #of: ReadonlyMap<ErrorProduct, ReadonlySignal<Frame | null>>;
   readonly #brought: Signal<readonly Frame[]> = signal([]);
   readonly #scene = signal(0);
-  readonly #frames: Frames;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(frames: Frames, status: Status, replaying: ReadonlySignal<boolean>, held: ReadonlySignal<boolean>) {
-    this.#frames = frames;
+  constructor(
+    private readonly frames: Frames,
+    status: Status,
+    replaying: ReadonlySignal<boolean>,
+    held: ReadonlySignal<boolean>,
+  ) {
     const still = computed(() => replaying.value || held.value);
     /** Whether what is known of one frame holds for the one on screen. */
     const holds = (meta: FrameMeta): boolean => {
@@ -112,7 +115,7 @@ export class RangeErrors {
   /** Of the frame that is shown: where one of a recording is, its origin says. */
   async #request(status: Status, again: boolean): Promise<void> {
     const [timer, scene, began_ms] = [this.#timer, this.#scene.peek(), performance.now()];
-    const origin = this.#frames.of("range").peek()?.origin ?? LIVE;
+    const origin = this.frames.of("range").peek()?.origin ?? LIVE;
     const still = origin === LIVE ? liveFrame(status.newest.peek()?.frame ?? 0) : origin;
     try {
       // While frames come, the one on screen may be gone.
@@ -121,9 +124,8 @@ export class RangeErrors {
       const reports = [...first, ...((await this.loader?.(path, PRODUCTS.slice(1))) ?? [])];
       if (scene === this.#scene.peek()) this.#brought.value = reports.map((report) => frameOf(report, path));
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
       // A camera without errors is asked again with its next sequence; a frame may be gone already.
-      if (!error.isGone) return;
+      if (!refusalIn(error).isGone) return;
     }
     const pause_ms = Math.max(AGAIN_MS, SHARE_OF_TIME * (performance.now() - began_ms));
     if (again && this.#timer === timer) this.#timer = setTimeout(() => void this.#request(status, again), pause_ms);

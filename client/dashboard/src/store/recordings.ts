@@ -1,6 +1,7 @@
-import { computed, effect, signal, untracked } from "@preact/signals";
+import { computed, effect, untracked } from "@preact/signals";
 import type { RecordingDocument, RecordingRequest, RecordingsDocument } from "../stream/documents";
-import { type Api, RequestError } from "./api";
+import { type Api, refusalIn } from "./api";
+import { Known } from "./known";
 
 /** How often one that runs is looked at. */
 const LOOK_MS = 1000;
@@ -9,20 +10,16 @@ const LOOK_MS = 1000;
 export const PAST_S = 10;
 
 /** The recordings of the service, as the page last saw them. */
-export class Recordings {
-  readonly document = signal<RecordingsDocument | null>(null);
-  /** Why the list cannot be had; null if it can. */
-  readonly trouble = signal<string | null>(null);
+export class Recordings extends Known<RecordingsDocument> {
   /** The one that runs; null while none does. */
   readonly active = computed((): RecordingDocument | null => {
     const { active = null, recordings = [] } = this.document.value ?? {};
     return recordings.find(({ id }) => id === active) ?? null;
   });
-  readonly #api: Api;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(api: Api) {
-    this.#api = api;
+  constructor(private readonly api: Api) {
+    super(() => api.ask("GET /recordings"));
     effect(() => {
       const running = this.active.value?.id;
       clearTimeout(this.#timer);
@@ -32,21 +29,8 @@ export class Recordings {
     });
   }
 
-  /** Reads the list anew. */
-  async refresh(): Promise<void> {
-    try {
-      this.document.value = await this.#api.recordings();
-      this.trouble.value = null;
-    } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
-      this.trouble.value = error.message;
-    }
-  }
-
-  async start(wanted: RecordingRequest): Promise<RecordingDocument> {
-    const started = await this.#api.startRecording(wanted);
-    await this.refresh();
-    return started;
+  start(wanted: RecordingRequest): Promise<RecordingDocument> {
+    return this.after(this.api.ask("POST /recordings", { body: wanted }));
   }
 
   /** Keeps what the service still holds of the last seconds. */
@@ -56,26 +40,25 @@ export class Recordings {
   }
 
   async stop(id: string): Promise<void> {
-    this.#put(await this.#api.stopRecording(id));
+    this.#put(await this.api.ask("POST /recordings/{recording}/stop", { of: id }));
     await this.refresh();
   }
 
   async annotate(id: string, annotations: Readonly<Record<string, unknown>>): Promise<void> {
-    this.#put(await this.#api.annotateRecording(id, annotations));
+    this.#put(await this.api.ask("PATCH /recordings/{recording}", { of: id, body: { annotations } }));
   }
 
   async remove(id: string): Promise<void> {
-    await this.#api.deleteRecording(id);
-    await this.refresh();
+    await this.after(this.api.ask("DELETE /recordings/{recording}", { of: id }));
   }
 
   async #look(id: string): Promise<void> {
     try {
-      const document = await this.#api.recording(id);
+      const document = await this.api.ask("GET /recordings/{recording}", { of: id });
       if (document.state === "recording") this.#put(document);
       else await this.refresh();
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
+      refusalIn(error);
       await this.refresh();
     }
   }

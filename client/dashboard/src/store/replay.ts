@@ -3,23 +3,15 @@ import { batch, computed, effect, signal, untracked } from "@preact/signals";
 import type { RecordingDocument, TimelineDocument } from "../stream/documents";
 import { LEAST_PRODUCTS } from "../stream/protocol";
 import type { FrameReport } from "../stream/summary";
-import { type Api, RequestError, recordingPath } from "./api";
+import { type Api, RequestError, recordingPath, refusalIn } from "./api";
 import { type Frames, frameOf } from "./frames";
 import type { Status } from "./status";
 
 /** Brings products of the frame at a path of the service; raises RequestError. */
 export type FrameLoader = (path: string, products: readonly string[]) => Promise<readonly FrameReport[]>;
 
-/** A recording's frames by number, and when each was captured after the first. */
-export interface Timeline {
-  readonly first: number;
-  readonly last: number;
-  readonly count: number;
-  readonly started_s: number | null;
-  /** Of every `step`-th frame. */
-  readonly times_s: readonly number[];
-  readonly step: number;
-}
+/** A recording's frames by number, and when each was captured after the first; of one that has frames. */
+export type Timeline = TimelineDocument & { readonly first: number; readonly last: number };
 
 /** Which settings a recorded frame is computed with: those it was recorded with, or those the service has now. */
 export type ReplaySettings = "recorded" | "current";
@@ -45,9 +37,6 @@ export class Replay {
   readonly active = computed(() => this.recording.value !== null);
   /** Set by what talks to the worker. */
   loader: FrameLoader | null = null;
-  readonly #api: Api;
-  readonly #frames: Frames;
-  readonly #status: Status;
   /** Where playing has come to, in s since the recording began. */
   #at_s = 0;
   #loading = false;
@@ -56,22 +45,22 @@ export class Replay {
   #recomputed = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(api: Api, frames: Frames, status: Status) {
-    this.#api = api;
-    this.#frames = frames;
-    this.#status = status;
+  constructor(
+    private readonly api: Api,
+    private readonly frames: Frames,
+    private readonly status: Status,
+  ) {
     effect(() => {
       if (this.recording.value === null || this.timeline.value === null) return;
-      void [this.frame.value, this.settings.value, this.#frames.wanted.value];
+      void [this.frame.value, this.settings.value, this.frames.wanted.value];
       untracked(() => void this.#load());
     });
   }
 
   /** Shows a recording from a frame on, by default its first. Raises RequestError. */
   async open(id: string, frame?: number): Promise<void> {
-    const [recording, document] = await Promise.all([this.#api.recording(id), this.#api.timeline(id)]);
-    const timeline = timelineOf(document);
-    if (timeline === null) throw new RequestError({ detail: `${recording.name} holds no frames.` });
+    const [recording, timeline] = await this.#read(id);
+    if (!hasFrames(timeline)) throw new RequestError({ detail: `${recording.name} holds no frames.` });
     batch(() => {
       this.trouble.value = null;
       this.playing.value = false;
@@ -94,7 +83,7 @@ export class Replay {
       this.timeline.value = null;
       this.shown.value = null;
       this.trouble.value = null;
-      this.#status.newest.value = null; // a frame of the camera may have the same number
+      this.status.newest.value = null; // a frame of the camera may have the same number
     });
   }
 
@@ -102,7 +91,7 @@ export class Replay {
   timeOf(frame: number): number {
     const timeline = this.timeline.peek();
     if (timeline === null) return 0;
-    const place = (frame - timeline.first) / timeline.step;
+    const place = (frame - timeline.first) / timeline.times_step;
     const [before, after] = [timeline.times_s[Math.floor(place)], timeline.times_s[Math.floor(place) + 1]];
     return after === undefined ? (before ?? timeline.times_s.at(-1) ?? 0) : before + (place % 1) * (after - before);
   }
@@ -149,7 +138,7 @@ export class Replay {
   /** One frame at a time: what is wanted meanwhile replaces what was. */
   async #load(): Promise<void> {
     const recording = this.recording.peek();
-    const wantedByViews = this.#frames.wanted.peek();
+    const wantedByViews = this.frames.wanted.peek();
     const products = wantedByViews.length === 0 ? LEAST_PRODUCTS : wantedByViews;
     if (recording === null || this.loader === null || this.#loading) return;
     const frame = this.frame.peek();
@@ -161,9 +150,9 @@ export class Replay {
       const reports = await this.loader(path, products);
       if (this.recording.peek()?.id === recording.id) this.#show(frame, path, reports);
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
+      const { message } = refusalIn(error);
       if (this.recording.peek()?.id === recording.id) {
-        this.trouble.value = error.message;
+        this.trouble.value = message;
         this.playing.value = false;
       }
     } finally {
@@ -176,15 +165,19 @@ export class Replay {
   #show(frame: number, path: string, reports: readonly FrameReport[]): void {
     batch(() => {
       this.trouble.value = null;
-      for (const report of reports) this.#frames.put(frameOf(report, path));
+      for (const report of reports) this.frames.put(frameOf(report, path));
       this.shown.value = frame;
       const meta = reports.at(-1)?.message.meta;
       if (meta !== undefined)
-        this.#status.frameReplayed(
+        this.status.frameReplayed(
           meta,
           reports.reduce((sum, { message }) => sum + message.encode_s, 0),
         );
     });
+  }
+
+  #read(of: string): Promise<[RecordingDocument, TimelineDocument]> {
+    return Promise.all([this.api.ask("GET /recordings/{recording}", { of }), this.api.ask("GET /recordings/{recording}/frames", { of })]);
   }
 
   /** A recording that is still being written has more frames by and by. */
@@ -198,20 +191,19 @@ export class Replay {
     const id = this.recording.peek()?.id;
     if (id === undefined) return;
     try {
-      const [recording, document] = await Promise.all([this.#api.recording(id), this.#api.timeline(id)]);
-      const timeline = timelineOf(document) ?? this.timeline.peek();
+      const [recording, timeline] = await this.#read(id);
       if (this.recording.peek()?.id !== id) return;
       batch(() => {
         this.recording.value = recording;
-        this.timeline.value = timeline;
+        if (hasFrames(timeline)) this.timeline.value = timeline;
       });
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
+      refusalIn(error);
     }
     this.#watchGrowth();
   }
 }
 
-function timelineOf({ first, last, count, host_time_s, times_s, times_step }: TimelineDocument): Timeline | null {
-  return first === null || last === null ? null : { first, last, count, started_s: host_time_s, times_s, step: times_step };
+function hasFrames(timeline: TimelineDocument): timeline is Timeline {
+  return timeline.first !== null && timeline.last !== null;
 }

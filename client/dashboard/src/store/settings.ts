@@ -38,15 +38,12 @@ export interface LinkPart {
 }
 
 export class Settings {
-  readonly #shelf: Shelf | null;
   readonly #values = new Map<object, unknown>();
   readonly #parts: LinkPart[] = [];
   /** What the last link said: also to settings of views that are shown later. */
   #said = new URLSearchParams();
 
-  constructor(shelf: Shelf | null) {
-    this.#shelf = shelf;
-  }
+  constructor(private readonly shelf: Shelf | null) {}
 
   /** The value of a setting, the same for all who ask. */
   of<T>(setting: Setting<T>): Signal<T> {
@@ -91,7 +88,7 @@ export class Settings {
 
   #remember<T>(value: Signal<T>, key: string, { accepts }: Setting<T>): void {
     try {
-      const stored: unknown = JSON.parse(this.#shelf?.getItem(key) ?? "null");
+      const stored: unknown = JSON.parse(this.shelf?.getItem(key) ?? "null");
       if (accepts?.(stored)) value.value = stored;
     } catch {
       // What cannot be read is not remembered.
@@ -99,7 +96,7 @@ export class Settings {
     effect(() => {
       const text = JSON.stringify(value.value);
       try {
-        this.#shelf?.setItem(key, text);
+        this.shelf?.setItem(key, text);
       } catch {
         // A full or refused store loses the setting, nothing else.
       }

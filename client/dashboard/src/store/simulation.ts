@@ -1,6 +1,6 @@
 import { signal } from "@preact/signals";
-import type { ExplanationDocument, FaultRequest, SimulationDocument } from "../stream/documents";
-import { type Api, RequestError } from "./api";
+import type { ExplanationDocument, FaultRequest, SimulationDocument, SimulationRequest } from "../stream/documents";
+import { type Api, refusalIn } from "./api";
 
 export type EffectChoice = SimulationDocument["effects"][string];
 export type Fault = FaultRequest["fault"];
@@ -12,21 +12,17 @@ export class Simulation {
   readonly explanation = signal<ExplanationDocument | null>(null);
   /** Why there is nothing to show. */
   readonly trouble = signal<string | null>(null);
-  readonly #api: Api;
 
-  constructor(api: Api) {
-    this.#api = api;
-  }
+  constructor(private readonly api: Api) {}
 
   async refresh(): Promise<void> {
     try {
-      const [world, explanation] = await Promise.all([this.#api.simulation(), this.#api.explanation()]);
+      const [world, explanation] = await Promise.all([this.api.ask("GET /simulation"), this.api.ask("GET /simulation/explain")]);
       this.world.value = world;
       this.explanation.value = explanation;
       this.trouble.value = null;
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
-      this.trouble.value = error.message;
+      this.trouble.value = refusalIn(error).message;
     }
   }
 
@@ -34,44 +30,30 @@ export class Simulation {
   async follow(): Promise<void> {
     if (this.explanation.peek() !== null) return this.refresh();
     try {
-      this.world.value = await this.#api.simulation();
+      this.world.value = await this.api.ask("GET /simulation");
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error; // read again with the next change
+      refusalIn(error); // read again with the next change
     }
   }
 
-  /** Puts the camera before another scene; effects that were chosen stay chosen. */
-  async stage(scene: string): Promise<void> {
-    await this.#api.setSimulation({ scene });
-    await this.refresh();
+  /** The same where it was read before. */
+  async keepUp(): Promise<void> {
+    if (this.world.peek() !== null) await this.follow();
   }
 
-  /** Puts the camera before a scene of one's own: the text of its file. */
-  async stageOwn(definition: string): Promise<void> {
-    await this.#api.setSimulation({ definition });
-    await this.refresh();
-  }
-
-  /** Puts filter and diffuser before the lens, or takes them away. */
-  async putDiffuser(diffuser: boolean): Promise<void> {
-    await this.#api.setSimulation({ diffuser });
+  /** Changes the world: the scene, effects that are forced, the diffuser before the lens. Answered once it is prepared; what is absent stays as it is. */
+  async set(wanted: SimulationRequest): Promise<void> {
+    await this.api.ask("PUT /simulation", { body: wanted });
     await this.refresh();
   }
 
   /** Forces an effect on or off, or leaves it to the scene. */
   async choose(effect: string, choice: EffectChoice | null): Promise<void> {
     const { [effect]: _, ...others } = this.world.peek()?.effects ?? {};
-    await this.#api.setSimulation({ effects: choice === null ? others : { ...others, [effect]: choice } });
-    await this.refresh();
-  }
-
-  /** Leaves all effects to the scene. */
-  async chooseNothing(): Promise<void> {
-    await this.#api.setSimulation({ effects: {} });
-    await this.refresh();
+    await this.set({ effects: choice === null ? others : { ...others, [effect]: choice } });
   }
 
   async cause(fault: Fault): Promise<void> {
-    this.world.value = await this.#api.cause(fault);
+    this.world.value = await this.api.ask("POST /simulation/faults", { body: { fault } });
   }
 }

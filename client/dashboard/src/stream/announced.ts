@@ -13,9 +13,6 @@ export interface Announcement {
 }
 
 export class Announced {
-  readonly #bring: (announcement: Announcement) => Promise<ArrayBuffer>;
-  readonly #take: (body: ArrayBuffer) => void;
-  readonly #miss: (announcement: Announcement, error: unknown) => void;
   #waiting: Announcement[] = [];
   /** The frame that was begun. */
   #frame = 0;
@@ -29,14 +26,10 @@ export class Announced {
   #round = 0;
 
   constructor(
-    bring: (announcement: Announcement) => Promise<ArrayBuffer>,
-    take: (body: ArrayBuffer) => void,
-    miss: (announcement: Announcement, error: unknown) => void,
-  ) {
-    this.#bring = bring;
-    this.#take = take;
-    this.#miss = miss;
-  }
+    private readonly bring: (announcement: Announcement) => Promise<ArrayBuffer>,
+    private readonly take: (body: ArrayBuffer) => void,
+    private readonly miss: (announcement: Announcement, error: unknown) => void,
+  ) {}
 
   /** Brings a product of a frame of which so many are announced. */
   add(announcement: Announcement, products: number): void {
@@ -66,11 +59,11 @@ export class Announced {
     this.#busy = true;
     for (let next = this.#next(); next !== undefined; next = this.#next()) {
       this.#bringing = next.frame;
-      const brought = await this.#bring(next).catch((error: unknown) => error);
+      const brought = await this.bring(next).catch((error: unknown) => error);
       if (round !== this.#round) return;
       this.#bringing = null;
-      if (brought instanceof ArrayBuffer) this.#take(brought);
-      else this.#miss(next, brought);
+      if (brought instanceof ArrayBuffer) this.take(brought);
+      else this.miss(next, brought);
       if (round !== this.#round) return; // what came of it was that something else is asked for
     }
     this.#busy = false;

@@ -67,9 +67,6 @@ const NOT_LET_IN = 4003;
 const SILENCE_S = 3;
 
 export class StreamConnection {
-  readonly #url: string;
-  readonly #around: Surroundings;
-  readonly #emit: (event: ConnectionEvent) => void;
   #products: readonly string[] = [];
   #token: string | null = null;
   #refused = false;
@@ -89,10 +86,11 @@ export class StreamConnection {
   #large = false;
   #refusesRequests = false;
 
-  constructor(url: string, around: Surroundings, emit: (event: ConnectionEvent) => void) {
-    this.#url = url;
-    this.#around = around;
-    this.#emit = emit;
+  constructor(
+    private readonly url: string,
+    private readonly around: Surroundings,
+    private readonly emit: (event: ConnectionEvent) => void,
+  ) {
     this.#announced = new Announced(
       (announcement) => around.bring(announcement, queryOf(this.#cut)),
       (body) => this.#receive(body),
@@ -135,7 +133,7 @@ export class StreamConnection {
     const done = Math.min(frame, this.#announced.done); // the service keeps a frame whose products are still requested
     const known = this.#inFlight.size;
     for (const number of this.#inFlight) if (number <= done) this.#inFlight.delete(number);
-    if (this.#inFlight.size === 0) this.#control.drewAll(this.#around.now_s());
+    if (this.#inFlight.size === 0) this.#control.drewAll(this.around.now_s());
     if (this.#open && (done === frame || this.#inFlight.size < known)) this.#socket?.send(encodeAck(done));
   }
 
@@ -159,14 +157,9 @@ export class StreamConnection {
     this.#connect();
   }
 
-  close(): void {
-    this.#clear();
-    this.#drop();
-  }
-
   #connect(): void {
-    this.#emit({ type: "connecting" });
-    const socket = this.#around.openSocket(this.#url, SUBPROTOCOL);
+    this.emit({ type: "connecting" });
+    const socket = this.around.openSocket(this.url, SUBPROTOCOL);
     this.#socket = socket;
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
@@ -174,7 +167,7 @@ export class StreamConnection {
       this.#refusesRequests = false;
       this.#inFlight.clear();
       this.#subscribe();
-      this.#emit({ type: "open" });
+      this.emit({ type: "open" });
       this.#listen();
     };
     socket.onmessage = ({ data }) => this.#receive(data);
@@ -247,7 +240,7 @@ export class StreamConnection {
 
   /** Says what is asked for now, and asks for it. */
   #askAnew(): void {
-    this.#emit({ type: "demand", ...this.#control.decision });
+    this.emit({ type: "demand", ...this.#control.decision });
     if (this.#open) this.#subscribe();
   }
 
@@ -260,7 +253,7 @@ export class StreamConnection {
     if (message.type !== "frame") return;
     const { product, axes, array, meta } = message;
     this.#codes.set(product, codesFor(axes, array.dtype));
-    if (this.#control.arrived(this.#around.now_s(), meta.frame, bytes)) this.#askAnew();
+    if (this.#control.arrived(this.around.now_s(), meta.frame, bytes)) this.#askAnew();
   }
 
   #receive(data: ArrayBuffer): void {
@@ -276,12 +269,12 @@ export class StreamConnection {
         return;
       }
       if (message.type === "frame") this.#inFlight.add(message.meta.frame);
-      this.#emit({ type: "message", message });
+      this.emit({ type: "message", message });
       if (message.type === "hello") this.#greeted(message);
       this.#weigh(message, bytes);
     } catch (error) {
       if (!(error instanceof ProtocolError)) throw error;
-      this.#emit({ type: "unreadable", reason: error.message });
+      this.emit({ type: "unreadable", reason: error.message });
     }
   }
 
@@ -297,9 +290,9 @@ export class StreamConnection {
   async #probe(): Promise<void> {
     const socket = this.#socket;
     try {
-      const document = await this.#around.probe();
+      const document = await this.around.probe();
       if (this.#socket !== socket) return;
-      this.#emit({ type: "camera", document });
+      this.emit({ type: "camera", document });
       this.#listen();
     } catch {
       if (this.#socket === socket) this.#lost("The service does not answer.");
@@ -309,9 +302,9 @@ export class StreamConnection {
   #lost(reason: string): void {
     this.#drop();
     const pause_s = Math.min(LONGEST_RETRY_S, FIRST_RETRY_S * 2 ** this.#attempts);
-    const retry_s = pause_s * (0.8 + 0.4 * this.#around.random()); // many pages must not come at once
+    const retry_s = pause_s * (0.8 + 0.4 * this.around.random()); // many pages must not come at once
     this.#attempts += 1;
-    this.#emit({ type: "waiting", retry_s, reason });
+    this.emit({ type: "waiting", retry_s, reason });
     this.#rearm(() => {
       this.#timer = null;
       this.#connect();
@@ -323,7 +316,7 @@ export class StreamConnection {
     this.#clear();
     this.#drop();
     this.#refused = true;
-    this.#emit({ type: "refused" });
+    this.emit({ type: "refused" });
   }
 
   #drop(): void {
@@ -338,11 +331,11 @@ export class StreamConnection {
 
   #rearm(action: () => void, delay_s: number): void {
     this.#clear();
-    this.#timer = this.#around.setTimer(action, delay_s);
+    this.#timer = this.around.setTimer(action, delay_s);
   }
 
   #clear(): void {
-    if (this.#timer !== null) this.#around.clearTimer(this.#timer);
+    if (this.#timer !== null) this.around.clearTimer(this.#timer);
     this.#timer = null;
   }
 }

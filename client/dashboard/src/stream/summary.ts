@@ -4,12 +4,6 @@ import type { Coefficients } from "../physics/maximumEntropy";
 import type { Span } from "../scales/scale";
 import type { FrameMessage } from "./protocol";
 
-/** Summary of a map: where most of its values lie. */
-export interface MapSummary extends Span {
-  /** Share of the pixels that have a value. */
-  readonly valid: number;
-}
-
 /** Summary of coefficients: how bright light gets, and when it arrives. */
 export interface LightSummary {
   /** Density that all but the brightest of the pixels' peaks stay below, in units of b_0 per second. */
@@ -23,17 +17,16 @@ const LIGHT_SAMPLES = 600;
 export const ARRIVAL_TIMES = 192;
 
 /** The 2nd and 98th percentile of the numbers among `values`, from at most `MAP_SAMPLES` of them. */
-export function summariseMap(values: ArrayLike<number>): MapSummary {
+export function summariseMap(values: ArrayLike<number>): Span {
   const stride = Math.max(1, Math.floor(values.length / MAP_SAMPLES));
   const sample: number[] = [];
-  let seen = 0;
-  for (let at = 0; at < values.length; at += stride, seen++) {
+  for (let at = 0; at < values.length; at += stride) {
     if (Number.isFinite(values[at])) sample.push(values[at]);
   }
-  if (sample.length === 0) return { low: NaN, high: NaN, valid: 0 };
+  if (sample.length === 0) return { low: NaN, high: NaN };
   const sorted = Float64Array.from(sample).sort();
   const quantile = (q: number): number => sorted[Math.round(q * (sorted.length - 1))];
-  return { low: quantile(0.02), high: quantile(0.98), valid: sample.length / seen };
+  return { low: quantile(0.02), high: quantile(0.98) };
 }
 
 /** Brightness and arrival times of the light in a frame, from a sample of its pixels. */
@@ -93,7 +86,8 @@ export function coefficientsOf({ array, meta }: FrameMessage): Coefficients | nu
 export interface FrameReport {
   readonly type: "frame";
   readonly message: FrameMessage;
-  readonly map: MapSummary | null;
+  /** Where most of the values of a map lie. */
+  readonly map: Span | null;
   readonly light: LightSummary | null;
 }
 

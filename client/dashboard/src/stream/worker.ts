@@ -7,16 +7,19 @@ import { frameUrl } from "./frameUrl";
 import { decodeMessage, type Problem, ProtocolError } from "./protocol";
 import { type FrameReport, summarised } from "./summary";
 
+/** What is passed on to the connection: what it is told, and the value of that. */
+type Told = {
+  [Name in "want" | "adapt" | "look" | "acknowledge" | "moved" | "rest"]: {
+    readonly type: Name;
+    readonly value: Parameters<StreamConnection[Name]>[0];
+  };
+};
+
 /** From the page to the worker. */
 export type Command =
+  | Told[keyof Told]
   | { readonly type: "open"; readonly url: string; readonly products: readonly string[]; readonly token: string | null }
   | { readonly type: "authenticate"; readonly token: string | null }
-  | { readonly type: "want"; readonly products: readonly string[] }
-  | { readonly type: "adapt"; readonly adapts: boolean }
-  | { readonly type: "look"; readonly sight: readonly number[] | null }
-  | { readonly type: "acknowledge"; readonly frame: number }
-  | { readonly type: "moved"; readonly pictures_hz: number }
-  | { readonly type: "rest"; readonly rests: boolean }
   | { readonly type: "retry" }
   | { readonly type: "bring"; readonly ticket: number; readonly path: string; readonly products: readonly string[] };
 
@@ -123,29 +126,13 @@ scope.onmessage = ({ data: command }) => {
       token = command.token;
       connection?.authenticate(token);
       break;
-    case "want":
-      connection?.want(command.products);
-      break;
-    case "adapt":
-      connection?.adapt(command.adapts);
-      break;
-    case "look":
-      connection?.look(command.sight);
-      break;
-    case "acknowledge":
-      connection?.acknowledge(command.frame);
-      break;
-    case "moved":
-      connection?.moved(command.pictures_hz);
-      break;
-    case "rest":
-      connection?.rest(command.rests);
-      break;
     case "bring":
       void bring(command.ticket, command.path, command.products);
       break;
     case "retry":
       connection?.retryNow();
       break;
+    default:
+      connection?.[command.type](command.value as never);
   }
 };

@@ -83,7 +83,7 @@ export function ActionMenu({ label, groups }: { label: string; groups: readonly 
       >
         {filled.map(({ title, actions }) => (
           <div key={title} class="menu-group" role="group" aria-label={title}>
-            <p class="menu-title" aria-hidden="true">
+            <p class="menu-title small quiet" aria-hidden="true">
               {title}
             </p>
             {actions.map(({ text, run }) => (

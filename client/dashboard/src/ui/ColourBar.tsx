@@ -1,10 +1,12 @@
-import { computed, type ReadonlySignal, useSignal } from "@preact/signals";
-import { useMemo, useRef } from "preact/hooks";
+import { type ReadonlySignal, useSignal } from "@preact/signals";
+import { useRef } from "preact/hooks";
 
 import { beyond, type ColourMapName, colourTable, LEVELS, levelOf } from "../scales/colourMaps";
 import { fixed, significant, withUnit } from "../scales/format";
 import { decimalsFor, fraction, histogram, niceStep, type Scale, type Span, ticks, valueAt } from "../scales/scale";
-import { useDrawing } from "./hooks";
+import type { Look } from "../store/looks";
+import { useStore } from "../store/store";
+import { useComputedOf, useDrawing } from "./hooks";
 import "./ColourBar.css";
 
 /** Share of the scale's length that the bar goes on beyond either end: for what lies there, and for handles to be drawn to. */
@@ -61,14 +63,10 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
     if (context) paintBar(context, base, scale, colours, values?.value?.values ?? null);
   }, [base, scale, colours, values]);
 
-  const marker = useMemo(
-    () =>
-      computed(() => {
-        const place = onBar(base, marked?.value ?? NaN);
-        return Number.isNaN(place) ? null : `${100 * Math.min(1, Math.max(0, place))}%`;
-      }),
-    [base, marked],
-  );
+  const marker = useComputedOf([base, marked], () => {
+    const place = onBar(base, marked?.value ?? NaN);
+    return Number.isNaN(place) ? null : `${100 * Math.min(1, Math.max(0, place))}%`;
+  });
   const numbers = ticks(base, 6);
   const decimals = decimalsFor(niceStep(base.high - base.low, 6));
   const write = (value: number): string => (base.kind === "linear" ? fixed(value, decimals) : significant(value, 1));
@@ -79,7 +77,7 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
       role="group"
       aria-label={`Colour scale from ${write(scale.low)} to ${withUnit(write(scale.high), unit)}`}
     >
-      <p class="colour-bar-unit">{unit === "1" ? "" : unit}</p>
+      <p class="colour-bar-unit small quiet">{unit === "1" ? "" : unit}</p>
       <div
         class="colour-bar-body"
         title={onLimit === undefined ? undefined : "Drag the handles; double click lets the ends follow the data"}
@@ -87,7 +85,7 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
       >
         <canvas ref={canvas} width={COLOURS_PX + (values === undefined ? 0 : HISTOGRAM_PX)} height={ROWS} aria-hidden="true" />
         {numbers.map((value) => (
-          <span key={value} class="colour-bar-tick" style={{ bottom: `${100 * onBar(base, value)}%` }}>
+          <span key={value} class="colour-bar-tick small quiet" style={{ bottom: `${100 * onBar(base, value)}%` }}>
             {write(value)}
           </span>
         ))}
@@ -97,6 +95,22 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
         ))}
       </div>
     </div>
+  );
+}
+
+/** The colour bar of a map, which sets its limits; as wide without one. */
+export function MapBar({ look, marked }: { look: Look | null; marked?: ReadonlySignal<number> }) {
+  const { looks } = useStore();
+  if (look === null) return <div class="colour-bar" />;
+  return (
+    <ColourBar
+      scale={look.scale.value}
+      colours={look.colours.value}
+      unit={look.product.unit}
+      values={look.frame}
+      {...(marked === undefined ? {} : { marked })}
+      onLimit={(limits) => looks.limit(look, limits)}
+    />
   );
 }
 

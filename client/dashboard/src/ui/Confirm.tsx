@@ -29,7 +29,7 @@ export function Confirm({ open, title, word, work, onClose, children }: ConfirmP
         onClose();
       }}
     >
-      <div class="control">{children}</div>
+      <div class="control column">{children}</div>
       <TaskLine task={task} />
       <div class="dialog-actions">
         <span class="spring" />

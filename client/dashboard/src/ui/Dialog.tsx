@@ -1,5 +1,5 @@
 import type { Signal } from "@preact/signals";
-import type { ComponentChildren } from "preact";
+import type { ComponentChildren, ComponentType } from "preact";
 import { useEffect, useRef } from "preact/hooks";
 import { LightOffButton } from "./LightOffButton";
 import "./Dialog.css";
@@ -40,7 +40,7 @@ export function Dialog({ open, title, onClose, children }: DialogProps) {
     >
       {open && (
         <>
-          <div class="dialog-inside">
+          <div class="dialog-inside column">
             <h2>{title}</h2>
             {children}
           </div>
@@ -54,18 +54,22 @@ export function Dialog({ open, title, onClose, children }: DialogProps) {
 interface SwitchedDialogProps {
   readonly open: Signal<boolean>;
   readonly title: string;
-  /** What is inside, with what closes it. */
-  readonly children: (close: () => void) => ComponentChildren;
+  /** What stands in it, and closes it when it is done. */
+  readonly inside: ComponentType<Done>;
+}
+
+export interface Done {
+  readonly onDone: () => void;
 }
 
 /** A dialog that is open while a signal says so. */
-export function SwitchedDialog({ open, title, children }: SwitchedDialogProps) {
+export function SwitchedDialog({ open, title, inside: Inside }: SwitchedDialogProps) {
   const close = (): void => {
     open.value = false;
   };
   return (
     <Dialog open={open.value} title={title} onClose={close}>
-      {children(close)}
+      <Inside onDone={close} />
     </Dialog>
   );
 }

@@ -1,10 +1,8 @@
-import { computed } from "@preact/signals";
-import { useMemo } from "preact/hooks";
-
 import { PIN_COLOURS } from "../store/measures";
 import type { Pixel } from "../store/pixel";
 import { useStore } from "../store/store";
 import { type Point, seenAt } from "../store/viewport";
+import { useComputedOf } from "./hooks";
 import "./Marks.css";
 
 /** What is marked in a picture of the sensor of this size: over the picture, as large at any zoom. */
@@ -29,20 +27,16 @@ const percent = (share: number): string => `${100 * share}%`;
 /** The crosshair of the pointed or the selected pixel; moves without rendering anything else. */
 function Crosshair({ of, width, height }: SizeProps & { of: "selected" | "pointed" }) {
   const store = useStore();
-  const style = useMemo(
-    () =>
-      computed(() => {
-        const pixel = store[of].value;
-        if (pixel === null) return null;
-        const view = store.viewport.view.value;
-        const at = seenAt(view, centreOf(pixel, width, height));
-        return { "--x": percent(at.x), "--y": percent(at.y), "--w": percent(view.zoom / width), "--h": percent(view.zoom / height) };
-      }),
-    [store, of, width, height],
-  );
+  const style = useComputedOf([store, of, width, height], () => {
+    const pixel = store[of].value;
+    if (pixel === null) return null;
+    const view = store.viewport.view.value;
+    const at = seenAt(view, centreOf(pixel, width, height));
+    return { "--x": percent(at.x), "--y": percent(at.y), "--w": percent(view.zoom / width), "--h": percent(view.zoom / height) };
+  });
   if (style.value === null) return null;
   return (
-    <div class={`mark mark-${of}`} style={style.value} aria-hidden="true">
+    <div class={`mark cover mark-${of}`} style={style.value} aria-hidden="true">
       <i class="mark-column" />
       <i class="mark-row" />
       <i class="mark-pixel" />
@@ -62,7 +56,7 @@ function RegionMark({ width, height }: SizeProps) {
     seenAt(view, { x: (region.x1 + 1) / width, y: (region.y1 + 1) / height }),
   ];
   return (
-    <div class="mark" aria-hidden="true">
+    <div class="mark cover" aria-hidden="true">
       <i
         class="mark-region"
         style={{ left: percent(from.x), top: percent(from.y), width: percent(to.x - from.x), height: percent(to.y - from.y) }}
@@ -74,8 +68,8 @@ function RegionMark({ width, height }: SizeProps) {
 /** A polygon, its corners in shares of the picture; each corner is marked, so that the first ones are seen too. */
 function PolygonMark({ corners }: { corners: readonly Point[] }) {
   return (
-    <div class="mark" aria-hidden="true">
-      <svg class="mark-polygon" viewBox="0 0 1 1" preserveAspectRatio="none">
+    <div class="mark cover" aria-hidden="true">
+      <svg class="mark-polygon cover" viewBox="0 0 1 1" preserveAspectRatio="none">
         <polygon points={corners.map(({ x, y }) => `${x},${y}`).join(" ")} />
       </svg>
       {corners.map(({ x, y }, n) => (
@@ -88,7 +82,7 @@ function PolygonMark({ corners }: { corners: readonly Point[] }) {
 function Pins({ width, height }: SizeProps) {
   const { measures, viewport } = useStore();
   return (
-    <div class="mark" aria-hidden="true">
+    <div class="mark cover" aria-hidden="true">
       {measures.pins.value.map((pin) => {
         const at = seenAt(viewport.view.value, centreOf(pin, width, height));
         return (

@@ -23,8 +23,8 @@ export const SlotContext = createContext<readonly ActionGroup[]>([]);
 export function Panel({ name, title, tools, downloads = [], children }: PanelProps) {
   const slot = useContext(SlotContext);
   return (
-    <section class={`panel panel-${name}`} aria-label={name} data-view={name}>
-      <header class="panel-head">
+    <section class={`panel column panel-${name}`} aria-label={name} data-view={name}>
+      <header class="panel-head row">
         {/* onto another panel, to change places with it; the menu does the same */}
         <div class="panel-title" draggable onDragStart={(event) => event.dataTransfer?.setData(DRAGGED, name)}>
           {title}

@@ -1,23 +1,22 @@
-import { computed, type ReadonlySignal, useComputed } from "@preact/signals";
+import type { ReadonlySignal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
-import { useEffect, useMemo, useRef } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 
 import { type Frame, sentWords } from "../store/frames";
 import { regionOf } from "../store/measures";
 import { type Pixel, stepped } from "../store/pixel";
 import { useStore } from "../store/store";
 import { type Point, placeIn, WHOLE } from "../store/viewport";
+import { FirstFrame } from "./FirstFrame";
+import { useComputedOf, usePictureSize } from "./hooks";
 import { Marks } from "./Marks";
 import "./Stage.css";
 
 interface StageProps {
-  /** Size of the picture in pixels of the sensor. */
-  readonly width: number;
-  readonly height: number;
   readonly label: string;
   /** What it is a picture of. */
   readonly frame: ReadonlySignal<Frame | null>;
-  /** The canvas. */
+  /** The canvas; before the first frame it is said what is waited for. */
   readonly children: ComponentChildren;
 }
 
@@ -43,7 +42,8 @@ interface Drag {
  * selected pixel, + and − zoom, Enter pins it, R marks a region around it, C sets a corner there and Escape takes
  * regions and pins away.
  */
-export function Stage({ width, height, label, frame, children }: StageProps) {
+export function Stage({ label, frame, children }: StageProps) {
+  const [width, height] = usePictureSize(frame);
   const store = useStore();
   const { viewport, measures } = store;
   const picture = useRef<HTMLDivElement>(null);
@@ -122,16 +122,13 @@ export function Stage({ width, height, label, frame, children }: StageProps) {
     event.stopPropagation();
   };
 
-  const style = useMemo(
-    () =>
-      computed(() => {
-        const { zoom, left, top } = viewport.view.value;
-        return zoom === 1 ? undefined : { transform: `scale(${zoom}) translate(${-100 * left}%, ${-100 * top}%)` };
-      }),
-    [viewport],
-  );
+  const style = useComputedOf([viewport], () => {
+    const { zoom, left, top } = viewport.view.value;
+    return zoom === 1 ? undefined : { transform: `scale(${zoom}) translate(${-100 * left}%, ${-100 * top}%)` };
+  });
   const zoomed = viewport.view.value !== WHOLE;
-  const sent = useComputed(() => (frame.value === null ? "" : sentWords(frame.value.meta))).value;
+  const sent = useComputedOf([frame], () => (frame.value === null ? "" : sentWords(frame.value.meta))).value;
+  const frameless = useComputedOf([frame], () => frame.value === null).value;
   return (
     <div class="stage" style={{ "--aspect": width / height }}>
       <div
@@ -150,8 +147,9 @@ export function Stage({ width, height, label, frame, children }: StageProps) {
         onDblClick={() => viewport.reset()}
         onKeyDown={onKeyDown}
       >
-        <div class="stage-zoom" style={style.value}>
+        <div class="stage-zoom cover" style={style.value}>
           {children}
+          {frameless && <FirstFrame />}
         </div>
         <Marks width={width} height={height} />
         {sent !== "" && (

@@ -11,18 +11,20 @@ interface SteerProps {
   readonly danger?: boolean;
   readonly disabled?: boolean;
   readonly submit?: boolean;
+  /** What it waits for while that is busy. */
+  readonly task?: Task;
   readonly children: ComponentChildren;
 }
 
 /** A button that changes something of the camera: not to be pressed where that would be refused, and it says why. */
-export function Steer({ onClick, title, primary = false, danger = false, disabled = false, submit = false, children }: SteerProps) {
+export function Steer({ onClick, title, primary = false, danger = false, disabled = false, submit = false, task, children }: SteerProps) {
   const { obstacle } = useStore();
   return (
     <button
       type={submit ? "submit" : "button"}
       class={primary ? "primary" : danger ? "danger" : undefined}
       title={obstacle.value ?? title}
-      disabled={disabled || obstacle.value !== null}
+      disabled={disabled || obstacle.value !== null || (task !== undefined && task.busy.value !== null)}
       data-obstacle={obstacle.value === null ? undefined : ""}
       onClick={onClick}
     >

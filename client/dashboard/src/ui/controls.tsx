@@ -1,28 +1,29 @@
-import type { ComponentChildren } from "preact";
+import type { Signal } from "@preact/signals";
+import type { ComponentChildren, InputHTMLAttributes } from "preact";
 import "./controls.css";
 
 interface ChoiceProps<T extends string | number> {
   readonly label: string;
-  readonly value: T;
-  readonly options: readonly { readonly value: T; readonly text: string }[];
-  readonly onChange: (value: T) => void;
+  /** What is chosen. */
+  readonly chosen: Signal<T>;
+  readonly of: readonly T[];
+  readonly text: (value: T) => string;
 }
 
 /** One of several, as a drop-down. */
-export function Choice<T extends string | number>({ label, value, options, onChange }: ChoiceProps<T>) {
+export function Choice<T extends string | number>({ label, chosen, of, text }: ChoiceProps<T>) {
   return (
-    <label class="choice">
+    <label class="choice inline-row">
       <span class="quiet choice-label unseen">{label}</span>
       <select
-        value={String(value)}
+        value={String(chosen.value)}
         onChange={(event) => {
-          const chosen = options.find((option) => String(option.value) === event.currentTarget.value);
-          if (chosen !== undefined) onChange(chosen.value);
+          chosen.value = of.find((value) => String(value) === event.currentTarget.value) ?? chosen.peek();
         }}
       >
-        {options.map((option) => (
-          <option key={option.value} value={String(option.value)}>
-            {option.text}
+        {of.map((value) => (
+          <option key={value} value={String(value)}>
+            {text(value)}
           </option>
         ))}
       </select>
@@ -98,19 +99,61 @@ export function Check({ checked, title, onChange, children }: CheckProps) {
   );
 }
 
-interface ToggleProps {
-  readonly pressed: boolean;
-  readonly title: string;
-  readonly onToggle: () => void;
+/** On or off. */
+export function Toggle({ on, title, children }: { on: Signal<boolean>; title: string; children: ComponentChildren }) {
+  return (
+    <button type="button" class="toggle" aria-pressed={on.value} title={title} onClick={() => (on.value = !on.peek())}>
+      {children}
+    </button>
+  );
+}
+
+interface TextFieldProps {
+  readonly label: string;
+  /** What is typed. */
+  readonly text: Signal<string>;
+  readonly name: string;
+  readonly type?: "text" | "password";
+  readonly class?: string;
+  readonly placeholder?: string;
+  readonly maxLength?: number;
+  readonly autocomplete?: string;
+  readonly spellcheck?: boolean;
+  readonly "aria-invalid"?: boolean;
+}
+
+/** Words as they are typed. */
+export function TextField({ label, text, class: kind = "field", ...input }: TextFieldProps) {
+  return (
+    <label class={kind}>
+      <span>{label}</span>
+      <input
+        {...({ type: "text", autocomplete: "off", ...input } as InputHTMLAttributes)}
+        value={text.value}
+        onInput={(event) => (text.value = event.currentTarget.value)}
+      />
+    </label>
+  );
+}
+
+interface FormProps {
+  readonly class: string;
+  readonly onSubmit: () => void;
   readonly children: ComponentChildren;
 }
 
-/** On or off. */
-export function Toggle({ pressed, title, onToggle, children }: ToggleProps) {
+/** Fields whose button, or the Enter key, does something in this page. */
+export function Form({ class: kind, onSubmit, children }: FormProps) {
   return (
-    <button type="button" class="toggle" aria-pressed={pressed} title={title} onClick={onToggle}>
+    <form
+      class={kind}
+      onSubmit={(event) => {
+        event.preventDefault();
+        onSubmit();
+      }}
+    >
       {children}
-    </button>
+    </form>
   );
 }
 

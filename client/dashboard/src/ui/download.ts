@@ -1,5 +1,5 @@
 /** Files made in the page: what is on screen, as it is on screen. */
-import { type Api, LIVE, liveFrame, RequestError } from "../store/api";
+import { type Api, LIVE, liveFrame, refusalIn } from "../store/api";
 import type { Frame } from "../store/frames";
 import { frameUrl } from "../stream/frameUrl";
 
@@ -33,7 +33,7 @@ export async function saveNumbers(api: Api, frame: Frame | null): Promise<void> 
   try {
     save(name, await api.file(frameUrl(path, `${product}.npy`)));
   } catch (error) {
-    if (!(error instanceof RequestError)) throw error;
+    refusalIn(error);
     save(name, new Blob([npy(values, shape)]));
   }
 }

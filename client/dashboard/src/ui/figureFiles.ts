@@ -1,5 +1,6 @@
 /** Figures as files and as pictures: what needs a browser. */
-import { save } from "./download";
+import type { Action } from "./ActionMenu";
+import { save, savePicture } from "./download";
 import { type Figure, figureLayout, figureSvg } from "./figure";
 
 /** Width of a figure's picture, in px; a PNG has `PNG_SCALE` times as many. */
@@ -14,7 +15,7 @@ export type FigureParts = Omit<Figure, "picture" | "columns" | "rows">;
  *
  * Of WebGL only in the task that drew it.
  */
-export async function saveFigure(name: string, canvas: HTMLCanvasElement | null, parts: FigureParts, kind: "png" | "svg"): Promise<void> {
+async function saveFigure(name: string, canvas: HTMLCanvasElement | null, parts: FigureParts, kind: "png" | "svg"): Promise<void> {
   if (canvas === null) return;
   const [columns, rows] = [canvas.width, canvas.height];
   const layout = figureLayout(columns, rows, FIGURE_PX);
@@ -39,6 +40,19 @@ export async function saveFigure(name: string, canvas: HTMLCanvasElement | null,
   context.drawImage(await imageOf(svg), 0, 0, drawn.width, drawn.height);
   const content = await new Promise<Blob | null>((done) => drawn.toBlob(done, "image/png"));
   if (content !== null) save(`${name}.png`, content);
+}
+
+/** What can be saved of a picture: as it is, and as a figure. It is asked for when it is saved, in the task that drew it. */
+export function pictureFiles(name: () => string, canvas: () => HTMLCanvasElement | null, parts: () => FigureParts | null): Action[] {
+  const figure = (kind: "png" | "svg") => (): void => {
+    const words = parts();
+    if (words !== null) void saveFigure(name(), canvas(), words, kind);
+  };
+  return [
+    { text: "Picture (PNG)", run: () => savePicture(name(), canvas()) },
+    { text: "Figure (PNG)", run: figure("png") },
+    { text: "Figure (SVG)", run: figure("svg") },
+  ];
 }
 
 /** An SVG as an image that can be drawn. */

@@ -1,6 +1,7 @@
-import { effect, type Signal, useSignal } from "@preact/signals";
-import { useEffect, useRef } from "preact/hooks";
+import { computed, effect, type ReadonlySignal, type Signal, useSignal } from "@preact/signals";
+import { useEffect, useMemo, useRef } from "preact/hooks";
 
+import type { Frame } from "../store/frames";
 import { useStore } from "../store/store";
 
 /**
@@ -11,6 +12,18 @@ export function useDrawing(draw: () => void, inputs: readonly unknown[]): void {
   const latest = useRef(draw);
   latest.current = draw;
   useEffect(() => effect(() => latest.current()), inputs);
+}
+
+/** What `compute` makes of signals, computed anew also when an input changes that is none. */
+export function useComputedOf<T>(inputs: readonly unknown[], compute: () => T): ReadonlySignal<T> {
+  return useMemo(() => computed(compute), inputs);
+}
+
+/** Width and height of a frame's picture in pixels of the sensor; the paper's sensor's before the first frame. */
+export function usePictureSize(frame: ReadonlySignal<Frame | null>): readonly [width: number, height: number] {
+  const size = useComputedOf([frame], () => (frame.value?.shape.slice(-2) ?? [120, 163]).join());
+  const [height, width] = size.value.split(",").map(Number);
+  return [width, height];
 }
 
 /** Has products streamed for as long as the view stands. */

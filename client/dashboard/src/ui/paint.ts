@@ -1,6 +1,16 @@
 import { beyond, type ColourMapName, colourTable, levelOf } from "../scales/colourMaps";
 import { fraction, type Scale } from "../scales/scale";
 
+/** Draws a picture on a canvas, its pixels as `write` makes them of clear RGBA bytes. */
+export function draw(canvas: HTMLCanvasElement | null, width: number, height: number, write: (rgba: Uint8ClampedArray) => void): void {
+  const context = canvas?.getContext("2d");
+  if (canvas === null || !context) return;
+  if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+  const image = context.createImageData(width, height);
+  write(image.data);
+  context.putImageData(image, 0, 0);
+}
+
 /** Writes the colours of `values` into RGBA bytes; what lies beyond the scale has a colour of its own, a pixel without a value stays clear. */
 export function paint(values: ArrayLike<number>, scale: Scale, colours: ColourMapName, rgba: Uint8ClampedArray): void {
   const pick = picker(scale, colours);

@@ -1,7 +1,7 @@
 import { type ReadonlySignal, signal } from "@preact/signals";
 import { useMemo } from "preact/hooks";
 
-import { RequestError } from "../store/api";
+import { refusalIn } from "../store/api";
 
 /** Something a control asks of the service: one at a time, with what came of it in words. */
 export interface Task {
@@ -25,8 +25,7 @@ function makeTask(): Task {
       await work();
       return true;
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
-      refusal.value = error.message;
+      refusal.value = refusalIn(error).message;
       return false;
     } finally {
       busy.value = null;

@@ -1,8 +1,9 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 
 import { Accuracy } from "../../src/store/accuracy";
-import { type Api, RequestError } from "../../src/store/api";
+import { RequestError } from "../../src/store/api";
 import type { JobDocument } from "../../src/stream/documents";
+import { answering } from "../answering";
 
 const job = (state: JobDocument["state"], more: Partial<JobDocument> = {}): JobDocument => ({
   id: "j",
@@ -26,18 +27,19 @@ beforeEach(() => {
   vi.useFakeTimers();
   [answers, cancelled, refusal] = [[], [], null];
   const start = () => (refusal === null ? Promise.resolve(job("queued")) : Promise.reject(refusal));
-  accuracy = new Accuracy({
-    startTradeoff: start,
-    startPlan: start,
-    job: () => {
+  const api = answering({
+    "POST /tradeoff/jobs": start,
+    "POST /plan/jobs": start,
+    "GET /jobs/{job}": () => {
       const answer = answers.shift() ?? job("running");
       return answer instanceof RequestError ? Promise.reject(answer) : Promise.resolve(answer);
     },
-    cancelJob: (id: string) => {
-      cancelled.push(id);
+    "POST /jobs/{job}/cancel": ({ of }) => {
+      cancelled.push(of);
       return Promise.resolve(job("running"));
     },
-  } as unknown as Api);
+  });
+  accuracy = new Accuracy(api);
 });
 afterEach(() => vi.useRealTimers());
 

@@ -1,8 +1,9 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 
-import { type Api, RequestError } from "../../src/store/api";
+import { RequestError } from "../../src/store/api";
 import { Calibrations } from "../../src/store/calibrations";
 import type { JobDocument } from "../../src/stream/documents";
+import { answering } from "../answering";
 
 const job = (state: JobDocument["state"], more: Partial<JobDocument> = {}): JobDocument => ({
   id: "j",
@@ -24,19 +25,20 @@ beforeEach(() => {
   vi.useFakeTimers();
   answers = [];
   lists = 0;
-  calibrations = new Calibrations({
-    calibrations: () => {
+  const api = answering({
+    "GET /calibrations": () => {
       lists += 1;
       return Promise.resolve({ active: "nominal", directory: "", calibrations: [] });
     },
-    measureCalibration: () => Promise.resolve(job("queued")),
-    cancelJob: () => Promise.resolve(job("running")),
-    jobs: () => Promise.resolve([job("done"), job("running", { id: "theirs" })]),
-    job: () => {
+    "POST /calibrations": () => Promise.resolve(job("queued")),
+    "POST /jobs/{job}/cancel": () => Promise.resolve(job("running")),
+    "GET /jobs": () => ({ jobs: [job("done"), job("running", { id: "theirs" })] }),
+    "GET /jobs/{job}": () => {
       const answer = answers.shift() ?? job("running");
       return answer instanceof RequestError ? Promise.reject(answer) : Promise.resolve(answer);
     },
-  } as unknown as Api);
+  });
+  calibrations = new Calibrations(api);
 });
 afterEach(() => vi.useRealTimers());
 

@@ -2,21 +2,21 @@ import { expect, test } from "vitest";
 
 import { type Api, RequestError } from "../../src/store/api";
 import { captureOne } from "../../src/store/capture";
+import { answering } from "../answering";
 
 function camera(answers: (number | RequestError)[]): { api: Api; sent: string[] } {
   const sent: string[] = [];
-  const api = {
-    setAcquisition: (running: boolean) => {
-      sent.push(running ? "start" : "stop");
-      return Promise.resolve({});
+  const api = answering(
+    {
+      "PUT /acquisition": ({ body }) => sent.push(body.running ? "start" : "stop"),
+      "GET /frames/{frame}": ({ at }) => {
+        sent.push(`wait after ${/after=(\d+)/.exec(at)?.[1]}`);
+        const frame = answers.shift();
+        return frame instanceof RequestError ? Promise.reject(frame) : { frame };
+      },
     },
-    newestFrame: () => Promise.resolve(7),
-    frameAfter: (frame: number) => {
-      sent.push(`wait after ${frame}`);
-      const answer = answers.shift();
-      return answer instanceof RequestError ? Promise.reject(answer) : Promise.resolve(answer);
-    },
-  } as unknown as Api;
+    { newestFrame: () => Promise.resolve(7) },
+  );
   return { api, sent };
 }
 

@@ -48,7 +48,7 @@ class Page {
   }
 
   get acknowledged(): number[] {
-    return this.sent.filter((command) => command.type === "acknowledge").map(({ frame: number }) => number);
+    return this.sent.filter((command) => command.type === "acknowledge").map(({ value }) => value);
   }
 }
 
@@ -64,8 +64,8 @@ describe("between worker and store", () => {
     page.store.frames.claim(["coefficients"]);
     expect(page.sent).toEqual([
       { type: "open", url: "ws://camera/", products: ["brightness", "range"], token: null },
-      { type: "adapt", adapts: true },
-      { type: "want", products: ["brightness", "coefficients", "range"] },
+      { type: "adapt", value: true },
+      { type: "want", value: ["brightness", "coefficients", "range"] },
     ]);
   });
 
@@ -73,14 +73,14 @@ describe("between worker and store", () => {
     page.absent = [{ name: "brightness", reason: "it needs a zeroth moment" }];
     await page.client.learnAbsent();
     expect(page.store.frames.absent.value).toEqual({ brightness: "it needs a zeroth moment" });
-    expect(page.sent.at(-1)).toEqual({ type: "want", products: ["range"] });
+    expect(page.sent.at(-1)).toEqual({ type: "want", value: ["range"] });
     expect(page.store.frames.amplitude.value).toBe("direct");
   });
 
   test("a product that is refused makes it look what the camera has", async () => {
     page.absent = [{ name: "brightness", reason: "it needs a zeroth moment" }];
     page.receives({ type: "message", message: { type: "error", problem: { type: "/problems/unknown-product" } } });
-    await vi.waitFor(() => expect(page.sent.at(-1)).toEqual({ type: "want", products: ["range"] }));
+    await vi.waitFor(() => expect(page.sent.at(-1)).toEqual({ type: "want", value: ["range"] }));
     expect(page.store.status.unreadable.value).toBeNull();
   });
 
@@ -135,12 +135,12 @@ describe("between worker and store", () => {
       page.receives({ ...frame("coefficients", n), light: null } as Report);
       page.refreshes();
     }
-    expect(page.sent.filter(({ type }) => type === "rest")).toEqual([{ type: "rest", rests: true }]);
+    expect(page.sent.filter(({ type }) => type === "rest")).toEqual([{ type: "rest", value: true }]);
     page.store.player.playing.value = true;
     page.store.measures.pins.value = [];
     page.receives({ ...frame("coefficients", 6), light: null } as Report);
     page.refreshes();
-    expect(page.sent.filter(({ type }) => type === "rest").slice(1)).toEqual([{ type: "rest", rests: false }]);
+    expect(page.sent.filter(({ type }) => type === "rest").slice(1)).toEqual([{ type: "rest", value: false }]);
   });
 
   describe("how fluently light moves", () => {
@@ -160,7 +160,7 @@ describe("between worker and store", () => {
 
     test("is counted while it plays, and while it is scrubbed", () => {
       page.store.player.playing.value = true;
-      expect(watches()).toEqual([{ type: "moved", pictures_hz: expect.closeTo(10, 6) as number }]);
+      expect(watches()).toEqual([{ type: "moved", value: expect.closeTo(10, 6) as number }]);
       page.store.player.playing.value = false;
       page.store.player.scrubbed.value = true;
       expect(watches()).toHaveLength(1);
@@ -251,7 +251,7 @@ describe("between worker and store", () => {
     expect(page.store.frames.of("range").value).toBeNull();
     expect(page.acknowledged).toEqual([]);
     page.store.replay.leave();
-    expect(page.sent.at(-1)).toEqual({ type: "want", products: ["brightness", "range"] });
+    expect(page.sent.at(-1)).toEqual({ type: "want", value: ["brightness", "range"] });
     page.receives(frame("range", 5));
     page.refreshes();
     expect(page.store.frames.of("range").value?.values[0]).toBe(5);

@@ -44,7 +44,7 @@ test("a token that is refused is said so, until another is shown", async () => {
   api.credentials.use("wrong");
   const refusals: string[] = [];
   api.onRefusal = ({ title }) => refusals.push(title ?? "");
-  await expect(api.camera()).rejects.toThrow(RequestError);
+  await expect(api.ask("GET /camera")).rejects.toThrow(RequestError);
   expect(sent).toEqual(["Bearer wrong"]);
   expect(refusals).toEqual([problem.title]);
   expect(api.credentials.refused.value?.type).toBe(problem.type);

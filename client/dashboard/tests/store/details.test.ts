@@ -5,21 +5,29 @@ import { type Api, LIVE, RequestError } from "../../src/store/api";
 import { Details } from "../../src/store/details";
 import type { Frame } from "../../src/store/frames";
 import type { Pixel } from "../../src/store/pixel";
+import { answering } from "../answering";
 
 const frame = (number: number, sequence_id = 1): Frame =>
   ({ origin: LIVE, meta: { frame: number, sequence_id, width: 10, height: 10 } }) as Frame;
 const settled = (): Promise<void> => new Promise((done) => setTimeout(done));
 
+/** The pixel that an address asks about. */
+function pixelIn(at: string): Pixel {
+  const query = new URLSearchParams(at.slice(at.indexOf("?")));
+  return { x: Number(query.get("x")), y: Number(query.get("y")) };
+}
+
 function watched() {
   const asked: string[] = [];
   let now_s = 0;
   let number = 1;
-  const api = {
-    pixel: (x: number, y: number) => {
+  const api = answering({
+    "GET /frames/{frame}/pixel": ({ at }) => {
+      const { x, y } = pixelIn(at);
       asked.push(`${x},${y}`);
-      return Promise.resolve({ x, y, meta: { frame: number, sequence_id: 1 } });
+      return { x, y, meta: { frame: number, sequence_id: 1 } };
     },
-  } as unknown as Api;
+  });
   const details = new Details(api, () => now_s);
   const pixel = signal<Pixel | null>(null);
   const newest = signal<Frame | null>(frame(1));
@@ -81,13 +89,14 @@ test("what is known goes with the frame that it is of, and is forgotten with its
 /** A service whose newest frame is 90, and which keeps no frame before 80. */
 function keeping(): { api: Api; asked: string[] } {
   const asked: string[] = [];
-  const pixel = (x: number, y: number, address: string = LIVE): Promise<unknown> => {
+  const pixel = (at: string): unknown => {
+    const address = at.slice(0, at.indexOf("/pixel"));
     asked.push(address);
     const number = address === LIVE ? 90 : Number(address.split("/").pop());
-    if (number < 80) return Promise.reject(new RequestError({ type: "/problems/frame-gone" }));
-    return Promise.resolve({ x, y, meta: { frame: number, sequence_id: 1 } });
+    if (number < 80) throw new RequestError({ type: "/problems/frame-gone" });
+    return { ...pixelIn(at), meta: { frame: number, sequence_id: 1 } };
   };
-  return { api: { pixel } as unknown as Api, asked };
+  return { api: answering({ "GET /frames/{frame}/pixel": ({ at }) => pixel(at) }), asked };
 }
 
 test.each([

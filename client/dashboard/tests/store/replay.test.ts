@@ -1,11 +1,12 @@
 import { beforeEach, describe, expect, test } from "vitest";
 
-import { type Api, RequestError } from "../../src/store/api";
+import { RequestError } from "../../src/store/api";
 import { Frames } from "../../src/store/frames";
 import { Replay } from "../../src/store/replay";
 import { Status } from "../../src/store/status";
 import type { FrameMessage } from "../../src/stream/protocol";
 import { type FrameReport, summarised } from "../../src/stream/summary";
+import { answering } from "../answering";
 
 const TIMES = [0, 0.1, 0.2, 0.3, 1.4, 1.5]; // the camera was lost for a second
 
@@ -30,15 +31,13 @@ class Screen {
   readonly waiting: (() => void)[] = [];
   refusal: RequestError | null = null;
   readonly replay = new Replay(
-    {
-      recording: (id: string) => Promise.resolve({ id, name: "corner", state: "complete" }),
-      timeline: (id: string) =>
-        Promise.resolve(
-          id === "empty"
-            ? { first: null, last: null, count: 0, times_s: [], times_step: 1 }
-            : { first: 1, last: 6, count: 6, duration_s: 1.5, host_time_s: 5, times_s: TIMES, times_step: 1 },
-        ),
-    } as unknown as Api,
+    answering({
+      "GET /recordings/{recording}": ({ of }) => ({ id: of, name: "corner", state: "complete" }),
+      "GET /recordings/{recording}/frames": ({ of }) =>
+        of === "empty"
+          ? { first: null, last: null, count: 0, times_s: [], times_step: 1 }
+          : { first: 1, last: 6, count: 6, duration_s: 1.5, host_time_s: 5, times_s: TIMES, times_step: 1 },
+    }),
     this.frames,
     this.status,
   );
@@ -148,7 +147,17 @@ describe("a recording on the page", () => {
   });
 
   test("of very many frames tells the time of some, and the others lie between", () => {
-    screen.replay.timeline.value = { first: 1, last: 7, count: 7, started_s: 0, times_s: [0, 0.3, 0.9], step: 3 };
+    const times_s = [0, 0.3, 0.9];
+    screen.replay.timeline.value = {
+      first: 1,
+      last: 7,
+      count: 7,
+      duration_s: 0.9,
+      frame_rate_hz: null,
+      host_time_s: 0,
+      times_s,
+      times_step: 3,
+    };
     expect([1, 2, 4, 5, 6, 7].map((frame) => screen.replay.timeOf(frame))).toEqual(
       [0, 0.1, 0.3, 0.5, 0.7, 0.9].map((time) => expect.closeTo(time, 9)),
     );

@@ -1,10 +1,11 @@
 import { signal } from "@preact/signals";
 import { expect, test } from "vitest";
 
-import { type Api, RequestError } from "../../src/store/api";
+import { RequestError } from "../../src/store/api";
 import { Events } from "../../src/store/events";
 import { Sequencing } from "../../src/store/sequencing";
-import type { AppliedDocument, ChoiceDocument } from "../../src/stream/documents";
+import type { AppliedDocument, ChoiceDocument, ReconstructionDocument } from "../../src/stream/documents";
+import { answering } from "../answering";
 
 const sequence = (harmonics: number, sequence_id: number): AppliedDocument =>
   ({ base_frequency_hz: 23e6, harmonics, exposure_s: 1e-3, images: 4 * harmonics, sequence_id }) as AppliedDocument;
@@ -15,21 +16,23 @@ const choice = (harmonics: number, estimator: string): ChoiceDocument =>
 function service() {
   const state = { estimator: "automatic", smoothing_px: 2, refusal: null as RequestError | null, sets: 0 };
   const current = signal<AppliedDocument | null>(sequence(3, 1));
-  const api = {
-    setSequence: ({ harmonics }: AppliedDocument) => {
-      if (state.refusal !== null) return Promise.reject(state.refusal);
-      state.sets += 1;
-      return Promise.resolve(sequence(harmonics, 1 + state.sets));
+  const set = ({ harmonics }: AppliedDocument): AppliedDocument => {
+    if (state.refusal !== null) throw state.refusal;
+    state.sets += 1;
+    return sequence(harmonics, 1 + state.sets);
+  };
+  const reconstruction = () => ({ reconstruction_id: 1, estimator: state.estimator, smoothing_px: state.smoothing_px });
+  const api = answering(
+    { "PUT /sequence": ({ body }) => set(body) },
+    {
+      reconstruction: async () => ({ document: reconstruction() as ReconstructionDocument, tag: "t" }),
+      setReconstruction: async (settings, tag) => {
+        expect(tag).toBe("t");
+        expect(settings).not.toHaveProperty("reconstruction_id");
+        return Object.assign(state, settings) as unknown as ReconstructionDocument;
+      },
     },
-    reconstruction: () =>
-      Promise.resolve({ document: { reconstruction_id: 1, estimator: state.estimator, smoothing_px: state.smoothing_px }, tag: "t" }),
-    setReconstruction: (settings: { estimator: string; smoothing_px: number }, tag: string) => {
-      expect(tag).toBe("t");
-      expect(settings).not.toHaveProperty("reconstruction_id");
-      Object.assign(state, settings);
-      return Promise.resolve({});
-    },
-  } as unknown as Api;
+  );
   const events = new Events(() => 5);
   return { state, current, events, sequencing: new Sequencing(api, events, current) };
 }

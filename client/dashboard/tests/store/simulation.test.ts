@@ -39,7 +39,7 @@ describe("choices of effects", () => {
   it("stay as they are when the scene changes", async () => {
     const { simulation, sent } = service({ ambient: "on" });
     await simulation.refresh();
-    await simulation.stage("corner");
+    await simulation.set({ scene: "corner" });
     expect(sent).toEqual([{ scene: "corner" }]);
     expect(simulation.world.value?.effects).toEqual({ ambient: "on" });
   });

@@ -250,17 +250,17 @@ describe("requests", () => {
   test("a problem becomes its own words, and keeps the field it names", async () => {
     const problem = { title: "Invalid sequence", detail: "harmonics is 99, but must be from 1 to 32.", field: "harmonics" };
     const api = answering(JSON.stringify(problem), 422, "application/problem+json");
-    const refusal = await api.camera().catch((error: unknown) => error);
+    const refusal = await api.ask("GET /camera").catch((error: unknown) => error);
     expect(refusal).toBeInstanceOf(RequestError);
     expect((refusal as RequestError).message).toBe(problem.detail);
     expect((refusal as RequestError).problem).toMatchObject({ status: 422, field: "harmonics" });
   });
 
   test("a proxy's page says at least its status", async () =>
-    await expect(answering("<html>", 502, "text/html").camera()).rejects.toThrow(/502/));
+    await expect(answering("<html>", 502, "text/html").ask("GET /camera")).rejects.toThrow(/502/));
 
   test("a service that cannot be reached says that", async () => {
     const api = new Api(() => Promise.reject(new TypeError("Failed to fetch")));
-    await expect(api.camera()).rejects.toThrow("The service cannot be reached.");
+    await expect(api.ask("GET /camera")).rejects.toThrow("The service cannot be reached.");
   });
 });

@@ -25,7 +25,7 @@ describe("a painted map", () => {
 });
 
 describe("the look of a map", () => {
-  const frame = (low: number, high: number): Frame => ({ map: { low, high, valid: 1 } }) as Frame;
+  const frame = (low: number, high: number): Frame => ({ map: { low, high } }) as Frame;
 
   test("follows the data until limits are set, and again when they are taken away", () => {
     const newest = signal<Frame | null>(frame(1, 4));

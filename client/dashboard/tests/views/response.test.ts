@@ -1,8 +1,9 @@
 import { describe, expect, test } from "vitest";
 
 import type { PixelDocument } from "../../src/stream/documents";
-import { FlagHistory, LOOKS } from "../../src/views/response/flagShares";
+import { FlagHistory } from "../../src/views/response/flagShares";
 import { richestPixel } from "../../src/views/response/interesting";
+import { LOOKS } from "../../src/views/response/looks";
 import { linesOf, ReturnHistory, sifted } from "../../src/views/response/returns";
 import { stemsOf } from "../../src/views/response/stems";
 import { momentsOf, picture } from "../oracle";

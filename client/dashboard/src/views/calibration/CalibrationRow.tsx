@@ -16,13 +16,13 @@ import "../recordings/RecordingRow.css";
 export function NominalRow({ active, task }: { active: boolean; task: Task }) {
   const { calibrations } = useStore();
   return (
-    <li class={active ? "recording recording-shown" : "recording"} data-calibration="nominal">
+    <li class={active ? "row recording recording-shown" : "row recording"} data-calibration="nominal">
       <div class="recording-words">
         <p class="recording-name">Nominal gains {active && <em class="tag tag-good">in use</em>}</p>
         <p class="quiet recording-figures">those of an ideal modulation; nothing was measured</p>
       </div>
       {!active && (
-        <Steer disabled={task.busy.value !== null} onClick={() => void task.run("Switching…", () => calibrations.activate("nominal"))}>
+        <Steer task={task} onClick={() => void task.run("Switching…", () => calibrations.activate("nominal"))}>
           Use
         </Steer>
       )}
@@ -50,7 +50,7 @@ export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
     else void task.run("Switching…", () => calibrations.activate(id, forcing));
   };
   return (
-    <li class={active ? "recording recording-shown" : "recording"} data-calibration={id}>
+    <li class={active ? "row recording recording-shown" : "row recording"} data-calibration={id}>
       <div class="recording-words">
         <p class="recording-name" title={id}>
           {called} {active && fits && <em class="tag tag-good">in use</em>} {active && !fits && <em class="tag">waits for its sequence</em>}{" "}
@@ -88,7 +88,8 @@ export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
       {!active && (
         <Steer
           title={fits ? "Calibrate frames with it from the next one on" : (reason ?? "It does not fit")}
-          disabled={!fits || task.busy.value !== null}
+          disabled={!fits}
+          task={task}
           onClick={use}
         >
           {forcing && warned.value ? "Use anyway" : "Use"}

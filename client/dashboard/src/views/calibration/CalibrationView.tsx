@@ -4,7 +4,7 @@ import { fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
 import type { CalibrationDocument, JobDocument } from "../../stream/documents";
 import { Confirm } from "../../ui/Confirm";
-import { NumberField } from "../../ui/controls";
+import { Check, Form, NumberField, TextField } from "../../ui/controls";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
@@ -27,7 +27,7 @@ export function CalibrationView() {
   const doomed = deleting.value;
   return (
     <Panel name="calibration" title={<h2>Calibration</h2>} tools={<Import task={task} />}>
-      <div class="panel-body fades">
+      <div class="panel-body column fades">
         {job === null ? <MeasureForm task={task} /> : <Measuring job={job} task={task} />}
         <Obstacle />
         <TaskLine task={task} field="calibration-status" />
@@ -41,7 +41,7 @@ export function CalibrationView() {
         )}
         {calibrations.trouble.value !== null && <p class="refusal">{calibrations.trouble.value}</p>}
         {known !== null && (
-          <ul class="recording-list" aria-label="Calibrations">
+          <ul class="recording-list column" aria-label="Calibrations">
             <NominalRow active={known.active === "nominal"} task={task} />
             {known.calibrations.map((calibration) => (
               <CalibrationRow key={calibration.id} calibration={calibration} task={task} onDelete={() => (deleting.value = calibration)} />
@@ -76,25 +76,8 @@ function MeasureForm({ task }: { task: Task }) {
   const measure = (): Promise<boolean> =>
     task.run("Starting…", () => calibrations.measure({ name: name.peek().trim(), frames: count, activate: activate.peek() }));
   return (
-    <form
-      class="record-form measure-form"
-      onSubmit={(event) => {
-        event.preventDefault();
-        void measure();
-      }}
-    >
-      <label class="field record-name">
-        <span>Name</span>
-        <input
-          type="text"
-          name="name"
-          maxLength={200}
-          autocomplete="off"
-          placeholder="after warm-up"
-          value={name.value}
-          onInput={(event) => (name.value = event.currentTarget.value)}
-        />
-      </label>
+    <Form class="record-form measure-form" onSubmit={() => void measure()}>
+      <TextField label="Name" class="field record-name" name="name" maxLength={200} placeholder="after warm-up" text={name} />
       <NumberField
         label="Frames, with and without light"
         unit=""
@@ -104,23 +87,17 @@ function MeasureForm({ task }: { task: Task }) {
         onType={(text) => (frames.value = text)}
       />
       <div class="record-actions">
-        <Steer
-          submit
-          primary
-          title="Measure with the present sequence; no frames come meanwhile"
-          disabled={!sensible || task.busy.value !== null}
-        >
+        <Steer submit primary title="Measure with the present sequence; no frames come meanwhile" disabled={!sensible} task={task}>
           Measure
         </Steer>
       </div>
       <p class="quiet form-wide">
         Put filter and diffuser before the lens first, so that the light shines at the sensor. <Diffuser task={task} />{" "}
-        <label class="check">
-          <input type="checkbox" checked={activate.value} onChange={(event) => (activate.value = event.currentTarget.checked)} /> Use it at
-          once
-        </label>
+        <Check checked={activate.value} onChange={(checked) => (activate.value = checked)}>
+          Use it at once
+        </Check>
       </p>
-    </form>
+    </Form>
   );
 }
 
@@ -134,8 +111,8 @@ function Diffuser({ task }: { task: Task }) {
   return (
     <Steer
       title={`${words} of the simulated camera`}
-      disabled={task.busy.value !== null}
-      onClick={() => void task.run(`${words}…`, () => simulation.putDiffuser(!world.diffusor))}
+      task={task}
+      onClick={() => void task.run(`${words}…`, () => simulation.set({ diffuser: !world.diffusor }))}
     >
       {words}
     </Steer>
@@ -150,7 +127,7 @@ function Undo({ former, calibrations: all, task }: { former: string; calibration
     <p class="calibration-undo">
       <Steer
         title="Calibrate frames by what was active before"
-        disabled={task.busy.value !== null}
+        task={task}
         onClick={() => void task.run("Switching…", () => calibrations.restore())}
       >
         Return to {called}
@@ -163,7 +140,7 @@ function Undo({ former, calibrations: all, task }: { former: string; calibration
 function Measuring({ job, task }: { job: JobDocument; task: Task }) {
   const { calibrations } = useStore();
   return (
-    <div class="measuring">
+    <div class="measuring wrapped">
       <span>
         Measuring: <span data-field="job-step">{job.step}</span>
       </span>

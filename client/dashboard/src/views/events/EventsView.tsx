@@ -9,7 +9,7 @@ export function EventsView() {
   const all = [...events.all.value].reverse();
   return (
     <Panel name="events" title={<h2>What happened</h2>}>
-      <div class="panel-body fades">
+      <div class="panel-body column fades">
         {all.length === 0 && <p class="quiet recordings-none">Nothing worth telling since the page was opened.</p>}
         <ul class="events fades" tabIndex={0} aria-label="What happened">
           {all.map(({ number, at_s, words, tone }) => (

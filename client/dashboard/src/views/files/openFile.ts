@@ -14,16 +14,13 @@ export interface OpenedFile extends Blob {
 /** Opens a file by what it is, and says what came of it. */
 export async function openFile(store: Store, file: OpenedFile): Promise<void> {
   const opener = OPENERS[file.name.slice(file.name.lastIndexOf(".")).toLowerCase()];
-  try {
+  await store.events.reported(async () => {
     if (opener === undefined)
       throw new RequestError({
         detail: `${file.name} is none of what this page opens: a scene (.toml), a recording (.h5) or a calibration (.npz).`,
       });
     store.events.tell(await opener(store, file), "good");
-  } catch (error) {
-    if (!(error instanceof RequestError)) throw error;
-    store.events.tell(error.message, "bad");
-  }
+  });
 }
 
 /** Each does it and answers what was done, or raises RequestError. */
@@ -35,7 +32,7 @@ const OPENERS: Readonly<Record<string, (store: Store, file: OpenedFile) => Promi
     const text = file.size > 4 * LONGEST_SCENE ? null : await file.text();
     if (text === null || text.length > LONGEST_SCENE)
       throw new RequestError({ detail: `${file.name} is longer than ${LONGEST_SCENE} characters, the most of a scene.` });
-    await store.simulation.stageOwn(text);
+    await store.simulation.set({ definition: text });
     return `The camera stands before the scene of ${file.name}.`;
   },
   ".h5": async (store, file) => {

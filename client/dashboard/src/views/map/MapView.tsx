@@ -1,23 +1,22 @@
-import { computed, type ReadonlySignal, type Signal } from "@preact/signals";
+import type { Signal } from "@preact/signals";
 import type { RefObject } from "preact";
-import { useMemo, useRef } from "preact/hooks";
+import { useRef } from "preact/hooks";
 import { drawnOf } from "../../store/frames";
 import type { Look } from "../../store/looks";
 import { MAP_PRODUCTS, type MapProduct } from "../../store/mapCatalogue";
 import { useStore } from "../../store/store";
 import type { ViewName } from "../../store/viewNames";
-import { ColourBar } from "../../ui/ColourBar";
-import { ColourChoice } from "../../ui/ColourChoice";
+import { MapBar } from "../../ui/ColourBar";
 import { Check, Tabs } from "../../ui/controls";
-import { saveNumbers, savePicture } from "../../ui/download";
-import { FirstFrame } from "../../ui/FirstFrame";
+import { saveNumbers } from "../../ui/download";
 import { captionOf } from "../../ui/figure";
-import { saveFigure } from "../../ui/figureFiles";
-import { useDrawing, useProducts } from "../../ui/hooks";
+import { type FigureParts, pictureFiles } from "../../ui/figureFiles";
+import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
 import { LimitFields } from "../../ui/LimitFields";
+import { ColourChoice } from "../../ui/LookChoices";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
-import { hatch, paint } from "../../ui/paint";
+import { draw, hatch, paint } from "../../ui/paint";
 import { Stage } from "../../ui/Stage";
 import { Measured } from "./Measured";
 import { Readout, valueAtPixel } from "./Readout";
@@ -44,26 +43,27 @@ function MapPanel({ name, choice }: MapPanelProps) {
   const shown = MAP_PRODUCTS.find((each) => each.product === choice.value && obstacleOf(each) === undefined) ?? MAP_PRODUCTS[0];
   const look = store.looks.of(shown.product);
   const canvas = useRef<HTMLCanvasElement>(null);
-  const figure = (kind: "png" | "svg"): void => {
+  const parts = (): FigureParts | null => {
     const meta = look.frame.peek()?.meta;
-    if (meta === undefined) return;
-    const parts = {
+    if (meta === undefined) return null;
+    return {
       title: shown.name,
       caption: captionOf(meta, store.sequence.peek()),
       scale: look.scale.peek(),
       colours: look.colours.peek(),
       unit: shown.unit,
       ground: "white",
-    } as const;
-    void saveFigure(`${shown.product}-${meta.frame}`, canvas.current, parts, kind);
+    };
   };
   return (
     <Panel
       name={name}
       downloads={[
-        { text: "Picture (PNG)", run: () => savePicture(`${shown.product}-${look.frame.peek()?.meta.frame ?? 0}`, canvas.current) },
-        { text: "Figure (PNG)", run: () => figure("png") },
-        { text: "Figure (SVG)", run: () => figure("svg") },
+        ...pictureFiles(
+          () => `${shown.product}-${look.frame.peek()?.meta.frame ?? 0}`,
+          () => canvas.current,
+          parts,
+        ),
         { text: `${shown.name} in ${shown.unit} (NPY)`, run: () => saveNumbers(store.api, look.frame.peek()) },
       ]}
       title={
@@ -108,35 +108,24 @@ function MapPicture({ look, canvas }: MapProps) {
   const store = useStore();
   const { product: shown, frame } = look;
   useProducts([shown.product, store.frames.amplitude.value]);
-  const { size, waiting, marked } = useMemo(
-    () =>
-      signalsOf(
-        look,
-        computed(() => store.pointed.value ?? store.selected.value),
-      ),
-    [look, store],
-  );
-  const [width, height] = size.value.split("x").map(Number);
+  const waiting = useComputedOf([look], () => frame.value === null);
+  const marked = useComputedOf([look, store], () => valueAtPixel(frame.value, store.pointed.value ?? store.selected.value));
 
   useDrawing(() => {
     const newest = frame.value;
     const scale = look.scale.value;
     const colours = look.colours.value;
     const target = canvas.current;
-    const context = target?.getContext("2d");
-    if (target === null || !context) return;
+    if (target === null) return;
     if (newest === null) {
       // What the map before showed is not this one's.
-      context.clearRect(0, 0, target.width, target.height);
+      target.getContext("2d")?.clearRect(0, 0, target.width, target.height);
       delete target.dataset.frame;
       delete target.dataset.product;
       return;
     }
     const [rows, columns] = newest.shape;
-    if (target.width !== columns || target.height !== rows) [target.width, target.height] = [columns, rows];
-    const image = context.createImageData(columns, rows);
-    paint(drawnOf(newest), scale, colours, image.data);
-    context.putImageData(image, 0, 0);
+    draw(target, columns, rows, (rgba) => paint(drawnOf(newest), scale, colours, rgba));
     // What the picture shows, for tests and for scripts that read the page.
     Object.assign(target.dataset, { product: shown.product, frame: newest.meta.frame, low: scale.low, high: scale.high, colours });
   }, [look]);
@@ -144,25 +133,13 @@ function MapPicture({ look, canvas }: MapProps) {
   return (
     <>
       <div class="picture">
-        <Stage width={width} height={height} frame={frame} label={`${shown.name} map`}>
+        <Stage frame={frame} label={`${shown.name} map`}>
           <canvas ref={canvas} />
           {shown.unit === "m" && <Hatch />}
-          {waiting.value && <FirstFrame />}
         </Stage>
-        {waiting.value ? (
-          <div class="colour-bar" />
-        ) : (
-          <ColourBar
-            scale={look.scale.value}
-            colours={look.colours.value}
-            unit={shown.unit}
-            values={frame}
-            marked={marked}
-            onLimit={(limits) => store.looks.limit(look, limits)}
-          />
-        )}
+        <MapBar look={waiting.value ? null : look} marked={marked} />
       </div>
-      <footer class="panel-foot">
+      <footer class="panel-foot column">
         <Readout key={shown.product} look={look} />
         <Measured look={look} />
       </footer>
@@ -178,26 +155,11 @@ function Hatch() {
   const trust = useStore().rangeErrors.of("trust");
   const canvas = useRef<HTMLCanvasElement>(null);
   useDrawing(() => {
-    const [frame, target] = [trust.value, canvas.current];
-    const context = target?.getContext("2d");
-    if (target === null || !context) return;
-    const [rows, columns] = frame?.shape ?? [0, 0];
-    [target.width, target.height] = [HATCH * columns, HATCH * rows]; // which clears it
-    if (frame === null) return;
-    const image = context.createImageData(target.width, target.height);
-    hatch(frame.values, columns, HATCH, new Uint32Array(image.data.buffer));
-    context.putImageData(image, 0, 0);
+    const frame = trust.value;
+    const [rows, columns] = frame?.shape ?? [1, 1];
+    draw(canvas.current, HATCH * columns, HATCH * rows, ({ buffer }) => {
+      if (frame !== null) hatch(frame.values, columns, HATCH, new Uint32Array(buffer));
+    });
   }, [trust]);
-  return <canvas ref={canvas} class="stage-hatch" title="Hatched: the range is not trusted" />;
-}
-
-function signalsOf({ frame }: Look, looked: ReadonlySignal<{ x: number; y: number } | null>) {
-  return {
-    size: computed(() => {
-      const [height, width] = frame.value?.shape ?? [120, 163];
-      return `${width}x${height}`;
-    }),
-    waiting: computed(() => frame.value === null),
-    marked: computed(() => valueAtPixel(frame.value, looked.value)),
-  };
+  return <canvas ref={canvas} class="stage-hatch cover" title="Hatched: the range is not trusted" />;
 }

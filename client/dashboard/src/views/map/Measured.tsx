@@ -1,5 +1,5 @@
-import { computed, type ReadonlySignal, useComputed } from "@preact/signals";
-import { useMemo, useRef } from "preact/hooks";
+import { type ReadonlySignal, useComputed } from "@preact/signals";
+import { useRef } from "preact/hooks";
 
 import { DEGREE } from "../../physics/constants";
 import { tiltOf } from "../../physics/plane";
@@ -8,7 +8,7 @@ import { histogram } from "../../scales/scale";
 import type { Look } from "../../store/looks";
 import { figuresOf, type RegionFigures } from "../../store/measures";
 import { useStore } from "../../store/store";
-import { useDrawing } from "../../ui/hooks";
+import { useComputedOf, useDrawing } from "../../ui/hooks";
 import { lensOf } from "../points/lens";
 import { PinsRow } from "./PinsRow";
 import { planeOf } from "./plane";
@@ -33,14 +33,10 @@ function RegionRow({ look }: { look: Look }) {
   const store = useStore();
   const { measures } = store;
   const { unit, decimals } = look.product;
-  const figures = useMemo(
-    () =>
-      computed(() => {
-        const [frame, region] = [look.frame.value, measures.region.value];
-        return frame === null || region === null ? null : figuresOf(frame.values, frame.shape[1], frame.shape[0], region);
-      }),
-    [look, measures],
-  );
+  const figures = useComputedOf([look, measures], () => {
+    const [frame, region] = [look.frame.value, measures.region.value];
+    return frame === null || region === null ? null : figuresOf(frame.values, frame.shape[1], frame.shape[0], region);
+  });
   const found = figures.value;
   const plane = useComputed(() => {
     const [frame, region] = [look.frame.value, measures.region.value];

@@ -84,7 +84,7 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
         {place}
       </span>
       {isRange && (
-        <span class="quiet readout-worth" data-field="worth" title={worth.value?.words}>
+        <span class="quiet clipped readout-worth" data-field="worth" title={worth.value?.words}>
           {value.value === NOTHING ? "no value" : worth.value?.words}
         </span>
       )}

@@ -2,20 +2,12 @@ import { useSignal } from "@preact/signals";
 import { useEffect, useId, useRef } from "preact/hooks";
 
 import { useStore } from "../../store/store";
-import { SwitchedDialog } from "../../ui/Dialog";
+import type { Done } from "../../ui/Dialog";
 import { commandsOf, matching } from "./commands";
 import "./Palette.css";
 
 /** All commands of the page, by the keyboard: type, choose by arrow keys, Enter. After the WAI-ARIA pattern "combobox" with a list. */
-export function Palette() {
-  return (
-    <SwitchedDialog open={useStore().palette} title="All commands">
-      {(close) => <Search onDone={close} />}
-    </SwitchedDialog>
-  );
-}
-
-function Search({ onDone }: { onDone: () => void }) {
+export function Palette({ onDone }: Done) {
   const store = useStore();
   const id = useId();
   const query = useSignal("");
@@ -38,7 +30,7 @@ function Search({ onDone }: { onDone: () => void }) {
     event.preventDefault();
   };
   return (
-    <div class="palette">
+    <div class="palette column">
       <input
         type="text"
         role="combobox"

@@ -1,5 +1,4 @@
 /** All that the page can do at once, to be searched by words. */
-import { RequestError } from "../../store/api";
 import { LAYOUTS } from "../../store/layout";
 import { MAP_PRODUCTS } from "../../store/mapCatalogue";
 import { copyLink } from "../../store/permalink";
@@ -41,13 +40,13 @@ export function commandsOf(store: Store): Command[] {
       ? PRESETS.map(({ name, sequence }) => ({
           words: `Sequence: ${name}`,
           key: "",
-          run: () => void reported(store, () => store.sequencing.set({ ...applied, ...sequence })),
+          run: () => void store.events.reported(() => store.sequencing.set({ ...applied, ...sequence })),
         }))
       : []),
     ...scenes.map(({ name }) => ({
       words: `Scene: ${name}`,
       key: "",
-      run: () => void reported(store, () => store.simulation.stage(name)),
+      run: () => void store.events.reported(() => store.simulation.set({ scene: name })),
     })),
     ...THEMES.map((theme) => ({
       words: `Colours: ${theme === "auto" ? "as the system" : theme}`,
@@ -72,20 +71,10 @@ function recordingCommands(store: Store): Command[] {
   const does = (what: string, work: () => Promise<unknown>): Command => ({
     words: `Recording: ${what}`,
     key: "",
-    run: () => void reported(store, work),
+    run: () => void store.events.reported(work),
   });
   if (active !== null) return [does("stop", () => recordings.stop(active.id))];
   return [does("start", () => recordings.start({})), does(`save the last ${PAST_S} s`, () => recordings.savePast())];
-}
-
-/** Runs a request of the service; says in the page's events why it was refused. */
-async function reported(store: Store, work: () => Promise<unknown>): Promise<void> {
-  try {
-    await work();
-  } catch (error) {
-    if (!(error instanceof RequestError)) throw error;
-    store.events.tell(error.message, "bad");
-  }
 }
 
 /** Those that hold every word of a query, whatever its case and order; at whose beginning one stands come first. */

@@ -1,21 +1,16 @@
 import type { Signal } from "@preact/signals";
-import { computed } from "@preact/signals";
-import { useMemo } from "preact/hooks";
 import type uPlot from "uplot";
 
 import type { Look } from "../../store/looks";
 import { useStore } from "../../store/store";
-import { useDrawing } from "../../ui/hooks";
+import { useComputedOf, useDrawing } from "../../ui/hooks";
 import { LineChart } from "./LineChart";
 import { profileOf } from "./profile";
 
 /** The map along the line from pin A to pin B. */
 export function AlongLine({ look, data }: { look: Look; data: Signal<uPlot.AlignedData> }) {
   const { measures } = useStore();
-  const ends = useMemo(
-    () => computed(() => (["A", "B"] as const).map((name) => measures.pins.value.find((pin) => pin.name === name))),
-    [measures],
-  );
+  const ends = useComputedOf([measures], () => (["A", "B"] as const).map((name) => measures.pins.value.find((pin) => pin.name === name)));
   useDrawing(() => {
     const [frame, [from, to]] = [look.frame.value, ends.value];
     if (frame === null || from === undefined || to === undefined) return;

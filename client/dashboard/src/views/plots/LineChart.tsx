@@ -1,10 +1,10 @@
-import { type ReadonlySignal, signal, useSignal } from "@preact/signals";
-import { useEffect, useMemo, useRef } from "preact/hooks";
+import type { ReadonlySignal } from "@preact/signals";
+import { useRef } from "preact/hooks";
 import uPlot from "uplot";
-import "uplot/dist/uPlot.min.css";
 
 import { useStore } from "../../store/store";
-import { useDrawing, useSize } from "../../ui/hooks";
+import { useDrawing } from "../../ui/hooks";
+import { inkOf, plain, usePlot } from "./page";
 
 export interface Line {
   readonly name: string;
@@ -27,27 +27,13 @@ interface LineChartProps {
 export function LineChart({ label, lines, along, across, ends, data }: LineChartProps) {
   const { theme } = useStore();
   const box = useRef<HTMLDivElement>(null);
-  const size = useMemo(() => signal({ width: 0, height: 0 }), []);
-  useSize(box, size);
-  const plot = useSignal<uPlot | null>(null);
   const form = JSON.stringify([lines, along, across, ends, theme.dark.value]);
-  useEffect(() => {
-    if (box.current === null) return undefined;
-    const made = makePlot(box.current, { lines, along, across, ends });
-    plot.value = made;
-    return () => {
-      plot.value = null;
-      made.destroy();
-    };
-  }, [form, plot]);
+  const { made } = usePlot(box, (place) => ({ plot: makePlot(place, { lines, along, across, ends }) }), [form]);
   useDrawing(() => {
-    const { width, height } = size.value;
-    if (width > 0 && height > 0) plot.value?.setSize({ width, height });
-  }, [plot, size]);
-  useDrawing(() => {
+    const plot = made.value?.plot;
     // Between a change of the lines and the next plot the data may be of other lines.
-    if (plot.value !== null && data.value.length === plot.value.series.length) plot.value.setData(data.value);
-  }, [plot, data]);
+    if (data.value.length === plot?.series.length) plot.setData(data.value);
+  }, [made, data]);
   return <div class="line-chart" ref={box} role="img" aria-label={label} />;
 }
 
@@ -55,29 +41,25 @@ function makePlot(
   box: HTMLElement,
   { lines, along, across, ends }: Pick<LineChartProps, "lines" | "along" | "across"> & { ends: LineChartProps["ends"] | undefined },
 ): uPlot {
-  const style = getComputedStyle(box);
-  const ink = (colour: string): string => (colour.startsWith("--") ? style.getPropertyValue(colour) : colour);
-  const font = `${style.getPropertyValue("--small")} ${style.fontFamily}`;
-  const axis = {
-    stroke: ink("--quiet"),
-    font,
-    labelFont: font,
-    grid: { stroke: ink("--hairline"), width: 1 },
-    ticks: { stroke: ink("--hairline"), width: 1, size: 4 },
-  };
+  const { ink, axis } = inkOf(box);
   return new uPlot(
     {
-      width: Math.max(1, box.clientWidth),
-      height: Math.max(1, box.clientHeight),
-      legend: { show: false },
-      cursor: { drag: { x: false, y: false }, y: false, points: { size: 6 } },
+      ...plain(box),
       padding: [8, 12, 0, 0],
       scales: { x: { time: false, ...(ends === undefined ? {} : { range: [...ends] as [number, number] }) } },
       axes: [
         { ...axis, size: 20, gap: 2, label: along, labelSize: 16, labelGap: 0 },
         { ...axis, size: 60, gap: 4, label: across, labelSize: 16, labelGap: 0, space: 28 },
       ],
-      series: [{}, ...lines.map(({ name, colour }) => ({ label: name, stroke: ink(colour), width: 1.5, spanGaps: false }))],
+      series: [
+        {},
+        ...lines.map(({ name, colour }) => ({
+          label: name,
+          stroke: colour.startsWith("--") ? ink(colour) : colour,
+          width: 1.5,
+          spanGaps: false,
+        })),
+      ],
     },
     [[], ...lines.map(() => [])],
     box,

@@ -1,4 +1,4 @@
-import { computed, type Signal, signal } from "@preact/signals";
+import { type Signal, signal } from "@preact/signals";
 import { useMemo } from "preact/hooks";
 import type uPlot from "uplot";
 import { deviation, fixed } from "../../scales/format";
@@ -6,7 +6,7 @@ import type { Frame } from "../../store/frames";
 import type { Look } from "../../store/looks";
 import { figuresOf, PIN_COLOURS } from "../../store/measures";
 import { type Store, useStore } from "../../store/store";
-import { useDrawing } from "../../ui/hooks";
+import { useComputedOf, useDrawing } from "../../ui/hooks";
 import { valueAtPixel } from "../map/Readout";
 import { History, KEPT_S } from "./history";
 import { type Line, LineChart } from "./LineChart";
@@ -21,7 +21,7 @@ interface Place extends Line {
 export function OverTime({ look, data }: { look: Look; data: Signal<uPlot.AlignedData> }) {
   const store = useStore();
   const history = useMemo(() => new History(), []);
-  const places = useMemo(() => computed(() => placesOf(store)), [store]);
+  const places = useComputedOf([store], () => placesOf(store));
   const taken = useMemo(() => signal(0), []);
   useDrawing(() => {
     const frame = look.frame.value;

@@ -1,4 +1,5 @@
 /** Values of a map over the last seconds, at places that are looked at. */
+import { statistics } from "../../physics/statistics";
 
 /** How long values are kept. */
 export const KEPT_S = 10;
@@ -43,13 +44,7 @@ export class History {
 
   figures(name: string): SeriesFigures {
     const values = this.#samples.map((sample) => finite(sample.values.get(name))).filter((value) => value !== null);
-    const mean = values.reduce((sum, value) => sum + value, 0) / values.length;
-    const squares = values.reduce((sum, value) => sum + (value - mean) ** 2, 0);
-    return {
-      last: this.#samples.at(-1)?.values.get(name) ?? NaN,
-      mean,
-      std: values.length > 1 ? Math.sqrt(squares / (values.length - 1)) : NaN,
-    };
+    return { last: this.#samples.at(-1)?.values.get(name) ?? NaN, ...statistics(values) };
   }
 }
 

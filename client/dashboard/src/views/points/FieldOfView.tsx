@@ -17,7 +17,7 @@ export function FieldOfView() {
     );
   }
   return (
-    <label class="choice" title="How wide the camera looks, across: the service does not know">
+    <label class="choice inline-row" title="How wide the camera looks, across: the service does not know">
       <span class="quiet">field of view</span>
       <input
         class="limit"

@@ -4,13 +4,13 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import { LightPainter } from "../../gl/paintLight";
 import type { Backdrop } from "../../gl/renderer";
 import { grouped } from "../../scales/format";
-import { LIVE, RequestError } from "../../store/api";
+import { LIVE, refusalIn } from "../../store/api";
 import { drawnOf, type Frame } from "../../store/frames";
 import type { TransientLook } from "../../store/lightLook";
 import { aBoolean, aNumber, oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { frameUrl } from "../../stream/frameUrl";
-import { ColourBar } from "../../ui/ColourBar";
+import { MapBar } from "../../ui/ColourBar";
 import { Choice, Toggle } from "../../ui/controls";
 import { save, savePicture } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
@@ -161,12 +161,10 @@ export function PointsView() {
     try {
       await download(store.api, frameUrl(place, "pointcloud.ply"), `pointcloud-${frame.meta.frame}.ply`);
     } catch (error) {
-      if (!(error instanceof RequestError)) throw error;
-      store.status.unreadable.value = error.message;
+      store.status.unreadable.value = refusalIn(error).message;
     }
   };
 
-  const bar = useComputed(() => ({ range: rangeLook, light: lightLook, validity: null, flight: null })[colouring.value]);
   const frameless = useComputed(() => range.value === null);
   const loading = useComputed(() => scene.value === null);
   return (
@@ -175,18 +173,8 @@ export function PointsView() {
       title={<h2>Points in space</h2>}
       tools={
         <PopoverButton face="Look" label="Look of the points" title="What the points are coloured by, and their size" kind="look">
-          <Choice
-            label="Colour by"
-            value={colouring.value}
-            options={COLOURINGS.map((each) => ({ value: each, text: each === "light" ? ofLight : NAMES[each] }))}
-            onChange={(each) => (colouring.value = each)}
-          />
-          <Choice
-            label="Size of a point"
-            value={pointSize.value}
-            options={[1, 2, 3, 4, 6].map((each) => ({ value: each, text: `${each} px` }))}
-            onChange={(each) => (pointSize.value = each)}
-          />
+          <Choice label="Colour by" chosen={colouring} of={COLOURINGS} text={(each) => (each === "light" ? ofLight : NAMES[each])} />
+          <Choice label="Size of a point" chosen={pointSize} of={[1, 2, 3, 4, 6]} text={(each) => `${each} px`} />
         </PopoverButton>
       }
       downloads={[
@@ -214,38 +202,23 @@ export function PointsView() {
         </div>
         {colouring.value === "flight" ? (
           <LightBar look={light} play="density" />
-        ) : bar.value === null ? (
-          <div class="colour-bar" />
         ) : (
-          <ColourBar
-            scale={bar.value.scale.value}
-            colours={bar.value.colours.value}
-            unit={bar.value.product.unit}
-            values={bar.value.frame}
-            onLimit={(limits) => {
-              if (bar.value !== null) store.looks.limit(bar.value, limits);
-            }}
-          />
+          <MapBar look={{ range: rangeLook, light: lightLook, validity: null }[colouring.value]} />
         )}
       </div>
-      <footer class="panel-foot">
+      <footer class="panel-foot column">
         <div class="panel-row">
           <span>
             <span data-field="points">{grouped(count.value)}</span> <span class="quiet">points</span>
           </span>
           <FieldOfView />
           <span class="panel-tools">
-            <Toggle
-              pressed={surrounded.value}
-              title="Floor with a grid in metres, the camera's axes (x red, y green, z blue) and its field of view"
-              onToggle={() => (surrounded.value = !surrounded.peek())}
-            >
+            <Toggle on={surrounded} title="Floor with a grid in metres, the camera's axes (x red, y green, z blue) and its field of view">
               Grid
             </Toggle>
             <Toggle
-              pressed={shaded.value}
+              on={shaded}
               title="Eye-dome lighting: what stands behind its neighbours is darker. Without it colours are exactly those of the colour bar"
-              onToggle={() => (shaded.value = !shaded.peek())}
             >
               Shading
             </Toggle>

@@ -113,6 +113,7 @@ export function SceneStage({ canvas, scene, range }: SceneStageProps) {
     <>
       <canvas
         ref={canvas}
+        class="cover"
         data-product="points"
         tabIndex={0}
         role="application"
@@ -127,11 +128,11 @@ export function SceneStage({ canvas, scene, range }: SceneStageProps) {
         onPointerDown={(event) => (pressed.current = event.button === 0 ? { x: event.clientX, y: event.clientY } : null)}
         onPointerUp={onPointerUp}
       />
-      <div class="scene-marks" aria-hidden="true">
+      <div class="mark cover scene-marks" aria-hidden="true">
         {marks.value.map(({ kind, x, y, text, colour }, n) => (
           <span
             key={n}
-            class={`scene-mark scene-mark-${kind}`}
+            class={`scene-mark small scene-mark-${kind}`}
             style={{ left: `${x}px`, top: `${y}px`, ...(colour === undefined ? {} : { "--pin": colour }) }}
           >
             {text}

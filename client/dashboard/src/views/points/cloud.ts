@@ -1,5 +1,5 @@
 /** A range map as points in space: written into the arrays of a geometry, nothing allocated a frame. */
-import type { ColourMapName } from "../../scales/colourMaps";
+import { type ColourMapName, rgbaOf } from "../../scales/colourMaps";
 import type { Scale } from "../../scales/scale";
 import { gravest } from "../../ui/flags";
 import { picker } from "../../ui/paint";
@@ -82,20 +82,10 @@ function writeRgb(rgba: number, out: Uint8Array, at: number): void {
   out[at + 2] = (rgba >> 16) & 255;
 }
 
-const VALID: readonly [number, number, number] = [150, 160, 170];
-const REASONS = Array.from({ length: 256 }, (_, bits): readonly [number, number, number] => {
-  const flag = gravest(bits);
-  if (flag === null) return VALID;
-  const rgb = parseInt(flag.colour.slice(1), 16);
-  return [rgb >> 16, (rgb >> 8) & 255, rgb & 255];
-});
+const VALID = "#96a0aa";
+const REASONS = Uint32Array.from({ length: 256 }, (_, bits) => rgbaOf((gravest(bits)?.colour ?? VALID).slice(1)));
 
 /** Colours by the gravest flag. */
 export function byFlags(flags: ArrayLike<number>): Painter {
-  return (pixel, out, at) => {
-    const [red, green, blue] = REASONS[flags[pixel] & 255];
-    out[at] = red;
-    out[at + 1] = green;
-    out[at + 2] = blue;
-  };
+  return (pixel, out, at) => writeRgb(REASONS[flags[pixel] & 255], out, at);
 }

@@ -2,6 +2,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { useStore } from "../../store/store";
 import type { ParameterDocument } from "../../stream/documents";
+import { Form } from "../../ui/controls";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
@@ -15,8 +16,8 @@ export function ReconstructionView() {
   /** What was typed, and the version that it began with; null while nothing was. */
   const typed = useSignal<{ readonly draft: Draft; readonly tag: string | null } | null>(null);
   useEffect(() => void reconstruction.refresh(), [reconstruction]);
-  const current = reconstruction.current.value;
-  const parameters = reconstruction.parameters.value;
+  const current = reconstruction.document.value;
+  const parameters = current?.parameters ?? [];
   const draft = typed.value?.draft ?? draftOf(parameters);
   const reading = readingOf(parameters, draft);
   const wrong = "wrong" in reading ? reading : null;
@@ -34,17 +35,17 @@ export function ReconstructionView() {
       tools={
         <Steer
           title="Smoothing, bias and all else as the daemon has them by default"
-          disabled={task.busy.value !== null || current === null}
+          task={task}
+          disabled={current === null}
           onClick={() => void apply({}, current?.tag ?? null)}
         >
           The defaults
         </Steer>
       }
     >
-      <form
-        class="panel-body fades"
-        onSubmit={(event) => {
-          event.preventDefault();
+      <Form
+        class="panel-body column fades"
+        onSubmit={() => {
           if ("settings" in reading) void apply(reading.settings, typed.peek()?.tag ?? current?.tag ?? null);
         }}
       >
@@ -74,12 +75,12 @@ export function ReconstructionView() {
             >
               Undo
             </button>
-            <Steer submit primary disabled={wrong !== null || task.busy.value !== null}>
+            <Steer submit primary disabled={wrong !== null} task={task}>
               Apply
             </Steer>
           </div>
         )}
-      </form>
+      </Form>
     </Panel>
   );
 }

@@ -1,6 +1,7 @@
 import { useSignal } from "@preact/signals";
 import { useStore } from "../../store/store";
 import type { RecordingDocument } from "../../stream/documents";
+import { Form } from "../../ui/controls";
 import { Dialog } from "../../ui/Dialog";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
@@ -16,21 +17,13 @@ export function Annotations({ recording, onClose }: { recording: RecordingDocume
   const set = (at: number, change: Partial<Line>): void => {
     lines.value = lines.peek().map((line, n) => (n === at ? { ...line, ...change } : line));
   };
+  const write = async (): Promise<void> => {
+    if (said !== null && (await task.run("Writing…", () => recordings.annotate(recording.id, said)))) onClose();
+  };
   return (
     <Dialog open title={`Notes on ${recording.name}`} onClose={onClose}>
-      <form
-        class="control"
-        onSubmit={(event) => {
-          event.preventDefault();
-          if (said !== null)
-            void task
-              .run("Writing…", () => recordings.annotate(recording.id, said))
-              .then((done) => {
-                if (done) onClose();
-              });
-        }}
-      >
-        <div class="lines">
+      <Form class="control column" onSubmit={() => void write()}>
+        <div class="lines column">
           {lines.value.map(({ name, text }, at) => (
             <div key={at} class="line">
               <input
@@ -71,7 +64,7 @@ export function Annotations({ recording, onClose }: { recording: RecordingDocume
             Save
           </button>
         </div>
-      </form>
+      </Form>
     </Dialog>
   );
 }

@@ -2,7 +2,7 @@ import { useSignal } from "@preact/signals";
 
 import { PAST_S } from "../../store/recordings";
 import { useStore } from "../../store/store";
-import { NumberField } from "../../ui/controls";
+import { Form, NumberField, TextField } from "../../ui/controls";
 import type { Task } from "../../ui/useTask";
 import { limitsOf } from "./limits";
 import "./RecordForm.css";
@@ -29,25 +29,8 @@ export function RecordForm({ task }: { task: Task }) {
   );
   const busy = task.busy.value !== null;
   return (
-    <form
-      class="record-form"
-      onSubmit={(event) => {
-        event.preventDefault();
-        void start();
-      }}
-    >
-      <label class="field record-name">
-        <span>Name</span>
-        <input
-          type="text"
-          name="name"
-          maxLength={200}
-          autocomplete="off"
-          placeholder="named after the time"
-          value={name.value}
-          onInput={(event) => (name.value = event.currentTarget.value)}
-        />
-      </label>
+    <Form class="record-form" onSubmit={() => void start()}>
+      <TextField label="Name" class="field record-name" name="name" maxLength={200} placeholder="named after the time" text={name} />
       <fieldset class="record-limits">
         <legend class="unseen">Ends after</legend>
         {number("Duration", "s", duration_s, "duration_s")}
@@ -72,6 +55,6 @@ export function RecordForm({ task }: { task: Task }) {
           Save the last {PAST_S} s
         </button>
       </div>
-    </form>
+    </Form>
   );
 }

@@ -35,7 +35,7 @@ export function RecordingRow({ recording, task, onAnnotate, onDelete }: RowProps
   const notes = Object.entries(annotations).map(([key, value]) => `${key}: ${typeof value === "string" ? value : JSON.stringify(value)}`);
   const why = recording.reason === null ? null : (END_REASONS[recording.reason] ?? recording.reason);
   return (
-    <li class={shown ? "recording recording-shown" : "recording"} data-recording={id}>
+    <li class={shown ? "row recording recording-shown" : "row recording"} data-recording={id}>
       <button
         type="button"
         class="play"

@@ -39,12 +39,12 @@ export function RecordingsView() {
         </>
       }
     >
-      <div class="panel-body fades">
+      <div class="panel-body column fades">
         {recordings.active.value === null ? <RecordForm task={task} /> : <Running recording={recordings.active.value} task={task} />}
         <TaskLine task={task} field="recordings-status" />
         {recordings.trouble.value !== null && <p class="refusal">{recordings.trouble.value}</p>}
         {known !== null && known.recordings.length === 0 && <p class="quiet recordings-none">Nothing was recorded yet.</p>}
-        <ul class="recording-list">
+        <ul class="recording-list column">
           {known?.recordings
             .filter(({ id }) => id !== known.active)
             .map((recording) => (
@@ -84,8 +84,8 @@ function Running({ recording, task }: { recording: RecordingDocument; task: Task
   const { recordings, replay } = useStore();
   const limit_s = recording.limits?.duration_s ?? null;
   return (
-    <div class="recording-now">
-      <span class="recording-sign">
+    <div class="wrapped recording-now">
+      <span class="recording-sign inline-row">
         <i aria-hidden="true" /> {recording.name}
       </span>
       <span data-field="recording-duration">

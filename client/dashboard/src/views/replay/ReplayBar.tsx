@@ -1,6 +1,6 @@
 import { useEffect } from "preact/hooks";
 import { fixed, grouped } from "../../scales/format";
-import { REPLAY_SPEEDS, type Replay, type ReplaySettings, type Timeline } from "../../store/replay";
+import { REPLAY_SPEEDS, type Replay, type Timeline } from "../../store/replay";
 import { useStore } from "../../store/store";
 import { Choice } from "../../ui/controls";
 import { PauseIcon, PlayIcon, StepIcon } from "../../ui/icons";
@@ -15,11 +15,13 @@ export function ReplayBar() {
   if (recording === null || timeline === null) return null;
   const playing = replay.playing.value;
   return (
-    <section class="replay" aria-label="Replay" data-frame={replay.shown.value ?? undefined}>
-      <div class="replay-name">
-        <strong title={recording.id}>{recording.name}</strong>
-        <span class={replay.trouble.value === null ? "quiet" : "refusal"} role="status" data-field="replay-status">
-          {replay.trouble.value ?? <CapturedAt started_s={timeline.started_s ?? recording.started_s} replay={replay} />}
+    <section class="replay wrapped" aria-label="Replay" data-frame={replay.shown.value ?? undefined}>
+      <div class="replay-name column">
+        <strong class="clipped" title={recording.id}>
+          {recording.name}
+        </strong>
+        <span class={`small clipped ${replay.trouble.value === null ? "quiet" : "refusal"}`} role="status" data-field="replay-status">
+          {replay.trouble.value ?? <CapturedAt started_s={timeline.host_time_s ?? recording.started_s} replay={replay} />}
         </span>
       </div>
       <div class="replay-controls">
@@ -38,20 +40,12 @@ export function ReplayBar() {
         <button type="button" class="play" aria-label="One frame on" title="One frame on (])" onClick={() => replay.step(1)}>
           <StepIcon />
         </button>
-        <Choice
-          label="Speed of the recording"
-          value={replay.speed.value}
-          options={REPLAY_SPEEDS.map((speed) => ({ value: speed, text: `${speed} ×` }))}
-          onChange={(speed) => (replay.speed.value = speed)}
-        />
+        <Choice label="Speed of the recording" chosen={replay.speed} of={REPLAY_SPEEDS} text={(speed) => `${speed} ×`} />
         <Choice
           label="Computed with"
-          value={replay.settings.value}
-          options={[
-            { value: "recorded" as ReplaySettings, text: "recorded settings" },
-            { value: "current", text: "present settings" },
-          ]}
-          onChange={(settings) => (replay.settings.value = settings)}
+          chosen={replay.settings}
+          of={["recorded", "current"]}
+          text={(settings) => (settings === "recorded" ? "recorded settings" : "present settings")}
         />
       </div>
       <Scrubber replay={replay} timeline={timeline} />

@@ -45,7 +45,7 @@ export function FlagWords({ flags, looked }: { flags: FlagHistory; looked: boole
     return found === undefined ? [] : [{ name, title, words, share: found.share }];
   });
   return (
-    <ul class="flag-words" data-field="flags">
+    <ul class="flag-words small" data-field="flags">
       {shown.length === 0 && <li>Nothing was wrong with this pixel.</li>}
       {shown.map(({ name, title, words, share }) => (
         <li key={name} data-flag={name}>
@@ -94,7 +94,7 @@ function ReturnTable({ details, history }: { details: PixelDocument; history: Re
           ))}
         </tbody>
       </table>
-      <p class="quiet listing-rest">{notes.filter((note) => note !== "").join("; ")}</p>
+      <p class="small quiet listing-rest">{notes.filter((note) => note !== "").join("; ")}</p>
     </div>
   );
 }

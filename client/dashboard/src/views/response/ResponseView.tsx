@@ -1,6 +1,5 @@
-import { computed, effect, type ReadonlySignal, type Signal, signal, untracked, useComputed, useSignal } from "@preact/signals";
+import { effect, type ReadonlySignal, type Signal, untracked, useComputed, useSignal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
-import "uplot/dist/uPlot.min.css";
 
 import { rangeOfTime_m } from "../../physics/constants";
 import { pixelOf } from "../../physics/reflection";
@@ -15,8 +14,9 @@ import { type Store, useStore } from "../../store/store";
 import { Tabs, Toggle } from "../../ui/controls";
 import { save } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
-import { useDrawing, useProducts, useSize } from "../../ui/hooks";
+import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
+import { usePlot } from "../plots/page";
 import { litOf, steady } from "../transient/arrivals";
 import { csvOf, drawnOf, type Subject } from "./curves";
 import { PixelFigures } from "./Figures";
@@ -52,19 +52,15 @@ export function ResponseView() {
   const looked = useComputed(() => store.details.frame.value ?? frame.value);
   useEffect(() => selectFirst(store, frame), [store, frame]);
   const side = store.settings.of(SIDE);
-  const shown = useMemo(
-    () =>
-      computed(() => {
-        const coefficients = looked.value?.coefficients;
-        const pixel = store.selected.value;
-        if (!coefficients || pixel === null) return null;
-        if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return null;
-        if (looked.value !== null && !wasSent(looked.value, pixel)) return null;
-        const index = pixel.y * coefficients.width + pixel.x;
-        return { pixel, coefficients, index };
-      }),
-    [looked, store],
-  );
+  const shown = useComputedOf([looked, store], () => {
+    const coefficients = looked.value?.coefficients;
+    const pixel = store.selected.value;
+    if (!coefficients || pixel === null) return null;
+    if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return null;
+    if (looked.value !== null && !wasSent(looked.value, pixel)) return null;
+    const index = pixel.y * coefficients.width + pixel.x;
+    return { pixel, coefficients, index };
+  });
   const levinson = useComputed(() => (shown.value === null ? null : pixelOf(shown.value.coefficients, shown.value.index)));
   const logarithmic = store.settings.of(LOGARITHMIC);
   const pointed = useSignal("");
@@ -106,7 +102,7 @@ export function ResponseView() {
           <Plot key={side.value} aspect={side.value} logarithmic={logarithmic} shown={shown} returns={returns} pointed={pointed} />
         )}
         {place.value !== null && (
-          <aside class="response-side fades" aria-label="What was found at the pixel" tabIndex={0}>
+          <aside class="response-side column fades" aria-label="What was found at the pixel" tabIndex={0}>
             <Found flags={flags} returns={returns} details={store.details.document.value} of={looked.value?.meta.frame ?? null} />
             <PixelFigures details={store.details.document.value} />
             <FlagWords flags={flags} looked={store.details.document.value !== null} />
@@ -150,18 +146,14 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
   const logarithmic = aspect === "density" && wanted.value;
   const { measures } = store;
   const box = useRef<HTMLDivElement>(null);
-  const size = useMemo(() => signal({ width: 0, height: 0 }), []);
-  useSize(box, size);
-  const plot = useSignal<ResponsePlot | null>(null);
   const dark = store.theme.dark.value;
   const held = useRef(0);
   const heldFor = useRef<Pixel | null>(null);
   const top = useRef<Span | null>(null);
   const lit = store.settings.of(LIT);
   const part = useSignal(PERIOD);
-  useEffect(() => {
-    if (box.current === null) return undefined;
-    const made = responsePlot(box.current, {
+  const form = (place: HTMLElement): ResponsePlot =>
+    responsePlot(place, {
       aspect,
       logarithmic,
       top: () => top.current?.high ?? 1,
@@ -172,17 +164,7 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
       },
       point: (sample) => (pointed.value = sample === null ? "" : sampleText(sample.time_ns, sample.value, aspect)),
     });
-    plot.value = made;
-    return () => {
-      plot.value = null;
-      made.plot.destroy();
-    };
-  }, [store, dark, logarithmic, aspect]);
-
-  useDrawing(() => {
-    const { width, height } = size.value;
-    if (width > 0 && height > 0) plot.value?.plot.setSize({ width, height });
-  }, [plot, size]);
+  const { made: plot, size } = usePlot(box, form, [store, dark, logarithmic, aspect]);
 
   useDrawing(() => {
     const now = shown.value;
@@ -214,9 +196,9 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
 
   const simulated = store.details.document.value?.truth != null;
   return (
-    <div class="response-plot-box">
+    <div class="response-plot-box column">
       <div class="response-plot" ref={box} data-empty={shown.value === null} data-aspect={aspect} />
-      <div class="key">
+      <div class="key wrapped small">
         {aspect === "bounds" && (
           <span class="key-band" title="Any light with these moments lies within them">
             bounds
@@ -244,15 +226,11 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
             asinh
           </em>
         )}
-        <Toggle
-          pressed={lit.value}
-          title="Only the time between the first and the last light of the picture, instead of the whole period"
-          onToggle={() => (lit.value = !lit.peek())}
-        >
+        <Toggle on={lit} title="Only the time between the first and the last light of the picture, instead of the whole period">
           lit
         </Toggle>
         {aspect === "density" && (
-          <Toggle pressed={logarithmic} title="Logarithmic density" onToggle={() => (wanted.value = !wanted.peek())}>
+          <Toggle on={wanted} title="Logarithmic density">
             log
           </Toggle>
         )}

@@ -3,6 +3,7 @@ import uPlot from "uplot";
 import { rangeOfTime_m } from "../../physics/constants";
 import { grouped, significant, withUnit } from "../../scales/format";
 import { PIN_COLOURS, PIN_NAMES } from "../../store/measures";
+import { inkOf, plain } from "../plots/page";
 import { type Curves, ESTIMATES, type PinLines } from "./curves";
 import type { Aspect } from "./sides";
 import { drawStems, NO_STEMS, type Stems } from "./stems";
@@ -30,14 +31,8 @@ export interface PlotOptions {
 
 /** A plot of light over time of flight in ns, with the range it stands for on top. */
 export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, ends_ns, seek, point }: PlotOptions): ResponsePlot {
-  const style = getComputedStyle(box);
-  const ink = style.getPropertyValue("--quiet");
-  const hairline = style.getPropertyValue("--hairline");
-  const line = style.getPropertyValue("--curve");
-  const font = `${style.getPropertyValue("--small")} ${style.fontFamily}`;
-  const axis = { stroke: ink, font, labelFont: font, grid: { stroke: hairline, width: 1 }, ticks: { stroke: hairline, width: 1, size: 4 } };
-  const wash = style.getPropertyValue("--curve-wash");
-  const truthInk = style.getPropertyValue("--truth");
+  const { ink, axis } = inkOf(box);
+  const [line, wash, truthInk] = ["--curve", "--curve-wash", "--truth"].map(ink);
   let stems = NO_STEMS;
   const solid = { stroke: line, width: 1.5, points: { show: false }, spanGaps: false };
   const edge = { ...solid, width: 0.75 };
@@ -53,10 +48,7 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, ends_
   const empty = (): uPlot.AlignedData => [[], ...[...series[aspect], ...ofPins].map(() => [])];
   const plot = new uPlot(
     {
-      width: Math.max(1, box.clientWidth),
-      height: Math.max(1, box.clientHeight),
-      legend: { show: false },
-      cursor: { drag: { x: false, y: false }, points: { size: 6 }, y: false },
+      ...plain(box),
       padding: [0, 12, 0, 0],
       hooks: {
         setCursor: [

@@ -1,12 +1,13 @@
 /** The returns of one pixel beside what is true, and how they scatter from look to look. */
+import { statistics } from "../../physics/statistics";
 import type { PixelDocument, ReturnDocument } from "../../stream/documents";
+import { Looks } from "./looks";
 
 /** Returns with less than this share of the light are listed together. */
 const WEAK_SHARE = 0.02;
 /** A return of a look before is the same one where it came within this time: 1 ns is 15 cm. */
 const SAME_S = 1e-9;
-/** Looks that count, and the fewest that a deviation is computed from. */
-const LOOKS = 30;
+/** The fewest looks that a deviation is computed from. */
 const FEWEST = 5;
 
 /** The returns that are worth a line, by time, and the light of the others together. */
@@ -51,22 +52,16 @@ export interface Scatter {
 
 /** The returns of one pixel over its last looks. */
 export class ReturnHistory {
-  #place = "";
-  #frame = NaN;
-  #looks: (readonly ReturnDocument[])[] = [];
+  readonly #looks = new Looks<readonly ReturnDocument[]>();
 
-  /** Takes a look, once a frame; another pixel, sequence or scene begins anew. */
+  /** Takes a look, once a frame; another pixel, sequence, calibration or scene begins anew. */
   take({ x, y, returns, meta }: Pick<PixelDocument, "x" | "y" | "returns" | "meta">, scene = ""): void {
-    const place = `${x},${y},${meta.sequence_id},${meta.calibration_id},${scene}`;
-    if (place !== this.#place) [this.#place, this.#looks, this.#frame] = [place, [], NaN];
-    if (meta.frame === this.#frame) return;
-    this.#frame = meta.frame;
-    this.#looks = [...this.#looks.slice(1 - LOOKS), returns];
+    this.#looks.take([x, y, meta.sequence_id, meta.calibration_id, scene].join(), meta.frame, returns);
   }
 
   /** How a return scatters. */
   of(found: ReturnDocument): Scatter {
-    const same = this.#looks.flatMap((look) => {
+    const same = this.#looks.all.flatMap((look) => {
       const near = nearest(found, look);
       return near !== null && Math.abs(near.time_s - found.time_s) <= SAME_S ? [near] : [];
     });
@@ -75,7 +70,5 @@ export class ReturnHistory {
 }
 
 function deviationOf(values: readonly number[]): number {
-  if (values.length < FEWEST) return NaN;
-  const mean = values.reduce((sum, value) => sum + value, 0) / values.length;
-  return Math.sqrt(values.reduce((sum, value) => sum + (value - mean) ** 2, 0) / (values.length - 1));
+  return values.length < FEWEST ? NaN : statistics(values).std;
 }

@@ -31,7 +31,7 @@ export function SimulationView() {
         )
       }
     >
-      <div class="panel-body fades">
+      <div class="panel-body column fades">
         {simulation.trouble.value !== null && <p class="quiet">{simulation.trouble.value}</p>}
         <Obstacle />
         {world !== null && (
@@ -42,7 +42,7 @@ export function SimulationView() {
         )}
         {world !== null && (
           <fieldset class="faults">
-            <legend>Let something go wrong</legend>
+            <legend class="small quiet">Let something go wrong</legend>
             {(world.faults as readonly Fault[]).map((fault) => (
               <FaultButton key={fault} fault={fault} task={task} />
             ))}
@@ -62,7 +62,7 @@ function ScenePicker({ task }: { task: Task }) {
   if (world === null) return null;
   const known = world.scenes.some(({ name }) => name === world.scene);
   return (
-    <label class="scene-picker">
+    <label class="scene-picker inline-row">
       <span class="quiet">Scene</span>
       <select
         name="scene"
@@ -71,7 +71,7 @@ function ScenePicker({ task }: { task: Task }) {
         disabled={task.busy.value !== null || obstacle.value !== null}
         onChange={(event) => {
           const scene = event.currentTarget.value;
-          void task.run(`Preparing ${scene}…`, () => simulation.stage(scene));
+          void task.run(`Preparing ${scene}…`, () => simulation.set({ scene }));
         }}
       >
         {!known && <option value={world.scene}>{world.scene}</option>}
@@ -102,10 +102,7 @@ function Effects({ task }: { task: Task }) {
           effects are computed: those above {explanation.called_above} of the noise floor, which is{" "}
           {engineering(explanation.noise_floor_dn, "DN")}.{" "}
           {chosen && (
-            <Steer
-              disabled={task.busy.value !== null}
-              onClick={() => void task.run("Leaving all effects to the scene…", () => simulation.chooseNothing())}
-            >
+            <Steer task={task} onClick={() => void task.run("Leaving all effects to the scene…", () => simulation.set({ effects: {} }))}>
               Leave all to the scene
             </Steer>
           )}
@@ -172,7 +169,8 @@ function FaultButton({ fault, task }: { fault: Fault; task: Task }) {
   return (
     <Steer
       title={title}
-      disabled={task.busy.value !== null || !possible(fault, plugged)}
+      task={task}
+      disabled={!possible(fault, plugged)}
       onClick={() => void task.run(`${title}…`, () => simulation.cause(fault))}
     >
       {word}

@@ -1,8 +1,8 @@
-import { useComputed, useSignal } from "@preact/signals";
-import { useEffect } from "preact/hooks";
+import type { ComponentChildren } from "preact";
 import { timeOfDay } from "../../scales/format";
 import { lossReason } from "../../store/events";
 import { useStore } from "../../store/store";
+import { useNow } from "../../ui/hooks";
 import { tokenWords } from "./words";
 import "./Banner.css";
 
@@ -12,66 +12,72 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
   const connection = status.connection.value;
   const off = lightOff.state.value;
   if (off !== null && off.kind !== "sent") {
+    const refused = off.kind === "refused";
     return (
-      <div class="banner" role="alert" data-banner="light">
-        <p>
-          <strong>The light may be on.</strong> {sentence(off.reason)}{" "}
-          {off.kind === "unconfirmed" && "This page asks again until it is confirmed off."}
-        </p>
-        <button type="button" onClick={() => (off.kind === "refused" ? lightOff.withdraw() : lightOff.press())}>
-          {off.kind === "refused" ? "Dismiss" : "Try now"}
-        </button>
-      </div>
+      <Alert about="light" word={refused ? "Dismiss" : "Try now"} onClick={() => (refused ? lightOff.withdraw() : lightOff.press())}>
+        <strong>The light may be on.</strong> {sentence(off.reason)} {!refused && "This page asks again until it is confirmed off."}
+      </Alert>
     );
   }
   if (connection.kind === "refused") {
     return (
-      <div class="banner" role="alert" data-banner="token">
-        <p>
-          <strong>Not let in.</strong> {tokenWords(api.credentials)}
-        </p>
-        <button type="button" onClick={() => (asksForToken.value = true)}>
-          Enter a token
-        </button>
-      </div>
+      <Alert about="token" word="Enter a token" onClick={() => (asksForToken.value = true)}>
+        <strong>Not let in.</strong> {tokenWords(api.credentials)}
+      </Alert>
     );
   }
   if (connection.kind === "waiting") {
     return (
-      <div class="banner" role="alert" data-banner="connection">
-        <p>
-          <strong>No connection to the service.</strong> {sentence(connection.reason)} <Countdown until_s={connection.retryAt_s} />
-        </p>
-        <button type="button" onClick={onRetry}>
-          Try now
-        </button>
-      </div>
+      <Alert about="connection" word="Try now" onClick={onRetry}>
+        <strong>No connection to the service.</strong> {sentence(connection.reason)} <Countdown until_s={connection.retryAt_s} />
+      </Alert>
     );
   }
   const loss = status.cameraLoss.value;
   if (loss !== null && connection.kind === "open") {
     return (
-      <div class="banner" role="alert" data-banner="camera">
-        <p>
-          <strong>Camera lost</strong> at {timeOfDay(loss.at_s)}. The service looks for it and goes on by itself; what you see is the last
-          frame. {loss.reason !== null && <span class="quiet">Reason: {lossReason(loss.reason)}</span>}
-        </p>
-      </div>
+      <Alert about="camera">
+        <strong>Camera lost</strong> at {timeOfDay(loss.at_s)}. The service looks for it and goes on by itself; what you see is the last
+        frame. {loss.reason !== null && <span class="quiet">Reason: {lossReason(loss.reason)}</span>}
+      </Alert>
     );
   }
   if (lease.lost.value !== null) {
     return (
-      <div class="banner banner-mild" role="alert" data-banner="control">
-        <p>
-          <strong>No longer in control.</strong> {lease.lost.value}
-        </p>
-        <button type="button" onClick={() => (lease.lost.value = null)}>
-          Dismiss
-        </button>
-      </div>
+      <Alert mild about="control" word="Dismiss" onClick={() => (lease.lost.value = null)}>
+        <strong>No longer in control.</strong> {lease.lost.value}
+      </Alert>
     );
   }
-  return <Unreadable />;
+  if (status.unreadable.value === null) return null;
+  return (
+    <Alert mild about="message" word="Dismiss" onClick={() => (status.unreadable.value = null)}>
+      {status.unreadable.value}
+    </Alert>
+  );
+}
+
+interface AlertProps {
+  readonly about: string;
+  /** Nothing is broken. */
+  readonly mild?: boolean;
+  /** On the button, where something can be done. */
+  readonly word?: string;
+  readonly onClick?: () => void;
+  readonly children: ComponentChildren;
+}
+
+function Alert({ about, mild = false, word, onClick, children }: AlertProps) {
+  return (
+    <div class={mild ? "wrapped banner banner-mild" : "wrapped banner"} role="alert" data-banner={about}>
+      <p>{children}</p>
+      {word !== undefined && (
+        <button type="button" onClick={onClick}>
+          {word}
+        </button>
+      )}
+    </div>
+  );
 }
 
 /** A title, as a sentence. */
@@ -79,26 +85,8 @@ function sentence(words: string): string {
   return /[.!?]$/.test(words) ? words : `${words}.`;
 }
 
-function Unreadable() {
-  const { status } = useStore();
-  if (status.unreadable.value === null) return null;
-  return (
-    <div class="banner banner-mild" role="alert" data-banner="message">
-      <p>{status.unreadable.value}</p>
-      <button type="button" onClick={() => (status.unreadable.value = null)}>
-        Dismiss
-      </button>
-    </div>
-  );
-}
-
 /** Seconds until the next attempt. */
 function Countdown({ until_s }: { until_s: number }) {
-  const now_s = useSignal(Date.now() / 1000);
-  useEffect(() => {
-    const timer = setInterval(() => (now_s.value = Date.now() / 1000), 250);
-    return () => clearInterval(timer);
-  }, [now_s]);
-  const left = useComputed(() => Math.max(0, Math.ceil(until_s - now_s.value)));
-  return <>{left.value > 0 ? `Trying again in ${left.value} s.` : "Trying again."}</>;
+  const left_s = Math.max(0, Math.ceil(until_s - useNow(0.25)));
+  return <>{left_s > 0 ? `Trying again in ${left_s} s.` : "Trying again."}</>;
 }

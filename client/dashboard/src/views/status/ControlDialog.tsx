@@ -1,6 +1,7 @@
 import type { Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
-import { SwitchedDialog } from "../../ui/Dialog";
+import { Form, TextField } from "../../ui/controls";
+import type { Done } from "../../ui/Dialog";
 import { useNow } from "../../ui/hooks";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
@@ -10,15 +11,7 @@ import "./ControlDialog.css";
 const LONGEST_NAME = 80;
 
 /** Who controls the camera, and the way to take control or give it back. */
-export function ControlDialog() {
-  return (
-    <SwitchedDialog open={useStore().asksForControl} title="Control">
-      {(close) => <Control onDone={close} />}
-    </SwitchedDialog>
-  );
-}
-
-function Control({ onDone }: { onDone: () => void }) {
+export function ControlDialog({ onDone }: Done) {
   const store = useStore();
   const { lease } = store;
   const name = store.settings.of(HOLDER);
@@ -32,10 +25,9 @@ function Control({ onDone }: { onDone: () => void }) {
   };
   const take = (takeover: boolean): Promise<void> => act("Taking control…", () => lease.take(name.peek().trim(), takeover));
   return (
-    <form
-      class="control"
-      onSubmit={(event) => {
-        event.preventDefault();
+    <Form
+      class="control column"
+      onSubmit={() => {
         if (control.kind !== "us") void take(control.kind === "other");
       }}
     >
@@ -58,17 +50,7 @@ function Control({ onDone }: { onDone: () => void }) {
         )}
       </p>
       {control.kind !== "us" && (
-        <label class="field">
-          <span>What others should call you</span>
-          <input
-            type="text"
-            name="holder"
-            autocomplete="nickname"
-            maxLength={LONGEST_NAME}
-            value={name.value}
-            onInput={(event) => (name.value = event.currentTarget.value)}
-          />
-        </label>
+        <TextField label="What others should call you" name="holder" autocomplete="nickname" maxLength={LONGEST_NAME} text={name} />
       )}
       <TaskLine task={task} field="control-status" />
       {control.kind === "other" && task.refusal.value !== null && (
@@ -98,7 +80,7 @@ function Control({ onDone }: { onDone: () => void }) {
           </button>
         )}
       </div>
-    </form>
+    </Form>
   );
 }
 

@@ -69,7 +69,7 @@ interface FigureProps {
 function Figure({ name, field, title, trend, children }: FigureProps) {
   return (
     <div class="figure" title={title}>
-      <dt>{name}</dt>
+      <dt class="small quiet">{name}</dt>
       <dd>
         <span data-field={field}>{children}</span>
         {trend !== undefined && <Course name={name} trend={trend} />}

@@ -2,54 +2,35 @@ import { useSignal } from "@preact/signals";
 import { LAYOUTS } from "../../store/layout";
 import { LONGEST_NAME } from "../../store/layouts";
 import { useStore } from "../../store/store";
-import { SwitchedDialog } from "../../ui/Dialog";
+import { Form, TextField } from "../../ui/controls";
+import type { Done } from "../../ui/Dialog";
 import "./LayoutDialog.css";
 
 /** Saves the present layout under a name, and removes saved ones. */
-export function LayoutDialog() {
-  return (
-    <SwitchedDialog open={useStore().asksForLayout} title="Layouts">
-      {(close) => <Saved onDone={close} />}
-    </SwitchedDialog>
-  );
-}
-
-function Saved({ onDone }: { onDone: () => void }) {
+export function LayoutDialog({ onDone }: Done) {
   const { layouts } = useStore();
   const text = useSignal("");
   const name = text.value.trim();
   const taken = name in LAYOUTS;
   const names = Object.keys(layouts.named.value);
   return (
-    <form
-      class="control"
-      onSubmit={(event) => {
-        event.preventDefault();
+    <Form
+      class="control column"
+      onSubmit={() => {
         layouts.save(name);
         onDone();
       }}
     >
-      <label class="field">
-        <span>Name of the present layout</span>
-        <input
-          type="text"
-          name="layout"
-          autocomplete="off"
-          maxLength={LONGEST_NAME}
-          value={text.value}
-          aria-invalid={taken}
-          onInput={(event) => (text.value = event.currentTarget.value)}
-        />
-      </label>
+      <TextField label="Name of the present layout" name="layout" maxLength={LONGEST_NAME} aria-invalid={taken} text={text} />
       <p class={taken ? "refusal" : "quiet"} role="status">
         {taken
           ? `${name} is a layout of the page's own: choose another name.`
           : "It is kept in this browser; a copied link shows it to others."}
       </p>
       {names.length > 0 && (
-        <ul class="saved-layouts" aria-label="Saved layouts">
+        <ul class="saved-layouts column" aria-label="Saved layouts">
           {names.map((each) => (
-            <li key={each}>
+            <li key={each} class="row">
               {each}
               <button type="button" aria-label={`Remove ${each}`} onClick={() => layouts.remove(each)}>
                 Remove
@@ -67,6 +48,6 @@ function Saved({ onDone }: { onDone: () => void }) {
           Save
         </button>
       </div>
-    </form>
+    </Form>
   );
 }

@@ -16,8 +16,8 @@ import "./StatusBar.css";
 /** How things stand in three things: health, rate and deviation, and what one looks at; all else is behind a button. */
 export function StatusBar() {
   return (
-    <header class="bar">
-      <h1 class="brand">
+    <header class="bar row">
+      <h1 class="brand inline-row">
         <img src="icon.svg" alt="" width="24" height="24" />
         <span class="wide">transientcam</span>
       </h1>
@@ -62,7 +62,7 @@ function StateChip() {
   });
   const { tone, word, why } = slowed(state.value, flowTrouble(status.flow.value, sequence.value?.frame_rate_hz ?? null, now_s));
   return (
-    <span class={`chip chip-${tone}`} role="status" data-field="state" title={why}>
+    <span class={`chip inline-row chip-${tone}`} role="status" data-field="state" title={why}>
       <i aria-hidden="true" />
       {word}
     </span>
@@ -118,7 +118,7 @@ function Exposure() {
   const set = (): Promise<boolean> => task.run("Applying…", () => sequencing.set({ ...applied, exposure_s }));
   return (
     <span data-field="exposure">
-      <Steer title={task.refusal.value ?? long} disabled={task.busy.value !== null} onClick={() => void set()}>
+      <Steer title={task.refusal.value ?? long} task={task} onClick={() => void set()}>
         {word}
         <span class="wide">: exposure {engineering(exposure_s, "s", 2)}</span>
       </Steer>
@@ -129,7 +129,7 @@ function Exposure() {
 /** A sign in the header, and what it means. */
 function Sign({ field, short, long }: { field: string; short: string; long: string }) {
   return (
-    <span class="chip chip-waiting sign" role="status" data-field={field} title={long}>
+    <span class="chip inline-row chip-waiting sign" role="status" data-field={field} title={long}>
       <i aria-hidden="true" />
       {short}
     </span>
@@ -162,7 +162,7 @@ function Subject() {
   const { capabilities, simulated } = camera.value;
   const scene = simulation.world.value?.scene;
   return (
-    <span class="camera-name" title={`Serial number ${String(capabilities.serial)}`} data-field="subject">
+    <span class="camera-name quiet clipped" title={`Serial number ${String(capabilities.serial)}`} data-field="subject">
       {simulated && scene !== undefined ? `simulated ${scene}` : String(capabilities.model)}
     </span>
   );

@@ -13,15 +13,11 @@ import "./Steering.css";
 export function Steering() {
   const store = useStore();
   return (
-    <div class="steering">
+    <div class="steering row">
       <RecordingSign />
       <ControlButton />
       {!store.replay.active.value && (
-        <Toggle
-          pressed={store.held.value}
-          title="Hold this frame while the camera goes on (H)"
-          onToggle={() => (store.held.value = !store.held.peek())}
-        >
+        <Toggle on={store.held} title="Hold this frame while the camera goes on (H)">
           <HoldIcon /> <span class="wide">Hold</span>
         </Toggle>
       )}
@@ -42,7 +38,7 @@ function Capture() {
   const toggle = (): Promise<void> =>
     run("Switching", async () => {
       store.lightOff.withdraw();
-      const { state } = await store.api.setAcquisition(running !== true);
+      const { state } = await store.api.ask("PUT /acquisition", { body: { running: running !== true } });
       store.status.cameraIs(state, Date.now() / 1000);
     });
   const single = (): Promise<void> =>
@@ -114,7 +110,7 @@ function Other({ holder, expires_s }: { holder: string; expires_s: number }) {
   const left_s = Math.max(0, Math.ceil(expires_s - useNow(1)));
   return (
     <>
-      <span class="control-holder">{holder}</span> <span class="quiet">{left_s} s</span>
+      <span class="control-holder clipped">{holder}</span> <span class="quiet">{left_s} s</span>
     </>
   );
 }
@@ -125,7 +121,7 @@ function RecordingSign() {
   const active = recordings.active.value;
   if (active === null) return null;
   return (
-    <span class="recording-sign" title={`${active.name} is being recorded`} data-field="recording-sign">
+    <span class="recording-sign inline-row" title={`${active.name} is being recorded`} data-field="recording-sign">
       <i aria-hidden="true" /> {fixed(active.duration_s, 0, "s")}
     </span>
   );

@@ -26,10 +26,10 @@ export function Toasts() {
     return () => clearTimeout(timer);
   }, [soonest_s, now_s]);
   return (
-    <div class="toasts" role="log" aria-label="What just happened">
+    <div class="toasts column small" role="log" aria-label="What just happened">
       {fresh.map(({ number, words, tone, remedy }) => (
-        <p key={number} class={`toast toast-${tone}`} title={words}>
-          <span class="toast-words">{words}</span>
+        <p key={number} class={`toast row toast-${tone}`} title={words}>
+          <span class="toast-words clipped">{words}</span>
           {remedy !== undefined && (
             <button type="button" class="link" onClick={remedy.run}>
               {remedy.word}

@@ -1,29 +1,21 @@
 import { useSignal } from "@preact/signals";
 
 import { useStore } from "../../store/store";
-import { SwitchedDialog } from "../../ui/Dialog";
+import { Form, TextField } from "../../ui/controls";
+import type { Done } from "../../ui/Dialog";
 import { tokenWords } from "./words";
 
 /** Asks for the token that the service lets people in with. */
-export function TokenDialog() {
-  return (
-    <SwitchedDialog open={useStore().asksForToken} title="Authentication required">
-      {(close) => <TokenForm onDone={close} />}
-    </SwitchedDialog>
-  );
-}
-
-function TokenForm({ onDone }: { onDone: () => void }) {
+export function TokenDialog({ onDone }: Done) {
   const { api, caller } = useStore();
   const { credentials } = api;
   const text = useSignal("");
   const known = credentials.token.value !== null;
   const recognised = caller.document.value;
   return (
-    <form
-      class="control"
-      onSubmit={(event) => {
-        event.preventDefault();
+    <Form
+      class="control column"
+      onSubmit={() => {
         credentials.use(text.peek());
         onDone();
       }}
@@ -31,17 +23,7 @@ function TokenForm({ onDone }: { onDone: () => void }) {
       <p class={known && credentials.refused.value !== null ? "refusal" : ""} data-field="token-words">
         {tokenWords(credentials)}
       </p>
-      <label class="field">
-        <span>Token</span>
-        <input
-          type="password"
-          name="token"
-          autocomplete="off"
-          spellcheck={false}
-          value={text.value}
-          onInput={(event) => (text.value = event.currentTarget.value)}
-        />
-      </label>
+      <TextField label="Token" type="password" name="token" spellcheck={false} text={text} />
       {known && recognised !== null && (
         <p data-field="caller">
           The service knows this page as <strong>{recognised.name}</strong>, {recognised.role}.
@@ -68,6 +50,6 @@ function TokenForm({ onDone }: { onDone: () => void }) {
           Use this token
         </button>
       </div>
-    </form>
+    </Form>
   );
 }

@@ -1,4 +1,4 @@
-import { computed, useComputed, useSignal } from "@preact/signals";
+import { useComputed, useSignal } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 import { rangeOfTime_m } from "../../physics/constants";
 import { COLOUR_MAPS, type ColourMapName } from "../../scales/colourMaps";
@@ -8,12 +8,12 @@ import { scaleOf, TONES, type ToneKind } from "../../scales/tone";
 import { oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { ColourBar } from "../../ui/ColourBar";
-import { ColourChoice } from "../../ui/ColourChoice";
 import { npy, save, savePicture } from "../../ui/download";
-import { useDrawing, useProducts } from "../../ui/hooks";
+import { useDrawing, usePictureSize, useProducts } from "../../ui/hooks";
+import { ColourChoice, ToneChoice } from "../../ui/LookChoices";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
-import { ToneChoice } from "../../ui/ToneChoice";
+import { draw } from "../../ui/paint";
 import { BINS, paintStreak, Streak, whiteOf } from "./streak";
 import "./StreakView.css";
 
@@ -31,26 +31,17 @@ export function StreakView() {
   const canvas = useRef<HTMLCanvasElement>(null);
   const bright = useSignal(NaN);
   const pointed = useSignal<{ x: number; bin: number } | null>(null);
-  const size = useMemo(
-    () => computed(() => `${frame.value?.coefficients?.width ?? 163}x${frame.value?.coefficients?.height ?? 120}`),
-    [frame],
-  );
-  const [width, height] = size.value.split("x").map(Number);
+  const [width, height] = usePictureSize(frame);
   const row = useComputed(() => Math.min(height - 1, store.selected.value?.y ?? height >> 1));
 
   useDrawing(() => {
     const coefficients = frame.value?.coefficients;
     const [y, toneNow, coloursNow] = [row.value, tone.value, colours.value];
-    const context = canvas.current?.getContext("2d");
-    if (!coefficients || canvas.current === null || !context || y >= coefficients.height) return;
+    if (!coefficients || canvas.current === null || y >= coefficients.height) return;
     streak.compute(coefficients, y);
     const white = whiteOf(streak.values);
     if (!(Math.abs(Math.log(white / bright.peek())) < 0.2)) bright.value = white; // not with every frame's noise
-    if (canvas.current.width !== streak.width || canvas.current.height !== BINS)
-      [canvas.current.width, canvas.current.height] = [streak.width, BINS];
-    const image = context.createImageData(streak.width, BINS);
-    paintStreak(streak.values, bright.peek(), toneNow, coloursNow, image.data);
-    context.putImageData(image, 0, 0);
+    draw(canvas.current, streak.width, BINS, (rgba) => paintStreak(streak.values, bright.peek(), toneNow, coloursNow, rgba));
     Object.assign(canvas.current.dataset, { frame: frame.peek()?.meta.frame, row: y, white: bright.peek(), colours: coloursNow });
   }, [frame, row]);
 
@@ -87,7 +78,7 @@ export function StreakView() {
       ]}
     >
       <div class="streak">
-        <div class="streak-axis" aria-hidden="true">
+        <div class="streak-axis small quiet" aria-hidden="true">
           {ticks({ low: 0, high: period_ns, kind: "linear" }, 6).map((time_ns) => (
             <span key={time_ns} style={{ top: `${(100 * time_ns) / period_ns}%` }}>
               {fixed(time_ns, 0, "ns")}
@@ -107,16 +98,16 @@ export function StreakView() {
             if (event.button === 0) choose(event);
           }}
         >
-          <canvas ref={canvas} data-product="streak" />
+          <canvas ref={canvas} class="cover" data-product="streak" />
           <Marks width={width} />
         </div>
         {bright.value > 0 && (
           <ColourBar scale={scaleOf(tone.value, Number((bright.value * 1e-9).toPrecision(3)))} colours={colours.value} unit="DN/ns" />
         )}
       </div>
-      <footer class="panel-foot">
+      <footer class="panel-foot column">
         <div class="panel-row">
-          <label class="scanline">
+          <label class="scanline row">
             <span class="quiet">Scanline</span>
             <input
               type="range"
@@ -152,7 +143,11 @@ function Readout({ frame, streak, pointed, width, period_ns }: ReadoutProps) {
     const density = streak.values[at.bin * width + at.x] * 1e-9;
     return `column ${at.x} · ${fixed(time_ns, 1, "ns")} · ${fixed(rangeOfTime_m(time_ns * 1e-9), 2, "m")} · ${significant(density, 3, "DN/ns")}`;
   });
-  return <span data-field="streak">{text}</span>;
+  return (
+    <span class="clipped" data-field="streak">
+      {text}
+    </span>
+  );
 }
 
 /** The player's time and the selected column. */

@@ -1,4 +1,3 @@
-import { useComputed } from "@preact/signals";
 import { useMemo, useRef } from "preact/hooks";
 import type { Coefficients } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
@@ -7,8 +6,8 @@ import { toned } from "../../scales/tone";
 import { gateStart_rad, NAMES, type TransientLook } from "../../store/lightLook";
 import { AMPLITUDE } from "../../store/mapCatalogue";
 import { useStore } from "../../store/store";
-import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing } from "../../ui/hooks";
+import { draw } from "../../ui/paint";
 import { Stage } from "../../ui/Stage";
 
 /** Finding poles takes microseconds a pixel: larger pictures are thinned to about this many. */
@@ -21,8 +20,6 @@ export function LightSoFar({ look }: { look: TransientLook }) {
   const scene = store.frames.of(AMPLITUDE);
   const canvas = useRef<HTMLCanvasElement>(null);
   const light = useMemo(() => new GatheredLight(), []);
-  const size = useComputed(() => `${frame.value?.coefficients?.width ?? 163}x${frame.value?.coefficients?.height ?? 120}`);
-  const [width, height] = size.value.split("x").map(Number);
 
   useDrawing(() => {
     const coefficients = frame.value?.coefficients;
@@ -30,28 +27,24 @@ export function LightSoFar({ look }: { look: TransientLook }) {
     // As bright as the still picture would be: at the end of the period it is that picture.
     const white = (scene.value?.map?.high ?? NaN) / 2 ** look.stops.value;
     const [tone, colours] = [look.tone.value, look.colours.value];
-    const context = canvas.current?.getContext("2d");
-    if (!coefficients || canvas.current === null || !context || !(white > 0)) return;
+    if (!coefficients || canvas.current === null || !(white > 0)) return;
     light.take(coefficients);
     const values = light.between(look.play.value === "gate" ? gateStart_rad(phase_rad, store.period_s.value) : 0, phase_rad);
-    if (canvas.current.width !== light.width || canvas.current.height !== light.height)
-      [canvas.current.width, canvas.current.height] = [light.width, light.height];
-    const image = context.createImageData(light.width, light.height);
-    const table = new Uint32Array(colourTable(colours).buffer);
-    const pixels = new Uint32Array(image.data.buffer);
-    for (let at = 0; at < values.length; at++) {
-      const share = values[at] / white;
-      pixels[at] = table[levelOf(share >= 0 ? toned(tone, share) : 0)];
-    }
-    context.putImageData(image, 0, 0);
+    draw(canvas.current, light.width, light.height, ({ buffer }) => {
+      const table = new Uint32Array(colourTable(colours).buffer);
+      const pixels = new Uint32Array(buffer);
+      for (let at = 0; at < values.length; at++) {
+        const share = values[at] / white;
+        pixels[at] = table[levelOf(share >= 0 ? toned(tone, share) : 0)];
+      }
+    });
     Object.assign(canvas.current.dataset, { frame: frame.peek()?.meta.frame, white, play: look.play.peek() });
     look.snapshot = () => canvas.current;
   }, [frame, look]);
 
   return (
-    <Stage width={width} height={height} frame={frame} label={NAMES[look.play.value]}>
+    <Stage frame={frame} label={NAMES[look.play.value]}>
       <canvas ref={canvas} data-product="transient" data-renderer="closed-form" />
-      {useComputed(() => frame.value === null).value && <FirstFrame />}
     </Stage>
   );
 }

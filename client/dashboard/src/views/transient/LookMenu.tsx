@@ -1,8 +1,7 @@
 import type { TransientLook } from "../../store/lightLook";
-import { ColourChoice } from "../../ui/ColourChoice";
 import { Check, Choice } from "../../ui/controls";
+import { ColourChoice, ToneChoice } from "../../ui/LookChoices";
 import { PopoverButton } from "../../ui/PopoverButton";
-import { ToneChoice } from "../../ui/ToneChoice";
 
 const STOPS = [-4, -3, -2, -1, 0, 1, 2, 3, 4, 6, 8];
 
@@ -11,12 +10,7 @@ export function LookMenu({ look }: { look: TransientLook }) {
   return (
     <PopoverButton face="Look" label="Look of the light" title="Tone, exposure and colours" kind="look">
       <ToneChoice tone={look.tone} />
-      <Choice
-        label="Exposure"
-        value={look.stops.value}
-        options={STOPS.map((stops) => ({ value: stops, text: stopsText(stops) }))}
-        onChange={(stops) => (look.stops.value = stops)}
-      />
+      <Choice label="Exposure" chosen={look.stops} of={STOPS} text={stopsText} />
       <ColourChoice colours={look.colours} />
       {look.play.value === "density" && (
         <Check

@@ -1,4 +1,4 @@
-import { signal, useComputed } from "@preact/signals";
+import { signal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 
 import { createRenderer, hasGraphics } from "../../gl/createRenderer";
@@ -7,7 +7,6 @@ import { drawnOf } from "../../store/frames";
 import type { TransientLook } from "../../store/lightLook";
 import { AMPLITUDE } from "../../store/mapCatalogue";
 import { useStore } from "../../store/store";
-import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing } from "../../ui/hooks";
 import { Stage } from "../../ui/Stage";
 
@@ -22,8 +21,6 @@ export function Picture({ look }: { look: TransientLook }) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const renderer = useMemo(() => signal<DensityRenderer | null>(null), []);
   const attempt = useMemo(() => signal(0), []);
-  const size = useComputed(() => `${frame.value?.coefficients?.width ?? 163}x${frame.value?.coefficients?.height ?? 120}`);
-  const [width, height] = size.value.split("x").map(Number);
 
   // A canvas keeps the kind of its context, and a lost one stays lost: each attempt gets a new canvas.
   useEffect(() => {
@@ -72,9 +69,8 @@ export function Picture({ look }: { look: TransientLook }) {
   useDrawing(draw, [renderer, look]);
 
   return (
-    <Stage width={width} height={height} frame={frame} label="Light in flight">
+    <Stage frame={frame} label="Light in flight">
       <canvas key={attempt.value} ref={canvas} data-product="transient" />
-      {useComputed(() => frame.value === null).value && <FirstFrame />}
     </Stage>
   );
 }

@@ -67,14 +67,14 @@ export function Timeline() {
         onPointerDown={() => ([player.playing.value, player.scrubbed.value] = [false, true])}
         onInput={(event) => player.seek(event.currentTarget.valueAsNumber)}
       />
-      <div class="timeline-metres" aria-hidden="true">
+      <div class="timeline-metres small quiet" aria-hidden="true">
         {ticks({ low: 0, high: period_m, kind: "linear" }, 6).map((range_m) => (
           <span key={range_m} style={{ left: `${(100 * range_m) / period_m}%` }}>
             {fixed(range_m, 0, "m")}
           </span>
         ))}
       </div>
-      <div class="timeline-ticks" aria-hidden="true">
+      <div class="timeline-ticks small quiet" aria-hidden="true">
         {marks.map((time_ns, at) => (
           <span key={time_ns} style={{ left: `${(100 * time_ns) / period_ns}%` }}>
             {fixed(time_ns, 0, at === marks.length - 1 ? "ns" : "")}

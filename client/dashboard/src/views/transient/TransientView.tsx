@@ -1,4 +1,4 @@
-import { computed, useComputed } from "@preact/signals";
+import { useComputed } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 
 import { rangeOfTime_m } from "../../physics/constants";
@@ -12,8 +12,8 @@ import { type Store, useStore } from "../../store/store";
 import { Choice, Tabs } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
 import { captionOf, timeWords } from "../../ui/figure";
-import { type FigureParts, saveFigure } from "../../ui/figureFiles";
-import { useDrawing, useProducts } from "../../ui/hooks";
+import { type FigureParts, pictureFiles } from "../../ui/figureFiles";
+import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
 import { litOf, peaksOf, steady, turnsOf } from "./arrivals";
@@ -64,9 +64,7 @@ export function TransientView() {
       name="transient"
       title={<h2>Light</h2>}
       downloads={[
-        { text: "Picture (PNG)", run: () => savePicture(figureName(), look.snapshot()) },
-        { text: "Figure (PNG)", run: () => void saveFigure(figureName(), look.snapshot(), subject.parts(), "png") },
-        { text: "Figure (SVG)", run: () => void saveFigure(figureName(), look.snapshot(), subject.parts(), "svg") },
+        ...pictureFiles(figureName, subject.snapshot, subject.parts),
         {
           text: "Strip of 8 times (PNG)",
           run: () => {
@@ -94,7 +92,7 @@ export function TransientView() {
         {play === "density" ? <Picture look={look} /> : <LightSoFar look={look} />}
         <LightBar look={look} play={play} />
       </div>
-      <footer class="panel-foot">
+      <footer class="panel-foot column">
         <FilmProgress filming={filming} />
         <Timeline />
         <div class="panel-row">
@@ -113,12 +111,7 @@ export function TransientView() {
             <span class="quiet slowed" title="How many times slower than light really is">
               1 : {slowness(player.speed_ns.value)}
             </span>
-            <Choice
-              label="Speed"
-              value={player.speed_ns.value}
-              options={SPEEDS_NS.map((speed) => ({ value: speed, text: `${speed} ns/s` }))}
-              onChange={(speed) => (player.speed_ns.value = speed)}
-            />
+            <Choice label="Speed" chosen={player.speed_ns} of={SPEEDS_NS} text={(speed) => `${speed} ns/s`} />
           </div>
         </div>
       </footer>
@@ -151,23 +144,19 @@ function slowness(speed_ns: number): string {
 function DensityReadout({ play }: { play: Play }) {
   const poles = useRef<Poles | null>(null);
   const store = useStore();
-  const density = useMemo(
-    () =>
-      computed(() => {
-        const coefficients = store.frames.of("coefficients").value?.coefficients;
-        const pixel = store.pointed.value ?? store.selected.value;
-        if (!coefficients || pixel === null) return NaN;
-        if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return NaN;
-        const index = pixel.y * coefficients.width + pixel.x;
-        const phase_rad = store.player.phase_rad.value;
-        if (play === "density") return densityAt(coefficients, index, phase_rad);
-        if (poles.current?.harmonics !== coefficients.harmonics) poles.current = new Poles(coefficients.harmonics, 1);
-        poles.current.findOne(coefficients, index, 0);
-        const before = play === "gate" ? poles.current.upTo(0, gateStart_rad(phase_rad, store.period_s.value)) : 0;
-        return poles.current.upTo(0, phase_rad) - before;
-      }),
-    [store, play],
-  );
+  const density = useComputedOf([store, play], () => {
+    const coefficients = store.frames.of("coefficients").value?.coefficients;
+    const pixel = store.pointed.value ?? store.selected.value;
+    if (!coefficients || pixel === null) return NaN;
+    if (pixel.x >= coefficients.width || pixel.y >= coefficients.height) return NaN;
+    const index = pixel.y * coefficients.width + pixel.x;
+    const phase_rad = store.player.phase_rad.value;
+    if (play === "density") return densityAt(coefficients, index, phase_rad);
+    if (poles.current?.harmonics !== coefficients.harmonics) poles.current = new Poles(coefficients.harmonics, 1);
+    poles.current.findOne(coefficients, index, 0);
+    const before = play === "gate" ? poles.current.upTo(0, gateStart_rad(phase_rad, store.period_s.value)) : 0;
+    return poles.current.upTo(0, phase_rad) - before;
+  });
   const text = useComputed(() =>
     Number.isNaN(density.value) ? "" : play === "density" ? significant(density.value * 1e-9, 3, "DN/ns") : fixed(density.value, 0, "DN"),
   );

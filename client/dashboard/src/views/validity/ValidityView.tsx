@@ -1,14 +1,14 @@
-import { computed, type ReadonlySignal, useComputed } from "@preact/signals";
-import { useMemo, useRef } from "preact/hooks";
+import { type ReadonlySignal, useComputed } from "@preact/signals";
+import { useRef } from "preact/hooks";
 import { fixed, grouped } from "../../scales/format";
 import { drawnOf, type Frame, sentOf } from "../../store/frames";
 import { aBoolean, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { Toggle } from "../../ui/controls";
 import { saveNumbers, savePicture } from "../../ui/download";
-import { FirstFrame } from "../../ui/FirstFrame";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
+import { draw } from "../../ui/paint";
 import { Stage } from "../../ui/Stage";
 import { countReasons, paintReasons, REASONS, type Reasons } from "./reasons";
 import "../response/Listings.css";
@@ -27,21 +27,12 @@ export function ValidityView() {
   const frame = store.frames.of(reasons.product);
   const scene = store.frames.of(amplitude);
   const canvas = useRef<HTMLCanvasElement>(null);
-  const { empty, size } = useMemo(
-    () => ({ empty: computed(() => frame.value === null), size: computed(() => (frame.value?.shape ?? [120, 163]).join("x")) }),
-    [frame],
-  );
-  const [height, width] = size.value.split("x").map(Number);
   useDrawing(() => {
     const [newest, brightness] = [frame.value, scene.value];
-    const context = canvas.current?.getContext("2d");
-    if (newest === null || canvas.current === null || !context) return;
+    if (newest === null || canvas.current === null) return;
     const [rows, columns] = newest.shape;
-    if (canvas.current.width !== columns || canvas.current.height !== rows) [canvas.current.width, canvas.current.height] = [columns, rows];
-    const image = context.createImageData(columns, rows);
-    const fits = brightness?.values.length === newest.values.length;
-    paintReasons(reasons, newest.values, fits ? drawnOf(brightness) : null, brightness?.map?.high ?? 1, image.data);
-    context.putImageData(image, 0, 0);
+    const light = brightness?.values.length === newest.values.length ? drawnOf(brightness) : null;
+    draw(canvas.current, columns, rows, (rgba) => paintReasons(reasons, newest.values, light, brightness?.map?.high ?? 1, rgba));
     canvas.current.dataset.frame = String(newest.meta.frame);
   }, [frame, scene, reasons]);
   return (
@@ -49,7 +40,7 @@ export function ValidityView() {
       name="validity"
       title={<h2>Validity</h2>}
       tools={
-        <Toggle pressed={trust.value} title="Which ranges can be trusted, and why" onToggle={() => (trust.value = !trust.peek())}>
+        <Toggle on={trust} title="Which ranges can be trusted, and why">
           Trust
         </Toggle>
       }
@@ -58,9 +49,8 @@ export function ValidityView() {
         { text: `${trust.value ? "Trust" : "Flags"} (NPY)`, run: () => saveNumbers(store.api, frame.peek()) },
       ]}
     >
-      <Stage width={width} height={height} frame={frame} label="Validity map">
+      <Stage frame={frame} label="Validity map">
         <canvas ref={canvas} data-product={reasons.product} />
-        {empty.value && <FirstFrame />}
       </Stage>
       <Legend key={reasons.product} frame={frame} reasons={reasons} />
     </Panel>

@@ -1,4 +1,5 @@
 /** Flags, or why ranges are not trusted, as a picture and as counts. */
+import { rgbaOf } from "../../scales/colourMaps";
 import { DISTRUST, FLAGS, type Flag } from "../../ui/flags";
 
 /** What can be wrong with a pixel, the gravest first, and how its values say so. */
@@ -33,9 +34,7 @@ export function paintReasons(
 ): void {
   const colours = Uint32Array.from({ length: 256 }, (_, value) => {
     const reason = all.find((each) => has(value, each));
-    const rgb = parseInt(reason?.colour.slice(1) ?? "0", 16);
-    // RGBA bytes on a little-endian machine, as every browser's is
-    return reason === undefined ? 0 : 0xff000000 | ((rgb & 0xff) << 16) | (rgb & 0xff00) | (rgb >> 16);
+    return reason === undefined ? 0 : rgbaOf(reason.colour.slice(1));
   });
   const pixels = new Uint32Array(rgba.buffer, rgba.byteOffset, rgba.byteLength / 4);
   for (let pixel = 0; pixel < pixels.length; pixel++) {
