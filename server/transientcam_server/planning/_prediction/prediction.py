@@ -45,6 +45,9 @@ FEW: Final = slice(None, None, 2)
 """The pixels that first predictions are made of: every other one of each kind."""
 STEP: Final = 4.0
 """Factor between steps of noise."""
+OUTVOTED: Final = 3
+"""Takes of which one that lost its synchronisation is left out."""
+FOUR_PHASES: Final = np.array([1, 1j, -1, -1j])
 NOMINAL: Final = Sequence(exposure_s=1e-3, zeroth="estimated")
 """The steps are multiples of its noise."""
 _HARDLY: Final = 0.8
@@ -194,8 +197,17 @@ class Predictor:
             return self._closer.predict(estimator, sequence, capture_s=capture_s)
         harmonics = self._harmonics(estimator, sequence)
         noise = self.relative_noise(sequence)
+        lost = self.scene.lost_share if sequence.takes < OUTVOTED else 0.0
+        if sequence.harmonics > 1:  # rebuilt from the opposite image and the sums
+            noise, lost = noise * math.sqrt(1 + 2 * lost), 0.0
         errors = self._errors(
-            estimator, harmonics, sequence.base_frequency_hz, noise, FINE_DRAWS, sequence.zeroth
+            estimator,
+            harmonics,
+            sequence.base_frequency_hz,
+            noise,
+            FINE_DRAWS,
+            sequence.zeroth,
+            lost=(lost, sequence.takes),
         )
         farthest_m = errors.farthest_m(self.scene.earliest_m, self.scene.latest_m)
         errors = self._crossed(errors, capture_s)
@@ -295,6 +307,7 @@ class Predictor:
         draws: int,
         zeroth: str,
         pixels: slice = slice(None),
+        lost: tuple[float, int] = (0.0, 1),
     ) -> PixelErrors:
         self._go_on()
         b = self.scene.relative_moments(harmonics, base_frequency_hz)[:, pixels]
@@ -305,6 +318,7 @@ class Predictor:
         random = np.random.default_rng((self._seed, harmonics, draws))
         of_device = tm.noise.MomentNoise((variance / contrast**2).astype(np.float32))
         drawn = tm.noise.draw(b, of_device, random, draws=draws)
+        drawn = drawn if not lost[0] else _out_of_step(drawn, *lost, random)
         # frames take the noise of a nominal device, too
         spread = np.broadcast_to(variance[:, None], drawn.shape)
         range_m = ranges_m(
@@ -320,6 +334,21 @@ class Predictor:
             self.scene.direct_m[pixels],
             self.scene.uncertainty_m[pixels],
         )
+
+
+def _out_of_step(b: _Array, share: float, takes: int, random: np.random.Generator) -> _Array:
+    """Return moments (m + 1, draws, P) of captures of which images lost their synchronisation.
+
+    Nothing tells such an image among the four of one frequency: for a part of the exposure, taken
+    as uniform from 0 to 1, its phase is a random one.
+    """
+    shape = takes, b.shape[1], len(FOUR_PHASES)
+    part = random.uniform(size=shape) * (random.uniform(size=shape) < share)
+    turned = 1 - part + part * np.exp(2j * np.pi * random.uniform(size=shape))
+    seen = np.real(b[1][..., None] * turned.mean(axis=0)[:, None] / FOUR_PHASES)
+    out: _Array = b.copy()
+    out[1] = (seen * FOUR_PHASES).sum(axis=-1) / 2
+    return out
 
 
 def _error(errors: PixelErrors, farthest_m: _Array | None, picks: _Array, drift_m: float) -> Figure:

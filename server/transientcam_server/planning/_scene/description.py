@@ -53,6 +53,8 @@ class FrameAverages:
         (m + 1, H, W) variance of smoothed moments between frames, of both parts together.
     temperature_c
         Of the camera; None where that is not known.
+    lost_share
+        Of the images, those that lost their synchronisation.
     single
         (m + 1, H, W) moments that are not smoothed, averaged over the frames.
     mean_dn
@@ -71,6 +73,7 @@ class FrameAverages:
     last: _Array
     scatter: _Array
     temperature_c: float | None
+    lost_share: float
     single: _Array
     mean_dn: _Array
     brightest_dn: float
@@ -212,6 +215,7 @@ def describe(
         ambiguity_checked=checked,
         contrast=tuple(contrast.tolist()),
         uncalibrated_m=averages.uncalibrated_m,
+        lost_share=averages.lost_share,
         calibrated=coarse is not None or averages.recipe.gains is not None,
         crossed_per_s=2 * moving_share * averages.recipe.applied.frame_rate_hz / averages.frames,
         crossed_m=_crossed_m(averages, lit & moving),

@@ -106,7 +106,7 @@ class _FrameSums:
 
     def __init__(self, recipe: Recipe, sensor: tm.noise.Sensor) -> None:
         self._recipe, self._sensor = recipe, sensor
-        self._frames = self._images = 0
+        self._frames = self._images = self._captured = self._lost = 0
         self._first: _Array
         self._last: _Array
         self._spoilt: tuple[RawFrame, tm.Reconstruction] | None = None
@@ -121,6 +121,8 @@ class _FrameSums:
         """Add a frame, and its reconstruction where there is one."""
         found = found or self._recipe.reconstruct(raw)
         self._temperature_c = raw.temperature_c
+        self._captured += len(raw.images)
+        self._lost += found.rejected_images + found.repaired_images + found.unrepaired_images
         if found.unrepaired_images:
             self._spoilt = raw, found
         else:
@@ -158,6 +160,7 @@ class _FrameSums:
             last=self._last,
             scatter=np.maximum(around, 0.0) / max(self._frames - 1, 1),
             temperature_c=self._temperature_c,
+            lost_share=self._lost / self._captured,
             single=self._single / self._frames,
             mean_dn=self._sum_dn / self._images - sensor.dark_dn,
             brightest_dn=float(np.quantile(self._highest_dn, BRIGHT_SHARE)) - sensor.dark_dn,

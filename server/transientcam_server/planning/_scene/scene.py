@@ -68,6 +68,8 @@ class SceneStatistics:
         Whether what was seen is known to be the scene's, and not the device's.
     uncalibrated_m
         How far ranges are off without a calibration, in the median pixel.
+    lost_share
+        Share of the images that lose their synchronisation.
     drift_m
         By how much ranges may have drifted since the calibration in use, without a sign.
     crossed_per_s, crossed_m
@@ -95,6 +97,7 @@ class SceneStatistics:
     contrast: tuple[float, ...] = ()
     calibrated: bool = True
     uncalibrated_m: float = 0.0
+    lost_share: float = 0.0
     drift_m: float = 0.0
     crossed_per_s: float = 0.0
     crossed_m: float = 0.0
@@ -126,6 +129,7 @@ class SceneStatistics:
             "ambiguity_checked": self.ambiguity_checked,
             "calibrated": self.calibrated,
             "uncalibrated_m": self.uncalibrated_m,
+            "lost_share": self.lost_share,
             "drift_m": self.drift_m,
             "of_one_frame": self.of_one_frame,
         }
