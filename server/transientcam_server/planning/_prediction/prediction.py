@@ -45,6 +45,8 @@ FEW: Final = slice(None, None, 2)
 """The pixels that first predictions are made of: every other one of each kind."""
 STEP: Final = 4.0
 """Factor between steps of noise."""
+SWING: Final = 0.25
+"""Error of a range that changes evenly during a capture, over that change."""
 OUTVOTED: Final = 3
 """Takes of which one that lost its synchronisation is left out."""
 FOUR_PHASES: Final = np.array([1, 1j, -1, -1j])
@@ -210,7 +212,9 @@ class Predictor:
             lost=(lost, sequence.takes),
         )
         farthest_m = errors.farthest_m(self.scene.earliest_m, self.scene.latest_m)
-        errors = self._crossed(errors, capture_s)
+        if self.scene.swing_m_per_s is not None:
+            moved_m = SWING * capture_s * self.scene.swing_m_per_s
+            errors = replace(errors, bias_m=np.hypot(errors.bias_m, moved_m))
         known = bool(
             self.scene.calibrated
             and not self.scene.lit_in_part
@@ -231,15 +235,6 @@ class Predictor:
     def _drift_m(self) -> float:
         """What is expected of a drift that is known only to be no larger than so much."""
         return self.scene.drift_m / 2
-
-    def _crossed(self, errors: PixelErrors, capture_s: float) -> PixelErrors:
-        """Return the errors where edges of what moves cross some pixels, evenly of all kinds."""
-        share = self.scene.crossed_share(capture_s)
-        place = np.arange(errors.bias_m.size)
-        crossed = np.floor((place + 1) * share) > np.floor(place * share)
-        bias_m = np.hypot(errors.bias_m, np.where(crossed, self.scene.crossed_m, 0.0))
-        outliers = errors.outlier_share + share * (1 - errors.outlier_share)
-        return replace(errors, bias_m=bias_m, outlier_share=outliers)
 
     def beyond_scene(self, sequence: Sequence) -> bool:
         """Whether a sequence sees more of the scene than the look that describes it."""

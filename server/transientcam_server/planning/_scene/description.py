@@ -1,5 +1,6 @@
 """From the moments of a look to the statistics of a scene."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -53,8 +54,6 @@ class FrameAverages:
         (m + 1, H, W) variance of smoothed moments between frames, of both parts together.
     temperature_c
         Of the camera; None where that is not known.
-    lost_share
-        Of the images, those that lost their synchronisation.
     single
         (m + 1, H, W) moments that are not smoothed, averaged over the frames.
     mean_dn
@@ -73,7 +72,6 @@ class FrameAverages:
     last: _Array
     scatter: _Array
     temperature_c: float | None
-    lost_share: float
     single: _Array
     mean_dn: _Array
     brightest_dn: float
@@ -136,6 +134,7 @@ def describe(
     coarse: FrameAverages | None = None,
     ambient_dn_per_s: float | None = None,
     gain_noise: float = 0.0,
+    quick: Sequence[FrameAverages] = (),
 ) -> SceneStatistics | None:
     """Describe the scene that frames show.
 
@@ -151,6 +150,8 @@ def describe(
         Light that is not the camera's, where that is known.
     gain_noise
         Variance that the gains of the calibration add to that of a frame, over it.
+    quick
+        Two frames of one frequency in succession each, of what moves.
 
     Returns
     -------
@@ -215,10 +216,8 @@ def describe(
         ambiguity_checked=checked,
         contrast=tuple(contrast.tolist()),
         uncalibrated_m=averages.uncalibrated_m,
-        lost_share=averages.lost_share,
         calibrated=coarse is not None or averages.recipe.gains is not None,
-        crossed_per_s=2 * moving_share * averages.recipe.applied.frame_rate_hz / averages.frames,
-        crossed_m=_crossed_m(averages, lit & moving),
+        swing_m_per_s=_swing_m_per_s(quick, lit) if quick else None,
     )
 
 
@@ -327,10 +326,18 @@ def _of_one_return(b: _Array, coarse: FrameAverages, pixels: _Array, base_hz: fl
     return np.asarray(np.abs(coarse_b[1]) * np.exp(1j * j * phase), b.dtype)
 
 
-def _crossed_m(averages: FrameAverages, moving: _Array) -> float:
-    """Return how far the range of a moving pixel (H, W) goes to and fro; 0 where none does."""
-    if not moving.any():
-        return 0.0
-    size = np.maximum(np.abs(averages.moments[1]), 1e-9)
-    swing_rad = np.minimum(2 * np.sqrt(averages.scatter[1]) / size, np.pi)
-    return float(tm.range_m(np.median(swing_rad[moving]), averages.recipe.base_frequency_hz))
+def _swing_m_per_s(quick: Sequence[FrameAverages], lit: _Array) -> _Array:
+    """Return how fast ranges change, in `PIXELS` that stand for the lit ones (H, W), by chance.
+
+    Between two frames, beyond what noise does, and when more of them do.
+    """
+    place, most = (np.arange(PIXELS) + 0.5) / PIXELS, np.zeros(PIXELS)
+    for two in quick:
+        size = np.maximum(np.abs(two.moments[1]), 1e-9)
+        noise = MOVED_DEVIATIONS * np.sqrt(2 * two.variance(two.mean_dn)[1]) / size
+        turned = np.angle(two.last[1] * np.conj(two.first[1]))
+        beyond = np.nan_to_num(np.sqrt(np.maximum(turned**2 - noise**2, 0.0)))[lit]
+        applied = two.recipe.applied
+        swing_m = np.asarray(tm.range_m(np.quantile(beyond, place), two.recipe.base_frequency_hz))
+        most = np.maximum(most, swing_m * applied.frame_rate_hz)
+    return np.random.default_rng(0).permutation(most)

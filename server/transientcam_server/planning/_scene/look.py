@@ -42,10 +42,10 @@ COARSE_HZ: Final = 2e6
 CALIBRATION_TAKES: Final = 16
 """Of a simulated camera, through its own diffuser, where its device is not ideal."""
 OF_THE_DEVICE: Final = frozenset(
-    ("roll-off", "pixel-pattern", "modulation-harmonics", "thermal-drift")
+    ("roll-off", "pixel-pattern", "modulation-harmonics", "thermal-drift", "outliers")
 )
-"""Effects that a calibration takes out."""
-STEPS: Final = 1 + 2 + STILL_FRAMES + 1
+"""Effects that a calibration shows."""
+STEPS: Final = 1 + 2 + 2 + STILL_FRAMES + 1
 """Of a look, at most, where the first exposure does not saturate."""
 FIRST_EXPOSURE_S: Final = 5e-4
 LONGEST_EXPOSURE_S: Final = 0.02
@@ -106,7 +106,7 @@ class _FrameSums:
 
     def __init__(self, recipe: Recipe, sensor: tm.noise.Sensor) -> None:
         self._recipe, self._sensor = recipe, sensor
-        self._frames = self._images = self._captured = self._lost = 0
+        self._frames = self._images = 0
         self._first: _Array
         self._last: _Array
         self._spoilt: tuple[RawFrame, tm.Reconstruction] | None = None
@@ -121,8 +121,6 @@ class _FrameSums:
         """Add a frame, and its reconstruction where there is one."""
         found = found or self._recipe.reconstruct(raw)
         self._temperature_c = raw.temperature_c
-        self._captured += len(raw.images)
-        self._lost += found.rejected_images + found.repaired_images + found.unrepaired_images
         if found.unrepaired_images:
             self._spoilt = raw, found
         else:
@@ -160,7 +158,6 @@ class _FrameSums:
             last=self._last,
             scatter=np.maximum(around, 0.0) / max(self._frames - 1, 1),
             temperature_c=self._temperature_c,
-            lost_share=self._lost / self._captured,
             single=self._single / self._frames,
             mean_dn=self._sum_dn / self._images - sensor.dark_dn,
             brightest_dn=float(np.quantile(self._highest_dn, BRIGHT_SHARE)) - sensor.dark_dn,
@@ -262,14 +259,17 @@ def look_at(
         fills_s = exposure_s * FILLED * sensor.brightest / max(brightest_dn, 1.0)
         return max(min(fills_s, longest_s), capabilities.min_exposure_s)
 
-    def calibrated(sequence: Sequence) -> Gains | None:
-        """Return the gains that a calibration of a simulated camera has; None where it is ideal."""
+    def calibrated(sequence: Sequence) -> tuple[Gains | None, float]:
+        """Return the gains of a simulated camera, and which share of its images it loses.
+
+        None and 0 where it is ideal, or real.
+        """
         there = camera.simulation
         if there is None or there.diffuser:
-            return None
+            return None, 0.0
         effects = there.explain(capabilities.nearest(sequence)).effects
         if not any(each.built for each in effects if each.effect in OF_THE_DEVICE):
-            return None
+            return None, 0.0
         there.change(diffuser=True)
         try:
             exposure_s = filling_s(coarse_sequence)
@@ -282,7 +282,7 @@ def look_at(
             )
         finally:
             there.change(diffuser=False)
-        return evaluate(capture).gains
+        return evaluate(capture).gains, capture.rejected_images / capture.kept.size
 
     coarse_sequence = replace(
         base, base_frequency_hz=COARSE_HZ, harmonics=1, zeroth="estimated", takes=1
@@ -292,15 +292,20 @@ def look_at(
     fine_sequence = replace(
         base, base_frequency_hz=fine_hz, harmonics=harmonics, zeroth="estimated", takes=TAKES
     )
-    gains = calibrated(fine_sequence)
+    gains, lost_share = calibrated(fine_sequence)
     exposure_s = filling_s(coarse_sequence)
     coarse_sequence = replace(coarse_sequence, exposure_s=exposure_s, takes=TAKES)
     fine_sequence = replace(fine_sequence, exposure_s=exposure_s)
+    quick_sequence = replace(fine_sequence, base_frequency_hz=2 * fine_hz, harmonics=1, takes=1)
+    quick = [captured(quick_sequence, 2, "motion").averages()]
     coarse = captured(coarse_sequence, 1, "coarse range")
     fine = captured(
         fine_sequence, FRAMES, "all frequencies", still_frames=STILL_FRAMES, gains=gains
     ).averages()
     captured(coarse_sequence, 1, "coarse range", more_of=coarse)
+    moves = not _still(fine)
+    if moves:
+        quick.append(captured(quick_sequence, 2, "motion").averages())
     go_on("direct range")
     scene = describe(
         fine,
@@ -308,10 +313,12 @@ def look_at(
         coarse=coarse.averages(),
         ambient_dn_per_s=ambient_dn_per_s,
         gain_noise=0.0 if gains is None else TAKES / CALIBRATION_TAKES,
+        quick=quick if moves else (),
     )
     if scene is None:
         raise no_light()
-    return replace(scene, drift_m=_drift_m(calibrated_c, fine.temperature_c))
+    drift_m = _drift_m(calibrated_c, fine.temperature_c)
+    return replace(scene, drift_m=drift_m, lost_share=lost_share)
 
 
 def no_light() -> Problem:

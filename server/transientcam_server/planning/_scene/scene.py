@@ -72,8 +72,8 @@ class SceneStatistics:
         Share of the images that lose their synchronisation.
     drift_m
         By how much ranges may have drifted since the calibration in use, without a sign.
-    crossed_per_s, crossed_m
-        Share of the lit pixels that an edge of what moves crosses in a second, and the error then.
+    swing_m_per_s
+        (P) how fast the ranges of lit pixels change, these or others; None where nothing moves.
     of_one_frame
         Whether no look was taken, but one frame of another purpose.
     """
@@ -99,8 +99,7 @@ class SceneStatistics:
     uncalibrated_m: float = 0.0
     lost_share: float = 0.0
     drift_m: float = 0.0
-    crossed_per_s: float = 0.0
-    crossed_m: float = 0.0
+    swing_m_per_s: _Array | None = None
     of_one_frame: bool = False
 
     def few(self) -> "SceneStatistics":
@@ -172,10 +171,6 @@ class SceneStatistics:
         j, known = np.arange(harmonics + 1), np.arange(len(self.contrast))
         found = np.interp(j * base_frequency_hz, known * self.base_frequency_hz, self.contrast)
         return np.where(j == 0, 1.0, found)
-
-    def crossed_share(self, capture_s: float) -> float:
-        """Return the share of the lit pixels that an edge crosses during a capture."""
-        return min(self.crossed_per_s * capture_s, self.moving_share)
 
     def covers(self, harmonics: int, base_frequency_hz: float) -> bool:
         """Whether moments at these frequencies are known without a model of the returns."""
