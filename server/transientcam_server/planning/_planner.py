@@ -55,6 +55,7 @@ class Planner:
         base: Sequence,
         *,
         ambient_dn_per_s: float | None = None,
+        calibrated_c: float | None = None,
         progress: Progress | None = None,
     ) -> SceneStatistics:
         """Look at the scene before a camera; see `look_at`."""
@@ -67,7 +68,8 @@ class Planner:
             self._settings,
             base=base,
             ambient_dn_per_s=ambient_dn_per_s,
-            go_on=lambda stage: shown.at(next(done) / STEPS, stage),
+            calibrated_c=calibrated_c,
+            go_on=lambda stage: shown.at(min(next(done) / STEPS, 1.0), stage),
         )
 
     def require_possible(self) -> None:

@@ -8,7 +8,7 @@ number of takes.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from statistics import NormalDist
 from typing import Any, Final
@@ -45,6 +45,11 @@ FEW: Final = slice(None, None, 2)
 """The pixels that first predictions are made of: every other one of each kind."""
 STEP: Final = 4.0
 """Factor between steps of noise."""
+SWING: Final = 0.25
+"""Error of a range that changes evenly during a capture, over that change."""
+OUTVOTED: Final = 3
+"""Takes of which one that lost its synchronisation is left out."""
+FOUR_PHASES: Final = np.array([1, 1j, -1, -1j])
 NOMINAL: Final = Sequence(exposure_s=1e-3, zeroth="estimated")
 """The steps are multiples of its noise."""
 _HARDLY: Final = 0.8
@@ -144,16 +149,18 @@ class Predictor:
             np.exp((1 - part) * np.log(one) + part * np.log(other))
             for one, other in ((low[0], high[0]), (low[1], high[1]))
         )
+        bias = np.hypot(bias, self._drift_m)
         return float(_typical(std)), float(np.median(bias)), float(np.median(np.hypot(std, bias)))
 
     def least_noise_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
         """Return a bound in m on the noise of the median pixel: that of Cramer and Rao.
 
-        Of one return with all the light; the sum of squares of 1 to m is in it.
+        Of one return with all the light, whose phase all frequencies tell together.
         """
         m = self._harmonics(estimator, sequence)
         noise = float(np.median(self._nominal)) * scale
-        std_rad = noise / math.sqrt(m * (m + 1) * (2 * m + 1) / 6)
+        contrast = self.scene.contrast_at(m, sequence.base_frequency_hz)
+        std_rad = noise / float(np.linalg.norm(np.arange(m + 1) * contrast))
         return float(tm.range_m(std_rad, sequence.base_frequency_hz))
 
     def least_bias_m(self, estimator: str, sequence: Sequence) -> float:
@@ -175,33 +182,59 @@ class Predictor:
         # noise of the look itself is in this, and in the direct range
         return _HARDLY * float(np.median(np.nan_to_num(bias_m, nan=math.inf)))
 
-    def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
+    def predict(
+        self,
+        estimator: str,
+        sequence: Sequence,
+        *,
+        closely: bool = False,
+        capture_s: float = 0.0,
+    ) -> Prediction:
         """Predict the errors of a sequence and an estimator, with intervals.
 
         ``closely``, with all pixels of the scene: several times the work, and narrower intervals.
+        What moves while it is captured, for ``capture_s``, is part of the errors.
         """
         if closely:
-            return self._closer.predict(estimator, sequence)
+            return self._closer.predict(estimator, sequence, capture_s=capture_s)
         harmonics = self._harmonics(estimator, sequence)
         noise = self.relative_noise(sequence)
+        lost = self.scene.lost_share if sequence.takes < OUTVOTED else 0.0
+        if sequence.harmonics > 1:  # rebuilt from the opposite image and the sums
+            noise, lost = noise * math.sqrt(1 + 2 * lost), 0.0
         errors = self._errors(
-            estimator, harmonics, sequence.base_frequency_hz, noise, FINE_DRAWS, sequence.zeroth
+            estimator,
+            harmonics,
+            sequence.base_frequency_hz,
+            noise,
+            FINE_DRAWS,
+            sequence.zeroth,
+            lost=(lost, sequence.takes),
         )
         farthest_m = errors.farthest_m(self.scene.earliest_m, self.scene.latest_m)
+        if self.scene.swing_m_per_s is not None:
+            moved_m = SWING * capture_s * self.scene.swing_m_per_s
+            errors = replace(errors, bias_m=np.hypot(errors.bias_m, moved_m))
         known = bool(
-            not self.scene.lit_in_part
+            self.scene.calibrated
+            and not self.scene.lit_in_part
             and self.scene.disagreement_m <= DISAGREEING * _median(errors.error_m)
             and _median(np.hypot(errors.std_m, farthest_m)) <= DOUBTFUL * _median(errors.error_m)
         )
         picks = resampled(noise.size, RESAMPLED, self._seed)
         return Prediction(
             figure(errors.std_m, _typical, picks),
-            _error(errors, None if known else farthest_m, picks),
-            float(_median(errors.bias_m)),
+            _error(errors, None if known else farthest_m, picks, self._drift_m),
+            float(_median(np.hypot(errors.bias_m, self._drift_m))),
             errors.outlier_share,
             float(_median(farthest_m)),
             bias_known=known,
         )
+
+    @property
+    def _drift_m(self) -> float:
+        """What is expected of a drift that is known only to be no larger than so much."""
+        return self.scene.drift_m / 2
 
     def beyond_scene(self, sequence: Sequence) -> bool:
         """Whether a sequence sees more of the scene than the look that describes it."""
@@ -213,11 +246,16 @@ class Predictor:
 
     def bound_width(self, sequence: Sequence) -> float:
         """Predict the width of the bounds on the density, over the mean density, median pixel."""
-        return self.resolving.bound_width(sequence, self.relative_noise(sequence))
+        return self.resolving.bound_width(sequence, self._noise_of_all(sequence))
 
     def separation(self, sequence: Sequence, distance_m: float) -> float:
         """Predict how often two equal returns at a distance are both found, in a typical pixel."""
-        return self.resolving.separation(sequence, self.relative_noise(sequence), distance_m)
+        return self.resolving.separation(sequence, self._noise_of_all(sequence), distance_m)
+
+    def _noise_of_all(self, sequence: Sequence) -> _Array:
+        """Return the deviation (P) that stands for all frequencies, of those with less contrast."""
+        contrast = self.scene.contrast_at(sequence.harmonics, sequence.base_frequency_hz)[1:]
+        return self.relative_noise(sequence) / float(np.sqrt(np.mean(contrast**2)))
 
     def relative_noise(self, sequence: Sequence) -> _Array:
         """Return the deviation (P) of the parts of the moments, over each pixel's brightness."""
@@ -264,14 +302,19 @@ class Predictor:
         draws: int,
         zeroth: str,
         pixels: slice = slice(None),
+        lost: tuple[float, int] = (0.0, 1),
     ) -> PixelErrors:
         self._go_on()
         b = self.scene.relative_moments(harmonics, base_frequency_hz)[:, pixels]
         variance = np.broadcast_to(noise[pixels] ** 2, b.shape).astype(np.float32)
         if zeroth == "estimated":
             variance[0] = 0
+        contrast = self.scene.contrast_at(harmonics, base_frequency_hz)[:, None]
         random = np.random.default_rng((self._seed, harmonics, draws))
-        drawn = tm.noise.draw(b, tm.noise.MomentNoise(variance), random, draws=draws)
+        of_device = tm.noise.MomentNoise((variance / contrast**2).astype(np.float32))
+        drawn = tm.noise.draw(b, of_device, random, draws=draws)
+        drawn = drawn if not lost[0] else _out_of_step(drawn, *lost, random)
+        # frames take the noise of a nominal device, too
         spread = np.broadcast_to(variance[:, None], drawn.shape)
         range_m = ranges_m(
             drawn.reshape((len(b), -1)),
@@ -288,17 +331,37 @@ class Predictor:
         )
 
 
-def _error(errors: PixelErrors, farthest_m: _Array | None, picks: _Array) -> Figure:
-    """Return the figure of the error; ``farthest_m`` (P) is the most bias, where none is known."""
+def _out_of_step(b: _Array, share: float, takes: int, random: np.random.Generator) -> _Array:
+    """Return moments (m + 1, draws, P) of captures of which images lost their synchronisation.
+
+    Nothing tells such an image among the four of one frequency: for a part of the exposure, taken
+    as uniform from 0 to 1, its phase is a random one.
+    """
+    shape = takes, b.shape[1], len(FOUR_PHASES)
+    part = random.uniform(size=shape) * (random.uniform(size=shape) < share)
+    turned = 1 - part + part * np.exp(2j * np.pi * random.uniform(size=shape))
+    seen = np.real(b[1][..., None] * turned.mean(axis=0)[:, None] / FOUR_PHASES)
+    out: _Array = b.copy()
+    out[1] = (seen * FOUR_PHASES).sum(axis=-1) / 2
+    return out
+
+
+def _error(errors: PixelErrors, farthest_m: _Array | None, picks: _Array, drift_m: float) -> Figure:
+    """Return the figure of the error.
+
+    ``farthest_m`` (P) is the most bias, where none is known; ``drift_m`` the expected drift, which
+    may be none, and twice as much.
+    """
     reach = KNOWN if farthest_m is None else UNKNOWN
     least_m, most_m = reach.least_bias * errors.bias_m, reach.most_bias * errors.bias_m
     if farthest_m is not None:
         most_m = np.maximum(most_m, farthest_m)
+    most_m = np.hypot(most_m, 2 * drift_m)
     least, most = (
         figure(np.hypot(errors.std_m, bias_m), _median, picks, reach.spread)
         for bias_m in (least_m, most_m)
     )
-    return between(figure(errors.error_m, _median, picks), least, most)
+    return between(figure(np.hypot(errors.error_m, drift_m), _median, picks), least, most)
 
 
 def _typical(deviations: _Array) -> _Array:

@@ -1,5 +1,6 @@
 """From the moments of a look to the statistics of a scene."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -20,6 +21,13 @@ LIT_DEVIATIONS: Final = 5.0
 LIT_FRAMES: Final = 8
 """Frames whose noise it is, at most."""
 MOVED_DEVIATIONS: Final = 5.0
+UNSTEADY: Final = 1.5
+"""Variance between frames over that of noise, from which on a pixel moves: repaired images have
+more noise."""
+LEAST_CONTRAST: Final = 0.2
+"""Frequencies that a device modulates less than so much are left to predictions by a model."""
+LEAST_STILL: Final = 0.1
+"""Share of the lit pixels that has to stand still for the others to be left out."""
 _EARLY: Final = 0.9
 """Share of a period by which a direct return may come before the mean of all light."""
 DIM: Final = 0.2
@@ -40,8 +48,12 @@ class FrameAverages:
         How many.
     moments
         (m + 1, H, W) smoothed moments, averaged over the frames.
-    moved
-        (m + 1, H, W) smoothed moments of the last frame less those of the first.
+    first, last
+        (m + 1, H, W) smoothed moments of these frames.
+    scatter
+        (m + 1, H, W) variance of smoothed moments between frames, of both parts together.
+    temperature_c
+        Of the camera; None where that is not known.
     single
         (m + 1, H, W) moments that are not smoothed, averaged over the frames.
     mean_dn
@@ -56,7 +68,10 @@ class FrameAverages:
     sensor: tm.noise.Sensor
     frames: int
     moments: _Array
-    moved: _Array
+    first: _Array
+    last: _Array
+    scatter: _Array
+    temperature_c: float | None
     single: _Array
     mean_dn: _Array
     brightest_dn: float
@@ -84,12 +99,32 @@ class FrameAverages:
         noise = tm.noise.moment_noise(
             2 * np.maximum(signal_dn, 0.0),
             self.sensor,
-            calibration=nominal_gains(sequence),
+            calibration=nominal_gains(sequence) * self.contrast,
             zeroth=sequence.zeroth,
             takes=sequence.takes,
         )
         left = tm.noise.smoothing_factor(self.recipe.settings.gaussian_px)
         return np.asarray(noise.variance) * left
+
+    @property
+    def contrast(self) -> _Array:
+        """What the device leaves of its modulation (m + 1), over the nominal: median pixel."""
+        return np.median(np.abs(self._relative_gains()), axis=(1, 2))
+
+    @property
+    def uncalibrated_m(self) -> float:
+        """How far nominal gains put the range of the median pixel off; 0 where they are used."""
+        relative = self._relative_gains()
+        if relative.shape[1:] != self.mean_dn.shape:
+            return 0.0
+        smoothed = tm.smooth(relative.astype(np.complex64), self.recipe.settings.gaussian_px or 0.5)
+        off_rad = np.median(np.abs(np.angle(smoothed[1])))
+        return float(tm.range_m(off_rad, self.recipe.base_frequency_hz))
+
+    def _relative_gains(self) -> _Array:
+        """Return the gains in use over the nominal ones, (m + 1, H, W) or of one pixel."""
+        nominal, gains = self.recipe.nominal_gains[:, None, None], self.recipe.gains
+        return np.ones_like(nominal) if gains is None else gains.planes / nominal
 
 
 def describe(
@@ -98,6 +133,8 @@ def describe(
     *,
     coarse: FrameAverages | None = None,
     ambient_dn_per_s: float | None = None,
+    gain_noise: float = 0.0,
+    quick: Sequence[FrameAverages] = (),
 ) -> SceneStatistics | None:
     """Describe the scene that frames show.
 
@@ -111,25 +148,41 @@ def describe(
         Frames at a low frequency, for ambient light and ambiguity of the range.
     ambient_dn_per_s
         Light that is not the camera's, where that is known.
+    gain_noise
+        Variance that the gains of the calibration add to that of a frame, over it.
+    quick
+        Two frames of one frequency in succession each, of what moves.
 
     Returns
     -------
     SceneStatistics or None
         None where no pixel has light.
     """
-    lit = lit_pixels(averages)
+    lit, moving = lit_pixels(averages), moving_pixels(averages)
     if coarse is not None:
         lit &= lit_pixels(coarse)
+        moving |= moving_pixels(coarse)
     if not lit.any():
         return None
-    there = np.flatnonzero(lit)
+    moving_share = float(moving[lit].mean())
+    # what moves is another thing at each frequency, and beyond any range between two of them
+    still = moving_share <= 1 - LEAST_STILL
+    there = np.flatnonzero(lit & ~moving if still else lit)
     pixels = there[typical_pixels(averages.at(there)[0], PIXELS)]
     b, mean_dn = averages.at(pixels)
-    variance = averages.variance(mean_dn) / averages.frames
     base_hz = averages.recipe.base_frequency_hz
+    variance = averages.variance(mean_dn) * (1 / averages.frames + gain_noise)
+    light_dn = _brightness(b if coarse is None else coarse.at(pixels)[0], b)
+    contrast = averages.contrast
+    if averages.recipe.gains is None and coarse is None:
+        contrast = contrast_of_picture(b, variance)
+        b, variance = b / contrast[:, None], variance / contrast[:, None] ** 2
+    elif coarse is not None and not still:
+        b = _of_one_return(b, coarse, pixels, base_hz)
+    told = 1 + int(np.flatnonzero(contrast >= LEAST_CONTRAST)[-1])
+    b, variance = b[:told], variance[:told]
     direct_m, uncertainty_m = direct_range(b, variance, base_hz, settings)
     earliest_m, latest_m = _plausible_by_kind(b, variance, base_hz, direct_m, uncertainty_m)
-    light_dn = _brightness(b if coarse is None else coarse.at(pixels)[0], b)
     checked = coarse is not None
     if coarse is not None:
         wrapped_m, direct_m = direct_m, _unwrapped(direct_m, b, coarse, pixels, base_hz)
@@ -159,8 +212,12 @@ def describe(
         relative_noise=np.sqrt(variance[1]) / light_dn,
         lit_share=float(lit.mean()),
         dim_share=dim_share(light_dn, direct_m),
-        moving_share=moving_share(averages, lit),
+        moving_share=moving_share,
         ambiguity_checked=checked,
+        contrast=tuple(contrast.tolist()),
+        uncalibrated_m=averages.uncalibrated_m,
+        calibrated=coarse is not None or averages.recipe.gains is not None,
+        swing_m_per_s=_swing_m_per_s(quick, lit) if quick else None,
     )
 
 
@@ -230,12 +287,57 @@ def _unwrapped(
     return np.asarray(np.maximum(mean_m - before_m, 0.0))
 
 
-def moving_share(averages: FrameAverages, lit: _Array) -> float:
-    """Return the share of lit pixels (H, W) whose first and last frame differ beyond noise."""
-    if averages.frames < 2:
-        return 0.0
-    apart = np.abs(averages.moved[1:]) ** 2
-    m = len(apart)
+def moving_pixels(averages: FrameAverages) -> _Array:
+    """Return which pixels (H, W) differ from frame to frame, or in the end, beyond noise."""
+    m, apart = len(averages.scatter) - 1, averages.frames - 1
+    if not apart:
+        return np.zeros(averages.usable.shape, dtype=bool)
+    variance = averages.variance(averages.mean_dn)[1:]
     with np.errstate(invalid="ignore"):
-        power = (apart / (2 * averages.variance(averages.mean_dn)[1:])).sum(axis=0)
-    return float((power > 2 * m + MOVED_DEVIATIONS * 2 * np.sqrt(m))[lit].mean())
+        moved = (np.abs(averages.last - averages.first)[1:] ** 2 / (2 * variance)).sum(axis=0)
+        between = apart * (averages.scatter[1:] / variance).sum(axis=0)
+        found: _Array = (moved > _most(2 * m)) | (between > UNSTEADY * _most(2 * m * apart))
+    return found
+
+
+def _most(freedom: int) -> float:
+    """Return what chi-square with so many degrees of freedom does not exceed by noise."""
+    return freedom + MOVED_DEVIATIONS * float(np.sqrt(2 * freedom))
+
+
+def contrast_of_picture(b: _Array, variance: _Array) -> _Array:
+    """Return what a device that is not calibrated leaves of its modulation (m + 1), at most 1.
+
+    What all pixels (P) lose alike is the device's, not the scene's: of the brighter half a quarter
+    is taken for single returns.
+    """
+    size = np.sqrt(np.maximum(np.abs(b) ** 2 - 2 * variance, 0.0))
+    bright = np.abs(b[1]) >= np.median(np.abs(b[1]))
+    kept = np.quantile((size / np.maximum(size[1], 1e-9))[:, bright], 0.75, axis=1)
+    return np.clip(np.concatenate([[1.0], kept[1:]]), 0.01, 1.0)
+
+
+def _of_one_return(b: _Array, coarse: FrameAverages, pixels: _Array, base_hz: float) -> _Array:
+    """Return moments (m + 1, P) of one return each, at the range of the coarse frames."""
+    coarse_b, _ = coarse.at(pixels)
+    phase = np.remainder(np.angle(coarse_b[1]), 2 * np.pi)
+    phase = phase * base_hz / coarse.recipe.base_frequency_hz
+    j = np.arange(len(b))[:, None]
+    return np.asarray(np.abs(coarse_b[1]) * np.exp(1j * j * phase), b.dtype)
+
+
+def _swing_m_per_s(quick: Sequence[FrameAverages], lit: _Array) -> _Array:
+    """Return how fast ranges change, in `PIXELS` that stand for the lit ones (H, W), by chance.
+
+    Between two frames, beyond what noise does, and when more of them do.
+    """
+    place, most = (np.arange(PIXELS) + 0.5) / PIXELS, np.zeros(PIXELS)
+    for two in quick:
+        size = np.maximum(np.abs(two.moments[1]), 1e-9)
+        noise = MOVED_DEVIATIONS * np.sqrt(2 * two.variance(two.mean_dn)[1]) / size
+        turned = np.angle(two.last[1] * np.conj(two.first[1]))
+        beyond = np.nan_to_num(np.sqrt(np.maximum(turned**2 - noise**2, 0.0)))[lit]
+        applied = two.recipe.applied
+        swing_m = np.asarray(tm.range_m(np.quantile(beyond, place), two.recipe.base_frequency_hz))
+        most = np.maximum(most, swing_m * applied.frame_rate_hz)
+    return np.random.default_rng(0).permutation(most)

@@ -8,29 +8,44 @@ import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_driver import AppliedSequence, Capabilities, RawFrame, Sequence
+from transientcam_driver import (
+    AppliedSequence,
+    Capabilities,
+    RawFrame,
+    Sequence,
+    Simulation,
+    capture_calibration,
+)
+from transientcam_driver.calibration import TemperatureDrift
 from transientcam_server.errors import Problem, kinds
-from transientcam_server.imaging import Recipe
+from transientcam_server.imaging import Gains, Recipe, evaluate
 from transientcam_server.planning._scene.description import (
     FrameAverages,
     describe,
     lit_pixels,
-    moving_share,
+    moving_pixels,
 )
 from transientcam_server.planning._scene.scene import SceneStatistics
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
-FRAMES: Final = 8
+TAKES: Final = 4
+"""Of a frame of the look: images that lost their synchronisation are left out."""
+FRAMES: Final = 2
 """Frames of the look at least; what differs between them is motion."""
-STILL_FRAMES: Final = 32
+STILL_FRAMES: Final = 8
 """And of a scene where nothing moves: what a plan calls bias is in part the noise of the look."""
 STILL_SHARE: Final = 0.01
 """Share of the lit pixels that may seem to move there."""
 COARSE_HZ: Final = 2e6
 """Base frequency of the coarse frame, unambiguous to 75 m."""
-COARSE_FRAMES: Final = 4
-STEPS: Final = 1 + COARSE_FRAMES + STILL_FRAMES + 1
+CALIBRATION_TAKES: Final = 16
+"""Of a simulated camera, through its own diffuser, where its device is not ideal."""
+OF_THE_DEVICE: Final = frozenset(
+    ("roll-off", "pixel-pattern", "modulation-harmonics", "thermal-drift", "outliers")
+)
+"""Effects that a calibration shows."""
+STEPS: Final = 1 + 2 + 2 + STILL_FRAMES + 1
 """Of a look, at most, where the first exposure does not saturate."""
 FIRST_EXPOSURE_S: Final = 5e-4
 LONGEST_EXPOSURE_S: Final = 0.02
@@ -49,6 +64,16 @@ class FrameSource(Protocol):
     @property
     def capabilities(self) -> Capabilities:
         """Limits and size of the device."""
+        ...
+
+    @property
+    def applied(self) -> AppliedSequence:
+        """What is really set."""
+        ...
+
+    @property
+    def simulation(self) -> Simulation | None:
+        """What a simulated camera alone offers; None of a real one."""
         ...
 
     def configure(self, sequence: Sequence) -> AppliedSequence:
@@ -71,6 +96,8 @@ class FrameSource(Protocol):
 class _FrameSums:
     """Sums over frames of one sequence: no more than the first and the last one are kept.
 
+    Frames with images that could not be repaired are left out, unless there are no others.
+
     Parameters
     ----------
     recipe, sensor
@@ -82,6 +109,9 @@ class _FrameSums:
         self._frames = self._images = 0
         self._first: _Array
         self._last: _Array
+        self._spoilt: tuple[RawFrame, tm.Reconstruction] | None = None
+        self._squares: _Array = np.zeros((), np.float32)
+        self._temperature_c: float | None = None
         self._single: _Array = np.zeros((), np.complex64)
         self._moments: _Array = np.zeros((), np.complex64)
         self._sum_dn: _Array = np.zeros(())
@@ -89,12 +119,21 @@ class _FrameSums:
 
     def add(self, raw: RawFrame, found: tm.Reconstruction | None = None) -> None:
         """Add a frame, and its reconstruction where there is one."""
-        single = np.asarray((found or self._recipe.reconstruct(raw)).measured)
+        found = found or self._recipe.reconstruct(raw)
+        self._temperature_c = raw.temperature_c
+        if found.unrepaired_images:
+            self._spoilt = raw, found
+        else:
+            self._add(raw, found)
+
+    def _add(self, raw: RawFrame, found: tm.Reconstruction) -> None:
+        single = np.asarray(found.measured)
         smoothing_px = self._recipe.settings.gaussian_px
         moments = tm.smooth(single, smoothing_px) if smoothing_px else single
         images = _modulated(raw)
         if not self._frames:
-            self._first = moments
+            self._first = self._last = moments
+        self._squares = self._squares + np.abs(moments - self._first) ** 2
         self._last = moments
         self._single = self._single + single
         self._moments = self._moments + moments
@@ -106,12 +145,19 @@ class _FrameSums:
     def averages(self) -> FrameAverages:
         """Return what the frames show so far, one at least."""
         sensor = self._sensor
+        if not self._frames and self._spoilt is not None:
+            self._add(*self._spoilt)
+        mean = self._moments / self._frames
+        around = self._squares - self._frames * np.abs(mean - self._first) ** 2
         return FrameAverages(
             recipe=self._recipe,
             sensor=sensor,
             frames=self._frames,
-            moments=self._moments / self._frames,
-            moved=self._last - self._first,
+            moments=mean,
+            first=self._first,
+            last=self._last,
+            scatter=np.maximum(around, 0.0) / max(self._frames - 1, 1),
+            temperature_c=self._temperature_c,
             single=self._single / self._frames,
             mean_dn=self._sum_dn / self._images - sensor.dark_dn,
             brightest_dn=float(np.quantile(self._highest_dn, BRIGHT_SHARE)) - sensor.dark_dn,
@@ -126,13 +172,16 @@ def look_at(
     *,
     base: Sequence | None = None,
     ambient_dn_per_s: float | None = None,
+    calibrated_c: float | None = None,
     go_on: Callable[[str], None] = lambda stage: None,
 ) -> SceneStatistics:
     """Look at the scene before a camera.
 
     Coarse frames at a low frequency give brightness, ambient light, head room and the range to
-    75 m; a fine one at half the base frequency, with harmonics up to the camera's highest
-    frequency, holds the moments of every sequence whose frequencies are multiples of that.
+    75 m; fine ones in between at half the base frequency, with harmonics up to the camera's highest
+    frequency, hold the moments of every sequence whose frequencies are multiples of that. As a
+    calibration fits one sequence alone, a simulated camera is calibrated for the look, by the
+    diffuser that it has: plans are for a camera that is calibrated with what they recommend.
 
     Parameters
     ----------
@@ -146,6 +195,8 @@ def look_at(
         Whose base frequency, its multiples and half of it are planned with, and its sub-phases.
     ambient_dn_per_s
         Light that is not the camera's; None takes it from the mean of the images.
+    calibrated_c
+        Temperature of the camera at the calibration in use; None where that is not known.
     go_on
         Called with the name of the stage before each frame; whatever it raises ends the look.
 
@@ -160,68 +211,114 @@ def look_at(
     capabilities = camera.capabilities
 
     def captured(
-        sequence: Sequence, frames: int, stage: str, *, still_frames: int = 0
-    ) -> FrameAverages:
+        sequence: Sequence,
+        frames: int,
+        stage: str,
+        *,
+        still_frames: int = 0,
+        gains: Gains | None = None,
+        more_of: _FrameSums | None = None,
+    ) -> _FrameSums:
         applied = camera.configure(capabilities.nearest(sequence))
-        recipe = Recipe(applied, settings, float(sensor.highest_dn), sensor=sensor)
-        sums = _FrameSums(recipe, sensor)
+        recipe = Recipe(applied, settings, float(sensor.highest_dn), gains, sensor=sensor)
+        sums = more_of or _FrameSums(recipe, sensor)
         spare_s = _SPARE_S + 4 / applied.frame_rate_hz
 
-        def take(count: int) -> FrameAverages:
+        def take(count: int) -> None:
             for _ in range(count):
                 go_on(stage)
                 sums.add(camera.read_frame(timeout_s=spare_s))
-            return sums.averages()
 
         camera.start()
         try:
-            averages = take(frames)
-            if still_frames and _still(averages):
-                averages = take(still_frames - frames)
+            take(frames)
+            if still_frames and _still(sums.averages()):
+                take(still_frames - frames)
         finally:
             camera.stop()
-        return averages
+        return sums
+
+    def filling_s(sequence: Sequence) -> float:
+        """Return the exposure that fills the brightest pixels, as far as there may be one."""
+        exposure_s = max(FIRST_EXPOSURE_S, capabilities.min_exposure_s)
+        while True:
+            first = captured(replace(sequence, exposure_s=exposure_s), 1, "exposure")
+            brightest_dn = first.averages().brightest_dn
+            if brightest_dn < sensor.brightest:
+                break
+            if exposure_s <= capabilities.min_exposure_s:
+                raise Problem(
+                    kinds.TARGET_UNREACHABLE,
+                    f"The scene is too bright: the shortest exposure, {exposure_s:g} s, saturates.",
+                    field="scene",
+                    value=None,
+                    best=None,
+                )
+            exposure_s = max(exposure_s / _DARKER, capabilities.min_exposure_s)
+        longest_s = min(LONGEST_EXPOSURE_S, capabilities.max_exposure_s)
+        fills_s = exposure_s * FILLED * sensor.brightest / max(brightest_dn, 1.0)
+        return max(min(fills_s, longest_s), capabilities.min_exposure_s)
+
+    def calibrated(sequence: Sequence) -> tuple[Gains | None, float]:
+        """Return the gains of a simulated camera, and which share of its images it loses.
+
+        None and 0 where it is ideal, or real.
+        """
+        there = camera.simulation
+        if there is None or there.diffuser:
+            return None, 0.0
+        effects = there.explain(capabilities.nearest(sequence)).effects
+        if not any(each.built for each in effects if each.effect in OF_THE_DEVICE):
+            return None, 0.0
+        there.change(diffuser=True)
+        try:
+            exposure_s = filling_s(coarse_sequence)
+            camera.configure(capabilities.nearest(replace(sequence, exposure_s=exposure_s)))
+            capture = capture_calibration(
+                camera,
+                takes=CALIBRATION_TAKES,
+                average=tm.average_takes,
+                progress=lambda done, total: go_on("calibration"),
+            )
+        finally:
+            there.change(diffuser=False)
+        return evaluate(capture).gains, capture.rejected_images / capture.kept.size
 
     coarse_sequence = replace(
         base, base_frequency_hz=COARSE_HZ, harmonics=1, zeroth="estimated", takes=1
     )
-    exposure_s = max(FIRST_EXPOSURE_S, capabilities.min_exposure_s)
-    while True:
-        first = captured(replace(coarse_sequence, exposure_s=exposure_s), 1, "exposure")
-        brightest_dn = first.brightest_dn
-        if brightest_dn < sensor.brightest:
-            break
-        if exposure_s <= capabilities.min_exposure_s:
-            raise Problem(
-                kinds.TARGET_UNREACHABLE,
-                f"The scene is too bright: the shortest exposure, {exposure_s:g} s, saturates.",
-                field="scene",
-                value=None,
-                best=None,
-            )
-        exposure_s = max(exposure_s / _DARKER, capabilities.min_exposure_s)
-    longest_s = min(LONGEST_EXPOSURE_S, capabilities.max_exposure_s)
-    filling_s = exposure_s * FILLED * sensor.brightest / max(brightest_dn, 1.0)
-    exposure_s = max(min(filling_s, longest_s), capabilities.min_exposure_s)
-    coarse = captured(
-        replace(coarse_sequence, exposure_s=exposure_s), COARSE_FRAMES, "coarse range"
-    )
     fine_hz = max(base.base_frequency_hz / 2, capabilities.min_frequency_hz)
     harmonics = min(int(capabilities.max_frequency_hz / fine_hz), MOST_HARMONICS)
     fine_sequence = replace(
-        base,
-        base_frequency_hz=fine_hz,
-        harmonics=harmonics,
-        zeroth="estimated",
-        takes=1,
-        exposure_s=exposure_s,
+        base, base_frequency_hz=fine_hz, harmonics=harmonics, zeroth="estimated", takes=TAKES
     )
-    fine = captured(fine_sequence, FRAMES, "all frequencies", still_frames=STILL_FRAMES)
+    gains, lost_share = calibrated(fine_sequence)
+    exposure_s = filling_s(coarse_sequence)
+    coarse_sequence = replace(coarse_sequence, exposure_s=exposure_s, takes=TAKES)
+    fine_sequence = replace(fine_sequence, exposure_s=exposure_s)
+    quick_sequence = replace(fine_sequence, base_frequency_hz=2 * fine_hz, harmonics=1, takes=1)
+    quick = [captured(quick_sequence, 2, "motion").averages()]
+    coarse = captured(coarse_sequence, 1, "coarse range")
+    fine = captured(
+        fine_sequence, FRAMES, "all frequencies", still_frames=STILL_FRAMES, gains=gains
+    ).averages()
+    captured(coarse_sequence, 1, "coarse range", more_of=coarse)
+    moves = not _still(fine)
+    if moves:
+        quick.append(captured(quick_sequence, 2, "motion").averages())
     go_on("direct range")
-    scene = describe(fine, settings, coarse=coarse, ambient_dn_per_s=ambient_dn_per_s)
+    scene = describe(
+        fine,
+        settings,
+        coarse=coarse.averages(),
+        ambient_dn_per_s=ambient_dn_per_s,
+        gain_noise=0.0 if gains is None else TAKES / CALIBRATION_TAKES,
+        quick=quick if moves else (),
+    )
     if scene is None:
         raise no_light()
-    return scene
+    drift_m = _drift_m(calibrated_c, fine.temperature_c)
+    return replace(scene, drift_m=drift_m, lost_share=lost_share)
 
 
 def no_light() -> Problem:
@@ -261,13 +358,20 @@ def look_of_frame(
     scene = describe(sums.averages(), recipe.settings, ambient_dn_per_s=ambient_dn_per_s)
     if scene is None:
         raise no_light()
-    return scene
+    then_c = None if recipe.gains is None else recipe.gains.temperature_c
+    return replace(scene, drift_m=_drift_m(then_c, raw.temperature_c), of_one_frame=True)
+
+
+def _drift_m(then_c: float | None, now_c: float | None) -> float:
+    """Return by how much ranges may have drifted since the calibration, without a sign."""
+    drift = TemperatureDrift.between(then_c, now_c)
+    return 0.0 if drift is None else drift.range_m
 
 
 def _still(averages: FrameAverages) -> bool:
     """Whether nothing moves that frames show."""
     lit = lit_pixels(averages)
-    return bool(lit.any()) and moving_share(averages, lit) <= STILL_SHARE
+    return bool(lit.any()) and float(moving_pixels(averages)[lit].mean()) <= STILL_SHARE
 
 
 def _modulated(frame: RawFrame) -> _Array:

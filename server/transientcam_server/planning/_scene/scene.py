@@ -18,6 +18,8 @@ FEW_PIXELS: Final = PIXELS // STRATUM
 """How many of them nearly all is predicted with."""
 MOSTLY_DIM: Final = 0.25
 """Share of dim pixels from which on it matters to the median one."""
+NOTABLE_M: Final = 5e-4
+"""Range that is worth a sentence."""
 AMBIGUOUS_SHARE: Final = 0.02
 """Share of the pixels whose direct return may lie beyond the unambiguous range."""
 LATE_SHARE: Final = 0.05
@@ -59,6 +61,21 @@ class SceneStatistics:
         Share of the lit pixels that changed while the scene was looked at.
     ambiguity_checked
         Whether `direct_m` is known not to be short by a multiple of the unambiguous range.
+    contrast
+        What the device leaves of its modulation at multiples 0 to M of `base_frequency_hz`; empty
+        where that is everything.
+    calibrated
+        Whether what was seen is known to be the scene's, and not the device's.
+    uncalibrated_m
+        How far ranges are off without a calibration, in the median pixel.
+    lost_share
+        Share of the images that lose their synchronisation.
+    drift_m
+        By how much ranges may have drifted since the calibration in use, without a sign.
+    swing_m_per_s
+        (P) how fast the ranges of lit pixels change, these or others; None where nothing moves.
+    of_one_frame
+        Whether no look was taken, but one frame of another purpose.
     """
 
     brightness_dn_per_s: _Array
@@ -77,6 +94,13 @@ class SceneStatistics:
     dim_share: float = 0.0
     moving_share: float = 0.0
     ambiguity_checked: bool = True
+    contrast: tuple[float, ...] = ()
+    calibrated: bool = True
+    uncalibrated_m: float = 0.0
+    lost_share: float = 0.0
+    drift_m: float = 0.0
+    swing_m_per_s: _Array | None = None
+    of_one_frame: bool = False
 
     def few(self) -> "SceneStatistics":
         """Return what fewer pixels show, `FEW_PIXELS` of them."""
@@ -102,6 +126,11 @@ class SceneStatistics:
             "dim_share": self.dim_share,
             "moving_share": self.moving_share,
             "ambiguity_checked": self.ambiguity_checked,
+            "calibrated": self.calibrated,
+            "uncalibrated_m": self.uncalibrated_m,
+            "lost_share": self.lost_share,
+            "drift_m": self.drift_m,
+            "of_one_frame": self.of_one_frame,
         }
 
     @property
@@ -113,6 +142,35 @@ class SceneStatistics:
     def disagreement_m(self) -> float:
         """What the look did not resolve of the direct range, in the median pixel."""
         return float(np.median(self.uncertainty_m))
+
+    @property
+    def conditions(self) -> str:
+        """Sentences on what of the camera a plan rests on, each after a space; or nothing."""
+        said = ""
+        if not self.calibrated:
+            said = (
+                " No calibration is in use: calibrate first, or ranges are off by more than this "
+                "tells."
+            )
+        elif self.uncalibrated_m > NOTABLE_M:
+            said = (
+                " Calibrate with this sequence: without, ranges are "
+                f"{self.uncalibrated_m * 1e3:.2g} mm off."
+            )
+        if self.drift_m > NOTABLE_M:
+            said += (
+                f" Since the calibration in use ranges may have drifted by {self.drift_m * 1e3:.2g}"
+                " mm."
+            )
+        return said
+
+    def contrast_at(self, harmonics: int, base_frequency_hz: float) -> _Array:
+        """Return what the device leaves of its modulation (m + 1) at multiples of a frequency."""
+        if len(self.contrast) < 2:
+            return np.ones(harmonics + 1)
+        j, known = np.arange(harmonics + 1), np.arange(len(self.contrast))
+        found = np.interp(j * base_frequency_hz, known * self.base_frequency_hz, self.contrast)
+        return np.where(j == 0, 1.0, found)
 
     def covers(self, harmonics: int, base_frequency_hz: float) -> bool:
         """Whether moments at these frequencies are known without a model of the returns."""

@@ -96,7 +96,9 @@ class Candidate:
         return Choice(
             applied,
             estimator,
-            self.predictor.predict(estimator, sequence, closely=closely),
+            self.predictor.predict(
+                estimator, sequence, closely=closely, capture_s=applied.capture_s
+            ),
             self.predictor.beyond_scene(sequence),
             self.reconstruct_s,
             self.predictor.bound_width(sequence) if bounded else None,

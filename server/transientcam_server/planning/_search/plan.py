@@ -133,7 +133,8 @@ def plan(
     progress.at(0.8, "twice the accuracy")
     twice = quickest(unlimited, {leading: best.error(leading) / 2}, contenders=1)
     scene = predictor.scene
-    return Plan(best, half_time, twice, leading, summary(best, twice, scene), scene)
+    words = summary(best, twice, scene) + scene.conditions
+    return Plan(best, half_time, twice, leading, words, scene)
 
 
 def _in_words(choice: Choice) -> str:
