@@ -9,10 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.base import PINHOLE
-from transientcam_simulation.effects import Glimpse, Values
+from transientcam_simulation.effects import (
+    CALLED_ABOVE,
+    WORST_ABOVE,
+    Glimpse,
+    Noise,
+    Values,
+    over_noise,
+)
 from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._held_light import FurtherLight
 from transientcam_simulation.light._paths import Lit, light_rays
-from transientcam_simulation.light._radiosity import Interreflection
+from transientcam_simulation.light._radiosity import Gathering, Interreflection
 from transientcam_simulation.light._rays import places_within, rays_through
 from transientcam_simulation.light._recent import Recent
 from transientcam_simulation.light._subpixel import PIXELS, may_be_thin
@@ -27,6 +35,7 @@ _WITHIN_AT_THIN = 16  # places, where something may be so thin that these four m
 _FREQUENCIES = 8  # judged at most; the highest one always
 _ROUNDING = 1e-9
 _KEPT = 32  # changes by effects, for the last few sequences
+_PATCHES = (6, 9, 13, 18)  # a side, where something moves, if they are fine enough
 _ROUGH_PATCHES = 6  # a side, to estimate interreflection
 _ROUGH_ERROR = 1.5  # by which that may be too low
 
@@ -74,6 +83,8 @@ class SceneFacts:
         self._found: Recent[tuple[str, tuple[float, ...], float], tuple[Values, ...]]
         self._found = Recent(_KEPT)
         self._left_out: dict[str, list[list[_SampledView]]] = {}
+        self._full: Values | None = None
+        self._coarse: dict[int, tuple[int, Values]] = {}
 
     @property
     def glimpses(self) -> tuple[Glimpse, ...]:
@@ -92,19 +103,22 @@ class SceneFacts:
         self, effect: str, frequencies_hz: tuple[float, ...], *, during_s: float = 0.0
     ) -> tuple[Values, ...]:
         """Return how far leaving out an effect moves each pixel's moments, at most, by time."""
+        if effect == "interreflection":
+            return self._further_light
         key = effect, _some(frequencies_hz), during_s if effect == "motion" else 0.0
         return self._found.get(key, lambda: self._changes(*key))
 
     def further_bounces(self, tolerance: float) -> int:
         """Return how often light goes from surface to surface until less than this is left."""
-        rough = self._rough(self._scene.at(self._times_s[0]))
-        return Exchange.of(rough, rough.transport.patches).bounces(tolerance)
+        return self._rough_exchange.bounces(tolerance)
+
+    @cached_property
+    def _rough_exchange(self) -> Exchange:
+        return Exchange.of(self._scene.at(self._times_s[0]), self._rough)
 
     def _changes(
         self, effect: str, frequencies_hz: tuple[float, ...], during_s: float
     ) -> tuple[Values, ...]:
-        if effect == "interreflection":
-            return self._further_light()
         surfaces, camera, there = self._scene.surfaces, self._camera, self._seen
         variants: dict[str, tuple[bool, Callable[[], list[list[_SampledView]]]]] = {
             "mirror-paths": (
@@ -238,6 +252,47 @@ class SceneFacts:
                     np.maximum(apart[k], change, out=apart[k])
         return apart
 
+    def patches_a_side(self, noise: Noise) -> int:
+        """Return how finely surfaces must be cut where they move: up to errors below the noise.
+
+        Coarser patches have longer steps of time (`FurtherLight`), whose errors count, too.
+        """
+        most = self._scene.transport.patches
+        for per_side in _PATCHES if self._further_light else ():
+            if per_side >= most:
+                break
+            when, change = self._coarser(per_side)
+            over = over_noise(noise, self._glimpses[when], change)
+            if np.sqrt(np.mean(over**2)) < CALLED_ABOVE and over.max() < WORST_ABOVE:
+                return per_side
+        return most
+
+    def _coarser(self, per_side: int) -> tuple[int, Values]:
+        """Return the time with most light over several surfaces, and its error by coarser patches.
+
+        In the middle of a step, and at 0 Hz, which bounds moments.
+        """
+        if per_side not in self._coarse:
+            when = int(np.argmax([each.sum() for each in self._further_light]))
+            time_s, seen = self._times_s[when], self._seen[when]
+            light = FurtherLight(self._scene, per_side=per_side)
+            ends = Gathering(seen.scene, light.patches, seen.lits[0])
+            around = [light.solution(time_s + by * light.step_s, 0.0) for by in (-0.5, 0.5)]
+            if self._full is None:
+                self._full = self._further(seen, self._scene.transport.patches)
+            coarse = ends.moments(np.mean(around, axis=0), 0.0)
+            self._coarse[per_side] = when, np.abs(coarse - self._full)
+        return self._coarse[per_side]
+
+    def _further(self, seen: _SampledView, per_side: int) -> Values:
+        """Return the brightness of light over several surfaces."""
+        transport = replace(self._scene.transport, patches=per_side)
+        scene, (height, width) = replace(seen.scene, transport=transport), self._shape
+        light = Interreflection(scene, seen.lits[0], width=width, height=height)
+        brightness: Values = light.moments(0.0).real.ravel()
+        return brightness
+
+    @cached_property
     def _further_light(self) -> tuple[Values, ...]:
         """Estimate the brightness of light over several surfaces, which bounds its moments."""
         transport = self._scene.transport
@@ -245,18 +300,11 @@ class SceneFacts:
         flat = len(scattering) == 1 and isinstance(scattering[0].shape, Rectangle)
         if flat or not scattering or transport.diffuse_bounces == 0:
             return ()
-        height, width = self._shape
-        found = []
-        for each in self._seen:
-            further = Interreflection(
-                self._rough(each.scene), each.lits[0], width=width, height=height
-            )
-            found.append(_ROUGH_ERROR * further.moments(0.0).real.ravel())
-        return tuple(found)
+        return tuple(_ROUGH_ERROR * self._further(each, self._rough) for each in self._seen)
 
-    def _rough(self, scene: Scene) -> Scene:
-        patches = min(_ROUGH_PATCHES, scene.transport.patches)
-        return replace(scene, transport=replace(scene.transport, patches=patches))
+    @property
+    def _rough(self) -> int:
+        return min(_ROUGH_PATCHES, self._scene.transport.patches)
 
 
 def _some(frequencies_hz: tuple[float, ...]) -> tuple[float, ...]:
