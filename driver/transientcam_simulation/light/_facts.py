@@ -18,7 +18,7 @@ from transientcam_simulation.effects import (
     over_noise,
 )
 from transientcam_simulation.light._exchange import Exchange
-from transientcam_simulation.light._held_light import FurtherLight
+from transientcam_simulation.light._held_light import FurtherLight, Work
 from transientcam_simulation.light._paths import Lit, light_rays
 from transientcam_simulation.light._radiosity import Gathering, Interreflection
 from transientcam_simulation.light._rays import places_within, rays_through
@@ -84,7 +84,7 @@ class SceneFacts:
         self._found = Recent(_KEPT)
         self._left_out: dict[str, list[list[_SampledView]]] = {}
         self._full: Values | None = None
-        self._coarse: dict[int, tuple[int, Values]] = {}
+        self._coarse: dict[int, tuple[Values, ...]] = {}
 
     @property
     def glimpses(self) -> tuple[Glimpse, ...]:
@@ -252,36 +252,60 @@ class SceneFacts:
                     np.maximum(apart[k], change, out=apart[k])
         return apart
 
+    def further_work(self, noise: Noise, *, moments: int, image_period_s: float) -> Work:
+        """Return what light over several surfaces takes an image where they move."""
+        moves = np.array([bool(each.motions) for each in self._scene.surfaces] + [False])
+        width, height = self._size
+        return Work.of(
+            FurtherLight(self._scene, per_side=self.patches_a_side(noise)),
+            moments=moments,
+            every_s=image_period_s,
+            pixels=width * height,
+            moving=width * height * np.mean([moves[k.lits[0].surface].mean() for k in self._seen]),
+        )
+
+    def further_cost_s(self, noise: Noise, *, moments: int, image_period_s: float) -> float:
+        """Return what light over several surfaces costs in each image where they move."""
+        if not self._scene.moves:
+            return 0.0
+        return self.further_work(noise, moments=moments, image_period_s=image_period_s).cost_s
+
     def patches_a_side(self, noise: Noise) -> int:
         """Return how finely surfaces must be cut where they move: up to errors below the noise.
 
         Coarser patches have longer steps of time (`FurtherLight`), whose errors count, too.
         """
         most = self._scene.transport.patches
-        for per_side in _PATCHES if self._further_light else ():
-            if per_side >= most:
-                break
-            when, change = self._coarser(per_side)
-            over = over_noise(noise, self._glimpses[when], change)
-            if np.sqrt(np.mean(over**2)) < CALLED_ABOVE and over.max() < WORST_ABOVE:
-                return per_side
-        return most
 
-    def _coarser(self, per_side: int) -> tuple[int, Values]:
-        """Return the time with most light over several surfaces, and its error by coarser patches.
+        def negligible(changes: tuple[Values, ...]) -> bool:
+            pairs = zip(self._glimpses, changes, strict=True)
+            over = np.array([over_noise(noise, *each) for each in pairs])
+            rms = np.sqrt(np.mean(over**2, axis=1)).max()
+            return bool(rms < CALLED_ABOVE and over.max() < WORST_ABOVE)
 
-        In the middle of a step, and at 0 Hz, which bounds moments.
+        light = self._further_light
+        if not light or negligible(light):
+            return min(_PATCHES[0], most)
+        fine = (each for each in _PATCHES if each >= most or negligible(self._coarser(each)))
+        return min(next(fine, most), most)
+
+    def _coarser(self, per_side: int) -> tuple[Values, ...]:
+        """Return the error of the brightness by coarser patches, in the middle of a step, by time.
+
+        At the time with most of that light; at others it counts as none. It bounds moments.
         """
         if per_side not in self._coarse:
             when = int(np.argmax([each.sum() for each in self._further_light]))
-            time_s, seen = self._times_s[when], self._seen[when]
+            seen = self._seen[when]
             light = FurtherLight(self._scene, per_side=per_side)
             ends = Gathering(seen.scene, light.patches, seen.lits[0])
-            around = [light.solution(time_s + by * light.step_s, 0.0) for by in (-0.5, 0.5)]
+            around_s = [self._times_s[when] + by * light.step_s for by in (-0.5, 0.5)]
+            coarse = ends.moments(np.mean([light.solution(t, 0.0) for t in around_s], axis=0), 0.0)
             if self._full is None:
                 self._full = self._further(seen, self._scene.transport.patches)
-            coarse = ends.moments(np.mean(around, axis=0), 0.0)
-            self._coarse[per_side] = when, np.abs(coarse - self._full)
+            errors = [np.zeros(len(self._rows)) for _ in self._seen]
+            errors[when] = np.abs(coarse - self._full)
+            self._coarse[per_side] = tuple(errors)
         return self._coarse[per_side]
 
     def _further(self, seen: _SampledView, per_side: int) -> Values:

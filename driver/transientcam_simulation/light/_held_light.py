@@ -7,7 +7,7 @@ patches are, and with them how long steps, is chosen by the noise (`SceneFacts.p
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -28,6 +28,7 @@ STEP_PATCHES: Final = 0.5
 HELD_STEPS: Final = 0.25
 """Of a step, for which what patches give the pixels stands."""
 _LONGEST_S = 3600.0  # of a step
+_COSTS_S = 3e-7, 3e-8, 1e-7, 1e-7  # of each kind of `Work`
 _EXCHANGES, _SOLVED, _HELD, _FACTORS = 3, 128, 3, 32  # kept
 
 
@@ -86,6 +87,58 @@ class FurtherLight:
             return between.irradiance(frequency_hz, bounces)
 
         return self._solved.get((time_s, frequency_hz), solve)
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What that light takes an image, on average.
+
+    Attributes
+    ----------
+    pairs
+        Of patches, whose form factors are computed.
+    turned
+        Of patches, between which a moment goes.
+    still, moving
+        Moments on pixels of what stands still, and of what moves.
+    """
+
+    pairs: float
+    turned: float
+    still: float
+    moving: float
+
+    @classmethod
+    def of(
+        cls, light: FurtherLight, *, moments: int, every_s: float, pixels: int, moving: float
+    ) -> "Work":
+        """Count it, for images so far apart that ask for moments at so many frequencies in all.
+
+        ``moving``: pixels that show what moves.
+        """
+        count = len(light.patches) ** 2
+        solutions = min(2.0, every_s / light.step_s)
+        parts = min(1.0, every_s / light.step_s / HELD_STEPS)
+        return cls(
+            solutions * count,
+            solutions * count * _asked(moments, solutions),
+            parts * pixels * _asked(moments, parts),
+            2 * moving,
+        )
+
+    @property
+    def cost_s(self) -> float:
+        """Processor time."""
+        costs_s = zip(_COSTS_S, (self.pairs, self.turned, self.still, self.moving), strict=True)
+        return sum(each_s * count for each_s, count in costs_s)
+
+
+def _asked(moments: int, an_image: float) -> float:
+    """Return the moments that are asked of what is computed so many times an image.
+
+    Each image asks for two: at 0 Hz, and at its own frequency.
+    """
+    return min(moments, max(2.0, 2.0 / an_image))
 
 
 class HeldLight:
