@@ -11,6 +11,7 @@ from transientcam_simulation.effects._conditions import (
     WORST_ABOVE,
     Call,
     Conditions,
+    over_noise,
 )
 from transientcam_simulation.effects._dark_current import DarkCurrentElectrons
 from transientcam_simulation.effects._distortion import Distortion
@@ -113,5 +114,6 @@ __all__ = [
     "Values",
     "draw_few",
     "measured_harmonics",
+    "over_noise",
     "read_offsets_rad",
 ]

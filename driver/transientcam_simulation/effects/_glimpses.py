@@ -89,6 +89,13 @@ class Facts(Protocol):
         """
         ...
 
+    def further_cost_s(self, noise: Noise, *, moments: int, image_period_s: float) -> float:
+        """Return what light over several surfaces costs in each image where they move.
+
+        Of a sequence that asks for moments at so many frequencies.
+        """
+        ...
+
     def further_bounces(self, tolerance: float) -> int:
         """Return how often light goes from surface to surface until less than this is left."""
         ...

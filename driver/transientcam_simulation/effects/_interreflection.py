@@ -1,11 +1,16 @@
 """Interreflection: light that goes from one scattering surface to another."""
 
+from dataclasses import replace
+
 from transientcam_simulation.effects._conditions import Call, Conditions, weigh
 from transientcam_simulation.effects._effect import LightEffect
 
 
 class DiffuseInterreflection(LightEffect):
-    """A continuous tail of late light, by radiosity with times of flight."""
+    """A continuous tail of late light, by radiosity with times of flight.
+
+    Solved once where nothing moves; else at steps of time, which cost something in every image.
+    """
 
     name = "interreflection"
     what = "light that surfaces give each other"
@@ -24,4 +29,9 @@ class DiffuseInterreflection(LightEffect):
         bounces = conditions.facts.further_bounces(conditions.negligible)
         surfaces = "1 further surface" if bounces == 1 else f"up to {bounces} further surfaces"
         reason = f"about {share:.1%} of the light comes over {surfaces}"
-        return weigh(conditions, changes, reason)
+        cost_s = conditions.facts.further_cost_s(
+            replace(conditions.noise, white_e=conditions.white_e),
+            moments=1 + len(conditions.frequencies_hz),
+            image_period_s=conditions.image_period_s,
+        )
+        return weigh(conditions, changes, reason, cost_s)

@@ -75,6 +75,7 @@ class Canvas:
     def __init__(
         self, background: View, quadratures_of: Callable[[View, Region | None], Quadratures]
     ) -> None:
+        self.background = background
         self._of = quadratures_of
         self._still = quadratures_of(background, None).copy()
         self._now = self._still.copy()

@@ -250,7 +250,7 @@ class World:
         """Ground truth, in DN at the exposure set; of the image that was made last."""
         plan = self._configured()
         time_s = plan.time_s if device_time_s is None else device_time_s
-        responses, surface = plan.views.exact(time_s).responses, plan.views.surface
+        responses, surface = plan.views.exact(time_s), plan.views.surface
         scale_dn = self._electrons_per_s * plan.sequence.exposure_s / self._sensor.gain_e_per_dn
         delay_s, weight = responses.returns()
         weight = weight * scale_dn
@@ -278,11 +278,12 @@ class World:
         def of(view: View, region: Region | None) -> Quadratures:
             return Quadratures.of(self._planes(plan, frequency_hz, view, region))
 
-        background = plan.views.background
+        background = view.background
         if background is not None and view.region is not None and plan.local:
-            if harmonic not in plan.canvases:
-                plan.canvases[harmonic] = Canvas(background, of)
-            return plan.canvases[harmonic].showing(view)
+            canvas = plan.canvases.get(harmonic)
+            if canvas is None or canvas.background is not background:
+                canvas = plan.canvases[harmonic] = Canvas(background, of)
+            return canvas.showing(view)
         if plan.view is not view:
             plan.view = view
             plan.quadratures.clear()

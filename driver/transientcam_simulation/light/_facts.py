@@ -9,10 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.base import PINHOLE
-from transientcam_simulation.effects import Glimpse, Values
+from transientcam_simulation.effects import (
+    CALLED_ABOVE,
+    WORST_ABOVE,
+    Glimpse,
+    Noise,
+    Values,
+    over_noise,
+)
 from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._held_light import FurtherLight, Work
 from transientcam_simulation.light._paths import Lit, light_rays
-from transientcam_simulation.light._radiosity import Interreflection
+from transientcam_simulation.light._radiosity import Gathering, Interreflection
 from transientcam_simulation.light._rays import places_within, rays_through
 from transientcam_simulation.light._recent import Recent
 from transientcam_simulation.light._subpixel import PIXELS, may_be_thin
@@ -27,6 +35,7 @@ _WITHIN_AT_THIN = 16  # places, where something may be so thin that these four m
 _FREQUENCIES = 8  # judged at most; the highest one always
 _ROUNDING = 1e-9
 _KEPT = 32  # changes by effects, for the last few sequences
+_PATCHES = (6, 9, 13, 18)  # a side, where something moves, if they are fine enough
 _ROUGH_PATCHES = 6  # a side, to estimate interreflection
 _ROUGH_ERROR = 1.5  # by which that may be too low
 
@@ -74,6 +83,8 @@ class SceneFacts:
         self._found: Recent[tuple[str, tuple[float, ...], float], tuple[Values, ...]]
         self._found = Recent(_KEPT)
         self._left_out: dict[str, list[list[_SampledView]]] = {}
+        self._full: Values | None = None
+        self._coarse: dict[int, tuple[Values, ...]] = {}
 
     @property
     def glimpses(self) -> tuple[Glimpse, ...]:
@@ -92,19 +103,22 @@ class SceneFacts:
         self, effect: str, frequencies_hz: tuple[float, ...], *, during_s: float = 0.0
     ) -> tuple[Values, ...]:
         """Return how far leaving out an effect moves each pixel's moments, at most, by time."""
+        if effect == "interreflection":
+            return self._further_light
         key = effect, _some(frequencies_hz), during_s if effect == "motion" else 0.0
         return self._found.get(key, lambda: self._changes(*key))
 
     def further_bounces(self, tolerance: float) -> int:
         """Return how often light goes from surface to surface until less than this is left."""
-        rough = self._rough(self._scene.at(self._times_s[0]))
-        return Exchange.of(rough, rough.transport.patches).bounces(tolerance)
+        return self._rough_exchange.bounces(tolerance)
+
+    @cached_property
+    def _rough_exchange(self) -> Exchange:
+        return Exchange.of(self._scene.at(self._times_s[0]), self._rough)
 
     def _changes(
         self, effect: str, frequencies_hz: tuple[float, ...], during_s: float
     ) -> tuple[Values, ...]:
-        if effect == "interreflection":
-            return self._further_light()
         surfaces, camera, there = self._scene.surfaces, self._camera, self._seen
         variants: dict[str, tuple[bool, Callable[[], list[list[_SampledView]]]]] = {
             "mirror-paths": (
@@ -238,6 +252,71 @@ class SceneFacts:
                     np.maximum(apart[k], change, out=apart[k])
         return apart
 
+    def further_work(self, noise: Noise, *, moments: int, image_period_s: float) -> Work:
+        """Return what light over several surfaces takes an image where they move."""
+        moves = np.array([bool(each.motions) for each in self._scene.surfaces] + [False])
+        width, height = self._size
+        return Work.of(
+            FurtherLight(self._scene, per_side=self.patches_a_side(noise)),
+            moments=moments,
+            every_s=image_period_s,
+            pixels=width * height,
+            moving=width * height * np.mean([moves[k.lits[0].surface].mean() for k in self._seen]),
+        )
+
+    def further_cost_s(self, noise: Noise, *, moments: int, image_period_s: float) -> float:
+        """Return what light over several surfaces costs in each image where they move."""
+        if not self._scene.moves:
+            return 0.0
+        return self.further_work(noise, moments=moments, image_period_s=image_period_s).cost_s
+
+    def patches_a_side(self, noise: Noise) -> int:
+        """Return how finely surfaces must be cut where they move: up to errors below the noise.
+
+        Coarser patches have longer steps of time (`FurtherLight`), whose errors count, too.
+        """
+        most = self._scene.transport.patches
+
+        def negligible(changes: tuple[Values, ...]) -> bool:
+            pairs = zip(self._glimpses, changes, strict=True)
+            over = np.array([over_noise(noise, *each) for each in pairs])
+            rms = np.sqrt(np.mean(over**2, axis=1)).max()
+            return bool(rms < CALLED_ABOVE and over.max() < WORST_ABOVE)
+
+        light = self._further_light
+        if not light or negligible(light):
+            return min(_PATCHES[0], most)
+        fine = (each for each in _PATCHES if each >= most or negligible(self._coarser(each)))
+        return min(next(fine, most), most)
+
+    def _coarser(self, per_side: int) -> tuple[Values, ...]:
+        """Return the error of the brightness by coarser patches, in the middle of a step, by time.
+
+        At the time with most of that light; at others it counts as none. It bounds moments.
+        """
+        if per_side not in self._coarse:
+            when = int(np.argmax([each.sum() for each in self._further_light]))
+            seen = self._seen[when]
+            light = FurtherLight(self._scene, per_side=per_side)
+            ends = Gathering(seen.scene, light.patches, seen.lits[0])
+            around_s = [self._times_s[when] + by * light.step_s for by in (-0.5, 0.5)]
+            coarse = ends.moments(np.mean([light.solution(t, 0.0) for t in around_s], axis=0), 0.0)
+            if self._full is None:
+                self._full = self._further(seen, self._scene.transport.patches)
+            errors = [np.zeros(len(self._rows)) for _ in self._seen]
+            errors[when] = np.abs(coarse - self._full)
+            self._coarse[per_side] = tuple(errors)
+        return self._coarse[per_side]
+
+    def _further(self, seen: _SampledView, per_side: int) -> Values:
+        """Return the brightness of light over several surfaces."""
+        transport = replace(self._scene.transport, patches=per_side)
+        scene, (height, width) = replace(seen.scene, transport=transport), self._shape
+        light = Interreflection(scene, seen.lits[0], width=width, height=height)
+        brightness: Values = light.moments(0.0).real.ravel()
+        return brightness
+
+    @cached_property
     def _further_light(self) -> tuple[Values, ...]:
         """Estimate the brightness of light over several surfaces, which bounds its moments."""
         transport = self._scene.transport
@@ -245,18 +324,11 @@ class SceneFacts:
         flat = len(scattering) == 1 and isinstance(scattering[0].shape, Rectangle)
         if flat or not scattering or transport.diffuse_bounces == 0:
             return ()
-        height, width = self._shape
-        found = []
-        for each in self._seen:
-            further = Interreflection(
-                self._rough(each.scene), each.lits[0], width=width, height=height
-            )
-            found.append(_ROUGH_ERROR * further.moments(0.0).real.ravel())
-        return tuple(found)
+        return tuple(_ROUGH_ERROR * self._further(each, self._rough) for each in self._seen)
 
-    def _rough(self, scene: Scene) -> Scene:
-        patches = min(_ROUGH_PATCHES, scene.transport.patches)
-        return replace(scene, transport=replace(scene.transport, patches=patches))
+    @property
+    def _rough(self) -> int:
+        return min(_ROUGH_PATCHES, self._scene.transport.patches)
 
 
 def _some(frequencies_hz: tuple[float, ...]) -> tuple[float, ...]:

@@ -15,8 +15,10 @@ from transientcam_simulation.light import (
 )
 from transientcam_simulation.light._bundle import Region, inside, numbers
 from transientcam_simulation.light._coverage import Plane
+from transientcam_simulation.light._held_light import HeldLight
 from transientcam_simulation.light._hit_points import LitEnds
 from transientcam_simulation.light._paths import Lit, scatter_of, sparse_image
+from transientcam_simulation.light._radiosity import Gathering
 from transientcam_simulation.light._still import StillLight
 from transientcam_simulation.scene import Scene
 
@@ -89,6 +91,8 @@ class MovingResponses:
     ----------
     uncovered
         Shares (H, W) of pixels that show what stands still.
+    held
+        Light over several surfaces; None if there is none.
 
     Attributes
     ----------
@@ -104,13 +108,16 @@ class MovingResponses:
         uncovered: Plane,
         shadows: list[Shadow],
         region: Region,
+        held: HeldLight | None = None,
     ) -> None:
         self.region = region
+        self.held = held
         self.scene = scene
         self._still = still
         self._found: dict[float, Moments] = {}
         self._shape = still.height, still.width
         self._layers = layers
+        self._ends: Gathering | None = None
         self._uncovered = uncovered
         self._dimmed = _Dimmed.by(shadows, uncovered)
 
@@ -135,7 +142,7 @@ class MovingResponses:
 
     def unchanged(self, frequency_hz: float) -> Moments:
         """Moments (H, W) of what stands still."""
-        return self._still.phasors(frequency_hz)[1]
+        return (self.held or self._still).moments(frequency_hz)
 
     def differing(self, frequency_hz: float) -> Moments:
         """Moments of the region that differs."""
@@ -156,7 +163,7 @@ class MovingResponses:
 
     def _of_still(self, frequency_hz: float) -> Moments:
         """Moments of the region, of what stands still and is not covered."""
-        each, total = self._still.phasors(frequency_hz)
+        each, total = self._still.phasors(frequency_hz)[0], self.unchanged(frequency_hz)
         dimmed = self._dimmed
         left = compiled_light.remaining(
             total.view(np.float32), each.view(np.float32), dimmed.chains, dimmed.regions,
@@ -166,6 +173,14 @@ class MovingResponses:
 
     def _of_layers(self, layers: Layers, frequency_hz: float) -> Moments:
         """Moments of the points of layers, in single precision."""
+        direct = self._direct_of_layers(layers, frequency_hz)
+        if self.held is None:
+            return direct
+        if self._ends is None:
+            self._ends = self.held.ends(self.scene, layers.lit.all())
+        return direct + self.held.on(self._ends, frequency_hz)
+
+    def _direct_of_layers(self, layers: Layers, frequency_hz: float) -> Moments:
         if not frequency_hz:
             brightness = np.zeros(layers.places.shape[1], dtype=np.float32)
             for _chain, way in layers.lit.ways:

@@ -26,6 +26,7 @@ from transientcam_simulation.light._bundle import (
     union,
 )
 from transientcam_simulation.light._coverage import Plane
+from transientcam_simulation.light._held_light import HeldLight
 from transientcam_simulation.light._hit_points import Ends
 from transientcam_simulation.light._layers import Layers, MovingResponses, Shadow, uncovered_by
 from transientcam_simulation.light._paths import ImageLight, image_lights
@@ -95,8 +96,8 @@ class MovingLight:
             tuple(self._light_segments(k, light)) for k, light in enumerate(self._lights)
         )
 
-    def at(self, time_s: float) -> MovingResponses:
-        """Impulse responses at a time."""
+    def at(self, time_s: float, held: HeldLight | None = None) -> MovingResponses:
+        """Impulse responses at a time; moments with light over several surfaces, if it is given."""
         scene = self.scene.at(time_s)
         shapes = [scene.surfaces[k].shape for k in self._movers]
         found = [each for sight in self._sights for each in self._cover(shapes, sight)]
@@ -108,7 +109,7 @@ class MovingLight:
             shadow for k in range(len(self._chains)) if (shadow := self._shadow(shapes, k, shows))
         ]
         region = union([*(each.region for each in visible), *(each.region for each in shadows)])
-        return MovingResponses(self.still, scene, layers, uncovered, shadows, region)
+        return MovingResponses(self.still, scene, layers, uncovered, shadows, region, held)
 
     def _cover(self, shapes: list[Shape], sight: Sight) -> Iterator[_VisibleSurface]:
         """Shares of pixels that surfaces cover, where nothing that stands still is before them."""

@@ -6,7 +6,6 @@ flight. Moments are therefore sums over all paths between patches, at exactly th
 requested; nothing is binned.
 """
 
-from dataclasses import replace
 from functools import cached_property
 from typing import Literal
 
@@ -23,6 +22,54 @@ from transientcam_simulation.scene import Bilinear, Scene
 
 _CENTROID_HZ = 1e5  # low enough that a phase is proportional to the mean delay
 _HISTOGRAM_PATCHES = 12  # a side, for the impulse response of a pixel
+
+
+class Gathering:
+    """Light of patches where rays of the camera end, between the patches' centres.
+
+    Parameters
+    ----------
+    scene, lit
+        The surfaces at their places, and rays that end on them.
+    patches
+        Of the same surfaces, at any places.
+
+    Attributes
+    ----------
+    places
+        Patches around the end of each ray, and weights of the interpolation.
+    """
+
+    def __init__(self, scene: Scene, patches: Patches, lit: Lit) -> None:
+        self._lit, self._scatter = lit, lit.scatter(scene)
+        count = len(lit.surface)
+        index, weights = np.zeros((count, 4), dtype=np.intp), np.zeros((count, 4))
+        for surface, cells in patches.cells.items():
+            mine = lit.surface == surface
+            if mine.any():
+                index[mine], weights[mine] = scene.surfaces[surface].shape.between_cells(
+                    lit.point[mine], cells.rows, cells.columns
+                )
+                index[mine] += patches.first[surface]
+        self.places: Bilinear = index, weights
+
+    def to_camera(self, frequency_hz: float) -> NDArray[np.complex128]:
+        """Return the factor of each ray's moment from its end to the camera."""
+        way = np.exp(2j * np.pi * frequency_hz / SPEED_OF_LIGHT_M_S * self._lit.distance_m)
+        factor: NDArray[np.complex128] = self._lit.reflectance * way
+        return factor if self._scatter is None else factor * self._scatter.transfer(frequency_hz)
+
+    def on_ends(self, irradiance: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
+        """Return the moments on the rays' ends, given those of the patches."""
+        index, weights = self.places
+        moments: NDArray[np.complexfloating] = np.einsum("pk,pk->p", weights, irradiance[index])
+        return moments
+
+    def moments(
+        self, irradiance: NDArray[np.complex128], frequency_hz: float
+    ) -> NDArray[np.complexfloating]:
+        """Return the moments that the camera sees."""
+        return self.on_ends(irradiance) * self.to_camera(frequency_hz)
 
 
 class Interreflection:
@@ -57,8 +104,9 @@ class Interreflection:
         self._fine = fine
         self._exchange = exchange or Exchange.of(scene, scene.transport.patches)
         self._bounces = self._exchange.bounces(tolerance)
-        self._places = self._between(self._exchange.patches, lit)
-        self._places_of_fine = [self._between(self._exchange.patches, each.rays) for each in fine]
+        patches = self._exchange.patches
+        self._ends = Gathering(scene, patches, lit)
+        self._ends_of_fine = [Gathering(scene, patches, each.rays) for each in fine]
 
     @property
     def patches(self) -> int:
@@ -76,26 +124,11 @@ class Interreflection:
 
     def _moments(self, frequency_hz: float) -> NDArray[np.complex128]:
         irradiance = self._exchange.irradiance(frequency_hz, self._bounces)
-        moments = self._gathered(irradiance, frequency_hz, self._lit, self._places)
-        for each, places in zip(self._fine, self._places_of_fine, strict=True):
-            of_rays = self._gathered(irradiance, frequency_hz, each.rays, places)
+        moments = self._ends.moments(irradiance, frequency_hz)
+        for each, ends in zip(self._fine, self._ends_of_fine, strict=True):
+            of_rays = ends.moments(irradiance, frequency_hz)
             moments[each.pixel] = each.of_pixels(of_rays).mean(axis=0)
         return moments.reshape(self._shape)
-
-    def error(self, frequency_hz: float) -> float:
-        """Estimate the error of the moments by their change when patches are twice as large.
-
-        Relative, root mean square over the pixels. The rule is of second order: of the change by
-        a factor of two, a third is left.
-        """
-        fine = self.moments(frequency_hz)
-        transport = self._scene.transport
-        halved = replace(transport, patches=max(2, transport.patches // 2))
-        height, width = self._shape
-        scene = replace(self._scene, transport=halved)
-        coarse = Interreflection(scene, self._lit, width=width, height=height)
-        change = np.sqrt(np.mean(np.abs(fine - coarse.moments(frequency_hz)) ** 2))
-        return float(change / np.sqrt(np.mean(np.abs(fine) ** 2)) / 3)
 
     @cached_property
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -115,31 +148,6 @@ class Interreflection:
         start_s += float(self._lit.distance_m[ray]) / SPEED_OF_LIGHT_M_S
         return start_s, mass * (weight / mass.sum())
 
-    def _gathered(
-        self, irradiance: NDArray[np.complex128], frequency_hz: float, lit: Lit, places: Bilinear
-    ) -> NDArray[np.complex128]:
-        on_pixel = np.einsum("pk,pk->p", places[1], irradiance[places[0]])
-        way = np.exp(2j * np.pi * frequency_hz / SPEED_OF_LIGHT_M_S * lit.distance_m)
-        moments = lit.reflectance * on_pixel * way
-        scatter = lit.scatter(self._scene)
-        if scatter is not None:
-            moments *= scatter.transfer(frequency_hz)
-        result: NDArray[np.complex128] = moments
-        return result
-
-    def _between(self, patches: Patches, lit: Lit) -> Bilinear:
-        """Patches around the end of each ray, and weights of the interpolation."""
-        count = len(lit.surface)
-        index, weights = np.zeros((count, 4), dtype=np.intp), np.zeros((count, 4))
-        for surface, cells in patches.cells.items():
-            mine = lit.surface == surface
-            if mine.any():
-                index[mine], weights[mine] = self._scene.surfaces[surface].shape.between_cells(
-                    lit.point[mine], cells.rows, cells.columns
-                )
-                index[mine] += patches.first[surface]
-        return index, weights
-
     @cached_property
     def _histogram(self) -> Exchange:
         few = min(_HISTOGRAM_PATCHES, self._scene.transport.patches)
@@ -147,7 +155,7 @@ class Interreflection:
 
     @cached_property
     def _between_few(self) -> Bilinear:
-        return self._between(self._histogram.patches, self._lit)
+        return Gathering(self._scene, self._histogram.patches, self._lit).places
 
 
 class WithInterreflection:

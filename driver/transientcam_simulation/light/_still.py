@@ -175,6 +175,10 @@ class StillLight:
             )
         return self._phasors[frequency_hz]
 
+    def moments(self, frequency_hz: float) -> Moments:
+        """Moments (H, W) in all."""
+        return self.phasors(frequency_hz)[1]
+
     @cached_property
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64], Scatter | None]:
         """Delays and weights (K, H W) by chain, and the spread of each.

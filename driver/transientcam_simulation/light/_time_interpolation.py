@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,16 +103,12 @@ class _Path:
 
 
 class Between:
-    """Impulse responses between two times, as a mean of both."""
+    """Moments between two times, as a mean of both."""
 
     def __init__(self, first: MovingResponses, second: MovingResponses, share: float) -> None:
         self._parts = ((1 - share, first), (share, second))
         self.region: Region = union([first.region, second.region])
-
-    @property
-    def kind(self) -> Literal["sparse", "dense"]:
-        """Kind of both."""
-        return self._nearer.kind
+        self.held = first.held
 
     def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
         """Moments of all pixels, (H, W)."""
@@ -138,18 +133,6 @@ class Between:
         """(H, W) of what the pixels see."""
         (one, first), (other, second) = self._parts
         return single(one * first.reflectance + other * second.reflectance)
-
-    def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return those at the nearer time."""
-        return self._nearer.returns()
-
-    def of_pixel(self, x: int, y: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return that of one pixel at the nearer time."""
-        return self._nearer.of_pixel(x, y)
-
-    @property
-    def _nearer(self) -> MovingResponses:
-        return max(self._parts, key=lambda part: part[0])[1]
 
 
 def _paths(scene: Scene, pixel_rad: float) -> tuple[_Path, ...]:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import Final, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,9 @@ from transientcam_simulation.effects import (
 from transientcam_simulation.light._bundle import Region
 from transientcam_simulation.light._compiler import load_compiled
 from transientcam_simulation.light._facts import SceneFacts, cosine_to_axis
-from transientcam_simulation.light._followed import FollowedRays
-from transientcam_simulation.light._paths import light_rays
+from transientcam_simulation.light._followed import FollowedRays, Within
+from transientcam_simulation.light._held_light import FurtherLight, HeldLight, HeldLights
+from transientcam_simulation.light._paths import Lit, light_rays
 from transientcam_simulation.light._radiosity import Interreflection, WithInterreflection
 from transientcam_simulation.light._rays import camera_rays
 from transientcam_simulation.light._recent import Recent
@@ -40,11 +41,8 @@ from transientcam_simulation.light._variants import (
 )
 from transientcam_simulation.scene import Scene
 
-if TYPE_CHECKING:
-    from transientcam_simulation.light._layers import MovingResponses
-    from transientcam_simulation.light._time_interpolation import Between
-
 Values = NDArray[np.float64]
+_Seen = TypeVar("_Seen")
 KEPT_PIXELS: Final = 40_000
 """Of sensors for which more is kept of a scene than what is shown: 1 KiB a pixel and view."""
 _STILL_VIEWS: Final = 3  # for sequences that alternate
@@ -68,58 +66,52 @@ class LightRequirements:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What the camera sees: impulse responses, and the reflectance of the pixels' surfaces (H, W).
+    """What the camera sees: moments by frequency, and reflectance of the pixels' surfaces (H, W).
 
-    ``region``: rows and columns of the pixels that differ from the background, and
+    ``region``: rows and columns of the pixels that differ from the ``background``, and
     ``moments_in`` their moments, or those of a larger region; None: all may differ.
     """
 
-    responses: Responses
+    everywhere: Callable[[float], NDArray[np.complexfloating] | Moments]
     reflectance: Callable[[], NDArray[np.float32] | np.float32]
     region: Region | None = None
     moments_in: Callable[[Region, float], Moments] | None = None
+    background: "View | None" = None
 
     def moments(
         self, frequency_hz: float, region: Region | None
     ) -> NDArray[np.complexfloating] | Moments:
         """Moments of all pixels, or of a region that holds all that differs."""
-        if region is None:
-            return self.responses.moments(frequency_hz)
-        if self.moments_in is not None:
+        if region is not None and self.moments_in is not None:
             return self.moments_in(region, frequency_hz)
-        return self.responses.moments(frequency_hz)[region]
+        return self.everywhere(frequency_hz)[... if region is None else region]
 
 
 @dataclass(frozen=True, slots=True)
 class Views:
     """The view at a time of the device; the same object as long as nothing changes.
 
-    ``exact`` takes no account of the time it takes. ``background`` is the view without what moves,
-    of which views are regions. ``surface`` is what the pixels see at a time; None without geometry.
+    ``exact`` are the responses then, which take no account of the time it takes. ``surface`` is
+    what the pixels see at a time; None without geometry.
     """
 
     at: Callable[[float], View]
-    exact: Callable[[float], View]
-    background: View | None = None
+    exact: Callable[[float], Responses]
     surface: Callable[[float], SurfaceSeen] | None = None
 
 
-class Latest:
-    """A view as a function of time that remembers the last one."""
+class Latest(Generic[_Seen]):
+    """A function of time that remembers its last value."""
 
-    def __init__(self, of: Callable[[float], View]) -> None:
+    def __init__(self, of: Callable[[float], _Seen]) -> None:
         self._of = of
-        self._last: tuple[float, View] | None = None
+        self._last: tuple[float, _Seen] | None = None
 
-    def __call__(self, time_s: float) -> View:
-        """Return the view at a time."""
+    def __call__(self, time_s: float) -> _Seen:
+        """Return the value at a time."""
         if self._last is None or self._last[0] != time_s:
             self._last = time_s, self._of(time_s)
         return self._last[1]
-
-
-def _view_of(now: "MovingResponses | Between") -> View:
-    return View(now, lambda: now.reflectance, now.region, now.moments_in)
 
 
 class Scenery(Protocol):
@@ -163,7 +155,8 @@ class GivenScenery:
     lens = PINHOLE
 
     def __init__(self, responses: Responses) -> None:
-        self._view = View(responses, lambda: np.float32(1))
+        self._responses = responses
+        self._view = View(responses.moments, lambda: np.float32(1))
 
     @property
     def glimpses(self) -> tuple[Glimpse, ...]:
@@ -172,7 +165,7 @@ class GivenScenery:
 
     @cached_property
     def _glimpses(self) -> tuple[Glimpse]:
-        brightness = self._view.responses.moments(0.0).real
+        brightness = self._responses.moments(0.0).real
         ones = np.ones(brightness.size)
         shape = brightness.shape[0], brightness.shape[1]
         return (Glimpse(brightness.ravel(), ones, ones, shape),)
@@ -184,7 +177,7 @@ class GivenScenery:
 
     def view(self, wanted: LightRequirements) -> Views:
         """Return the given view."""
-        return Views(lambda _time_s: self._view, lambda _time_s: self._view)
+        return Views(lambda _time_s: self._view, lambda _time_s: self._responses)
 
 
 class SurfaceScenery:
@@ -265,56 +258,77 @@ class SurfaceScenery:
         tolerance = CALLED_ABOVE * float(wanted.noise.deviation(0.0, 0.0))
         further = DiffuseInterreflection.name in effects
         if not self.moves:
-            view = self._still_view(still, followed, tolerance if further else None)
+            responses: Responses = still.responses()
+            if further:
+                light = self._further(still.scene, still.lit, tolerance, still.fine, followed)
+                responses = WithInterreflection(responses, light)
+            view = View(responses.moments, lambda: still.reflectance.reshape(self._shape))
 
             def seen(_time_s: float) -> SurfaceSeen:
-                brightness = view.responses.moments(0.0).real
+                brightness = responses.moments(0.0).real
                 return surface_seen(still.scene, still.rays, still.lit, still.fine, brightness)
 
-            return Views(lambda _time_s: view, lambda _time_s: view, surface=seen)
+            return Views(lambda _time_s: view, lambda _time_s: responses, seen)
         load_compiled()
         from transientcam_simulation.light._moving import MovingLight
         from transientcam_simulation.light._time_interpolation import Steps
 
         moving = MovingLight(scene, still, soft=MixedPixels.name in effects)
+        held: Callable[[float], HeldLight | None] = lambda _time_s: None  # noqa: E731
+        if further:
+            patches = self.facts.patches_a_side(wanted.noise)
+            held = HeldLights(FurtherLight(scene, per_side=patches, tolerance=tolerance), still).at
+        steps = Steps(
+            scene,
+            lambda time_s: moving.at(time_s, held(time_s)),
+            pixel_rad=still.pixel_rad,
+            every_s=wanted.image_period_s,
+        )
+        backgrounds: Recent[HeldLight | None, View] = Recent(1)
+
+        def at(time_s: float) -> View:
+            now = steps.at(time_s)
+            background = backgrounds.get(
+                now.held,
+                lambda: View(
+                    (now.held or still).moments, lambda: still.reflectance.reshape(self._shape)
+                ),
+            )
+            return View(
+                now.moments, lambda: now.reflectance, now.region, now.moments_in, background
+            )
+
+        def responses_at(time_s: float) -> Responses:
+            now = moving.at(time_s)
+            if not further:
+                return now
+            return WithInterreflection(now, self._further(now.scene, now.lit, tolerance))
+
+        exact = Latest(responses_at)
 
         def seen_then(time_s: float) -> SurfaceSeen:
-            now, brightness = scene.at(time_s), exact(time_s).responses.moments(0.0).real
+            now, brightness = scene.at(time_s), exact(time_s).moments(0.0).real
             return surface_seen(now, still.rays, light_rays(now, still.rays), (), brightness)
 
-        if further:
-            exact = Latest(lambda time_s: self._lit_view(moving.at(time_s), tolerance))
-            return Views(exact, exact, surface=seen_then)
-        exact = Latest(lambda time_s: _view_of(moving.at(time_s)))
-        steps = Steps(scene, moving.at, pixel_rad=still.pixel_rad, every_s=wanted.image_period_s)
-        between = Latest(lambda time_s: _view_of(steps.at(time_s)))
-        return Views(between, exact, self._still_view(still, followed, None), seen_then)
+        return Views(Latest(at), exact, seen_then)
 
-    def _lit_view(self, now: "MovingResponses", tolerance: float) -> View:
-        """View of a moving scene with light over several surfaces, computed anew."""
-        width, height = self._size["width"], self._size["height"]
-        light = Interreflection(now.scene, now.lit, width=width, height=height, tolerance=tolerance)
-        return View(WithInterreflection(now, light), lambda: now.reflectance)
+    @property
+    def _shape(self) -> tuple[int, int]:
+        return self._size["height"], self._size["width"]
 
-    def _still_view(
-        self, still: StillLight, followed: FollowedRays, tolerance: float | None
-    ) -> View:
-        """View what stands still, with light over several surfaces up to a tolerance."""
-        shape = self._size["height"], self._size["width"]
-        responses: Responses = still.responses()
-        if tolerance is not None:
-            light = Interreflection(
-                still.scene,
-                still.lit,
-                width=still.width,
-                height=still.height,
-                fine=still.fine,
-                tolerance=tolerance,
-                exchange=followed.exchange,
-            )
-            responses = WithInterreflection(responses, light)
-        reflectance = still.reflectance.reshape(shape)
-        return View(responses, lambda: reflectance)
+    def _further(
+        self,
+        scene: Scene,
+        lit: Lit,
+        tolerance: float,
+        fine: tuple[Within, ...] = (),
+        followed: FollowedRays | None = None,
+    ) -> Interreflection:
+        """Light over several surfaces of a scene at a time, up to a tolerance."""
+        exchange = None if followed is None else followed.exchange
+        return Interreflection(
+            scene, lit, **self._size, fine=fine, tolerance=tolerance, exchange=exchange
+        )
 
     def _with(self, wanted: LightRequirements) -> Scene:
         """Return the scene with the effects of light that are wanted, and no others."""

@@ -208,11 +208,11 @@ def write(folder: Path, text: str) -> Path:
 
 def test_a_composed_scene_is_seen_where_it_is_at_that_time(tmp_path: Path) -> None:
     scene = load_scene(write(tmp_path, COMPOSED))
-    view = (
-        scenery_of(scene, width=41, height=31).view(LightRequirements(frozenset({"scattering"}))).at
+    views = scenery_of(scene, width=41, height=31).view(
+        LightRequirements(frozenset({"scattering"}))
     )
     for time_s, x in ((0.0, -0.5), (0.5, 0.0), (1.0, 0.5)):
-        delay_s = view(time_s).responses.returns()[0][0]
+        delay_s = views.exact(time_s).returns()[0][0]
         nearest = np.nanargmin(delay_s[15])
         seen_at = math.tan(math.radians(22.5)) * (2 * (nearest + 0.5) / 41 - 1) * 1.55
         assert seen_at == pytest.approx(x, abs=0.15)

@@ -1,0 +1,183 @@
+"""Light that moving surfaces give each other, against its full solution for every image."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from transientcam_driver.sequence import Sequence
+from transientcam_simulation.effects import Noise
+from transientcam_simulation.emulated import world_of
+from transientcam_simulation.imaging import World
+from transientcam_simulation.light import LightRequirements
+from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._facts import SceneFacts
+from transientcam_simulation.light._held_light import FurtherLight, HeldLights
+from transientcam_simulation.light._paths import light_rays
+from transientcam_simulation.light._radiosity import Interreflection
+from transientcam_simulation.light._rays import camera_rays
+from transientcam_simulation.light._still import StillLight
+from transientcam_simulation.light._transport import SurfaceScenery
+from transientcam_simulation.light._variants import still_scene
+from transientcam_simulation.scene import (
+    Ellipsoid,
+    Light,
+    Motion,
+    Rectangle,
+    Scene,
+    Surface,
+    Viewpoint,
+)
+
+WIDTH, HEIGHT = 54, 40
+READOUT_S = 3.98e-3
+VIDEO = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005)
+LONG = Sequence(harmonics=4, takes=20)
+QUIET = dict.fromkeys(("shot-noise", "read-noise", "mixed-pixels"), "off")
+
+
+def v(*values: float) -> NDArray[np.float64]:
+    return np.array(values, dtype=np.float64)
+
+
+def scene(repeat: str = "loop") -> Scene:
+    """A ball goes round before a wall, past a post."""
+    turn = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+    path_m = np.stack([0.35 * np.cos(turn), 0.35 * np.sin(turn), 0.05 * np.cos(turn)], axis=1)
+    wall = Rectangle.facing(v(0, 2.2, 0), v(0, -1, 0), size=(4, 3))
+    motion = Motion(path_m, 4.0, repeat)  # type: ignore[arg-type]
+    return Scene(
+        name="round",
+        description="",
+        file=None,
+        light=Light(3e7, v(0.05, 0, 0.02), v(0, 2, 0), 0.0),
+        camera=Viewpoint(v(0, 0, 0), v(0, 2, 0), 50.0),
+        surfaces=(
+            Surface("wall", "diffuse", wall, 0.6),
+            Surface("ball", "diffuse", Ellipsoid(v(0, 1.5, 0), v(0.16, 0.16, 0.16)), 0.7,
+                    motions=(motion,)),
+            Surface("post", "diffuse", Ellipsoid(v(0, 1.5, -0.2), v(0.03, 0.03, 0.6)), 0.3),
+        ),
+    )  # fmt: skip
+
+
+def world(interreflection: str, sequence: Sequence) -> World:
+    of = replace(scene(), effects=QUIET | {"interreflection": interreflection})
+    built = world_of(of, width=WIDTH, height=HEIGHT, readout_s=READOUT_S)
+    built.configure(sequence, sequence.labels)
+    return built
+
+
+def solved_in_full(time_s: float, frequency_hz: float) -> NDArray[np.complex128]:
+    """Moments (H, W) of light over several surfaces, as if the scene stood still."""
+    now = scene().at(time_s)
+    assert now.camera is not None
+    lit = light_rays(now, camera_rays(now.camera, width=WIDTH, height=HEIGHT))
+    return Interreflection(now, lit, width=WIDTH, height=HEIGHT).moments(frequency_hz)
+
+
+@pytest.mark.parametrize(("sequence", "takes"), [(VIDEO, (0,)), (LONG, (3, 16))])
+def test_what_steps_leave_out_is_below_the_noise(
+    sequence: Sequence, takes: tuple[int, ...]
+) -> None:
+    lit, dark = (world(choice, sequence) for choice in ("auto", "off"))
+    conditions = lit.conditions(sequence)
+    factor_e = 0.5 * conditions.scale_e * conditions.sub_phase_gain(1)
+    period_s = sequence.exposure_s + READOUT_S
+    errors_e: dict[int, NDArray[np.complex128]] = {}
+    for label in (each for each in sequence.labels if each.take in takes and each.harmonic > 0):
+        time_s = 1.3 + label.index * period_s
+        found_e, direct_e = (
+            of.mean_image_e(label, number=0, device_time_s=time_s).astype(np.float64)
+            for of in (lit, dark)
+        )
+        turned = solved_in_full(time_s, label.frequency_hz) * np.exp(-1j * label.phase_rad)
+        expected_e = (factor_e * turned).real + 0.5 * conditions.scale_e * solved_in_full(
+            time_s, 0.0
+        ).real
+        error_e = (found_e - direct_e - expected_e) * np.exp(1j * label.phase_rad) / len(takes)
+        errors_e[label.harmonic] = errors_e.get(label.harmonic, 0) + error_e
+    brightness = lit.truth(device_time_s=1.3).brightness
+    gain = sequence.exposure_s * 3e7 / lit.sensor.gain_e_per_dn
+    deviation_e = conditions.noise.deviation(brightness / gain, 1.0) * conditions.scale_e
+
+    assert len(errors_e) == sequence.harmonics
+    over = np.max([np.abs(each) for each in errors_e.values()], axis=0) / deviation_e
+    assert np.mean(over > 0.5) < 0.01
+    assert np.sqrt(np.mean(over**2)) < 0.2
+
+
+def held(of: Scene, *, per_side: int = 6) -> HeldLights:
+    still = StillLight(still_scene(of), width=WIDTH, height=HEIGHT)
+    return HeldLights(FurtherLight(of, per_side=per_side), still)
+
+
+def test_light_follows_from_the_time_whatever_was_asked_before() -> None:
+    first, second = held(scene()), held(scene())
+    for time_s in (55.0, 0.2, 7.7, 3.9, 8.1):
+        second.at(time_s).moments(69e6)
+
+    assert first.at(7.7).moments(69e6).tobytes() == second.at(7.7).moments(69e6).tobytes()
+    assert first.at(7.7).moments(69e6).tobytes() != first.at(8.7).moments(69e6).tobytes()
+
+
+def test_at_its_steps_light_is_solved_exactly() -> None:
+    light = FurtherLight(scene(), per_side=8)
+
+    found = light.irradiance(5 * light.step_s, 46e6)
+
+    exchange = Exchange.of(scene().at(5 * light.step_s), 8)
+    expected = exchange.irradiance(46e6, exchange.bounces(1e-4))
+    assert found == pytest.approx(expected, rel=1e-6, abs=1e-12)
+
+
+def test_where_a_path_starts_again_light_jumps_with_it() -> None:
+    light = FurtherLight(scene("restart"), per_side=8)
+
+    for time_s in (4.0 - 1e-6, 4.0 + 1e-6):
+        exchange = Exchange.of(scene("restart").at(time_s), 8)
+        expected = exchange.irradiance(0.0, exchange.bounces(1e-4))
+        assert light.irradiance(time_s, 0.0) == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_a_scene_that_hardly_moves_is_hardly_ever_solved() -> None:
+    of = scene()
+    slow = Motion(of.surfaces[1].motions[0].path_m, 4e9, "loop")
+    moving = replace(of, surfaces=(of.surfaces[0], replace(of.surfaces[1], motions=(slow,))))
+
+    assert FurtherLight(moving, per_side=6).step_s >= 3600
+
+
+def test_patches_are_as_fine_as_the_noise_calls_for() -> None:
+    facts = SceneFacts(scene(), width=WIDTH, height=HEIGHT)
+
+    sides = [facts.patches_a_side(Noise(3e4, 0.0, 900.0, takes)) for takes in (1, 100, 1_000_000)]
+
+    assert sides[0] < sides[1] <= sides[2] == scene().transport.patches
+
+
+@pytest.mark.parametrize("takes", [1, 1_000_000])
+def test_the_work_that_is_stated_is_what_is_done(
+    takes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pairs = 0
+    solve = Exchange.of
+
+    def counted(of: Scene, per_side: int) -> Exchange:
+        nonlocal pairs
+        found = solve(of, per_side)
+        pairs += len(found.patches) ** 2
+        return found
+
+    scenery = SurfaceScenery(scene(), width=WIDTH, height=HEIGHT)
+    noise = Noise(3e4, 0.0, 900.0, takes)
+    stated = scenery.facts.further_work(noise, moments=4, image_period_s=0.005)
+    views = scenery.view(LightRequirements(frozenset({"interreflection"}), noise))
+    monkeypatch.setattr(Exchange, "of", counted)
+    images = 400
+    for k in range(images):
+        view = views.at(3.0 + 0.005 * k)
+        view.moments(0.0, view.region)
+
+    assert images * stated.pairs / 2 < pairs < images * stated.pairs * 2
