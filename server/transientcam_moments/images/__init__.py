@@ -14,6 +14,7 @@ from transientcam_moments.images._calibration import (
 )
 from transientcam_moments.images._four_bucket import (
     ZEROTH_IMAGES,
+    demodulate,
     four_bucket,
     harmonics_of,
     measure,
@@ -64,6 +65,7 @@ __all__ = [
     "calibration_of",
     "checked_mask",
     "checked_waveform",
+    "demodulate",
     "fill_bad_pixels",
     "find_bad_pixels",
     "four_bucket",

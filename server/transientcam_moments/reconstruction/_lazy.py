@@ -51,6 +51,7 @@ from transientcam_moments.reconstruction._flags import INVALID, Flags, flags
 from transientcam_moments.reconstruction._neighbours import over_neighbours, sensor_noise
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, OWN, Settings
+from transientcam_moments.reconstruction._turns import LowFrequency, turns
 
 _SHOWN = ("smoothed", "flags", "coefficients", "returns", "range_m")
 """Properties that the short text of a reconstruction names once they are computed."""
@@ -86,6 +87,8 @@ class Reconstruction:
         How the likelihood uses several threads, as `kernels.over` returns it.
     images : CapturedImages, optional
         What the moments were measured from, which tells their noise.
+    low : LowFrequency, optional
+        What tells turns of the phase; ranges are within the first one, when left out.
 
     Raises
     ------
@@ -108,6 +111,7 @@ class Reconstruction:
         correction: HarmonicCorrection | None = None,
         spread: Spread = at_once,
         images: CapturedImages | None = None,
+        low: LowFrequency | None = None,
     ) -> None:
         if not (settings.consecutive or self._of_any_multiples):
             raise ParameterError("multiples", settings.multiples, "1 to m")
@@ -121,6 +125,7 @@ class Reconstruction:
         self._repaired = repaired
         self._calibration = calibration
         self._images = images
+        self._low = low
 
     @cached_property
     def measured(self) -> Array:
@@ -218,13 +223,16 @@ class Reconstruction:
     @cached_property
     def flags(self) -> Array:
         """Flags of every pixel, uint8 of `Flags`."""
-        if self.settings.technique not in OF_ANY_MULTIPLES or self.noise is None:
-            return self._flags_of_moments
         xp = namespace(self.smoothed)
+        found, open_ = self._flags_of_moments, self._turns[1]
+        if open_ is not None:
+            found = found | xp.where(open_, int(Flags.CONTRADICTORY), 0).astype(xp.uint8)
+        if self.settings.technique not in OF_ANY_MULTIPLES or self.noise is None:
+            return found
         estimate = self.estimate
         unexplained = self.has_range & ~estimate.explained()
         undetermined = self.has_range & estimate.ambiguous()
-        found = self._flags_of_moments | xp.where(unexplained, int(Flags.UNEXPLAINED), 0)
+        found = found | xp.where(unexplained, int(Flags.UNEXPLAINED), 0)
         found = found | xp.where(undetermined, int(Flags.DEGENERATE), 0)
         return found.astype(xp.uint8)
 
@@ -280,7 +288,15 @@ class Reconstruction:
 
     @property
     def has_range(self) -> Array:
-        """Where there is light, more than noise where that is known, and all moments are finite."""
+        """Where there is light, more than noise where that is known, and all moments are finite.
+
+        Not where the phase at the low frequency leaves open which turn a range is in.
+        """
+        open_ = self._turns[1]
+        return self._has_phase if open_ is None else self._has_phase & ~open_
+
+    @property
+    def _has_phase(self) -> Array:
         return (self._flags_of_moments & int(INVALID)) == 0
 
     @cached_property
@@ -503,8 +519,32 @@ class Reconstruction:
     def phase_rad(self) -> Array:
         """Phase of the direct return by the estimator of the settings; NaN where there is none.
 
+        With the turns before it, where the phase at a low frequency was measured.
         Raises ParameterError, as `direct` does, where the estimator needs more harmonics.
         """
+        xp = namespace(self.moments)
+        phase = self._phase_in_turn + 2 * np.pi * self._turns[0]
+        return xp.where(self.has_range, phase, np.nan).astype(self.brightness.dtype)
+
+    @cached_property
+    def _turns(self) -> tuple[Array | float, Array | None]:
+        """What `turns` returns; none, and None, where no low frequency tells."""
+        if self._low is None:
+            return 0.0, None
+        light, noise_of, ambient = self.smoothed[0].real, self._noise_of(self._calibration), None
+        sigma_px = self.settings.smoothing_sigma_px * (self.settings.neighbours != "none")
+        with np.errstate(all="ignore"):  # of pixels without light
+            std: Array | float = 0.0
+            if noise_of is not None:
+                ambient = self.ambient
+                noise = noise_of(light) if ambient is None else noise_of(light, ambient=ambient)
+                std = namespace(light).sqrt(noise.variance[0]) / light
+            whole, open_ = turns(self._low, self._phase_in_turn, self.returns, std, sigma_px)
+        return whole, open_ & self._has_phase
+
+    @cached_property
+    def _phase_in_turn(self) -> Array:
+        """Phase of the direct return in [0, 2 pi), whatever it is worth."""
         xp = namespace(self.moments)
         if self.settings.technique == "maximum-entropy":
             phase = self.peaks.first_rad
@@ -512,7 +552,7 @@ class Reconstruction:
             phase = in_turn(xp.arctan2(self.moments[1].imag, self.moments[1].real))
         else:
             phase = self._separation.phase_rad
-        return xp.where(self.has_range, phase, np.nan).astype(self.brightness.dtype)
+        return phase
 
     @cached_property
     def range_m(self) -> Array:

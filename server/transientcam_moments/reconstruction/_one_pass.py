@@ -14,6 +14,7 @@ from transientcam_moments.noise import CapturedImages
 from transientcam_moments.reconstruction import Reconstruction
 from transientcam_moments.reconstruction._flags import INVALID, Flags
 from transientcam_moments.reconstruction._settings import Settings
+from transientcam_moments.reconstruction._turns import LowFrequency
 
 
 class PassedReconstruction(Reconstruction):
@@ -41,6 +42,8 @@ class PassedReconstruction(Reconstruction):
         As of `Reconstruction`.
     share : array, shape (H, W), optional
         Its `variance_share`.
+    low : LowFrequency, optional
+        As of `Reconstruction`.
     """
 
     def __init__(
@@ -55,6 +58,7 @@ class PassedReconstruction(Reconstruction):
         spread: Spread = at_once,
         images: CapturedImages | None = None,
         share: Array | None = None,
+        low: LowFrequency | None = None,
     ) -> None:
         super().__init__(
             None,
@@ -64,6 +68,7 @@ class PassedReconstruction(Reconstruction):
             calibration=calibration,
             spread=spread,
             images=images,
+            low=low,
         )
         self._measure = measure
         self.smoothed = planes.smoothed
@@ -80,7 +85,7 @@ class PassedReconstruction(Reconstruction):
             self.uniform = planes.uniform
             self.direct = planes.direct
             self.indirect = planes.indirect
-            if settings.base_frequency_hz is not None:
+            if settings.base_frequency_hz is not None and low is None:
                 self.range_m = planes.range_m
         if self._undetected is not None:
             no_signal = np.where(self._undetected, np.uint8(Flags.NO_SIGNAL), np.uint8(0))

@@ -23,6 +23,7 @@ from transientcam_moments.images import (
     calibrate,
     checked_mask,
     checked_waveform,
+    demodulate,
     fill_bad_pixels,
     gaussian_taps,
     harmonics_of,
@@ -43,6 +44,7 @@ from transientcam_moments.reconstruction._one_pass import PassedReconstruction
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, Settings
 from transientcam_moments.reconstruction._sparse_frequencies import GappedReconstruction
+from transientcam_moments.reconstruction._turns import LowFrequency, low_phase_rad
 
 _BY_THE_PASS = ("pisarenko", "pisarenko-merged", *OF_ANY_MULTIPLES)
 """Estimators that follow from the pass's returns or moments."""
@@ -88,6 +90,9 @@ class Reconstructor:
             if not self.settings.consecutive:
                 limit = "1 to m, for a waveform to be taken out"
                 raise ParameterError("multiples", self.settings.multiples, limit)
+        self._low_phase_rad = (
+            None if calibration is None else low_phase_rad(self.settings, calibration)
+        )
         self._waveform = waveform if waveform is not None and matters(waveform) else None
         self._lock = threading.Lock()
         self._prepared: dict[tuple[Any, ...], OnePass] = {}
@@ -156,8 +161,9 @@ class Reconstructor:
                 calibration=self._calibration,
                 spread=spread,
                 images=images,
+                low=self._low(self._replaced(takes[0])),
             )
-        moments, kept = self._measured(takes, None if repaired is None else repaired.left_out)
+        moments, kept, low = self._measured(takes, None if repaired is None else repaired.left_out)
         if recovered is not None:
             used = True if self._bad is None else ~self._bad  # values of bad pixels are not
             moments[:, recovered.undetermined & used] = np.nan
@@ -168,7 +174,7 @@ class Reconstructor:
             saturated_pixels = saturated(stack, full_scale=self.settings.full_scale)
             if self._bad is not None:  # their own values are not used
                 saturated_pixels = saturated_pixels & ~self._bad
-        return self._of_moments(moments, saturated_pixels, kept, spread, repaired, images)
+        return self._of_moments(moments, saturated_pixels, kept, spread, repaired, images, low)
 
     def of_measured(
         self,
@@ -215,6 +221,7 @@ class Reconstructor:
         spread: Spread,
         repaired: Repair | None = None,
         images: CapturedImages | None = None,
+        low: LowFrequency | None = None,
     ) -> Reconstruction:
         """Go on from calibrated moments."""
         if not self.settings.consecutive:
@@ -227,6 +234,7 @@ class Reconstructor:
                 calibration=self._calibration,
                 spread=spread,
                 images=images,
+                low=low,
             )
         one_pass = self._pass_of_moments(moments)
         correction = self._correction(moments)
@@ -242,6 +250,7 @@ class Reconstructor:
                 correction=correction,
                 spread=spread,
                 images=images,
+                low=low,
             )
         gains, left_out = self._calibration, (saturated_pixels, self._bad)
         how = images, spread
@@ -261,6 +270,7 @@ class Reconstructor:
             spread=spread,
             images=images,
             share=share,
+            low=low,
         )
 
     def _correction(self, moments: Array) -> HarmonicCorrection | None:
@@ -332,14 +342,29 @@ class Reconstructor:
             self.settings.gaussian_px,
         )
 
-    def _measured(self, takes: Array, left_out: Array | None = None) -> tuple[Array, Array]:
-        """Return calibrated moments of raw images, and which images went into them."""
+    def _measured(
+        self, takes: Array, left_out: Array | None = None
+    ) -> tuple[Array, Array, LowFrequency | None]:
+        """Return calibrated moments of raw images, which images went into them, and turns."""
         average, kept = average_takes(takes, left_out=left_out)
-        if self._bad is not None:
-            average = fill_bad_pixels(average, self._bad)
+        average = self._replaced(average)
         zeroth, _ = self._require_labels()
         moments = measure(average, zeroth=zeroth, phases_rad=self.settings.sampled_rad)
-        return self._calibrated(moments), kept
+        return self._calibrated(moments), kept, self._low(average)
+
+    def _replaced(self, images: Array) -> Array:
+        return images if self._bad is None else fill_bad_pixels(images, self._bad)
+
+    def _low(self, images: Array) -> LowFrequency | None:
+        """Return what the images (N, ...) of one take tell of turns of the phase, if anything."""
+        settings, phase_rad = self.settings, self._low_phase_rad
+        low_hz, base_hz, phases_rad = (
+            settings.low_frequency_hz, settings.base_frequency_hz, settings.sampled_rad,
+        )  # fmt: skip
+        if phase_rad is None or low_hz is None or base_hz is None:
+            return None
+        phasor = demodulate(images[None, : len(phases_rad)], phases_rad)[0]
+        return LowFrequency(phasor * np.exp(-1j * phase_rad), low_hz / base_hz)
 
     def _calibrated(self, moments: Array) -> Array:
         return moments if self._calibration is None else calibrate(moments, self._calibration)

@@ -64,6 +64,11 @@ class Settings:
     zeroth : {"low-frequency", "on-off", "estimated"}, optional
         How b_0 was measured (Sec. 4.3). Raw images need it; moments whose b_0 is 0 since it was
         not measured are "estimated".
+    low_frequency_hz : float, optional
+        Where b_0 was measured, if at a low frequency. Its phase in raw images says which turn of
+        the base frequency's phase a range is in: up to c / (2 low_frequency_hz), 166 m at 0.9 MHz.
+    low_phase_rad : float, optional
+        Phase of the gain there; by that of b_1 and b_2, when left out (`low_phase_rad`).
     takes : int, optional
         Captures in the images, averaged without outliers. Raw images need it.
     multiples : tuple of int, optional
@@ -107,6 +112,8 @@ class Settings:
 
     base_frequency_hz: float | None = None
     zeroth: str | None = None
+    low_frequency_hz: float | None = None
+    low_phase_rad: float | None = None
     takes: int | None = None
     multiples: tuple[int, ...] | None = None
     phases_rad: tuple[float, ...] | None = None
@@ -127,6 +134,8 @@ class Settings:
             raise ParameterError("base_frequency_hz", self.base_frequency_hz, "> 0 and finite")
         if self.zeroth is not None:
             chosen("zeroth", self.zeroth, tuple(ZEROTH_IMAGES))
+        if self.low_frequency_hz is not None and not 0 < self.low_frequency_hz < float("inf"):
+            raise ParameterError("low_frequency_hz", self.low_frequency_hz, "> 0 and finite")
         if self.takes is not None and self.takes < 1:
             raise ParameterError("takes", self.takes, ">= 1")
         if self.sensor is not None:

@@ -126,9 +126,13 @@ def range_accuracy(
         np.asarray(found.smoothed)[grid][:, seen],
         np.asarray(moment_noise(recipe, found).variance, dtype=np.float32)[grid][:, seen],
     )
-    drawn_m = frame.drawn_m()
-    std_m = _placed(typical_deviation(drawn_m), seen)
-    shifts_m = [_placed(other_m, seen) - range_m for other_m in frame.others_m()]
+    turn_m = float(tm.range_m(2 * np.pi, recipe.base_frequency_hz))
+
+    def shift_m(other_m: _Array) -> _Array:  # whatever turn a range is in
+        return np.remainder(other_m - range_m[seen] + turn_m / 2, turn_m) - turn_m / 2
+
+    std_m = _placed(typical_deviation(shift_m(frame.drawn_m())), seen)
+    shifts_m = [_placed(shift_m(other_m), seen) for other_m in frame.others_m()]
     unknown = np.full(seen.shape, np.nan, dtype=np.float32)
     bias_m = np.max([np.abs(median_around(each)) for each in shifts_m], axis=0, initial=0.0)
     bias_m = np.where(np.isfinite(range_m), bias_m, np.nan) if shifts_m else unknown

@@ -80,7 +80,7 @@ def describe_pixel(
     return {
         "x": x,
         "y": y,
-        "range_m": None if flags & tm.INVALID else _number(found.range_m[at]),
+        "range_m": None if flags & tm.INVALID else _number(image.range_m[y, x]),
         "direct": _number(found.direct[at]) or 0.0,
         "indirect": _number(found.indirect[at]) or 0.0,
         "brightness": _number(found.brightness[at]) or 0.0,
