@@ -1,5 +1,6 @@
 """What follows from the moments of an image: each property computed once, when first read."""
 
+import math
 from collections.abc import Callable
 from functools import cached_property
 from html import escape
@@ -7,7 +8,7 @@ from html import escape
 import numpy as np
 
 from transientcam_compiled import Spread, at_once
-from transientcam_moments.arrays import Array, in_turn, map_html, namespace
+from transientcam_moments.arrays import Array, map_html, namespace
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
 from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.images import HarmonicCorrection, Repair
@@ -51,7 +52,7 @@ from transientcam_moments.reconstruction._flags import INVALID, Flags, flags
 from transientcam_moments.reconstruction._neighbours import over_neighbours, sensor_noise
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, OWN, Settings
-from transientcam_moments.reconstruction._turns import LowFrequency, turns
+from transientcam_moments.reconstruction._turns import LowFrequency, Turned, beginning_at, turned
 
 _SHOWN = ("smoothed", "flags", "coefficients", "returns", "range_m")
 """Properties that the short text of a reconstruction names once they are computed."""
@@ -224,8 +225,9 @@ class Reconstruction:
     def flags(self) -> Array:
         """Flags of every pixel, uint8 of `Flags`."""
         xp = namespace(self.smoothed)
-        found, open_ = self._flags_of_moments, self._turns[1]
-        if open_ is not None:
+        found = self._flags_of_moments
+        if self._turned is not None:
+            open_ = self._turned.open & self._has_phase
             found = found | xp.where(open_, int(Flags.CONTRADICTORY), 0).astype(xp.uint8)
         if self.settings.technique not in OF_ANY_MULTIPLES or self.noise is None:
             return found
@@ -292,8 +294,7 @@ class Reconstruction:
 
         Not where the phase at the low frequency leaves open which turn a range is in.
         """
-        open_ = self._turns[1]
-        return self._has_phase if open_ is None else self._has_phase & ~open_
+        return self._has_phase if self._turned is None else self._has_phase & ~self._turned.open
 
     @property
     def _has_phase(self) -> Array:
@@ -467,22 +468,36 @@ class Reconstruction:
 
     @cached_property
     def _separation(self) -> Separation:
-        technique = self._technique
+        """Direct and indirect light, the turn beginning at the least range."""
+        threshold, technique = self.settings.threshold, self._technique
+        returns: Returns | Likelihood
         if self.settings.technique in OF_ANY_MULTIPLES:
             estimate = self.estimate
             if isinstance(estimate, Unwrapped):
-                return estimate.separate()
-            return estimate.separate(self.settings.threshold)
-        if self.settings.technique == "pisarenko-merged":
-            return separate(merge_returns(self.returns, self.noise), self.settings.threshold)
-        if technique is None:
-            return separate(self.returns, self.settings.threshold)
-        xp = namespace(self.smoothed)
-        b = np.asarray(self.smoothed)
-        check_order(b.shape[0] - 1, least=technique.least_harmonics, name=technique.name)
-        # as measured: none of them needs biased moments
-        found = technique.estimate(b).separate(self.settings.threshold)
-        return Separation(*(xp.asarray(part) for part in found))
+                found = estimate.separate()
+                return found._replace(phase_rad=self._begun(found.phase_rad))
+            returns, found = estimate, estimate.separate(threshold)
+        elif technique is not None:
+            xp = namespace(self.smoothed)
+            b = np.asarray(self.smoothed)
+            check_order(b.shape[0] - 1, least=technique.least_harmonics, name=technique.name)
+            # as measured: none of them needs biased moments
+            parts = technique.estimate(b).separate(threshold)
+            found = Separation(*(xp.asarray(part) for part in parts))
+            return found._replace(phase_rad=self._begun(found.phase_rad))
+        else:
+            merged = self.settings.technique == "pisarenko-merged"
+            returns = merge_returns(self.returns, self.noise) if merged else self.returns
+            found = separate(returns, threshold)
+        return beginning_at(
+            self.settings.start_rad, found, returns.phase_rad, returns.weight, threshold
+        )
+
+    def _begun(self, phase: Array) -> Array:
+        """Return phases in the turn that begins at the least range."""
+        xp, start = namespace(phase), self.settings.start_rad
+        turn = 2 * np.pi / math.gcd(*(self.settings.multiples or (1,)))
+        return (start + xp.remainder(phase - start, turn)).astype(phase.dtype)
 
     @property
     def _technique(self) -> Technique | None:
@@ -508,12 +523,12 @@ class Reconstruction:
     @cached_property
     def direct(self) -> Array:
         """Brightness of the direct return."""
-        return self._separation.direct
+        return (self._turned or self._separation).direct
 
     @cached_property
     def indirect(self) -> Array:
         """Brightness of all later returns, and of earlier ones below the threshold."""
-        return self._separation.indirect
+        return (self._turned or self._separation).indirect
 
     @cached_property
     def phase_rad(self) -> Array:
@@ -523,36 +538,49 @@ class Reconstruction:
         Raises ParameterError, as `direct` does, where the estimator needs more harmonics.
         """
         xp = namespace(self.moments)
-        phase = self._phase_in_turn + 2 * np.pi * self._turns[0]
+        phase = self._phase_in_turn if self._turned is None else self._turned.phase_rad
         return xp.where(self.has_range, phase, np.nan).astype(self.brightness.dtype)
 
     @cached_property
-    def _turns(self) -> tuple[Array | float, Array | None]:
-        """What `turns` returns; none, and None, where no low frequency tells."""
+    def _turned(self) -> Turned | None:
+        """Direct light in its turn; None where no low frequency tells."""
         if self._low is None:
-            return 0.0, None
-        light, noise_of, ambient = self.smoothed[0].real, self._noise_of(self._calibration), None
+            return None
+        found = self._separation._replace(phase_rad=self._phase_in_turn)
+        xp, estimate = namespace(found.phase_rad), None
+        if self.settings.technique in OF_ANY_MULTIPLES:
+            estimate = self.estimate
+        if isinstance(estimate, Likelihood):
+            late = xp.nan_to_num(estimate.phase_rad[:1] + estimate.delay_rad)
+            phase = xp.concatenate([estimate.phase_rad, late])
+            weight = xp.concatenate([estimate.weight, estimate.tail[None]])
+        elif estimate is not None:
+            phase, weight = found.phase_rad[None], found.direct[None]
+        else:
+            phase, weight = self.returns.phase_rad, self.returns.weight
+        light, noise_of = self.smoothed[0].real, self._noise_of(self._calibration)
         sigma_px = self.settings.smoothing_sigma_px * (self.settings.neighbours != "none")
+        std: Array | float = 0.0
         with np.errstate(all="ignore"):  # of pixels without light
-            std: Array | float = 0.0
             if noise_of is not None:
                 ambient = self.ambient
                 noise = noise_of(light) if ambient is None else noise_of(light, ambient=ambient)
-                std = namespace(light).sqrt(noise.variance[0]) / light
-            whole, open_ = turns(self._low, self._phase_in_turn, self.returns, std, sigma_px)
-        return whole, open_ & self._has_phase
+                std = xp.sqrt(noise.variance[0]) / light
+            at = self.settings.threshold
+            return turned(self._low, found, phase, weight, std, sigma_px, at)
 
     @cached_property
     def _phase_in_turn(self) -> Array:
-        """Phase of the direct return in [0, 2 pi), whatever it is worth."""
+        """Phase of the direct return, from the least range on, whatever it is worth."""
         xp = namespace(self.moments)
         if self.settings.technique == "maximum-entropy":
-            phase = self.peaks.first_rad
-        elif self.settings.technique == "single-frequency":
-            phase = in_turn(xp.arctan2(self.moments[1].imag, self.moments[1].real))
-        else:
-            phase = self._separation.phase_rad
-        return phase
+            found, zero = self.peaks, 0 * self.peaks.first_rad
+            first = Separation(zero, zero, found.first_rad)
+            start = self.settings.start_rad
+            return beginning_at(start, first, found.phase_rad, found.density, 0.0).phase_rad
+        if self.settings.technique == "single-frequency":
+            return self._begun(xp.arctan2(self.moments[1].imag, self.moments[1].real))
+        return self._separation.phase_rad
 
     @cached_property
     def range_m(self) -> Array:

@@ -81,17 +81,25 @@ class PassedReconstruction(Reconstruction):
             self._flags_of_moments = planes.flags | np.uint8(Flags.NO_SIGNAL) * nothing
         self.returns = Returns(planes.phase_rad, planes.weight, planes.uniform, planes.count)
         self.brightness = planes.brightness
-        if settings.technique == "pisarenko":  # else they follow from another estimate
+        if settings.technique == "pisarenko":  # else it follows from another estimate
             self.uniform = planes.uniform
+        if settings.technique == "pisarenko" and low is None and self._first_alike(planes):
             self.direct = planes.direct
             self.indirect = planes.indirect
-            if settings.base_frequency_hz is not None and low is None:
+            if settings.base_frequency_hz is not None:
                 self.range_m = planes.range_m
         if self._undetected is not None:
             no_signal = np.where(self._undetected, np.uint8(Flags.NO_SIGNAL), np.uint8(0))
             self._flags_of_moments = self._flags_of_moments | no_signal
             if "range_m" in vars(self):
                 self.range_m = np.where(self._undetected, np.float32(np.nan), planes.range_m)
+
+    def _first_alike(self, planes: Planes) -> bool:
+        """Return whether no return is between 0 and the least range: else its turn is another."""
+        start = self.settings.start_rad
+        seam = start % (2 * np.pi)
+        apart = planes.phase_rad >= seam if start < 0 else planes.phase_rad < seam
+        return not apart.any()
 
     @cached_property
     def measured(self) -> Array:

@@ -1,5 +1,6 @@
 """How moments become range, and what the range may be taken from."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from transientcam_moments.errors import ParameterError
 from transientcam_moments.images import FOUR_PHASES_RAD, SIGMA_PX, ZEROTH_IMAGES, phase_weights
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, EPSILON
 from transientcam_moments.noise import Sensor
+from transientcam_moments.reconstruction._ranging import range_m
 
 NEIGHBOURS = ("edge-preserving", "gaussian", "none")
 """How moments are averaged over neighbouring pixels; see `Settings`."""
@@ -87,6 +89,10 @@ class Settings:
         one. There is none without two image axes.
     smoothing_sigma_px : float
         Of the Gaussian; 0 for none.
+    least_range_m : float, optional
+        Of the sensor, where a turn of the phase begins: ranges are from here on to c / (2 f)
+        farther, and "first" is counted from here. A 64th of that below 0, when left out, so that
+        noise does not put what is at 0 m to the far end.
     threshold : float
         The range is that of the first return, or peak, with this share of the strongest one's
         weight, or density.
@@ -121,6 +127,7 @@ class Settings:
     keep: str = "harmonics"
     neighbours: str = "gaussian"
     smoothing_sigma_px: float = SIGMA_PX
+    least_range_m: float | None = None
     threshold: float = DIRECT_THRESHOLD
     estimator: str = "automatic"
     minimum_brightness: float = 0.0
@@ -149,6 +156,8 @@ class Settings:
         chosen("keep", self.keep, ("harmonics", "brightness"))
         chosen("neighbours", self.neighbours, NEIGHBOURS)
         in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
+        if self.least_range_m is not None:
+            in_range("least_range_m", self.least_range_m, -1000.0, 1000.0, "-1000 to 1000 m")
         in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
         chosen("estimator", self.estimator, ("automatic", *ESTIMATORS))
         chosen("spoilt_images", self.spoilt_images, CORRUPT_IMAGES)
@@ -162,6 +171,14 @@ class Settings:
     def technique(self) -> str:
         """The estimator, also where it is automatic."""
         return automatic(self.multiples) if self.estimator == "automatic" else self.estimator
+
+    @property
+    def start_rad(self) -> float:
+        """Phase at the base frequency where a turn begins, above -2 pi and below 2 pi."""
+        if self.least_range_m is None or self.base_frequency_hz is None:
+            return -2 * np.pi / 64
+        turn_m = range_m(2 * np.pi, self.base_frequency_hz)
+        return 2 * np.pi * math.fmod(self.least_range_m / float(turn_m), 1.0)
 
     @property
     def sampled_rad(self) -> tuple[float, ...]:

@@ -1,24 +1,62 @@
-"""Which turn of the base frequency's phase a range is in, by the phase at a low frequency."""
+"""Where a turn of the base frequency's phase begins, and which one a range is in."""
 
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from transientcam_moments.arrays import Array, namespace
+from transientcam_moments.arrays import Array, namespace, some
 from transientcam_moments.images import gaussian_taps, smooth
 from transientcam_moments.likelihood import SIGNIFICANCE, ambiguous
-from transientcam_moments.moment_problem import Returns
+from transientcam_moments.moment_problem import Returns, Separation
 from transientcam_moments.reconstruction._settings import Settings
 
 _TURN: Final = 2 * np.pi
 _UNMODELLED_RAD: Final = 0.5
 """Of the base frequency: what calibration, and returns that are not found, leave of the phase."""
+_DOUBTFUL_RAD: Final = 1.0
+"""By which returns have to predict another phase before they may come in another order."""
 _NOISY_RAD: Final = 0.7
 """Noise from which on a pixel is averaged over more neighbours."""
 _WIDE_PX: Final = 2.0
 """Of that Gaussian."""
 _BEFORE: Final = 1 / 16
 """Of a turn of the low frequency, by which noise may put light before the camera."""
+
+
+def beginning_at(
+    start_rad: float, found: Separation, phase: Array, weight: Array, threshold: float
+) -> Separation:
+    """Return direct and indirect light where the turn begins at a phase, and so does its phase.
+
+    Parameters
+    ----------
+    start_rad
+        -2 pi to 2 pi.
+    found : Separation
+        Of a turn from 0 on: kept wherever the first return is the same.
+    phase, weight : array, shape (K, ...)
+        Of all returns, the phase in [0, 2 pi).
+    threshold
+        As of `separate`.
+    """
+    xp = namespace(found.phase_rad)
+    begun = start_rad + xp.remainder(found.phase_rad - start_rad, _TURN)
+    begun = begun.astype(found.phase_rad.dtype)
+    seam = start_rad % _TURN
+    between = phase >= seam if start_rad < 0 else phase < seam
+    if not some(between.any()):
+        return found._replace(phase_rad=begun)
+    enough = (weight >= threshold * weight.max(axis=0)) & (weight > 0)
+    begins = xp.where(enough, start_rad + xp.remainder(phase - start_rad, _TURN), np.inf)
+    order = xp.argmin(begins, axis=0)[None]
+    first, light, old = (
+        xp.take_along_axis(part, order, axis=0)[0] for part in (begins, weight, phase)
+    )
+    other = (xp.where(enough, phase, np.inf).min(axis=0) != old) & (first < np.inf)
+    direct = xp.where(other, light, found.direct)
+    indirect = xp.where(other, found.direct + found.indirect - light, found.indirect)
+    begun = xp.where(other, first, begun).astype(begun.dtype)
+    return Separation(direct, indirect, begun)
 
 
 class LowFrequency(NamedTuple):
@@ -59,31 +97,57 @@ def low_phase_rad(settings: Settings, calibration: Array) -> float | None:
     return float(np.angle(first) - delay_rad * (1 - low_hz / base_hz))
 
 
-def turns(
-    low: LowFrequency, phase: Array, returns: Returns, std_rad: Array | float, sigma_px: float
-) -> tuple[Array, Array]:
-    """Return how many whole turns come before a phase, and where that stays open.
+class Turned(NamedTuple):
+    """Direct light with the whole turns before it, and what of it stays open.
+
+    Attributes
+    ----------
+    phase_rad, direct, indirect : array, shape (...)
+        As of `Separation`, the phase from the least range on without end.
+    open : boolean array, shape (...)
+        Where another number of turns explains the low frequency nearly as well: by noise, or as
+        light of several turns is mixed.
+    """
+
+    phase_rad: Array
+    direct: Array
+    indirect: Array
+    open: Array
+
+
+def turned(
+    low: LowFrequency,
+    found: Separation,
+    phase: Array,
+    weight: Array,
+    std_rad: Array | float,
+    sigma_px: float,
+    threshold: float,
+) -> Turned:
+    """Put direct light in its turn.
 
     Parameters
     ----------
     low
         Of the pixels (...).
-    phase : array, shape (...)
-        Of the direct return at the base frequency.
-    returns : Returns
-        All light that was found: the low frequency sees its sum.
+    found : Separation
+        Its phase within one turn.
+    phase, weight : array, shape (K, ...)
+        All light that was found, of which the low frequency sees the sum.
     std_rad : array, shape (...)
         Standard deviation of the phase at the low frequency before smoothing.
     sigma_px : float
         Of the Gaussian that it is smoothed with; noisy pixels take `_WIDE_PX`.
+    threshold : float
+        As of `separate`.
 
-    Returns
-    -------
-    tuple of arrays, shape (...)
-        Turns >= 0, and where another number of them explains the phase nearly as well: by noise, or
-        as light of several turns is mixed.
+    Notes
+    -----
+    Light that is said to come first may be later light of the next turn. Where the phase at the low
+    frequency is far from what the order of the returns predicts, that order is taken, beginning
+    with another one of them, which predicts it best.
     """
-    xp = namespace(phase)
+    xp = namespace(found.phase_rad)
     picture = low.phasor.ndim == 2
     phasor, square = low.phasor, (std_rad / low.ratio) ** 2
     if picture and sigma_px > 0:
@@ -91,17 +155,45 @@ def turns(
         near, wide = (smooth(low.phasor[None], px)[0] for px in (sigma_px, _WIDE_PX))
         phasor = xp.where(noisy, wide, near)
         square = square * xp.where(noisy, _left(_WIDE_PX), _left(sigma_px))
-    # later light within one turn behind the direct return, what is just before it, before it
-    behind = xp.remainder(xp.nan_to_num(returns.phase_rad - phase) + 1.0, _TURN) - 1.0
-    light = xp.where(returns.weight > 0, returns.weight, 0.0)
-    seen = (light * xp.exp(1j * low.ratio * behind)).sum(axis=0)
-    seen = xp.where(light.sum(axis=0) > 0, seen, 1.0) * xp.exp(1j * low.ratio * phase)
+    weight = xp.where(weight > 0, weight, 0.0)
+    phase = xp.where(weight > 0, phase, 0.0)
+    passed = _passed(low.ratio, phasor, found.phase_rad, phase, weight)
+    first, direct, indirect = found.phase_rad, found.direct, found.indirect
+    if xp is np:
+        enough = (weight >= threshold * weight.max(axis=0)) & (weight > 0)
+        doubtful = (_rest(passed) > _DOUBTFUL_RAD) & (enough.sum(axis=0) > 1)
+        if doubtful.any():
+            planes = [np.array(each) for each in (first, direct, indirect, passed)]
+            of_them = phase[:, doubtful], weight[:, doubtful]
+            best = [each[doubtful] for each in planes]
+            for k, (other, light) in enumerate(zip(*of_them, strict=True)):
+                tried = _passed(low.ratio, phasor[doubtful], other, *of_them)
+                better = enough[k, doubtful] & (_rest(tried) < _rest(best[3]) - _DOUBTFUL_RAD / 2)
+                new = other, light, best[1] + best[2] - light, tried
+                best = [np.where(better, *each) for each in zip(new, best, strict=True)]
+            for plane, each in zip(planes, best, strict=True):
+                plane[doubtful] = each
+            first, direct, indirect, passed = planes
+    lead = 2 * _TURN * (np.pi - _rest(passed)) / (square + _UNMODELLED_RAD**2)
+    whole = xp.maximum(xp.round(passed), 0.0)
+    return Turned(first + _TURN * whole, direct, indirect, ambiguous(lead, SIGNIFICANCE))
+
+
+def _passed(ratio: float, phasor: Array, first: Array, phase: Array, weight: Array) -> Array:
+    """Return the turns before the first return (P), not whole, if others (K, P) are behind it."""
+    xp = namespace(first)
+    # what is just before it, as of another estimate, is before it
+    behind = xp.remainder(phase - first + 1.0, _TURN) - 1.0
+    seen = (weight * xp.exp(1j * ratio * behind)).sum(axis=0)
+    seen = xp.where(weight.sum(axis=0) > 0, seen, 1.0) * xp.exp(1j * ratio * first)
     apart = phasor * xp.conj(seen)
-    passed = xp.arctan2(apart.imag, apart.real) / _TURN
-    passed = (xp.remainder(passed + _BEFORE, 1.0) - _BEFORE) / low.ratio
-    whole = xp.round(passed)
-    lead = 2 * _TURN * (np.pi - _TURN * abs(passed - whole)) / (square + _UNMODELLED_RAD**2)
-    return xp.maximum(whole, 0.0), ambiguous(lead, SIGNIFICANCE)
+    turn = xp.arctan2(apart.imag, apart.real) / _TURN
+    return (xp.remainder(turn + _BEFORE, 1.0) - _BEFORE) / ratio
+
+
+def _rest(passed: Array) -> Array:
+    """Return how far turns are from whole ones, as a phase."""
+    return _TURN * abs(passed - namespace(passed).round(passed))
 
 
 def _left(sigma_px: float) -> float:
