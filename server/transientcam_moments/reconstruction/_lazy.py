@@ -244,7 +244,7 @@ class Reconstruction:
         xp = namespace(self.smoothed)
         found = flags(
             self.smoothed,
-            minimum_brightness=self.settings.minimum_brightness,
+            minimum_brightness=self.settings.least_light(self.smoothed.dtype),
             eigenvalue=self.eigenvalue,
         )
         # biasing made the matrix definite; what is left of its defect is the flag for biasing

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from transientcam_moments.arrays import MAX_HARMONICS, chosen, in_range
 from transientcam_moments.comparisons import TECHNIQUES
@@ -171,6 +172,10 @@ class Settings:
     def technique(self) -> str:
         """The estimator, also where it is automatic."""
         return automatic(self.multiples) if self.estimator == "automatic" else self.estimator
+
+    def least_light(self, dtype: DTypeLike) -> float:
+        """Return the brightness that is no signal: subnormal moments have too few digits, too."""
+        return max(self.minimum_brightness, float(np.finfo(dtype).tiny))
 
     @property
     def start_rad(self) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from transientcam_moments.arrays import Array, namespace, some
 from transientcam_moments.images import gaussian_taps, smooth
 from transientcam_moments.likelihood import SIGNIFICANCE, ambiguous
-from transientcam_moments.moment_problem import Returns, Separation
+from transientcam_moments.moment_problem import Separation
 from transientcam_moments.reconstruction._settings import Settings
 
 _TURN: Final = 2 * np.pi

@@ -29,8 +29,8 @@ from transientcam_server.imaging._recipe.recipe import Recipe
 _Array = NDArray[Any]
 WITHIN: Final = 0.9
 """Share of the trusted pixels that the metadata's interval is of."""
-DRAWS: Final = 4
-"""Noisy copies of a frame."""
+DRAWS, QUICK_DRAWS = 4, 16
+"""Noisy copies of a frame; where the estimator is the phase of one moment."""
 SPARSE_PX: Final = 4
 """Rows and columns between pixels, where there is no time for all of them."""
 _OTHERS: Final = ("likelihood", "pisarenko")
@@ -174,11 +174,12 @@ class _Frame:
         if self.recipe.applied.sequence.zeroth == "estimated":
             variance[0] = 0
         random = np.random.default_rng(_SEED)
-        drawn = tm.noise.draw(self.b, tm.noise.MomentNoise(variance), random, draws=DRAWS)
+        own = self.recipe.technique
+        draws = QUICK_DRAWS if own == "single-frequency" else DRAWS
+        drawn = tm.noise.draw(self.b, tm.noise.MomentNoise(variance), random, draws=draws)
         spread = np.broadcast_to(self.variance[:, None], drawn.shape)
         flat = (len(self.b), -1)
-        own = self.recipe.technique
-        return self._ranges_m(drawn.reshape(flat), spread.reshape(flat), own).reshape((DRAWS, -1))
+        return self._ranges_m(drawn.reshape(flat), spread.reshape(flat), own).reshape((draws, -1))
 
     def others_m(self) -> list[_Array]:
         """Return the range (P) by every other way that there is; none where m = 1."""
