@@ -1,4 +1,4 @@
-"""Whether pixels without light have no range, and those with light have one: halves of a picture."""
+"""Whether pixels without light have no range, and lit ones have one: halves of a picture."""
 
 import itertools
 from pathlib import Path

@@ -547,9 +547,8 @@ class Reconstruction:
         if self._low is None:
             return None
         found = self._separation._replace(phase_rad=self._phase_in_turn)
-        xp, estimate = namespace(found.phase_rad), None
-        if self.settings.technique in OF_ANY_MULTIPLES:
-            estimate = self.estimate
+        xp, technique = namespace(found.phase_rad), self.settings.technique
+        estimate = self.estimate if technique in OF_ANY_MULTIPLES else None
         if isinstance(estimate, Likelihood):
             late = xp.nan_to_num(estimate.phase_rad[:1] + estimate.delay_rad)
             phase = xp.concatenate([estimate.phase_rad, late])
@@ -566,8 +565,16 @@ class Reconstruction:
                 ambient = self.ambient
                 noise = noise_of(light) if ambient is None else noise_of(light, ambient=ambient)
                 std = xp.sqrt(noise.variance[0]) / light
-            at = self.settings.threshold
-            return turned(self._low, found, phase, weight, std, sigma_px, at)
+            # the phase of b_1 is of no return that could come first instead
+            at = np.inf if technique == "single-frequency" else self.settings.threshold
+            done = turned(self._low, found, phase, weight, std, sigma_px, at)
+            if technique == "maximum-entropy":
+                apart = self.peaks.phase_rad - done.phase_rad + np.pi
+                apart = xp.nan_to_num(xp.remainder(apart, 2 * np.pi) - np.pi, nan=np.inf)
+                nearest = xp.argmin(abs(apart), axis=0)[None]
+                apart = xp.take_along_axis(apart, nearest, axis=0)[0]
+                done = done._replace(phase_rad=done.phase_rad + xp.where(apart < 4, apart, 0.0))
+            return done
 
     @cached_property
     def _phase_in_turn(self) -> Array:

@@ -17,7 +17,7 @@ _DOUBTFUL_RAD: Final = 1.0
 """By which returns have to predict another phase before they may come in another order."""
 _NOISY_RAD: Final = 0.7
 """Noise from which on a pixel is averaged over more neighbours."""
-_WIDE_PX: Final = 2.0
+_WIDE_PX: Final = 3.0
 """Of that Gaussian."""
 _BEFORE: Final = 1 / 16
 """Of a turn of the low frequency, by which noise may put light before the camera."""
@@ -78,8 +78,8 @@ def low_phase_rad(settings: Settings, calibration: Array) -> float | None:
     """Return the phase of the gain at the low frequency; None where it does not follow.
 
     That of the settings, or else what sub-phases, the same at all frequencies, and one delay that
-    is shorter than half a period of the base frequency give it, by the gains of b_1 and b_2. Gains
-    for all pixels alike with m = 1 are taken to have no delay.
+    is shorter than half a period of the base frequency give it, by the gains of b_1 and b_2. With
+    m = 1 a gain without phase, or with a quarter of a turn as of arccos sampling, has no delay.
     """
     low_hz, base_hz = settings.low_frequency_hz, settings.base_frequency_hz
     if settings.zeroth != "low-frequency" or low_hz is None or base_hz is None:
@@ -90,7 +90,9 @@ def low_phase_rad(settings: Settings, calibration: Array) -> float | None:
         return settings.low_phase_rad
     gain = np.asarray(calibration)
     if len(gain) < 3:
-        return float(np.angle(gain[1])) if gain.ndim == 1 else None
+        if gain.ndim > 1 or abs(gain[1].real * gain[1].imag) > 1e-9 * abs(gain[1]) ** 2:
+            return None
+        return float(np.angle(gain[1]))
     with np.errstate(all="ignore"):
         first, second = (np.nansum(each / abs(each)) for each in gain[1:3])
     delay_rad = np.angle(second * np.conj(first))
