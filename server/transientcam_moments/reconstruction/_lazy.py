@@ -8,7 +8,7 @@ from html import escape
 import numpy as np
 
 from transientcam_compiled import Spread, at_once
-from transientcam_moments.arrays import Array, map_html, namespace
+from transientcam_moments.arrays import Array, in_turn, map_html, namespace
 from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
 from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.images import HarmonicCorrection, Repair
@@ -52,7 +52,13 @@ from transientcam_moments.reconstruction._flags import INVALID, Flags, flags
 from transientcam_moments.reconstruction._neighbours import over_neighbours, sensor_noise
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, OWN, Settings
-from transientcam_moments.reconstruction._turns import LowFrequency, Turned, beginning_at, turned
+from transientcam_moments.reconstruction._turns import (
+    LowFrequency,
+    Turned,
+    beginning_at,
+    begun,
+    turned,
+)
 
 _SHOWN = ("smoothed", "flags", "coefficients", "returns", "range_m")
 """Properties that the short text of a reconstruction names once they are computed."""
@@ -489,15 +495,13 @@ class Reconstruction:
             merged = self.settings.technique == "pisarenko-merged"
             returns = merge_returns(self.returns, self.noise) if merged else self.returns
             found = separate(returns, threshold)
-        return beginning_at(
-            self.settings.start_rad, found, returns.phase_rad, returns.weight, threshold
-        )
+        start, early = self.settings.start_rad, self.settings.early_threshold
+        return beginning_at(start, found, returns.phase_rad, returns.weight, early)
 
     def _begun(self, phase: Array) -> Array:
         """Return phases in the turn that begins at the least range."""
-        xp, start = namespace(phase), self.settings.start_rad
         turn = 2 * np.pi / math.gcd(*(self.settings.multiples or (1,)))
-        return (start + xp.remainder(phase - start, turn)).astype(phase.dtype)
+        return begun(phase, self.settings.start_rad, turn)
 
     @property
     def _technique(self) -> Technique | None:
@@ -583,10 +587,10 @@ class Reconstruction:
         if self.settings.technique == "maximum-entropy":
             found, zero = self.peaks, 0 * self.peaks.first_rad
             first = Separation(zero, zero, found.first_rad)
-            start = self.settings.start_rad
-            return beginning_at(start, first, found.phase_rad, found.density, 0.0).phase_rad
+            start, early = self.settings.start_rad, self.settings.early_threshold
+            return beginning_at(start, first, found.phase_rad, found.density, early).phase_rad
         if self.settings.technique == "single-frequency":
-            return self._begun(xp.arctan2(self.moments[1].imag, self.moments[1].real))
+            return self._begun(in_turn(xp.arctan2(self.moments[1].imag, self.moments[1].real)))
         return self._separation.phase_rad
 
     @cached_property

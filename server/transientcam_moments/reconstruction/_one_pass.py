@@ -95,11 +95,12 @@ class PassedReconstruction(Reconstruction):
                 self.range_m = np.where(self._undetected, np.float32(np.nan), planes.range_m)
 
     def _first_alike(self, planes: Planes) -> bool:
-        """Return whether no return is between 0 and the least range: else its turn is another."""
+        """Return whether a turn from 0 on has the same first returns, with the same phases."""
         start = self.settings.start_rad
         seam = start % (2 * np.pi)
-        apart = planes.phase_rad >= seam if start < 0 else planes.phase_rad < seam
-        return not apart.any()
+        return not (start - seam and (planes.phase_rad >= seam).any()) and (
+            start <= 0 or not (planes.phase_rad < seam).any()
+        )
 
     @cached_property
     def measured(self) -> Array:

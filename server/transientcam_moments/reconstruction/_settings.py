@@ -1,6 +1,5 @@
 """How moments become range, and what the range may be taken from."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,8 +91,8 @@ class Settings:
         Of the Gaussian; 0 for none.
     least_range_m : float, optional
         Of the sensor, where a turn of the phase begins: ranges are from here on to c / (2 f)
-        farther, and "first" is counted from here. A 64th of that below 0, when left out, so that
-        noise does not put what is at 0 m to the far end.
+        farther, and "first" is counted from here. When left out, strong first light within the
+        last 64th of that is below 0: noise does not put what is at 0 m to the far end.
     threshold : float
         The range is that of the first return, or peak, with this share of the strongest one's
         weight, or density.
@@ -179,11 +178,19 @@ class Settings:
 
     @property
     def start_rad(self) -> float:
-        """Phase at the base frequency where a turn begins, above -2 pi and below 2 pi."""
+        """Phase at the base frequency where a turn begins."""
         if self.least_range_m is None or self.base_frequency_hz is None:
             return -2 * np.pi / 64
-        turn_m = range_m(2 * np.pi, self.base_frequency_hz)
-        return 2 * np.pi * math.fmod(self.least_range_m / float(turn_m), 1.0)
+        return self.least_range_m / float(range_m(1.0, self.base_frequency_hz))
+
+    @property
+    def early_threshold(self) -> float:
+        """Weight over the strongest from which a return comes first only as a turn begins there.
+
+        Where no least range is stated three quarters: what is weaker may be later light near the
+        end of the turn.
+        """
+        return 0.75 if self.least_range_m is None else self.threshold
 
     @property
     def sampled_rad(self) -> tuple[float, ...]:

@@ -1,5 +1,6 @@
 """Where a turn of the base frequency's phase begins, and which one a range is in."""
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -23,6 +24,14 @@ _BEFORE: Final = 1 / 16
 """Of a turn of the low frequency, by which noise may put light before the camera."""
 
 
+def begun(phase: Array, start_rad: float, turn_rad: float = _TURN) -> Array:
+    """Return phases in [0, turn) in the turn that begins at a phase; the rest as they are."""
+    xp = namespace(phase)
+    whole = math.floor(start_rad / turn_rad) * turn_rad
+    found = xp.where(phase < start_rad - whole, phase + (whole + turn_rad), phase + whole)
+    return found.astype(phase.dtype)
+
+
 def beginning_at(
     start_rad: float, found: Separation, phase: Array, weight: Array, threshold: float
 ) -> Separation:
@@ -31,32 +40,28 @@ def beginning_at(
     Parameters
     ----------
     start_rad
-        -2 pi to 2 pi.
+        Of the base frequency.
     found : Separation
         Of a turn from 0 on: kept wherever the first return is the same.
     phase, weight : array, shape (K, ...)
         Of all returns, the phase in [0, 2 pi).
     threshold
-        As of `separate`.
+        As of `separate`, for returns that come first only as the turn begins there.
     """
     xp = namespace(found.phase_rad)
-    begun = start_rad + xp.remainder(found.phase_rad - start_rad, _TURN)
-    begun = begun.astype(found.phase_rad.dtype)
     seam = start_rad % _TURN
-    between = phase >= seam if start_rad < 0 else phase < seam
-    if not some(between.any()):
-        return found._replace(phase_rad=begun)
-    enough = (weight >= threshold * weight.max(axis=0)) & (weight > 0)
-    begins = xp.where(enough, start_rad + xp.remainder(phase - start_rad, _TURN), np.inf)
-    order = xp.argmin(begins, axis=0)[None]
-    first, light, old = (
-        xp.take_along_axis(part, order, axis=0)[0] for part in (begins, weight, phase)
+    direct, indirect, first = found.direct, found.indirect, begun(found.phase_rad, start_rad)
+    early = (phase >= seam) & (weight >= threshold * weight.max(axis=0)) & (weight > 0)
+    other = early.any(axis=0) & (found.phase_rad < seam)
+    if not some(other):
+        return Separation(direct, indirect, first)
+    order = xp.argmin(xp.where(early, phase, np.inf), axis=0)[None]
+    light, at = (xp.take_along_axis(part, order, axis=0)[0] for part in (weight, phase))
+    return Separation(
+        xp.where(other, light, direct),
+        xp.where(other, direct + indirect - light, indirect),
+        xp.where(other, begun(at, start_rad), first),
     )
-    other = (xp.where(enough, phase, np.inf).min(axis=0) != old) & (first < np.inf)
-    direct = xp.where(other, light, found.direct)
-    indirect = xp.where(other, found.direct + found.indirect - light, found.indirect)
-    begun = xp.where(other, first, begun).astype(begun.dtype)
-    return Separation(direct, indirect, begun)
 
 
 class LowFrequency(NamedTuple):
@@ -176,8 +181,11 @@ def turned(
             for plane, each in zip(planes, best, strict=True):
                 plane[doubtful] = each
             first, direct, indirect, passed = planes
-    lead = 2 * _TURN * (np.pi - _rest(passed)) / (square + _UNMODELLED_RAD**2)
     whole = xp.maximum(xp.round(passed), 0.0)
+    off = xp.where(
+        whole > 0, abs(passed - whole), passed - whole
+    )  # less than 0 turns there are not
+    lead = _TURN**2 * (1 - 2 * off) / (square + _UNMODELLED_RAD**2)
     return Turned(first + _TURN * whole, direct, indirect, ambiguous(lead, SIGNIFICANCE))
 
 

@@ -132,13 +132,29 @@ def test_noise_puts_no_wall_to_the_other_end(estimator: str, least_range_m: floa
 
 
 @pytest.mark.parametrize("estimator", ["likelihood", "pisarenko", "two-returns"])
-def test_light_just_before_zero_comes_before_light_behind_it(estimator: str) -> None:
-    image = found(estimator, (-0.01, 1.04), (0.8, 1.0), snr=200.0)
+@pytest.mark.parametrize(("least_range_m", "weight"), [(None, 1.0), (-0.1, 0.4)])
+def test_light_just_before_zero_comes_before_light_behind_it(
+    estimator: str, least_range_m: float | None, weight: float
+) -> None:
+    image = found(estimator, (-0.01, 1.04), (weight, 1.0), snr=200.0, least_range_m=least_range_m)
     assert (abs(np.asarray(image.range_m) + 0.01) < 0.1).mean() > 0.98
-    np.testing.assert_allclose(np.median(image.direct), 0.8 * SCALE_DN, rtol=0.1)
+    np.testing.assert_allclose(np.median(image.direct), weight * SCALE_DN, rtol=0.1)
 
 
-@pytest.mark.parametrize("estimator", (*FOUR, "two-returns", "unwrapped-phase"))
+def test_weak_later_light_near_the_end_of_a_turn_does_not_come_first() -> None:
+    image = found("likelihood", (2.0, 6.47), (1.0, 0.4), snr=200.0)
+    np.testing.assert_allclose(image.range_m, 2.0, atol=0.05)
+
+
+def test_a_least_range_beyond_a_turn_begins_there() -> None:
+    images, labels = captured((7.4,))
+    images, labels = images[4:], {name: values[4:] for name, values in labels.items()}
+    gain, settings = np.ones(5), tm.Settings(full_scale=65535, least_range_m=7.0)
+    image = tm.reconstruct(images, settings, **labels, calibration=gain)
+    np.testing.assert_allclose(image.range_m, 7.4, atol=0.05)
+
+
+@pytest.mark.parametrize("estimator", [*FOUR, "two-returns", "unwrapped-phase"])
 @pytest.mark.parametrize("scale", [1e-310, 1e-320])
 def test_subnormal_moments_have_no_range_and_a_flag(estimator: str, scale: float) -> None:
     b = np.exp(1j * np.arange(5))[:, None] * np.full(3, scale)
