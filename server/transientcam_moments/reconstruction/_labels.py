@@ -110,13 +110,6 @@ class Labels:
         lowest = self.multiples[0]
         return float(self.frequency_hz[self.harmonic == lowest][0]) / lowest
 
-    @property
-    def low_frequency_hz(self) -> float | None:
-        """Where b_0 was measured; None where no frequencies are given, or at none."""
-        if self.frequency_hz is None or self.zeroth != "low-frequency":
-            return None
-        return float(self.frequency_hz[self.harmonic == 0][0]) or None
-
     @cached_property
     def order(self) -> Array:
         """Places (N,) of the images in the order that `measure` takes them in."""
@@ -176,10 +169,11 @@ class Labels:
             "zeroth": self.zeroth,
             "takes": self.takes,
             "base_frequency_hz": self.base_frequency_hz,
-            "low_frequency_hz": self.low_frequency_hz,
             "multiples": self.multiples,
             "phases_rad": self.phases_rad,
         }
+        if self.frequency_hz is not None and self.zeroth == "low-frequency":
+            found["low_frequency_hz"] = float(self.frequency_hz[self.harmonic == 0][0])
         known = {name: value for name, value in found.items() if value is not None}
         for name, value in known.items():
             stated = getattr(given, name)

@@ -2,19 +2,16 @@
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels.one_pass import Planes
 from transientcam_moments.arrays import Array
-from transientcam_moments.images import Repair
 from transientcam_moments.moment_problem import Coefficients, Returns, levinson
-from transientcam_moments.noise import CapturedImages
 from transientcam_moments.reconstruction import Reconstruction
 from transientcam_moments.reconstruction._flags import INVALID, Flags
 from transientcam_moments.reconstruction._settings import Settings
-from transientcam_moments.reconstruction._turns import LowFrequency
 
 
 class PassedReconstruction(Reconstruction):
@@ -28,21 +25,11 @@ class PassedReconstruction(Reconstruction):
         Those it was made with.
     measure : callable
         Returns the calibrated moments that are not smoothed; called when they are first read.
-    kept : boolean array, shape (takes, N), optional
-        Which images went into the moments; all, when left out.
-    repaired : Repair, optional
-        What was done to the images before.
-    calibration : array, optional
-        As of `Reconstruction`.
     corrected : boolean array, shape (...), optional
         Where known harmonics were taken out; none are known, when left out.
-    spread : callable, optional
-        As of `Reconstruction`.
-    images : CapturedImages, optional
-        As of `Reconstruction`.
     share : array, shape (H, W), optional
         Its `variance_share`.
-    low : LowFrequency, optional
+    given
         As of `Reconstruction`.
     """
 
@@ -51,25 +38,12 @@ class PassedReconstruction(Reconstruction):
         planes: Planes,
         settings: Settings,
         measure: Callable[[], Array],
-        kept: Array | None = None,
-        repaired: Repair | None = None,
-        calibration: Array | None = None,
+        *,
         corrected: Array | None = None,
-        spread: Spread = at_once,
-        images: CapturedImages | None = None,
         share: Array | None = None,
-        low: LowFrequency | None = None,
+        **given: Any,
     ) -> None:
-        super().__init__(
-            None,
-            settings,
-            kept=kept,
-            repaired=repaired,
-            calibration=calibration,
-            spread=spread,
-            images=images,
-            low=low,
-        )
+        super().__init__(None, settings, **given)
         self._measure = measure
         self.smoothed = planes.smoothed
         self._averaged = planes.smoothed, share
@@ -83,7 +57,10 @@ class PassedReconstruction(Reconstruction):
         self.brightness = planes.brightness
         if settings.technique == "pisarenko":  # else it follows from another estimate
             self.uniform = planes.uniform
-        if settings.technique == "pisarenko" and low is None and self._first_alike(planes):
+        # in a turn that begins elsewhere, or with others before it, another return may be first
+        end = settings.start_rad + 2 * np.pi if settings.least_range_m is None else 0.0
+        usual = self._low is None and not (planes.phase_rad >= end).any()
+        if settings.technique == "pisarenko" and usual:
             self.direct = planes.direct
             self.indirect = planes.indirect
             if settings.base_frequency_hz is not None:
@@ -93,14 +70,6 @@ class PassedReconstruction(Reconstruction):
             self._flags_of_moments = self._flags_of_moments | no_signal
             if "range_m" in vars(self):
                 self.range_m = np.where(self._undetected, np.float32(np.nan), planes.range_m)
-
-    def _first_alike(self, planes: Planes) -> bool:
-        """Return whether a turn from 0 on has the same first returns, with the same phases."""
-        start = self.settings.start_rad
-        seam = start % (2 * np.pi)
-        return not (start - seam and (planes.phase_rad >= seam).any()) and (
-            start <= 0 or not (planes.phase_rad < seam).any()
-        )
 
     @cached_property
     def measured(self) -> Array:

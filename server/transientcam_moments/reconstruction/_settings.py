@@ -1,5 +1,6 @@
 """How moments become range, and what the range may be taken from."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,10 +68,7 @@ class Settings:
         How b_0 was measured (Sec. 4.3). Raw images need it; moments whose b_0 is 0 since it was
         not measured are "estimated".
     low_frequency_hz : float, optional
-        Where b_0 was measured, if at a low frequency. Its phase in raw images says which turn of
-        the base frequency's phase a range is in: up to c / (2 low_frequency_hz), 166 m at 0.9 MHz.
-    low_phase_rad : float, optional
-        Phase of the gain there; by that of b_1 and b_2, when left out (`low_phase_rad`).
+        Where b_0 was measured so: of raw images ranges are unambiguous to half its wavelength.
     takes : int, optional
         Captures in the images, averaged without outliers. Raw images need it.
     multiples : tuple of int, optional
@@ -90,9 +88,8 @@ class Settings:
     smoothing_sigma_px : float
         Of the Gaussian; 0 for none.
     least_range_m : float, optional
-        Of the sensor, where a turn of the phase begins: ranges are from here on to c / (2 f)
-        farther, and "first" is counted from here. When left out, strong first light within the
-        last 64th of that is below 0: noise does not put what is at 0 m to the far end.
+        Of the sensor, where a turn of the phase, c / (2 f), begins, and so "first". When left out,
+        strong first light in the last 64th is below 0: noise puts nothing at 0 m to the far end.
     threshold : float
         The range is that of the first return, or peak, with this share of the strongest one's
         weight, or density.
@@ -119,7 +116,6 @@ class Settings:
     base_frequency_hz: float | None = None
     zeroth: str | None = None
     low_frequency_hz: float | None = None
-    low_phase_rad: float | None = None
     takes: int | None = None
     multiples: tuple[int, ...] | None = None
     phases_rad: tuple[float, ...] | None = None
@@ -141,8 +137,6 @@ class Settings:
             raise ParameterError("base_frequency_hz", self.base_frequency_hz, "> 0 and finite")
         if self.zeroth is not None:
             chosen("zeroth", self.zeroth, tuple(ZEROTH_IMAGES))
-        if self.low_frequency_hz is not None and not 0 < self.low_frequency_hz < float("inf"):
-            raise ParameterError("low_frequency_hz", self.low_frequency_hz, "> 0 and finite")
         if self.takes is not None and self.takes < 1:
             raise ParameterError("takes", self.takes, ">= 1")
         if self.sensor is not None:
@@ -184,13 +178,10 @@ class Settings:
         return self.least_range_m / float(range_m(1.0, self.base_frequency_hz))
 
     @property
-    def early_threshold(self) -> float:
-        """Weight over the strongest from which a return comes first only as a turn begins there.
-
-        Where no least range is stated three quarters: what is weaker may be later light near the
-        end of the turn.
-        """
-        return 0.75 if self.least_range_m is None else self.threshold
+    def low_ratio(self) -> float:
+        """The low frequency over the base frequency; 0 where it cannot tell turns."""
+        ratio = (self.low_frequency_hz or 0.0) / (self.base_frequency_hz or math.inf)
+        return ratio if ratio < 1 else 0.0
 
     @property
     def sampled_rad(self) -> tuple[float, ...]:

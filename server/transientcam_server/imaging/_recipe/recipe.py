@@ -181,23 +181,6 @@ class Recipe:
         return nominal_gains(self.applied.sequence, delay_s=self.applied.delay_s)
 
     @cached_property
-    def low_phase_rad(self) -> float:
-        """Phase of the gain at the low frequency: of sub-phases, and the delay within the camera.
-
-        Measured gains tell how far that is from the nominal one, to half a period of the first
-        multiple.
-        """
-        sequence, delay_s = self.applied.sequence, self.applied.delay_s
-        rad_s = 2 * np.pi * sequence.base_frequency_hz * sequence.multiples[0]
-        first = self.nominal_gains[1]
-        of_sub_phases = np.angle(first * np.exp(-1j * rad_s * delay_s))
-        if self.gains is not None:
-            with np.errstate(all="ignore"):
-                unit = self.gains.planes[1] / np.abs(self.gains.planes[1])
-            delay_s += np.angle(np.nansum(unit) / first) / rad_s
-        return float(of_sub_phases + 2 * np.pi * self.applied.low_frequency_hz * delay_s)
-
-    @cached_property
     def noise_gains(self) -> NDArray[Any]:
         """The gains (m + 1,) that noise is predicted with, of all pixels.
 
@@ -267,7 +250,6 @@ class Recipe:
             base_frequency_hz=sequence.base_frequency_hz,
             zeroth=sequence.zeroth,
             low_frequency_hz=self.applied.low_frequency_hz or None,
-            low_phase_rad=self.low_phase_rad,
             takes=sequence.takes,
             multiples=sequence.multiples,
             phases_rad=sequence.sampling.phases_rad,
