@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.accuracy import worlds
+from benchmarks.accuracy import halves, worlds
 from benchmarks.accuracy.capturing import CAPTURE_SEED, SETTINGS
 from benchmarks.common.tables import Table, heads
 from transientcam.wire import Trust
@@ -41,9 +41,17 @@ class Judged(NamedTuple):
 
 
 def tables(
-    *, scenes: int = 8, seed: int = 9, directory: str = "", names: tuple[str, ...] = BUILT_IN
+    *,
+    scenes: int = 8,
+    seed: int = 9,
+    directory: str = "",
+    names: tuple[str, ...] = BUILT_IN,
+    exposures_s: tuple[float, ...] = halves.EXPOSURES_S,
 ) -> Iterator[Table]:
-    """Judge random scenes of a seed, those of a directory, and built-in ones by their names."""
+    """Judge random scenes of a seed, those of a directory, and built-in ones by their names.
+
+    And which pixels have a range, of pictures whose halves are lit and not, at some exposures.
+    """
     table = Table(
         "What pixels say of themselves",
         heads(
@@ -65,6 +73,10 @@ def tables(
         for path in (*paths, *names):
             found.append(judged(path))
             table.rows.append((Path(path).stem, *_figures(found[-1])))
+        if exposures_s:
+            yield halves.table(Path(folder), exposures_s)
+    if not found:
+        return
     together = Judged(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
     table.rows.append(("all", *_figures(together)))
     yield table

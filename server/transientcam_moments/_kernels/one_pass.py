@@ -213,7 +213,7 @@ class OnePass:
             s.analyse(
                 s.order, s.turns, int(self._estimated), smoothed, scratch.saturated,
                 scratch.eigenvalue, planes.brightness, planes.uniform, planes.validity,
-                planes.flags, settings.epsilon, settings.minimum_brightness, planes.phase_rad,
+                planes.flags, settings.epsilon, settings.least_light(np.float32), planes.phase_rad,
                 planes.weight, planes.count, scratch.residual, _EPS, s.steps, start, stop,
             )  # fmt: skip
             room = scratch.take_wide()

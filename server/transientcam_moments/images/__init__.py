@@ -14,6 +14,7 @@ from transientcam_moments.images._calibration import (
 )
 from transientcam_moments.images._four_bucket import (
     ZEROTH_IMAGES,
+    demodulate,
     four_bucket,
     harmonics_of,
     measure,

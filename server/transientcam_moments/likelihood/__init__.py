@@ -8,7 +8,7 @@ from transientcam_moments.likelihood import (
     _start as start,
     _tail as tail,
 )
-from transientcam_moments.likelihood._chi_square import SIGNIFICANCE, chi_square_quantile
+from transientcam_moments.likelihood._chi_square import SIGNIFICANCE, ambiguous, chi_square_quantile
 from transientcam_moments.likelihood._choice import (
     MOST_RETURNS,
 )
@@ -50,6 +50,7 @@ __all__ = [
     "STARTS",
     "Likelihood",
     "Unwrapped",
+    "ambiguous",
     "chi_square_quantile",
     "choice",
     "fitted",

@@ -44,32 +44,12 @@ def undetected_pixels(
     ambient: Array | None,
     share: Array | None = None,
 ) -> Array | None:
-    """Return what `undetected` does of smoothed moments, quickly where most pixels are lit.
+    """Return what `undetected` does of smoothed moments (m + 1, ...), quickly where most are lit.
 
-    Parameters
-    ----------
-    moments : NumPy array, shape (m + 1, ...)
-        Smoothed.
-    brightness : array, shape (...)
-        What is known of b_0.
-    noise_of : callable
-        Returns the noise of moments that no gain was taken out of, as `smoothed_of` takes it.
-    sigma_px : float
-        With which they were smoothed.
-    calibration : array, shape (m + 1,) or (m + 1, ...), optional
-        Gains that the moments were divided by; 1, when left out.
-    ambient : array, shape (...), optional
-        Light in DN an image that is not the camera's.
-    share : array, shape (...), optional
-        Of a pixel's own variance that averaging has left, where that was no Gaussian.
+    ``noise_of`` returns the noise of moments that no gain was taken out of, as `smoothed_of` takes
+    it, ``ambient`` is in DN an image, and ``share`` what averaging has left of a pixel's variance,
+    where that was no Gaussian. None where there is no such pixel.
 
-    Returns
-    -------
-    boolean array, shape (...)
-        None where there is no such pixel.
-
-    Notes
-    -----
     Smoothing leaves no more noise than a pixel with its brightness has by itself: a pixel whose
     b_1 alone is above that is lit, and needs no look at its neighbours.
     """

@@ -172,6 +172,8 @@ class Labels:
             "multiples": self.multiples,
             "phases_rad": self.phases_rad,
         }
+        if self.frequency_hz is not None and self.zeroth == "low-frequency":
+            found["low_frequency_hz"] = float(self.frequency_hz[self.harmonic == 0][0])
         known = {name: value for name, value in found.items() if value is not None}
         for name, value in known.items():
             stated = getattr(given, name)

@@ -1,5 +1,6 @@
 """What follows from the moments of an image: each property computed once, when first read."""
 
+import math
 from collections.abc import Callable
 from functools import cached_property
 from html import escape
@@ -51,6 +52,7 @@ from transientcam_moments.reconstruction._flags import INVALID, Flags, flags
 from transientcam_moments.reconstruction._neighbours import over_neighbours, sensor_noise
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, OWN, Settings
+from transientcam_moments.reconstruction._turns import beginning_at, begun, turned
 
 _SHOWN = ("smoothed", "flags", "coefficients", "returns", "range_m")
 """Properties that the short text of a reconstruction names once they are computed."""
@@ -86,6 +88,8 @@ class Reconstruction:
         How the likelihood uses several threads, as `kernels.over` returns it.
     images : CapturedImages, optional
         What the moments were measured from, which tells their noise.
+    low : array, shape (...), optional
+        Light at the low frequency of b_0, whose phase tells turns; within one, when left out.
 
     Raises
     ------
@@ -108,6 +112,7 @@ class Reconstruction:
         correction: HarmonicCorrection | None = None,
         spread: Spread = at_once,
         images: CapturedImages | None = None,
+        low: Array | None = None,
     ) -> None:
         if not (settings.consecutive or self._of_any_multiples):
             raise ParameterError("multiples", settings.multiples, "1 to m")
@@ -121,6 +126,7 @@ class Reconstruction:
         self._repaired = repaired
         self._calibration = calibration
         self._images = images
+        self._low = low
 
     @cached_property
     def measured(self) -> Array:
@@ -218,13 +224,17 @@ class Reconstruction:
     @cached_property
     def flags(self) -> Array:
         """Flags of every pixel, uint8 of `Flags`."""
-        if self.settings.technique not in OF_ANY_MULTIPLES or self.noise is None:
-            return self._flags_of_moments
         xp = namespace(self.smoothed)
+        found = self._flags_of_moments
+        if self._turned is not None:
+            open_ = self._turned[1] & self._has_phase
+            found = found | xp.where(open_, int(Flags.CONTRADICTORY), 0).astype(xp.uint8)
+        if self.settings.technique not in OF_ANY_MULTIPLES or self.noise is None:
+            return found
         estimate = self.estimate
         unexplained = self.has_range & ~estimate.explained()
         undetermined = self.has_range & estimate.ambiguous()
-        found = self._flags_of_moments | xp.where(unexplained, int(Flags.UNEXPLAINED), 0)
+        found = found | xp.where(unexplained, int(Flags.UNEXPLAINED), 0)
         found = found | xp.where(undetermined, int(Flags.DEGENERATE), 0)
         return found.astype(xp.uint8)
 
@@ -234,7 +244,7 @@ class Reconstruction:
         xp = namespace(self.smoothed)
         found = flags(
             self.smoothed,
-            minimum_brightness=self.settings.minimum_brightness,
+            minimum_brightness=self.settings.least_light(self.smoothed.dtype),
             eigenvalue=self.eigenvalue,
         )
         # biasing made the matrix definite; what is left of its defect is the flag for biasing
@@ -280,7 +290,13 @@ class Reconstruction:
 
     @property
     def has_range(self) -> Array:
-        """Where there is light, more than noise where that is known, and all moments are finite."""
+        """Where there is light, more than noise where that is known, all moments are finite, and a
+        low frequency does not leave open which turn a range is in.
+        """
+        return self._has_phase if self._turned is None else self._has_phase & ~self._turned[1]
+
+    @property
+    def _has_phase(self) -> Array:
         return (self._flags_of_moments & int(INVALID)) == 0
 
     @cached_property
@@ -340,11 +356,11 @@ class Reconstruction:
         moments, noise_of = self.smoothed, self._noise_of(self._calibration)
         if noise_of is None:
             return None
-        brightness, ambient, share = self._least_brightness, self.ambient, self.variance_share
-        if self.settings.gaussian_px > 0 and moments.ndim == 3:
-            sigma_px = self.settings.gaussian_px
-            return smoothed_of(noise_of, brightness, sigma_px, ambient=ambient)
-        noise = noise_of(brightness) if ambient is None else noise_of(brightness, ambient=ambient)
+        brightness, share = self._least_brightness, self.variance_share
+        sigma_px = self.settings.gaussian_px
+        if sigma_px > 0 and moments.ndim == 3:
+            return smoothed_of(noise_of, brightness, sigma_px, ambient=self.ambient)
+        noise = noise_of(brightness, ambient=0.0 if self.ambient is None else self.ambient)
         return noise if share is None else MomentNoise(noise.variance * share)
 
     @cached_property
@@ -450,23 +466,42 @@ class Reconstruction:
         return (std * scatter(flat, of_them, multiples, error)).astype(std.dtype)
 
     @cached_property
+    def _sharp(self) -> Returns | Likelihood:
+        """Returns, one of which is the direct one."""
+        if self.settings.technique in ("likelihood", "two-returns"):
+            return self.two_returns if self.settings.technique == "two-returns" else self.likelihood
+        merged = self.settings.technique == "pisarenko-merged"
+        return merge_returns(self.returns, self.noise) if merged else self.returns
+
+    @cached_property
     def _separation(self) -> Separation:
-        technique = self._technique
-        if self.settings.technique in OF_ANY_MULTIPLES:
-            estimate = self.estimate
-            if isinstance(estimate, Unwrapped):
-                return estimate.separate()
-            return estimate.separate(self.settings.threshold)
-        if self.settings.technique == "pisarenko-merged":
-            return separate(merge_returns(self.returns, self.noise), self.settings.threshold)
-        if technique is None:
-            return separate(self.returns, self.settings.threshold)
-        xp = namespace(self.smoothed)
-        b = np.asarray(self.smoothed)
-        check_order(b.shape[0] - 1, least=technique.least_harmonics, name=technique.name)
-        # as measured: none of them needs biased moments
-        found = technique.estimate(b).separate(self.settings.threshold)
-        return Separation(*(xp.asarray(part) for part in found))
+        """Direct and indirect light of the turn from the least range on."""
+        threshold, technique = self.settings.threshold, self._technique
+        if technique is not None:
+            xp = namespace(self.smoothed)
+            b = np.asarray(self.smoothed)
+            check_order(b.shape[0] - 1, least=technique.least_harmonics, name=technique.name)
+            # as measured: none of them needs biased moments
+            parts = technique.estimate(b).separate(threshold)
+            return self._lone(Separation(*(xp.asarray(part) for part in parts)))
+        if self.settings.technique == "unwrapped-phase":
+            return self._lone(self.unwrapped.separate())
+        sharp = self._sharp
+        known = isinstance(sharp, Likelihood)
+        found = sharp.separate(threshold) if known else separate(sharp, threshold)
+        return self._first(found, sharp.phase_rad, sharp.weight)
+
+    def _first(self, found: Separation, phase: Array, weight: Array) -> Separation:
+        """Return the first of several returns from the least range on.
+
+        Where none is stated light just below 0 has to be strong: it may be later light.
+        """
+        least = self.settings.threshold if self.settings.least_range_m is not None else 0.75
+        return beginning_at(self.settings.start_rad, found, phase, weight, least)
+
+    def _lone(self, found: Separation) -> Separation:
+        turn = 2 * np.pi / math.gcd(*(self.settings.multiples or (1,)))
+        return found._replace(phase_rad=begun(found.phase_rad, self.settings.start_rad, turn))
 
     @property
     def _technique(self) -> Technique | None:
@@ -492,27 +527,63 @@ class Reconstruction:
     @cached_property
     def direct(self) -> Array:
         """Brightness of the direct return."""
-        return self._separation.direct
+        return self._placed.direct
 
     @cached_property
     def indirect(self) -> Array:
         """Brightness of all later returns, and of earlier ones below the threshold."""
-        return self._separation.indirect
+        return self._placed.indirect
 
     @cached_property
     def phase_rad(self) -> Array:
         """Phase of the direct return by the estimator of the settings; NaN where there is none.
 
+        With the turns before it, where the phase at a low frequency was measured.
         Raises ParameterError, as `direct` does, where the estimator needs more harmonics.
         """
         xp = namespace(self.moments)
-        if self.settings.technique == "maximum-entropy":
-            phase = self.peaks.first_rad
-        elif self.settings.technique == "single-frequency":
-            phase = in_turn(xp.arctan2(self.moments[1].imag, self.moments[1].real))
-        else:
-            phase = self._separation.phase_rad
+        phase = (self._in_turn if self._turned is None else self._turned[0]).phase_rad
         return xp.where(self.has_range, phase, np.nan).astype(self.brightness.dtype)
+
+    @property
+    def _placed(self) -> Separation:
+        return self._separation if self._turned is None else self._turned[0]
+
+    @cached_property
+    def _turned(self) -> tuple[Separation, Array] | None:
+        """What `turned` returns; None where no low frequency tells."""
+        if self._low is None:
+            return None
+        settings, found, technique = self.settings, self._in_turn, self.settings.technique
+        peaky = technique == "maximum-entropy"
+        phase, weight = self.peaks[2:] if peaky else (self._sharp.phase_rad, self._sharp.weight)
+        # the phase of one moment, or of all, is of no return that could come first instead
+        lone = technique in ("single-frequency", "unwrapped-phase")
+        light, noise_of = self.smoothed[0].real, self._noise_of(self._calibration)
+        sigma_px = settings.smoothing_sigma_px * (settings.neighbours != "none")
+        std: Array | float = 0.0
+        with np.errstate(all="ignore"):  # of pixels without light
+            if noise_of is not None:
+                noise = noise_of(light, ambient=0.0 if self.ambient is None else self.ambient)
+                std = namespace(light).sqrt(noise.variance[0]) / light
+            placed, open_ = turned(
+                self._low, settings.low_ratio, found, phase, weight, std, sigma_px,
+                np.inf if lone else settings.threshold,
+            )  # fmt: skip
+        return self._separation._replace(phase_rad=placed.phase_rad) if peaky else placed, open_
+
+    @cached_property
+    def _in_turn(self) -> Separation:
+        """Direct light and its phase from the least range on, whatever it is worth."""
+        found, b = self._separation, self.moments[1]
+        if self.settings.technique == "maximum-entropy":
+            first = found._replace(phase_rad=self.peaks.first_rad)
+            of_peaks = self._first(first, self.peaks.phase_rad, self.peaks.density)
+            return found._replace(phase_rad=of_peaks.phase_rad)
+        if self.settings.technique == "single-frequency":
+            phase = in_turn(namespace(b).arctan2(b.imag, b.real))
+            return self._lone(found._replace(phase_rad=phase))
+        return found
 
     @cached_property
     def range_m(self) -> Array:

@@ -2,15 +2,13 @@
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from transientcam_compiled import Spread, at_once
 from transientcam_moments._kernels.one_pass import Planes
 from transientcam_moments.arrays import Array
-from transientcam_moments.images import Repair
 from transientcam_moments.moment_problem import Coefficients, Returns, levinson
-from transientcam_moments.noise import CapturedImages
 from transientcam_moments.reconstruction import Reconstruction
 from transientcam_moments.reconstruction._flags import INVALID, Flags
 from transientcam_moments.reconstruction._settings import Settings
@@ -27,20 +25,12 @@ class PassedReconstruction(Reconstruction):
         Those it was made with.
     measure : callable
         Returns the calibrated moments that are not smoothed; called when they are first read.
-    kept : boolean array, shape (takes, N), optional
-        Which images went into the moments; all, when left out.
-    repaired : Repair, optional
-        What was done to the images before.
-    calibration : array, optional
-        As of `Reconstruction`.
     corrected : boolean array, shape (...), optional
         Where known harmonics were taken out; none are known, when left out.
-    spread : callable, optional
-        As of `Reconstruction`.
-    images : CapturedImages, optional
-        As of `Reconstruction`.
     share : array, shape (H, W), optional
         Its `variance_share`.
+    given
+        As of `Reconstruction`.
     """
 
     def __init__(
@@ -48,23 +38,12 @@ class PassedReconstruction(Reconstruction):
         planes: Planes,
         settings: Settings,
         measure: Callable[[], Array],
-        kept: Array | None = None,
-        repaired: Repair | None = None,
-        calibration: Array | None = None,
+        *,
         corrected: Array | None = None,
-        spread: Spread = at_once,
-        images: CapturedImages | None = None,
         share: Array | None = None,
+        **given: Any,
     ) -> None:
-        super().__init__(
-            None,
-            settings,
-            kept=kept,
-            repaired=repaired,
-            calibration=calibration,
-            spread=spread,
-            images=images,
-        )
+        super().__init__(None, settings, **given)
         self._measure = measure
         self.smoothed = planes.smoothed
         self._averaged = planes.smoothed, share
@@ -76,8 +55,12 @@ class PassedReconstruction(Reconstruction):
             self._flags_of_moments = planes.flags | np.uint8(Flags.NO_SIGNAL) * nothing
         self.returns = Returns(planes.phase_rad, planes.weight, planes.uniform, planes.count)
         self.brightness = planes.brightness
-        if settings.technique == "pisarenko":  # else they follow from another estimate
+        if settings.technique == "pisarenko":  # else it follows from another estimate
             self.uniform = planes.uniform
+        # in a turn that begins elsewhere, or with others before it, another return may be first
+        end = settings.start_rad + 2 * np.pi if settings.least_range_m is None else 0.0
+        usual = self._low is None and not (planes.phase_rad >= end).any()
+        if settings.technique == "pisarenko" and usual:
             self.direct = planes.direct
             self.indirect = planes.indirect
             if settings.base_frequency_hz is not None:

@@ -23,6 +23,7 @@ from transientcam_moments.images import (
     calibrate,
     checked_mask,
     checked_waveform,
+    demodulate,
     fill_bad_pixels,
     gaussian_taps,
     harmonics_of,
@@ -43,6 +44,7 @@ from transientcam_moments.reconstruction._one_pass import PassedReconstruction
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, Settings
 from transientcam_moments.reconstruction._sparse_frequencies import GappedReconstruction
+from transientcam_moments.reconstruction._turns import low_phase_rad
 
 _BY_THE_PASS = ("pisarenko", "pisarenko-merged", *OF_ANY_MULTIPLES)
 """Estimators that follow from the pass's returns or moments."""
@@ -88,6 +90,9 @@ class Reconstructor:
             if not self.settings.consecutive:
                 limit = "1 to m, for a waveform to be taken out"
                 raise ParameterError("multiples", self.settings.multiples, limit)
+        self._low_phase_rad = (
+            None if calibration is None else low_phase_rad(self.settings, calibration)
+        )
         self._waveform = waveform if waveform is not None and matters(waveform) else None
         self._lock = threading.Lock()
         self._prepared: dict[tuple[Any, ...], OnePass] = {}
@@ -133,7 +138,7 @@ class Reconstructor:
         data = data if isinstance(data, Sequence) else as_array(data)
         if not isinstance(data, Sequence) and np.dtype(data.dtype).kind == "c":
             moments = data if self._bad is None else fill_bad_pixels(data, self._bad)
-            return self._of_moments(self._calibrated(moments), saturated_pixels, None, spread)
+            return self._of_moments(self._calibrated(moments), saturated_pixels, spread)
         zeroth, count = self._require_labels()
         takes = takes_first(data, count, len(self.settings.sampled_rad))
         repaired = self._repaired(takes, previous)
@@ -142,22 +147,19 @@ class Reconstructor:
         recovered = self._recovered(takes, zeroth)
         if recovered is not None:
             takes = recovered.images
-        images = self._images(takes, zeroth, repaired, recovered)
+        given: dict[str, Any] = {"repaired": repaired}
+        given["images"] = self._images(takes, zeroth, repaired, recovered)
         # behind the smoothing, where a waveform is known: harmonics are taken out there
         behind = self._waveform is not None or self.settings.keeps_edges
         one_pass = None if behind else self._pass_of_images(takes, zeroth)
         if one_pass is not None:
             planes = one_pass.images(takes[0], saturated_pixels, spread)
             return PassedReconstruction(
-                planes,
-                self.settings,
-                lambda: self._measured(takes)[0],
-                repaired=repaired,
-                calibration=self._calibration,
-                spread=spread,
-                images=images,
-            )
-        moments, kept = self._measured(takes, None if repaired is None else repaired.left_out)
+                planes, self.settings, lambda: self._measured(takes)[0],
+                calibration=self._calibration, spread=spread, low=self._low(takes[0]), **given,
+            )  # fmt: skip
+        left_out = None if repaired is None else repaired.left_out
+        moments, given["kept"], given["low"] = self._measured(takes, left_out)
         if recovered is not None:
             used = True if self._bad is None else ~self._bad  # values of bad pixels are not
             moments[:, recovered.undetermined & used] = np.nan
@@ -168,7 +170,7 @@ class Reconstructor:
             saturated_pixels = saturated(stack, full_scale=self.settings.full_scale)
             if self._bad is not None:  # their own values are not used
                 saturated_pixels = saturated_pixels & ~self._bad
-        return self._of_moments(moments, saturated_pixels, kept, spread, repaired, images)
+        return self._of_moments(moments, saturated_pixels, spread, **given)
 
     def of_measured(
         self,
@@ -194,7 +196,7 @@ class Reconstructor:
         spread : callable
             As of a call.
         """
-        found = self._of_moments(moments, saturated_pixels, None, spread)
+        found = self._of_moments(moments, saturated_pixels, spread)
         if ambient_dn > 0:
             found.ambient = np.full(moments.shape[1:], ambient_dn, moments.real.dtype)
         return found
@@ -208,60 +210,27 @@ class Reconstructor:
         return settings.zeroth, settings.takes
 
     def _of_moments(
-        self,
-        moments: Array,
-        saturated_pixels: Array | None,
-        kept: Array | None,
-        spread: Spread,
-        repaired: Repair | None = None,
-        images: CapturedImages | None = None,
+        self, moments: Array, saturated_pixels: Array | None, spread: Spread, **given: Any
     ) -> Reconstruction:
-        """Go on from calibrated moments."""
+        """Go on from calibrated moments, with what else `Reconstruction` is given."""
+        given |= {"calibration": self._calibration, "spread": spread}
+        lazily = {"saturated_pixels": saturated_pixels, "bad_pixels": self._bad}
         if not self.settings.consecutive:
-            return GappedReconstruction(
-                moments,
-                self.settings,
-                saturated_pixels,
-                bad_pixels=self._bad,
-                kept=kept,
-                calibration=self._calibration,
-                spread=spread,
-                images=images,
-            )
+            return GappedReconstruction(moments, self.settings, **lazily, **given)
         one_pass = self._pass_of_moments(moments)
         correction = self._correction(moments)
         if one_pass is None:
-            return Reconstruction(
-                moments,
-                self.settings,
-                saturated_pixels,
-                bad_pixels=self._bad,
-                kept=kept,
-                repaired=repaired,
-                calibration=self._calibration,
-                correction=correction,
-                spread=spread,
-                images=images,
-            )
+            given["correction"] = correction
+            return Reconstruction(moments, self.settings, **lazily, **given)
         gains, left_out = self._calibration, (saturated_pixels, self._bad)
-        how = images, spread
+        how = given.get("images"), spread
         smoothed, share = over_neighbours(moments, self.settings, gains, left_out, *how)
         corrected = None
         if correction is not None:
             smoothed, corrected = correction(smoothed, spread=spread)
         planes = one_pass.moments(smoothed, saturated_pixels, spread)
-        return PassedReconstruction(
-            planes,
-            self.settings,
-            lambda: moments,
-            kept=kept,
-            repaired=repaired,
-            calibration=self._calibration,
-            corrected=corrected,
-            spread=spread,
-            images=images,
-            share=share,
-        )
+        given |= {"corrected": corrected, "share": share}
+        return PassedReconstruction(planes, self.settings, lambda: moments, **given)
 
     def _correction(self, moments: Array) -> HarmonicCorrection | None:
         """Return what takes the harmonics of the waveform out of these moments, if any is known."""
@@ -332,14 +301,26 @@ class Reconstructor:
             self.settings.gaussian_px,
         )
 
-    def _measured(self, takes: Array, left_out: Array | None = None) -> tuple[Array, Array]:
-        """Return calibrated moments of raw images, and which images went into them."""
+    def _measured(
+        self, takes: Array, left_out: Array | None = None
+    ) -> tuple[Array, Array, Array | None]:
+        """Return calibrated moments of raw images, which images went into them, and `_low`."""
         average, kept = average_takes(takes, left_out=left_out)
         if self._bad is not None:
             average = fill_bad_pixels(average, self._bad)
         zeroth, _ = self._require_labels()
         moments = measure(average, zeroth=zeroth, phases_rad=self.settings.sampled_rad)
-        return self._calibrated(moments), kept
+        return self._calibrated(moments), kept, self._low(average)
+
+    def _low(self, images: Array) -> Array | None:
+        """Return light at the low frequency of one take's images (N, ...), if it tells turns."""
+        if self._low_phase_rad is None:
+            return None
+        phases_rad = self.settings.sampled_rad
+        phasor = demodulate(images[None, : len(phases_rad)], phases_rad)
+        if self._bad is not None:
+            phasor = fill_bad_pixels(phasor, self._bad)
+        return phasor[0] * np.exp(-1j * self._low_phase_rad)
 
     def _calibrated(self, moments: Array) -> Array:
         return moments if self._calibration is None else calibrate(moments, self._calibration)

@@ -1,8 +1,10 @@
 """How moments become range, and what the range may be taken from."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from transientcam_moments.arrays import MAX_HARMONICS, chosen, in_range
 from transientcam_moments.comparisons import TECHNIQUES
@@ -10,6 +12,7 @@ from transientcam_moments.errors import ParameterError
 from transientcam_moments.images import FOUR_PHASES_RAD, SIGMA_PX, ZEROTH_IMAGES, phase_weights
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, EPSILON
 from transientcam_moments.noise import Sensor
+from transientcam_moments.reconstruction._ranging import range_m
 
 NEIGHBOURS = ("edge-preserving", "gaussian", "none")
 """How moments are averaged over neighbouring pixels; see `Settings`."""
@@ -64,6 +67,8 @@ class Settings:
     zeroth : {"low-frequency", "on-off", "estimated"}, optional
         How b_0 was measured (Sec. 4.3). Raw images need it; moments whose b_0 is 0 since it was
         not measured are "estimated".
+    low_frequency_hz : float, optional
+        Where b_0 was measured so: of raw images ranges are unambiguous to half its wavelength.
     takes : int, optional
         Captures in the images, averaged without outliers. Raw images need it.
     multiples : tuple of int, optional
@@ -82,6 +87,9 @@ class Settings:
         one. There is none without two image axes.
     smoothing_sigma_px : float
         Of the Gaussian; 0 for none.
+    least_range_m : float, optional
+        Of the sensor, where a turn of the phase, c / (2 f), begins, and so "first". When left out,
+        strong first light in the last 64th is below 0: noise puts nothing at 0 m to the far end.
     threshold : float
         The range is that of the first return, or peak, with this share of the strongest one's
         weight, or density.
@@ -107,6 +115,7 @@ class Settings:
 
     base_frequency_hz: float | None = None
     zeroth: str | None = None
+    low_frequency_hz: float | None = None
     takes: int | None = None
     multiples: tuple[int, ...] | None = None
     phases_rad: tuple[float, ...] | None = None
@@ -114,6 +123,7 @@ class Settings:
     keep: str = "harmonics"
     neighbours: str = "gaussian"
     smoothing_sigma_px: float = SIGMA_PX
+    least_range_m: float | None = None
     threshold: float = DIRECT_THRESHOLD
     estimator: str = "automatic"
     minimum_brightness: float = 0.0
@@ -140,6 +150,8 @@ class Settings:
         chosen("keep", self.keep, ("harmonics", "brightness"))
         chosen("neighbours", self.neighbours, NEIGHBOURS)
         in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
+        if self.least_range_m is not None:
+            in_range("least_range_m", self.least_range_m, -1000.0, 1000.0, "-1000 to 1000 m")
         in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
         chosen("estimator", self.estimator, ("automatic", *ESTIMATORS))
         chosen("spoilt_images", self.spoilt_images, CORRUPT_IMAGES)
@@ -153,6 +165,23 @@ class Settings:
     def technique(self) -> str:
         """The estimator, also where it is automatic."""
         return automatic(self.multiples) if self.estimator == "automatic" else self.estimator
+
+    def least_light(self, dtype: DTypeLike) -> float:
+        """Return the brightness that is no signal: subnormal moments have too few digits, too."""
+        return max(self.minimum_brightness, float(np.finfo(dtype).tiny))
+
+    @property
+    def start_rad(self) -> float:
+        """Phase at the base frequency where a turn begins."""
+        if self.least_range_m is None or self.base_frequency_hz is None:
+            return -2 * np.pi / 64
+        return self.least_range_m / float(range_m(1.0, self.base_frequency_hz))
+
+    @property
+    def low_ratio(self) -> float:
+        """The low frequency over the base frequency; 0 where it cannot tell turns."""
+        ratio = (self.low_frequency_hz or 0.0) / (self.base_frequency_hz or math.inf)
+        return ratio if ratio < 1 else 0.0
 
     @property
     def sampled_rad(self) -> tuple[float, ...]:

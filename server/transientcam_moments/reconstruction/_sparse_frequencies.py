@@ -68,7 +68,7 @@ class GappedReconstruction(Reconstruction):
         xp = namespace(self.smoothed)
         size = abs(self.smoothed)
         finite = xp.isfinite(size).all(axis=0)
-        dark = finite & ~(self._least_brightness > self.settings.minimum_brightness)
+        dark = finite & ~(self._least_brightness > self.settings.least_light(size.dtype))
         found = xp.where(finite, 0, int(Flags.NON_FINITE))
         for flag, where in (
             (Flags.NO_SIGNAL, dark),

@@ -29,8 +29,8 @@ from transientcam_server.imaging._recipe.recipe import Recipe
 _Array = NDArray[Any]
 WITHIN: Final = 0.9
 """Share of the trusted pixels that the metadata's interval is of."""
-DRAWS: Final = 4
-"""Noisy copies of a frame."""
+DRAWS, QUICK_DRAWS = 4, 16
+"""Noisy copies of a frame; where the estimator is the phase of one moment."""
 SPARSE_PX: Final = 4
 """Rows and columns between pixels, where there is no time for all of them."""
 _OTHERS: Final = ("likelihood", "pisarenko")
@@ -126,9 +126,13 @@ def range_accuracy(
         np.asarray(found.smoothed)[grid][:, seen],
         np.asarray(moment_noise(recipe, found).variance, dtype=np.float32)[grid][:, seen],
     )
-    drawn_m = frame.drawn_m()
-    std_m = _placed(typical_deviation(drawn_m), seen)
-    shifts_m = [_placed(other_m, seen) - range_m for other_m in frame.others_m()]
+    turn_m = float(tm.range_m(2 * np.pi, recipe.base_frequency_hz))
+
+    def shift_m(other_m: _Array) -> _Array:  # whatever turn a range is in
+        return np.remainder(other_m - range_m[seen] + turn_m / 2, turn_m) - turn_m / 2
+
+    std_m = _placed(typical_deviation(shift_m(frame.drawn_m())), seen)
+    shifts_m = [_placed(shift_m(other_m), seen) for other_m in frame.others_m()]
     unknown = np.full(seen.shape, np.nan, dtype=np.float32)
     bias_m = np.max([np.abs(median_around(each)) for each in shifts_m], axis=0, initial=0.0)
     bias_m = np.where(np.isfinite(range_m), bias_m, np.nan) if shifts_m else unknown
@@ -170,11 +174,12 @@ class _Frame:
         if self.recipe.applied.sequence.zeroth == "estimated":
             variance[0] = 0
         random = np.random.default_rng(_SEED)
-        drawn = tm.noise.draw(self.b, tm.noise.MomentNoise(variance), random, draws=DRAWS)
+        own = self.recipe.technique
+        draws = QUICK_DRAWS if own == "single-frequency" else DRAWS
+        drawn = tm.noise.draw(self.b, tm.noise.MomentNoise(variance), random, draws=draws)
         spread = np.broadcast_to(self.variance[:, None], drawn.shape)
         flat = (len(self.b), -1)
-        own = self.recipe.technique
-        return self._ranges_m(drawn.reshape(flat), spread.reshape(flat), own).reshape((DRAWS, -1))
+        return self._ranges_m(drawn.reshape(flat), spread.reshape(flat), own).reshape((draws, -1))
 
     def others_m(self) -> list[_Array]:
         """Return the range (P) by every other way that there is; none where m = 1."""

@@ -135,23 +135,12 @@ def beyond_noise(
     found: tm.Reconstruction,
     noise_of: Callable[..., tm.noise.MomentNoise],
 ) -> _Array:
-    """Return which lit pixels have moments that noise alone does not explain.
+    """Return which lit pixels (H, W) have moments that noise alone does not explain.
 
     Moments of light have a Toeplitz matrix without negative eigenvalues (Proposition 1); here the
-    smallest one is negative by more than `EXPLAINED_DEVIATIONS`.
-
-    Parameters
-    ----------
-    found
-        The frame, (m + 1, H, W).
-    noise_of
-        Returns the noise of moments with a brightness above 0 before smoothing, to which its
-        variance is affine: of each moment (m + 1, ...), or of all together (1, ...). Called with
-        ``ambient=`` where there is other light than the camera's.
-
-    Returns
-    -------
-    boolean array, shape (H, W)
+    smallest one is negative by more than `EXPLAINED_DEVIATIONS`. ``noise_of`` returns the noise of
+    moments with a brightness above 0 before smoothing, to which its variance is affine: of each
+    moment (m + 1, ...), or of all together (1, ...); with ``ambient=`` where there is other light.
     """
     beyond = _beyond_own_share(found, noise_of)
     doubtful = np.flatnonzero(beyond)

@@ -3,7 +3,6 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -59,18 +58,16 @@ def describe_pixel(
     """
     flags = tm.Flags(int(image.flags[y, x]))
     rad_s = 2.0 * np.pi * recipe.base_frequency_hz
-    found: tm.Reconstruction = image
     at: tuple[Any, ...] = (..., y, x)
     density: dict[str, Any] = {"time_s": [], "density_per_s": [], "cumulative": []}
     lower, upper = np.empty((2, 0))
     if recipe.applied.sequence.sampling.consecutive:
-        # smoothing and biasing are done; flags are not to be judged a second time
-        settings = replace(image.settings, zeroth="low-frequency")
-        found, at = tm.Reconstruction(image.moments[:, y, x, np.newaxis], settings), (..., 0)
+        moments = image.moments[:, y, x, np.newaxis]
+        coefficients = tm.levinson(moments)
         phase_rad = 2.0 * np.pi * np.arange(bins) / bins
-        per_s = rad_s * tm.density(found.coefficients, phase_rad)[:, 0]
-        cumulative = tm.cumulative(found.coefficients, phase_rad)[:, 0]
-        bounds = tm.bounds(found.moments, phase_rad, BOUNDS_RADIUS)
+        per_s = rad_s * tm.density(coefficients, phase_rad)[:, 0]
+        cumulative = tm.cumulative(coefficients, phase_rad)[:, 0]
+        bounds = tm.bounds(moments, phase_rad, BOUNDS_RADIUS)
         lower, upper = (rad_s * bound[:, 0] for bound in bounds)
         density = {
             "time_s": [float(phase) / rad_s for phase in phase_rad],
@@ -80,21 +77,21 @@ def describe_pixel(
     return {
         "x": x,
         "y": y,
-        "range_m": None if flags & tm.INVALID else _number(found.range_m[at]),
-        "direct": _number(found.direct[at]) or 0.0,
-        "indirect": _number(found.indirect[at]) or 0.0,
-        "brightness": _number(found.brightness[at]) or 0.0,
-        "uniform": _number(found.uniform[at]) or 0.0,
+        "range_m": None if flags & tm.INVALID else _number(image.range_m[at]),
+        "direct": _number(image.direct[at]) or 0.0,
+        "indirect": _number(image.indirect[at]) or 0.0,
+        "brightness": _number(image.brightness[at]) or 0.0,
+        "uniform": _number(image.uniform[at]) or 0.0,
         "validity": _number(image.validity[y, x]),
         "flags": [str(flag.name).lower() for flag in tm.Flags if flag and flag in flags],
         "moments": [
             {"re": _number(each.real) or 0.0, "im": _number(each.imag) or 0.0}
-            for each in found.moments[at]
+            for each in image.moments[at]
         ],
         "returns": [
             {"time_s": float(phase) / rad_s, "weight": float(weight)}
             for phase, weight in zip(
-                found.returns.phase_rad[at], found.returns.weight[at], strict=True
+                image.returns.phase_rad[at], image.returns.weight[at], strict=True
             )
             if weight > 0.0 and math.isfinite(phase) and not flags & tm.INVALID
         ],

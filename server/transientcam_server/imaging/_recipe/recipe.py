@@ -249,6 +249,7 @@ class Recipe:
         settings = chosen.for_moments(
             base_frequency_hz=sequence.base_frequency_hz,
             zeroth=sequence.zeroth,
+            low_frequency_hz=self.applied.low_frequency_hz or None,
             takes=sequence.takes,
             multiples=sequence.multiples,
             phases_rad=sequence.sampling.phases_rad,
