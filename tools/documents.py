@@ -38,6 +38,7 @@ _OF_A_FRAME = (
     "PredictedStdDocument",
     "TrustCountsDocument",
     "RangeAccuracyDocument",
+    "FramesAveragedDocument",
     "HopDocument",
     "FrameDocument",
     "FrameMeta",

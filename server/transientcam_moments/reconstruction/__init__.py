@@ -13,6 +13,7 @@ from transientcam_moments.reconstruction._settings import (
     automatic,
     least_harmonics,
 )
+from transientcam_moments.reconstruction._still import Measured
 
 __all__ = [
     "ESTIMATORS",
@@ -22,6 +23,7 @@ __all__ = [
     "SPEED_OF_LIGHT_M_S",
     "Flags",
     "Labels",
+    "Measured",
     "Reconstruction",
     "Reconstructor",
     "Settings",

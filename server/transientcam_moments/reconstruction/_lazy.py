@@ -86,6 +86,8 @@ class Reconstruction:
         How the likelihood uses several threads, as `kernels.over` returns it.
     images : CapturedImages, optional
         What the moments were measured from, which tells their noise.
+    frames : array, shape (H, W), optional
+        How many frames each pixel of the moments is the mean of; one, when left out.
 
     Raises
     ------
@@ -108,6 +110,7 @@ class Reconstruction:
         correction: HarmonicCorrection | None = None,
         spread: Spread = at_once,
         images: CapturedImages | None = None,
+        frames: Array | None = None,
     ) -> None:
         if not (settings.consecutive or self._of_any_multiples):
             raise ParameterError("multiples", settings.multiples, "1 to m")
@@ -121,10 +124,11 @@ class Reconstruction:
         self._repaired = repaired
         self._calibration = calibration
         self._images = images
+        self.frames_averaged = frames
 
     @cached_property
     def measured(self) -> Array:
-        """Calibrated moments (m + 1, ...), not smoothed."""
+        """Calibrated moments (m + 1, ...) of the frame alone, not smoothed."""
         return self._measured
 
     @cached_property
@@ -153,12 +157,15 @@ class Reconstruction:
     def _averaged(self) -> tuple[Array, Array | None]:
         """Moments averaged over neighbours, and `variance_share`."""
         left_out, gains = (self._saturated, self._bad), self._calibration
-        how = self._images, self._spread
-        return over_neighbours(self.measured, self.settings, gains, left_out, *how)
+        how = self._images, self._spread, self.frames_averaged
+        return over_neighbours(self._measured, self.settings, gains, left_out, *how)
 
     @property
     def variance_share(self) -> Array | None:
-        """Share (H, W) of a pixel's variance that `average_neighbours` has left; else None."""
+        """What averaging over neighbours that agree and over frames has left of the variance.
+
+        (H, W), over that of one frame by itself, or after the Gaussian; None where there was none.
+        """
         return self._averaged[1]
 
     @cached_property
@@ -343,8 +350,11 @@ class Reconstruction:
         brightness, ambient, share = self._least_brightness, self.ambient, self.variance_share
         if self.settings.gaussian_px > 0 and moments.ndim == 3:
             sigma_px = self.settings.gaussian_px
-            return smoothed_of(noise_of, brightness, sigma_px, ambient=ambient)
-        noise = noise_of(brightness) if ambient is None else noise_of(brightness, ambient=ambient)
+            noise = smoothed_of(noise_of, brightness, sigma_px, ambient=ambient)
+        elif ambient is None:
+            noise = noise_of(brightness)
+        else:
+            noise = noise_of(brightness, ambient=ambient)
         return noise if share is None else MomentNoise(noise.variance * share)
 
     @cached_property

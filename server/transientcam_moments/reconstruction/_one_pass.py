@@ -37,7 +37,7 @@ class PassedReconstruction(Reconstruction):
         Where known harmonics were taken out; none are known, when left out.
     spread : callable, optional
         As of `Reconstruction`.
-    images : CapturedImages, optional
+    images, frames : optional
         As of `Reconstruction`.
     share : array, shape (H, W), optional
         Its `variance_share`.
@@ -55,6 +55,7 @@ class PassedReconstruction(Reconstruction):
         spread: Spread = at_once,
         images: CapturedImages | None = None,
         share: Array | None = None,
+        frames: Array | None = None,
     ) -> None:
         super().__init__(
             None,
@@ -64,6 +65,7 @@ class PassedReconstruction(Reconstruction):
             calibration=calibration,
             spread=spread,
             images=images,
+            frames=frames,
         )
         self._measure = measure
         self.smoothed = planes.smoothed

@@ -9,7 +9,7 @@ from transientcam_moments.comparisons import TECHNIQUES
 from transientcam_moments.errors import ParameterError
 from transientcam_moments.images import FOUR_PHASES_RAD, SIGMA_PX, ZEROTH_IMAGES, phase_weights
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, EPSILON
-from transientcam_moments.noise import Sensor
+from transientcam_moments.noise import MOST_FRAMES, Sensor
 
 NEIGHBOURS = ("edge-preserving", "gaussian", "none")
 """How moments are averaged over neighbouring pixels; see `Settings`."""
@@ -80,6 +80,9 @@ class Settings:
         How moments are averaged over neighbouring pixels: "gaussian" is the paper's (Sec. 6),
         "edge-preserving" is `average_neighbours`, which needs a sensor and is the Gaussian without
         one. There is none without two image axes.
+    still_frames : int
+        How many frames of a stream `Reconstructor.average` averages where nothing changes, at most;
+        1 to `noise.MOST_FRAMES`. A frame by itself never uses others.
     smoothing_sigma_px : float
         Of the Gaussian; 0 for none.
     threshold : float
@@ -113,6 +116,7 @@ class Settings:
     epsilon: float = EPSILON
     keep: str = "harmonics"
     neighbours: str = "gaussian"
+    still_frames: int = 1
     smoothing_sigma_px: float = SIGMA_PX
     threshold: float = DIRECT_THRESHOLD
     estimator: str = "automatic"
@@ -139,6 +143,7 @@ class Settings:
         in_range("epsilon", self.epsilon, 0.0, float(np.nextafter(1.0, 0.0)), "0 <= epsilon < 1")
         chosen("keep", self.keep, ("harmonics", "brightness"))
         chosen("neighbours", self.neighbours, NEIGHBOURS)
+        in_range("still_frames", self.still_frames, 1, MOST_FRAMES, f"1 to {MOST_FRAMES}")
         in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
         in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
         chosen("estimator", self.estimator, ("automatic", *ESTIMATORS))

@@ -466,6 +466,8 @@ export interface FrameDocument {
   /** Light in DN an image that is not the camera's, in the median pixel; 0 where it hardly adds
    * noise, null until something was computed and where no sensor is known. */
   readonly ambient_dn: number | null;
+  /** With the setting `still_frames`; null without, for recordings, and until computed. */
+  readonly frames_averaged: FramesAveragedDocument | null;
   /** Null until the range was computed. */
   readonly predicted_range_std_m: PredictedStdDocument | null;
   /** Null until one of the products range_std, range_bias, range_error, trust was computed. */
@@ -477,6 +479,13 @@ export interface FrameMeta extends FrameDocument {
   /** column and row of the first pixel, width, height */
   readonly region: readonly [number, number, number, number];
   readonly decimation: number;
+}
+
+/** How many frames the pixels of this one are the mean of, itself included. */
+export interface FramesAveragedDocument {
+  readonly median: number;
+  /** 1 where something moves. */
+  readonly least: number;
 }
 
 /** Light that comes back from one range. */
@@ -1004,6 +1013,11 @@ export interface ReconstructionDocument {
    * the daemon, a compiled kernel, of at most 8 harmonics; until then it is `gaussian`, as it is in
    * plans. */
   readonly neighbours: "edge-preserving" | "gaussian" | "none";
+  /** How many frames of a stream are averaged, at most, in each pixel that stands still; 1 for
+   * none. A pixel begins anew in the frame in which it changes by more than noise, or has drifted:
+   * the noise falls with the square root of `frames_averaged`. It needs the noise of the sensor, or
+   * images that tell it. Frames of recordings are never averaged. */
+  readonly still_frames: number;
   /** Standard deviation of the Gaussian that smooths the moments, in pixels; 0 for none. */
   readonly smoothing_px: number;
   /** Smallest eigenvalue every pixel's moments are raised to, over its brightness (Sec. 4.3). */
@@ -1053,6 +1067,11 @@ export interface ReconstructionRequest {
    * the daemon, a compiled kernel, of at most 8 harmonics; until then it is `gaussian`, as it is in
    * plans. */
   readonly neighbours?: "edge-preserving" | "gaussian" | "none";
+  /** How many frames of a stream are averaged, at most, in each pixel that stands still; 1 for
+   * none. A pixel begins anew in the frame in which it changes by more than noise, or has drifted:
+   * the noise falls with the square root of `frames_averaged`. It needs the noise of the sensor, or
+   * images that tell it. Frames of recordings are never averaged. */
+  readonly still_frames?: number;
   /** Standard deviation of the Gaussian that smooths the moments, in pixels; 0 for none. */
   readonly smoothing_px?: number;
   /** Smallest eigenvalue every pixel's moments are raised to, over its brightness (Sec. 4.3). */
