@@ -1,6 +1,7 @@
 """Averaging moments over frames where nothing changes: a recursive mean, begun anew by a test."""
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 from statistics import NormalDist
 from typing import Final, NamedTuple
@@ -39,7 +40,7 @@ class Still(NamedTuple):
         How many frames a pixel is the mean of; at least 1.
     mean, recent : array, shape (2, m + 1, H, W)
         Real and imaginary parts of means over all frames and over the last ones, for the next call.
-    count : array, shape (H, W)
+    seen : array, shape (H, W)
         How many frames these have seen; 0 where there are none.
     """
 
@@ -48,7 +49,7 @@ class Still(NamedTuple):
     frames: Array
     mean: _Planes
     recent: _Planes
-    count: _Planes
+    seen: _Planes
 
     def __repr__(self) -> str:
         """State the shapes and spans of its arrays."""
@@ -132,7 +133,7 @@ def average_frames(
         if before is None:
             nothing = np.zeros(shape, new.dtype)
             before = Still(moments, noise, nothing, new, new, nothing)
-        seen = before.count
+        seen = before.seen
         stays = present & (seen > 0)
         stays &= ~_changed(new, before, weight, order, stays)
         if corrupt:
@@ -167,13 +168,13 @@ def _changed(
     """Return which pixels differ from their means by more than noise, or have drifted."""
     shape, planes = among.shape, len(order)
     flat = [each.reshape((2, planes, -1)) for each in (new, before.mean, before.recent)]
-    pixels = weight.reshape((planes, -1)), before.count.reshape(-1), among.reshape(-1)
+    pixels = weight.reshape((planes, -1)), before.seen.reshape(-1), among.reshape(-1)
     numbers = int(((weight.max(axis=(1, 2)) > 0) * np.where(order > 0, 2, 1)).sum())
     changed, doubtful = np.zeros((2, among.size), dtype=bool)
     sums = np.zeros((4, among.size), new.dtype)
     for start in range(0, among.size, _BLOCK_PIXELS):
         block = np.s_[..., start : start + _BLOCK_PIXELS]
-        parts = [each[block] for each in (*flat, *pixels)]
+        parts = [each[block] for each in flat], [each[block] for each in pixels]
         changed[block], doubtful[block] = _judged(*parts, order[:, None], numbers, sums[block])
     changed, doubtful, sums = (each.reshape((-1, *shape)) for each in (changed, doubtful, sums))
     for step in (1, 3):  # 3 x 3 pixels, then 3 x 3 of these; what has changed is not among them
@@ -184,13 +185,18 @@ def _changed(
 
 
 def _judged(
-    new: _Planes, mean: _Planes, recent: _Planes, weight: _Planes, seen: _Planes, among: Array,
-    order: NDArray[np.int_], numbers: int, shifts: _Planes,
-) -> tuple[Array, Array]:  # fmt: skip
+    moments: Sequence[_Planes],
+    pixels: Sequence[Array],
+    order: NDArray[np.int_],
+    numbers: int,
+    shifts: _Planes,
+) -> tuple[Array, Array]:
     """Return which of some pixels have changed by themselves, and which may have.
 
     Writes what they are later and brighter by, in deviations: the frame and the last ones.
     """
+    new, mean, recent = moments
+    weight, seen, among = pixels
     seen, j = np.maximum(seen, 1), order.astype(new.dtype)
     size = weight * (mean[0] * mean[0] + mean[1] * mean[1])
     brightness, depth = size.sum(axis=0), (j * j * size).sum(axis=0)

@@ -60,7 +60,7 @@ class Measured:
         if self.still is None:
             return None
         none = np.empty(0)
-        still = self.still._replace(noise=MomentNoise(none), mean=none, recent=none, count=none)
+        still = self.still._replace(noise=MomentNoise(none), mean=none, recent=none, seen=none)
         return Measured(still.moments, image_noise=self.image_noise, still=still)
 
     @property
@@ -77,7 +77,7 @@ def over_frames(
     frame: Measured, before: Measured | None, settings: Settings, calibration: Array | None
 ) -> Measured:
     """Average a frame with the one before; it stays as it is where no one knows its noise."""
-    known = settings.sensor
+    known: Sensor | ImageNoise | None = settings.sensor
     if known is None and frame.images is not None:
         known = image_noise(frame.images, measured_brightness(frame.moments, settings))
     how = frame.images, frame.ambient_dn

@@ -13,7 +13,7 @@ from transientcam_server.imaging._frames.workers import Workers
 from transientcam_server.imaging._recipe.recipe import Recipe
 
 _log = logging.getLogger("transientcam_server.imaging.still")
-MOST_WAITING: Final = 4
+MOST_WAITING: Final = 8
 """Frames whose averages are due; one more stands alone, and the next begins anew."""
 
 

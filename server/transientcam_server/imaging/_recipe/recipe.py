@@ -254,8 +254,9 @@ class Recipe:
     def _measured(self, raw: RawFrame, previous: RawFrame | None) -> tm.Measured:
         if isinstance(raw, MomentFrame):
             corrupt = any(raw.treated[name] for name in OF_IMAGES[1:])
-            how = {"ambient_dn": raw.ambient_dn, "corrupt": corrupt}
-            return tm.Measured(raw.moments, raw.saturated, **how)
+            return tm.Measured(
+                raw.moments, raw.saturated, ambient_dn=raw.ambient_dn, corrupt=corrupt
+            )
         before = _images_before(raw, previous)
         return self._reconstructor.measure(_in_turn(raw), previous=before)
 
