@@ -39,6 +39,7 @@ _OF_A_FRAME = (
     "PredictedStdDocument",
     "TrustCountsDocument",
     "RangeAccuracyDocument",
+    "FramesAveragedDocument",
     "HopDocument",
     "FrameDocument",
     "FrameMeta",

@@ -71,12 +71,13 @@ from transientcam_moments.moment_problem import (
     smallest_eigenvalue,
     smoothed_density,
 )
-from transientcam_moments.noise import Averaged, average_neighbours
+from transientcam_moments.noise import Averaged, Still, average_frames, average_neighbours
 from transientcam_moments.reconstruction import (
     INVALID,
     SPEED_OF_LIGHT_M_S,
     Flags,
     Labels,
+    Measured,
     Reconstruction,
     Reconstructor,
     Settings,
@@ -97,6 +98,7 @@ __all__ = [
     "HarmonicCorrection",
     "Labels",
     "Likelihood",
+    "Measured",
     "MomentsError",
     "ParameterError",
     "Peaks",
@@ -107,9 +109,11 @@ __all__ = [
     "Separation",
     "Settings",
     "ShapeError",
+    "Still",
     "SweepPhasors",
     "UnlabelledImages",
     "Unwrapped",
+    "average_frames",
     "average_neighbours",
     "average_takes",
     "bias",

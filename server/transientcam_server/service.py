@@ -399,8 +399,11 @@ class Service:
             ``only-moments`` for what is done with images that this service does not have.
         """
         require_estimator(settings, self.applied.sequence, field="estimator")
-        if settings != self._of_origin(settings):
+        possible = self._of_origin(settings)
+        if settings.spoilt_images != possible.spoilt_images:
             self.require_images("The repair of corrupt images is set")
+        if settings.still_frames != possible.still_frames:
+            self.require_images("The noise that still_frames needs is measured")
         return self._reconstruct_with(settings)
 
     def _reconstruct_with(self, settings: ReconstructionSettings) -> SettingsVersion:
@@ -415,7 +418,10 @@ class Service:
         """Return settings with what the origin of moments has done before they come here."""
         if self.relay is None or self.has_images:
             return settings
-        return settings.model_copy(update={"spoilt_images": self.relay.origin.spoilt_images})
+        update: dict[str, Any] = {"spoilt_images": self.relay.origin.spoilt_images}
+        if self.sensor is None:
+            update["still_frames"] = 1
+        return settings.model_copy(update=update)
 
     def require_images(self, done: str) -> None:
         """Refuse what needs images, where this service relays moments alone.

@@ -87,6 +87,11 @@ class ReconstructionSettings(_Group):
     an edge: the noise falls two to four times further. It needs the noise of the sensor and, in
     the daemon, a compiled kernel, of at most 8 harmonics; until then it is `gaussian`, as it is in
     plans."""
+    still_frames: int = Field(default=1, ge=1, le=tm.noise.MOST_FRAMES)
+    """How many frames of a stream are averaged, at most, in each pixel that stands still; 1 for
+    none. A pixel begins anew in the frame in which it changes by more than noise, or has drifted:
+    the noise falls with the square root of `frames_averaged`. It needs the noise of the sensor, or
+    images that tell it. Frames of recordings are never averaged."""
     smoothing_px: _Finite = Field(default=_DEFAULTS.smoothing_sigma_px, ge=0.0, le=10.0)
     """Standard deviation of the Gaussian that smooths the moments, in pixels; 0 for none."""
     bias: _Finite = Field(default=_DEFAULTS.epsilon, ge=1e-6, le=0.99)
@@ -128,6 +133,7 @@ class ReconstructionSettings(_Group):
         return tm.Settings(
             epsilon=self.bias,
             neighbours=self.neighbours,
+            still_frames=self.still_frames,
             smoothing_sigma_px=self.smoothing_px,
             threshold=self.return_threshold,
             least_range_m=self.least_range_m,

@@ -92,6 +92,7 @@ PRODUCTS: Final[dict[str, Product]] = {
             "misfit over noise, about 1 where the moments are explained: of two-returns or "
             "unwrapped-phase where that is the estimator, of the likelihood else",
         ),
+        Product("frames_averaged", "1", _IMAGE, "<u2", "how many frames a pixel is the mean of"),
         Product("flags", "1", _IMAGE, "|u1", "what was wrong with a pixel; 0 for nothing"),
         Product(
             "coefficients",

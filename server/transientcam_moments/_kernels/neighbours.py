@@ -11,7 +11,6 @@ from transientcam_compiled import Spread, at_once
 from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._kernels import simd
 from transientcam_moments._kernels.arrays import (
-    Booleans,
     Complexes,
     Places,
     RealPlane,
@@ -27,8 +26,8 @@ _ROWS = 8  # of a part at least
 
 
 @njit(forceinline=True, error_model="numpy")
-def _agreement(place: float, there: Plane, doubt: Plane) -> Any:
-    return place * there * smaller(larger(2.0 - doubt, 0.0 * doubt), 0.0 * doubt + 1.0)
+def _agreement(place: float, doubt: Plane) -> Any:
+    return place * smaller(larger(2.0 - doubt, 0.0 * doubt), 0.0 * doubt + 1.0)
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -53,13 +52,14 @@ def _round(
     mr, mi = bank(one, order, 1), bank(one, order, 1)
     for p in range(start, stop, simd.width(one)):
         norm = 0.0 * one
+        there = simd.load(one, present, p)
         for j in range(size):
             er[j], ei[j] = simd.load(one, current[2 * j], p), simd.load(one, current[2 * j + 1], p)
-            mr[j], mi[j] = simd.load(one, raw[2 * j], p), simd.load(one, raw[2 * j + 1], p)
+            mr[j] = there * simd.load(one, raw[2 * j], p)
+            mi[j] = there * simd.load(one, raw[2 * j + 1], p)
             w[j] = simd.load(one, weight[j], p)
             tr[j], ti[j] = multiples[j] * w[j] * er[j], multiples[j] * w[j] * ei[j]
             norm = norm + multiples[j] * (tr[j] * er[j] + ti[j] * ei[j])
-        there = simd.load(one, present, p)
         total, square = there, there
         worth = 1.0 / simd.load(one, share, p)
         of_shift, of_misfit = shift * worth / larger(norm, tiny(one)), misfit * worth
@@ -85,18 +85,19 @@ def _round(
             of_c = select(by_a > 0.0, both, vv) + neighbours.MISFIT_OF_ONE * vv
             late_a = select(by_c > 0.0, mirrored, tu) + neighbours.SHIFT_OF_ONE * tu
             late_c = select(by_a > 0.0, mirrored, tv) + neighbours.SHIFT_OF_ONE * tv
-            wa = _agreement(places[k], by_a, larger(of_misfit * of_a, of_shift * late_a))
-            wc = _agreement(places[k], by_c, larger(of_misfit * of_c, of_shift * late_c))
+            sa = _agreement(places[k], larger(of_misfit * of_a, of_shift * late_a))
+            sc = _agreement(places[k], larger(of_misfit * of_c, of_shift * late_c))
+            wa, wc = by_a * sa, by_c * sc
             for j in range(size):
                 mr[j] = mr[j] + _weighed(raw[2 * j], a, wa, c, wc)
                 mi[j] = mi[j] + _weighed(raw[2 * j + 1], a, wa, c, wc)
             total = total + (wa + wc)
-            square = square + (wa * wa + wc * wc)
+            square = square + (wa * sa + wc * sc)
         inverse = 1.0 / larger(total, tiny(one))
         for j in range(size):
             simd.store(following[2 * j], p, mr[j] * inverse)
             simd.store(following[2 * j + 1], p, mi[j] * inverse)
-        simd.store(left, p, select(there > 0.0, square * inverse * inverse, one))
+        simd.store(left, p, select(there > 0.0, there * square * inverse * inverse, one))
 
 
 def _by_rows(run: Callable[..., Any], first: int, row: int, top: int, end: int) -> None:
@@ -111,7 +112,7 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
     def kernel(
         raw: Complexes,
         weight: Reals,
-        present: Booleans,
+        present: RealPlane,
         multiples: tuple[int, ...],
         numbers: float,
         *,

@@ -36,9 +36,11 @@ from transientcam_moments.noise._of_images import CapturedImages, image_noise
 from transientcam_moments.noise._returns import ReturnNoise, direct_phase_noise, return_noise
 from transientcam_moments.noise._scatter import scatter
 from transientcam_moments.noise._sensor import ImageNoise, Sensor
+from transientcam_moments.noise._still import MOST_FRAMES, Still, average_frames
 
 __all__ = [
     "ASSUMED_NOISE",
+    "MOST_FRAMES",
     "Averaged",
     "CapturedImages",
     "CramerRao",
@@ -46,7 +48,9 @@ __all__ = [
     "MomentNoise",
     "ReturnNoise",
     "Sensor",
+    "Still",
     "ambient_light",
+    "average_frames",
     "average_neighbours",
     "cramer_rao",
     "density_std",

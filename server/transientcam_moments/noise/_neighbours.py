@@ -57,6 +57,7 @@ def average_neighbours(
     *,
     multiples: tuple[int, ...] | None = None,
     left_out: Array | None = None,
+    frames: Array | None = None,
     spread: Spread = at_once,
 ) -> Averaged:
     """Average each pixel with those neighbours whose moments differ by no more than noise.
@@ -72,6 +73,8 @@ def average_neighbours(
     left_out : boolean array, shape (H, W), optional
         Pixels, such as saturated ones, that stay as they are and count as nothing for the others;
         so do those with a moment that isn't finite, or without noise.
+    frames : array, shape (H, W), optional
+        How many frames the moments of each pixel, and their noise, are the mean of: its weight.
     spread : callable
         How the compiled kernel uses several threads, as `kernels.over` returns it.
 
@@ -118,7 +121,8 @@ def average_neighbours(
     measured = weight.max(axis=(1, 2)) > 0
     numbers = xp.maximum((measured * np.array([2 if j else 1 for j in order])).sum(), 1)
     raw = xp.where(present, moments, 0) / size
-    found, share = _averaged(raw, weight, present, order, numbers, spread=spread)
+    there = present.astype(real) if frames is None else xp.where(present, frames, 0).astype(real)
+    found, share = _averaged(raw, weight, there, order, numbers, spread=spread)
     share = xp.minimum(share + _flattened(raw - found, found, weight, order), 1)
     averaged = xp.where(present, found * size, moments)
     return Averaged(averaged, MomentNoise((variance * share).astype(share.dtype)), share)
@@ -134,16 +138,16 @@ def neighbourhood(radius_px: float) -> list[tuple[int, int, float]]:
 
 @accelerated("neighbours", of="F")
 def _averaged(
-    raw: Array, weight: Array, present: Array, multiples: tuple[int, ...], numbers: Array
+    raw: Array, weight: Array, there: Array, multiples: tuple[int, ...], numbers: Array
 ) -> tuple[Array, Array]:
     """Planar statement: averages of moments with noise about 1, and the share of variance left.
 
-    ``weight`` is one over the variances, ``numbers`` how many were measured in a pixel.
+    ``weight`` is one over the variances, ``there`` how many frames a pixel is the mean of, 0 where
+    it is left out, ``numbers`` how many were measured in a pixel.
     """
     xp = namespace(raw)
     least = np.finfo(weight.dtype).tiny
     order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
-    there = present.astype(weight.dtype)
     current, share = raw, xp.ones_like(there)
     lit, given = _padded(there), _padded(raw)
     for radius_px in RADII_PX:
@@ -151,7 +155,7 @@ def _averaged(
         tangent = order * weight * current
         shift = 2 / MOST_SHIFT / xp.maximum((order * (tangent.conj() * current).real).sum(0), least)
         misfit = 1 / (MOST_MISFIT * numbers)
-        total, square, mean = there, there, raw
+        total, square, mean = there, there, raw * there
         for row, column, place in neighbourhood(radius_px):
             ahead, behind = ((row, column), (-row, -column))
             by = [_shifted(lit, *offset) for offset in (ahead, behind)]
@@ -166,11 +170,12 @@ def _averaged(
                 one = xp.where(by[1 - i] > 0, both, alone[i]) + MISFIT_OF_ONE * alone[i]
                 two = xp.where(by[1 - i] > 0, mirrored, single) + SHIFT_OF_ONE * single
                 doubt = xp.maximum(misfit * one, shift * two) / share
-                agreement = place * by[i] * xp.clip(2 - doubt, 0, 1)
-                mean = mean + agreement * _shifted(given, *offset)
-                total, square = total + agreement, square + agreement**2
+                agreement = place * xp.clip(2 - doubt, 0, 1)
+                counts = by[i] * agreement
+                mean = mean + counts * _shifted(given, *offset)
+                total, square = total + counts, square + counts * agreement
         total = xp.maximum(total, least)
-        current, share = mean / total, xp.where(present, square / total**2, 1)
+        current, share = mean / total, xp.where(there > 0, there * square / total**2, 1)
     return current.astype(raw.dtype), share.astype(weight.dtype)
 
 

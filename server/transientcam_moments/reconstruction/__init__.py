@@ -13,3 +13,4 @@ from transientcam_moments.reconstruction._settings import (
     automatic,
     least_harmonics,
 )
+from transientcam_moments.reconstruction._still import Measured

@@ -90,6 +90,8 @@ class Reconstruction:
         What the moments were measured from, which tells their noise.
     low : array, shape (...), optional
         Light at the low frequency of b_0, whose phase tells turns; within one, when left out.
+    frames : array, shape (H, W), optional
+        How many frames each pixel of the moments is the mean of; one, when left out.
 
     Raises
     ------
@@ -113,6 +115,7 @@ class Reconstruction:
         spread: Spread = at_once,
         images: CapturedImages | None = None,
         low: Array | None = None,
+        frames: Array | None = None,
     ) -> None:
         if not (settings.consecutive or self._of_any_multiples):
             raise ParameterError("multiples", settings.multiples, "1 to m")
@@ -127,10 +130,11 @@ class Reconstruction:
         self._calibration = calibration
         self._images = images
         self._low = low
+        self.frames_averaged = frames
 
     @cached_property
     def measured(self) -> Array:
-        """Calibrated moments (m + 1, ...), not smoothed."""
+        """Calibrated moments (m + 1, ...) of the frame alone, not smoothed."""
         return self._measured
 
     @cached_property
@@ -159,12 +163,15 @@ class Reconstruction:
     def _averaged(self) -> tuple[Array, Array | None]:
         """Moments averaged over neighbours, and `variance_share`."""
         left_out, gains = (self._saturated, self._bad), self._calibration
-        how = self._images, self._spread
-        return over_neighbours(self.measured, self.settings, gains, left_out, *how)
+        how = self._images, self._spread, self.frames_averaged
+        return over_neighbours(self._measured, self.settings, gains, left_out, *how)
 
     @property
     def variance_share(self) -> Array | None:
-        """Share (H, W) of a pixel's variance that `average_neighbours` has left; else None."""
+        """What averaging over neighbours that agree and over frames has left of the variance.
+
+        (H, W), over that of one frame by itself, or after the Gaussian; None where there was none.
+        """
         return self._averaged[1]
 
     @cached_property
@@ -359,8 +366,9 @@ class Reconstruction:
         brightness, share = self._least_brightness, self.variance_share
         sigma_px = self.settings.gaussian_px
         if sigma_px > 0 and moments.ndim == 3:
-            return smoothed_of(noise_of, brightness, sigma_px, ambient=self.ambient)
-        noise = noise_of(brightness, ambient=0.0 if self.ambient is None else self.ambient)
+            noise = smoothed_of(noise_of, brightness, sigma_px, ambient=self.ambient)
+        else:
+            noise = noise_of(brightness, ambient=0.0 if self.ambient is None else self.ambient)
         return noise if share is None else MomentNoise(noise.variance * share)
 
     @cached_property

@@ -1,5 +1,6 @@
 """Averaging over neighbouring pixels as the settings have it."""
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial, reduce
 from operator import or_
@@ -27,30 +28,60 @@ def over_neighbours(
     left_out: Sequence[Array | None],
     images: CapturedImages | None,
     spread: Spread,
+    frames: Array | None = None,
 ) -> tuple[Array, Array | None]:
     """Average calibrated moments (m + 1, ...) over neighbours.
 
-    Pixels of the masks ``left_out`` count for no other one, but to a Gaussian. Returns the share
-    (H, W) of each pixel's own variance that is left, too; None of a Gaussian, or without images.
+    Pixels of the masks ``left_out`` count for no other one, but to a Gaussian; ``frames`` are how
+    many frames (H, W) each is the mean of. Returns the share (H, W) that is left of the variance
+    that one frame has by itself, or after the Gaussian, too; None of one frame and a Gaussian.
     """
-    sensor = settings.sensor
-    noise_of = sensor_noise(settings, sensor, calibration, len(moments))
-    if moments.ndim != 3 or not settings.keeps_edges or sensor is None or noise_of is None:
+    noise = None
+    if moments.ndim == 3 and settings.keeps_edges:
+        noise = measured_noise(moments, settings, settings.sensor, calibration, images)
+    if noise is None:
         px = settings.gaussian_px if moments.ndim == 3 else 0.0
-        return (smooth(moments, px) if px > 0 else moments), None
-    measured = settings.zeroth != "estimated"
-    brightness = moments[0].real if measured else abs(moments[1:]).max(axis=0)
-    ambient = None if images is None else images.ambient(brightness, sensor)
-    noise = noise_of(brightness) if ambient is None else noise_of(brightness, ambient=ambient)
+        share = None if frames is None else 1 / frames
+        if px == 0:
+            return moments, share
+        if share is not None:  # as of noise that is the same all around
+            share = smooth(share[None], px / math.sqrt(2))[0]
+        return smooth(moments, px), share
+    if frames is not None:
+        noise = MomentNoise(noise.variance / frames)
     masks = [namespace(moments).asarray(each) for each in left_out if each is not None]
     found = average_neighbours(
         moments,
         noise,
         multiples=None if settings.multiples is None else (0, *settings.multiples),
         left_out=reduce(or_, masks) if masks else None,
+        frames=frames,
         spread=spread,
     )
-    return found.moments, found.share
+    return found.moments, found.share if frames is None else found.share / frames
+
+
+def measured_noise(
+    moments: Array,
+    settings: Settings,
+    sensor: Sensor | ImageNoise | None,
+    calibration: Array | None,
+    images: CapturedImages | None,
+    ambient_dn: float = 0.0,
+) -> MomentNoise | None:
+    """Return the noise of moments of one frame, each pixel by itself; None if it isn't known."""
+    noise_of = sensor_noise(settings, sensor, calibration, len(moments))
+    if noise_of is None or sensor is None:
+        return None
+    brightness = measured_brightness(moments, settings)
+    ambient = ambient_dn if images is None else images.ambient(brightness, sensor)
+    return noise_of(brightness, ambient=0.0 if ambient is None else ambient)
+
+
+def measured_brightness(moments: Array, settings: Settings) -> Array:
+    """Return b_0, or what is known of it where it was not measured."""
+    measured = settings.zeroth != "estimated"
+    return moments[0].real if measured else abs(moments[1:]).max(axis=0)
 
 
 def sensor_noise(

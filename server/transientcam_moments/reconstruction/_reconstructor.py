@@ -44,6 +44,7 @@ from transientcam_moments.reconstruction._one_pass import PassedReconstruction
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, Settings
 from transientcam_moments.reconstruction._sparse_frequencies import GappedReconstruction
+from transientcam_moments.reconstruction._still import Measured, over_frames
 from transientcam_moments.reconstruction._turns import low_phase_rad
 
 _BY_THE_PASS = ("pisarenko", "pisarenko-merged", *OF_ANY_MULTIPLES)
@@ -100,7 +101,7 @@ class Reconstructor:
 
     def __call__(
         self,
-        data: Array | Sequence[Array],
+        data: Array | Sequence[Array] | Measured,
         *,
         saturated_pixels: Array | None = None,
         previous: Array | None = None,
@@ -110,9 +111,10 @@ class Reconstructor:
 
         Parameters
         ----------
-        data : array
-            Real images (N, ...) in capture order, as `measure` takes them, or complex moments
-            (m + 1, ...). They must stay as they are if ``measured`` is to be read later.
+        data : array or Measured
+            Real images (N, ...) in capture order, as `measure` takes them, complex moments
+            (m + 1, ...), or what the methods `measure` and `average` return, to which nothing more
+            is given. They must stay as they are if ``measured`` is to be read later.
         saturated_pixels : boolean array, shape (...), optional
             Pixels to be flagged; found in images by themselves.
         previous : array, optional
@@ -135,10 +137,73 @@ class Reconstructor:
         UnlabelledImages
             When the data are raw images, and settings or gains leave open what they show.
         """
+        if isinstance(data, Measured):
+            return self._of_frame(data, spread)
+        if _is_moments(data):
+            return self._of_frame(self.measure(data, saturated_pixels=saturated_pixels), spread)
+        takes, repaired, recovered, images = self._prepare(data, previous)
+        # behind the smoothing, where a waveform is known: harmonics are taken out there
+        behind = self._waveform is not None or self.settings.keeps_edges
+        one_pass = None if behind else self._pass_of_images(takes)
+        if one_pass is not None:
+            planes = one_pass.images(takes[0], saturated_pixels, spread)
+            return PassedReconstruction(
+                planes,
+                self.settings,
+                lambda: self._measured(takes)[0],
+                repaired=repaired,
+                calibration=self._calibration,
+                spread=spread,
+                images=images,
+                low=self._low(takes[0]),
+            )
+        frame = self._frame(takes, repaired, recovered, images, saturated_pixels)
+        return self._of_frame(frame, spread)
+
+    def measure(
+        self,
+        data: Array | Sequence[Array],
+        *,
+        saturated_pixels: Array | None = None,
+        previous: Array | None = None,
+    ) -> Measured:
+        """Return the moments of one frame, for `average`; all is as of a call."""
+        if not _is_moments(data):
+            return self._frame(*self._prepare(data, previous), saturated_pixels)
+        data = as_array(data)
+        moments = data if self._bad is None else fill_bad_pixels(data, self._bad)
+        return Measured(self._calibrated(moments), saturated_pixels)
+
+    def average(self, frame: Measured, before: Measured | None = None) -> Measured:
+        """Average a frame of a stream with those before, pixel by pixel, where nothing changed.
+
+        ::
+
+            before = None
+            for images in stream:
+                before = reconstructor.average(reconstructor.measure(images), before)
+                range_m = reconstructor(before).range_m
+
+        Parameters
+        ----------
+        frame : Measured
+            Of the same settings and shape as all before it.
+        before : Measured, optional
+            What this returned of the frame before; all begins anew without.
+
+        Returns
+        -------
+        Measured
+            With `Still` by `average_frames`, of at most ``still_frames`` of the settings; without
+            where the noise is neither stated nor told by the images.
+        """
+        return over_frames(frame, before, self.settings, self._calibration)
+
+    def _prepare(
+        self, data: Array | Sequence[Array], previous: Array | None
+    ) -> tuple[Array, Repair | None, Recovered | None, CapturedImages | None]:
+        """Return images take by take, repaired, and what was done to them."""
         data = data if isinstance(data, Sequence) else as_array(data)
-        if not isinstance(data, Sequence) and np.dtype(data.dtype).kind == "c":
-            moments = data if self._bad is None else fill_bad_pixels(data, self._bad)
-            return self._of_moments(self._calibrated(moments), saturated_pixels, spread)
         zeroth, count = self._require_labels()
         takes = takes_first(data, count, len(self.settings.sampled_rad))
         repaired = self._repaired(takes, previous)
@@ -147,19 +212,18 @@ class Reconstructor:
         recovered = self._recovered(takes, zeroth)
         if recovered is not None:
             takes = recovered.images
-        given: dict[str, Any] = {"repaired": repaired}
-        given["images"] = self._images(takes, zeroth, repaired, recovered)
-        # behind the smoothing, where a waveform is known: harmonics are taken out there
-        behind = self._waveform is not None or self.settings.keeps_edges
-        one_pass = None if behind else self._pass_of_images(takes, zeroth)
-        if one_pass is not None:
-            planes = one_pass.images(takes[0], saturated_pixels, spread)
-            return PassedReconstruction(
-                planes, self.settings, lambda: self._measured(takes)[0],
-                calibration=self._calibration, spread=spread, low=self._low(takes[0]), **given,
-            )  # fmt: skip
+        return takes, repaired, recovered, self._images(takes, zeroth, repaired, recovered)
+
+    def _frame(
+        self,
+        takes: Array,
+        repaired: Repair | None,
+        recovered: Recovered | None,
+        images: CapturedImages | None,
+        saturated_pixels: Array | None,
+    ) -> Measured:
         left_out = None if repaired is None else repaired.left_out
-        moments, given["kept"], given["low"] = self._measured(takes, left_out)
+        moments, kept, low = self._measured(takes, left_out)
         if recovered is not None:
             used = True if self._bad is None else ~self._bad  # values of bad pixels are not
             moments[:, recovered.undetermined & used] = np.nan
@@ -170,36 +234,10 @@ class Reconstructor:
             saturated_pixels = saturated(stack, full_scale=self.settings.full_scale)
             if self._bad is not None:  # their own values are not used
                 saturated_pixels = saturated_pixels & ~self._bad
-        return self._of_moments(moments, saturated_pixels, spread, **given)
-
-    def of_measured(
-        self,
-        moments: Array,
-        *,
-        saturated_pixels: Array | None = None,
-        ambient_dn: float = 0.0,
-        spread: Spread = at_once,
-    ) -> Reconstruction:
-        """Go on from the moments that another reconstruction began with.
-
-        Where that one had several takes and the same settings, calibration and bad pixels, all
-        that follows is equal to the bit; with one take the compiled pass may round in another way.
-
-        Parameters
-        ----------
-        moments : array, shape (m + 1, ...)
-            `Reconstruction.measured`: calibrated, and bad pixels replaced already.
-        saturated_pixels : boolean array, shape (...), optional
-            Pixels to be flagged; none, when left out.
-        ambient_dn : float
-            Light in DN an image that was not the camera's, the same for all pixels.
-        spread : callable
-            As of a call.
-        """
-        found = self._of_moments(moments, saturated_pixels, spread)
-        if ambient_dn > 0:
-            found.ambient = np.full(moments.shape[1:], ambient_dn, moments.real.dtype)
-        return found
+        corrupt = repaired is not None and any(bool(np.any(each)) for each in repaired[1:])
+        return Measured(
+            moments, saturated_pixels, kept, repaired, images, low=low, corrupt=corrupt
+        )
 
     def _require_labels(self) -> tuple[str, int]:
         """Return how b_0 was measured and the number of takes, where raw images can be read."""
@@ -209,28 +247,45 @@ class Reconstructor:
             raise UnlabelledImages(tuple(name for name, each in stated.items() if each is None))
         return settings.zeroth, settings.takes
 
-    def _of_moments(
-        self, moments: Array, saturated_pixels: Array | None, spread: Spread, **given: Any
-    ) -> Reconstruction:
-        """Go on from calibrated moments, with what else `Reconstruction` is given."""
-        given |= {"calibration": self._calibration, "spread": spread}
-        lazily = {"saturated_pixels": saturated_pixels, "bad_pixels": self._bad}
-        if not self.settings.consecutive:
-            return GappedReconstruction(moments, self.settings, **lazily, **given)
-        one_pass = self._pass_of_moments(moments)
-        correction = self._correction(moments)
-        if one_pass is None:
-            given["correction"] = correction
-            return Reconstruction(moments, self.settings, **lazily, **given)
-        gains, left_out = self._calibration, (saturated_pixels, self._bad)
-        how = given.get("images"), spread
-        smoothed, share = over_neighbours(moments, self.settings, gains, left_out, *how)
-        corrected = None
-        if correction is not None:
-            smoothed, corrected = correction(smoothed, spread=spread)
-        planes = one_pass.moments(smoothed, saturated_pixels, spread)
-        given |= {"corrected": corrected, "share": share}
-        return PassedReconstruction(planes, self.settings, lambda: moments, **given)
+    def _of_frame(self, frame: Measured, spread: Spread) -> Reconstruction:
+        """Go on from calibrated moments."""
+        moments, frames = frame.moments, None
+        if frame.still is not None:
+            moments, frames = frame.still.moments, frame.still.frames
+        gains, correction = self._calibration, None
+        given: dict[str, Any] = {
+            "kept": frame.kept,
+            "repaired": frame.repaired,
+            "calibration": gains,
+            "spread": spread,
+            "images": frame.images,
+            "low": frame.low,
+            "frames": frames,
+        }
+        if self.settings.consecutive:
+            correction = self._correction(moments)
+        if self.settings.consecutive and (one_pass := self._pass_of_moments(moments)) is not None:
+            left_out = frame.saturated, self._bad
+            how = frame.images, spread, frames
+            smoothed, share = over_neighbours(moments, self.settings, gains, left_out, *how)
+            corrected = None
+            if correction is not None:
+                smoothed, corrected = correction(smoothed, spread=spread)
+            planes = one_pass.moments(smoothed, frame.saturated, spread)
+            given |= {"corrected": corrected, "share": share}
+            found: Reconstruction = PassedReconstruction(
+                planes, self.settings, lambda: frame.moments, **given
+            )
+        else:
+            kind = Reconstruction if self.settings.consecutive else GappedReconstruction
+            given |= {"bad_pixels": self._bad, "correction": correction}
+            found = kind(moments, self.settings, frame.saturated, **given)
+            found.measured = frame.moments
+        if frame.image_noise is not None:
+            found.image_noise = frame.image_noise
+        if frame.ambient_dn > 0:
+            found.ambient = np.full(moments.shape[1:], frame.ambient_dn, moments.real.dtype)
+        return found
 
     def _correction(self, moments: Array) -> HarmonicCorrection | None:
         """Return what takes the harmonics of the waveform out of these moments, if any is known."""
@@ -333,7 +388,8 @@ class Reconstructor:
     # (several takes, other images, moments) behind the smoothing. All else goes stage by stage,
     # each computed when it is first read.
 
-    def _pass_of_images(self, takes: Array, zeroth: str) -> OnePass | None:
+    def _pass_of_images(self, takes: Array) -> OnePass | None:
+        zeroth, _ = self._require_labels()
         if not is_four_bucket(self.settings.sampled_rad):
             return None
         m = harmonics_of(takes.shape[1], zeroth)
@@ -398,6 +454,10 @@ class Reconstructor:
         return replacement.places, lambda raw: measure(
             replacement.values(raw), zeroth=zeroth, phases_rad=phases_rad
         )
+
+
+def _is_moments(data: Array | Sequence[Array]) -> bool:
+    return not isinstance(data, Sequence) and np.dtype(as_array(data).dtype).kind == "c"
 
 
 def reconstruct(

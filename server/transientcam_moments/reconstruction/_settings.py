@@ -11,7 +11,7 @@ from transientcam_moments.comparisons import TECHNIQUES
 from transientcam_moments.errors import ParameterError
 from transientcam_moments.images import FOUR_PHASES_RAD, SIGMA_PX, ZEROTH_IMAGES, phase_weights
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, EPSILON
-from transientcam_moments.noise import Sensor
+from transientcam_moments.noise import MOST_FRAMES, Sensor
 from transientcam_moments.reconstruction._ranging import range_m
 
 NEIGHBOURS = ("edge-preserving", "gaussian", "none")
@@ -85,6 +85,9 @@ class Settings:
         How moments are averaged over neighbouring pixels: "gaussian" is the paper's (Sec. 6),
         "edge-preserving" is `average_neighbours`, which needs a sensor and is the Gaussian without
         one. There is none without two image axes.
+    still_frames : int
+        How many frames of a stream `Reconstructor.average` averages where nothing changes, at most;
+        1 to `noise.MOST_FRAMES`. A frame by itself never uses others.
     smoothing_sigma_px : float
         Of the Gaussian; 0 for none.
     least_range_m : float, optional
@@ -122,6 +125,7 @@ class Settings:
     epsilon: float = EPSILON
     keep: str = "harmonics"
     neighbours: str = "gaussian"
+    still_frames: int = 1
     smoothing_sigma_px: float = SIGMA_PX
     least_range_m: float | None = None
     threshold: float = DIRECT_THRESHOLD
@@ -149,6 +153,7 @@ class Settings:
         in_range("epsilon", self.epsilon, 0.0, float(np.nextafter(1.0, 0.0)), "0 <= epsilon < 1")
         chosen("keep", self.keep, ("harmonics", "brightness"))
         chosen("neighbours", self.neighbours, NEIGHBOURS)
+        in_range("still_frames", self.still_frames, 1, MOST_FRAMES, f"1 to {MOST_FRAMES}")
         in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
         if self.least_range_m is not None:
             in_range("least_range_m", self.least_range_m, -1000.0, 1000.0, "-1000 to 1000 m")

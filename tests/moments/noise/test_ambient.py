@@ -143,8 +143,8 @@ def test_moments_of_another_reconstruction_bring_their_light_along() -> None:
     b = one_return().astype(np.complex64)
     reconstructor = tm.Reconstructor(settings("low-frequency"), calibration=np.ones(4))
 
-    dim = reconstructor.of_measured(b).noise
-    bright = reconstructor.of_measured(b, ambient_dn=100.0).noise
+    dim = reconstructor(tm.Measured(b)).noise
+    bright = reconstructor(tm.Measured(b, ambient_dn=100.0)).noise
 
     assert dim is not None
     assert bright is not None

@@ -385,7 +385,7 @@ def test_moments_as_measured_give_what_their_images_gave(estimator: str) -> None
     saturated = np.asarray(ours.flags & tm.Flags.SATURATED, bool)
     assert saturated[2, 3]
 
-    again = reconstructor.of_measured(np.array(ours.measured), saturated_pixels=saturated)
+    again = reconstructor(tm.Measured(np.array(ours.measured), saturated))
 
     for name in ("measured", "smoothed", "moments", "flags", "validity", "range_m", "direct"):
         np.testing.assert_array_equal(getattr(again, name), getattr(ours, name), err_msg=name)

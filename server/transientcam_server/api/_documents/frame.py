@@ -81,6 +81,14 @@ class RangeAccuracyDocument(Document):
     that predicts them is compiled."""
 
 
+class FramesAveragedDocument(Document):
+    """How many frames the pixels of this one are the mean of, itself included."""
+
+    median: float
+    least: int
+    """1 where something moves."""
+
+
 class HopDocument(Document):
     """One relay that a frame came through."""
 
@@ -143,6 +151,8 @@ class FrameDocument(Document):
     ambient_dn: float | None = None
     """Light in DN an image that is not the camera's, in the median pixel; 0 where it hardly adds
     noise, null until something was computed and where no sensor is known."""
+    frames_averaged: FramesAveragedDocument | None = None
+    """With the setting `still_frames`; null without, for recordings, and until computed."""
     predicted_range_std_m: PredictedStdDocument | None = None
     """Null until the range was computed."""
     accuracy: RangeAccuracyDocument | None = None

@@ -63,6 +63,9 @@ class Frame:
         images, once they are reconstructed, where no sensor is stated.
     previous
         The capture before, where its images may be filled in from it.
+    averaged
+        Its moments together with those of the frames before, once they are; None where it stands
+        alone.
     past
         Whether it is a former or a recorded one, whose computation delays no new one.
     """
@@ -75,12 +78,14 @@ class Frame:
         recipe: Recipe,
         *,
         previous: RawFrame | None = None,
+        averaged: "asyncio.Future[tm.Measured | None] | None" = None,
         truth: Callable[[float | None], Truth] | None = None,
         past: bool = False,
     ) -> None:
         self.number = number
         self.raw = raw
         self.previous = previous
+        self.averaged = averaged
         self.recipe = recipe
         self.past = past
         self._workers = workers
@@ -105,6 +110,7 @@ class Frame:
             self.raw,
             self.recipe,
             previous=self.previous,
+            averaged=None if self.averaged is None else self._workers.start(_alone(self.averaged)),
             truth=self._truth,
             past=True,
         )
@@ -121,6 +127,14 @@ class Frame:
         """Height and width in pixels."""
         height, width = self.raw.images.shape[-2:]
         return height, width
+
+    @property
+    def size_bytes(self) -> int:
+        """What a frame takes in memory of which nothing else is computed."""
+        if self.averaged is None:
+            return self.raw.size_bytes
+        planes = len(self.recipe.applied.sequence.multiples) + 1
+        return self.raw.size_bytes + (8 * planes + 4) * math.prod(self.shape)
 
     @property
     def computing(self) -> bool:
@@ -190,6 +204,7 @@ class Frame:
         requested: set[str] = set()
         try:
             while self._requested:
+                averaged = None if self.averaged is None else await _shared(self.averaged)
                 requested, self._requested = self._requested, set()
                 with self._workers.one_more_frame() as alone:
                     self._computed, elapsed_s = await self._run(
@@ -199,6 +214,7 @@ class Frame:
                         self.raw,
                         self.previous,
                         requested,
+                        averaged,
                         # frames at once take a core each, which is less work than sharing all
                         self._spread if alone else tm.kernels.at_once,
                     )
@@ -450,6 +466,11 @@ def _size(value: object) -> int:
 
 def _array_key(product: Product, view: View) -> Hashable:
     return "product", product.name, view if product.over_time else EVERYTHING
+
+
+async def _alone(averaged: "asyncio.Future[tm.Measured | None]") -> tm.Measured | None:
+    found = await _shared(averaged)
+    return None if found is None else found.average_alone()
 
 
 async def _shared(future: "asyncio.Future[_T]") -> _T:

@@ -73,7 +73,7 @@ class History:
     def append(self, frame: Frame) -> None:
         """Take the newest frame, and forget what there is no more room or time for."""
         self.latest = frame
-        now_s, size_bytes = self._clock(), frame.raw.size_bytes
+        now_s, size_bytes = self._clock(), frame.size_bytes
         room_bytes = self.settings.max_bytes - size_bytes
         oldest_s = now_s - self.settings.seconds
         while self._kept and (self.size_bytes > room_bytes or self._kept[0].arrived_s < oldest_s):

@@ -57,6 +57,7 @@ def frame_meta(
         "corrected_pixels": None if found is None else found.corrected_pixels,
         "pixels": computed.pixels,
         "ambient_dn": computed.ambient_dn,
+        "frames_averaged": computed.frames_averaged,
         "predicted_range_std_m": computed.range_noise,
         "accuracy": None if accuracy is None else accuracy.to_document(),
     }

@@ -16,6 +16,7 @@ from transientcam_driver import (
 )
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging._frames.frame import Frame
+from transientcam_server.imaging._frames.still import StillFrames
 from transientcam_server.imaging._frames.workers import Workers
 from transientcam_server.imaging._products.products import PRODUCTS, Product
 from transientcam_server.imaging._products.requirements import absent_products
@@ -86,6 +87,7 @@ class Pipeline:
         self._simulation = camera.simulation
         self._truth = _truth_of(camera.simulation)
         self._frames = 0
+        self._still = StillFrames(workers)
         self._last: RawFrame | None = None
         self._recipe: Recipe | None = None
         self.absent = absent_products(
@@ -106,7 +108,9 @@ class Pipeline:
             self._recipe = recipe  # else the same one: it holds what was prepared for it
             self.prepare_kernels(applied)
         previous, self._last = self._last, raw
-        return self.recorded_frame(self._frames, raw, self._recipe, previous=previous)
+        frame = self.recorded_frame(self._frames, raw, self._recipe, previous=previous)
+        frame.averaged = self._still.following(raw, self._recipe, frame.previous)
+        return frame
 
     def recipe_of(self, applied: AppliedSequence) -> Recipe:
         """Return what the next frame of a sequence is computed with."""

@@ -10,7 +10,7 @@ from typing import Final, cast
 import numpy as np
 
 import transientcam_moments as tm
-from transientcam.documents import PixelCountsDocument, PredictedStdDocument
+from transientcam.documents import FramesAveragedDocument, PixelCountsDocument, PredictedStdDocument
 from transientcam_driver import RawFrame
 from transientcam_server.imaging._errors_of_range.noise import contradictions, range_noise
 from transientcam_server.imaging._recipe.recipe import Recipe
@@ -46,6 +46,8 @@ class Computed:
         How many pixels carry each flag.
     ambient_dn
         Light in DN an image that is not the camera's, in the median pixel; None without a sensor.
+    frames_averaged
+        How many frames a pixel rests on; None where frames are not averaged.
     range_noise
         Predicted deviation of the range, as the metadata have it; None before the returns.
     """
@@ -54,6 +56,7 @@ class Computed:
     failures: dict[str, Exception] = field(default_factory=dict)
     pixels: PixelCountsDocument | None = None
     ambient_dn: float | None = None
+    frames_averaged: FramesAveragedDocument | None = None
     range_noise: PredictedStdDocument | None = None
 
 
@@ -63,21 +66,25 @@ def compute(
     raw: RawFrame,
     previous: RawFrame | None,
     stages: Iterable[str],
+    averaged: tm.Measured | None = None,
     spread: tm.kernels.Spread = tm.kernels.at_once,
 ) -> Computed:
     """Compute stages of a frame; one that fails leaves the others as they are. Never raises.
 
-    ``spread`` is how compiled kernels use several threads.
+    ``averaged`` is what goes on in place of the images, as of `Recipe.average`; ``spread`` is how
+    compiled kernels use several threads.
     """
     requested = set(stages)
     computed = replace(before, failures={})
     try:
         if computed.reconstruction is None:
-            computed.reconstruction = found = recipe.reconstruct(raw, previous, spread=spread)
+            found = recipe.reconstruct(raw, previous, averaged=averaged, spread=spread)
+            computed.reconstruction = found
             _read(found, FIRST)
             _flag_contradictions(recipe.with_noise_of(found), found)
             computed.pixels = pixel_counts(found)
             computed.ambient_dn = _ambient_dn(recipe, found)
+            computed.frames_averaged = _frames_averaged(found)
         else:
             found = computed.reconstruction
     except Exception as error:
@@ -130,6 +137,15 @@ def _ambient_dn(recipe: Recipe, found: tm.Reconstruction) -> float | None:
     if recipe.sensor is None:
         return None
     return 0.0 if found.ambient is None else float(np.median(found.ambient))
+
+
+def _frames_averaged(found: tm.Reconstruction) -> FramesAveragedDocument | None:
+    if found.frames_averaged is None:
+        return None
+    return {
+        "median": float(np.median(found.frames_averaged)),
+        "least": int(found.frames_averaged.min()),
+    }
 
 
 def _range_noise(

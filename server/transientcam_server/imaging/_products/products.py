@@ -212,6 +212,11 @@ def _return_planes(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Arr
     return planes
 
 
+def _frames_averaged(recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
+    one = np.ones(found.flags.shape)
+    return one if found.frames_averaged is None else np.asarray(found.frames_averaged)
+
+
 def _property(name: str) -> Callable[[Recipe, object, View], _Array]:
     """Return a computation that reads a property of the input."""
 
@@ -302,6 +307,7 @@ PRODUCTS: Final[dict[str, Product]] = {
             of_noise=True,
             steps=Steps(1e2, "1e-2"),
         ),
+        Product(_WIRE["frames_averaged"], "light", _frames_averaged),
         Product(_WIRE["flags"], "light", _property("flags")),
         Product(
             _WIRE["coefficients"],

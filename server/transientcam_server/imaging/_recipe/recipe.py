@@ -15,7 +15,7 @@ from transientcam_moments.reconstruction import OF_ANY_MULTIPLES, automatic
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging._recipe.calibration import FACTORY_ID, Gains, nominal_gains
 from transientcam_server.imaging._recipe.lens import ASSUMED_FIELD_OF_VIEW_DEG, Intrinsics
-from transientcam_server.imaging._recipe.moment_frame import MomentFrame
+from transientcam_server.imaging._recipe.moment_frame import OF_IMAGES, MomentFrame
 from transientcam_server.settings import ReconstructionSettings
 
 _log = logging.getLogger("transientcam_server.imaging.recipe")
@@ -224,22 +224,41 @@ class Recipe:
         raw: RawFrame,
         previous: RawFrame | None = None,
         *,
+        averaged: tm.Measured | None = None,
         spread: tm.kernels.Spread = tm.kernels.at_once,
     ) -> tm.Reconstruction:
         """Return the reconstruction of a capture; it computes what is read of it.
 
         ``previous``, where it has the same sequence, is what corrupt images are filled in from;
+        ``averaged`` is what `average` returned of this capture, or its average alone;
         ``spread`` is how compiled kernels use several threads.
         """
-        if isinstance(raw, MomentFrame):
-            return self._reconstructor.of_measured(
-                raw.moments,
-                saturated_pixels=raw.saturated,
-                ambient_dn=raw.ambient_dn,
-                spread=spread,
-            )
-        before = None if previous is None or previous.epoch != raw.epoch else _in_turn(previous)
+        if averaged is not None and averaged.is_alone:
+            averaged = averaged.beside(self._measured(raw, previous))
+        if averaged is None and isinstance(raw, MomentFrame):
+            averaged = self._measured(raw, None)
+        if averaged is not None:
+            return self._reconstructor(averaged, spread=spread)
+        before = _images_before(raw, previous)
         return self._reconstructor(_in_turn(raw), previous=before, spread=spread)
+
+    def average(
+        self, raw: RawFrame, previous: RawFrame | None, before: tm.Measured | None
+    ) -> tm.Measured:
+        """Return the moments of a capture, averaged with those before where nothing changed.
+
+        ``before`` is what this returned of the capture before; it begins anew without.
+        """
+        return self._reconstructor.average(self._measured(raw, previous), before)
+
+    def _measured(self, raw: RawFrame, previous: RawFrame | None) -> tm.Measured:
+        if isinstance(raw, MomentFrame):
+            corrupt = any(raw.treated[name] for name in OF_IMAGES[1:])
+            return tm.Measured(
+                raw.moments, raw.saturated, ambient_dn=raw.ambient_dn, corrupt=corrupt
+            )
+        before = _images_before(raw, previous)
+        return self._reconstructor.measure(_in_turn(raw), previous=before)
 
     @cached_property
     def _reconstructor(self) -> tm.Reconstructor:
@@ -262,6 +281,10 @@ class Recipe:
             bad_pixels=None if gains is None else gains.bad,
             waveform=self.waveform,
         )
+
+
+def _images_before(raw: RawFrame, previous: RawFrame | None) -> NDArray[np.uint16] | None:
+    return None if previous is None or previous.epoch != raw.epoch else _in_turn(previous)
 
 
 def _in_turn(raw: RawFrame) -> NDArray[np.uint16]:

@@ -48,7 +48,7 @@ def found(
     even = 0.01
     b = (1 - share - even) * np.exp(1j * j * METRES * range_m)
     b = b + share * np.exp(1j * j * METRES * (range_m + after_m)) + even * (j == 0)
-    return RECIPE._reconstructor.of_measured((light_dn * b).astype(np.complex64))
+    return RECIPE._reconstructor(tm.Measured((light_dn * b).astype(np.complex64)))
 
 
 def trust_of(

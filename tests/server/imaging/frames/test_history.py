@@ -17,11 +17,11 @@ class FakeFrame:
 
     def __init__(self, number: int, size_bytes: int = 100, applied: object = "one") -> None:
         self.number = number
-        self.raw = SimpleNamespace(size_bytes=size_bytes)
+        self.size_bytes = size_bytes
         self.recipe = SimpleNamespace(applied=applied)
 
     def bare(self) -> "FakeFrame":
-        return FakeFrame(self.number, self.raw.size_bytes, self.recipe.applied)
+        return FakeFrame(self.number, self.size_bytes, self.recipe.applied)
 
 
 class Clock:

@@ -56,6 +56,7 @@ function limitsOf(parameter: ParameterDocument): string {
 
 const LABELS: Readonly<Record<string, string | undefined>> = {
   neighbours: "Neighbours",
+  still_frames: "Frames where still",
   smoothing_px: "Smoothing",
   bias: "Bias",
   return_threshold: "Threshold of a return",
