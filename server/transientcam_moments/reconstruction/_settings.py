@@ -118,22 +118,22 @@ class Settings:
 
     base_frequency_hz: float | None = None
     zeroth: str | None = None
-    low_frequency_hz: float | None = None
     takes: int | None = None
     multiples: tuple[int, ...] | None = None
     phases_rad: tuple[float, ...] | None = None
     epsilon: float = EPSILON
     keep: str = "harmonics"
     neighbours: str = "gaussian"
-    still_frames: int = 1
     smoothing_sigma_px: float = SIGMA_PX
-    least_range_m: float | None = None
     threshold: float = DIRECT_THRESHOLD
     estimator: str = "automatic"
     minimum_brightness: float = 0.0
     full_scale: float = 4095.0
     spoilt_images: str = "repair"
     sensor: Sensor | None = None
+    low_frequency_hz: float | None = None
+    still_frames: int = 1
+    least_range_m: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no stage could work with (ParameterError)."""
