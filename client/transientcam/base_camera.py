@@ -15,12 +15,11 @@ from transientcam.requests import (
     document,
     frames,
     given,
+    planning,
     recording_path,
 )
 from transientcam.transport import parse_address
 
-_PLANNED_S: Final = 120.0
-"""How much longer than usual it takes to look at a scene and weigh all sequences, when busy."""
 _SCENE_BUILT_S: Final = 60.0
 """The same of building a simulated scene."""
 _WRITTEN_S: Final = 60.0
@@ -102,8 +101,9 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         ProblemError
             ``target-unreachable`` where nothing reaches the target; it says what limits.
         """
-        body = given(target=target, budget=budget, fixed=fixed, estimator=estimator)
-        return self._ask(document("plan", method="POST", body=body, extra_timeout_s=_PLANNED_S))
+        return self._ask(
+            planning.plan(target=target, budget=budget, fixed=fixed, estimator=estimator)
+        )
 
     def start_plan(
         self,
@@ -120,16 +120,17 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
             job = camera.start_plan({"range_error_m": 0.005})
             plan = camera.wait_for(job["id"], on_progress=print)["result"]
         """
-        body = given(target=target, budget=budget, fixed=fixed, estimator=estimator)
-        return self._ask(document("plan/jobs", method="POST", body=body))
+        return self._ask(
+            planning.start_plan(target=target, budget=budget, fixed=fixed, estimator=estimator)
+        )
 
     def tradeoff(self, by: str = "range_error_m") -> _Document:
         """Return what accuracy costs in time: the sequences that no other beats, in ``front``."""
-        return self._ask(document("tradeoff", params=[("by", by)], extra_timeout_s=_PLANNED_S))
+        return self._ask(planning.tradeoff(by))
 
     def start_tradeoff(self, by: str = "range_error_m") -> _Document:
         """Begin what `tradeoff` returns as a job, and return that; see `start_plan`."""
-        return self._ask(document("tradeoff/jobs", method="POST", body={"by": by}))
+        return self._ask(planning.start_tradeoff(by))
 
     @property
     def calibrations(self) -> Calibrations[_Document, _Bytes]:

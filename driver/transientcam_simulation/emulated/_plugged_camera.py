@@ -4,7 +4,7 @@ import threading
 from abc import ABC, abstractmethod
 from typing import Generic, TypeVar
 
-from transientcam_driver.errors import CameraBusy, CameraNotFound
+from transientcam_driver.errors import CameraBusy, CameraLost, CameraNotFound
 from transientcam_simulation.emulated._open_usb import Fault, PendingFaults
 
 Link = TypeVar("Link")
@@ -70,6 +70,11 @@ class PluggedCamera(ABC, Generic[Link]):
     def is_at(self, link: Link) -> bool:
         """Whether a link leads to this camera still."""
         return self._link is link
+
+    def require(self, link: Link) -> None:
+        """Refuse a link that does not lead here any more (CameraLost)."""
+        if not self.is_at(link):
+            raise CameraLost("it is not plugged in any more")
 
     def unplug(self) -> None:
         """Pull the cable, and with it the power."""

@@ -14,7 +14,7 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 from transientcam_server.daemon._metering import in_turns
 from transientcam_server.daemon._read_limiter import Valve
 from transientcam_server.daemon._refusals import refusal
-from transientcam_server.daemon._stalls import StallTimer
+from transientcam_server.daemon._stalls import CutWhereStalled
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.settings import LimitSettings
 
@@ -22,7 +22,7 @@ _END: Final = b"\r\n\r\n"
 """Of a head, and of a body in chunks (RFC 9112, Sec. 2.1, 7.1)."""
 
 
-class BoundedConnection(HttpToolsProtocol):
+class BoundedConnection(CutWhereStalled, HttpToolsProtocol):
     """One connection, until it ends or becomes a WebSocket; its transport is a `Valve`.
 
     One request is parsed at a time: the next one is read when the last one is answered.
@@ -34,7 +34,6 @@ class BoundedConnection(HttpToolsProtocol):
         super().__init__(*arguments, **options)
         self._limits = limits
         self._deadline: asyncio.TimerHandle | None = None
-        self._stall_timer: StallTimer | None = None
         self._unparsed = b""
         self._tail = b""
         self._in_head = True
@@ -49,35 +48,18 @@ class BoundedConnection(HttpToolsProtocol):
         super().connection_made(cast("asyncio.Transport", transport))
         self.app = in_turns(self.app, lambda: self.transport.account)
         self.flow = FlowControl(cast("asyncio.Transport", transport))
-        self._stall_timer = StallTimer(
-            cast("asyncio.Transport", transport), limit_s=self._limits.stalled_s, loop=self.loop
-        )
         self._expect_within(self._limits.head_s)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Stop all timers."""
         self._expect_within(None)
         self._unparsed = b""
-        if self._stall_timer is not None:
-            self._stall_timer.end()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
         """Parse what arrived up to the end of one request."""
         self._unparsed += data
         self._parse()
-
-    def pause_writing(self) -> None:
-        """Start the timer: the client does not read."""
-        super().pause_writing()
-        if self._stall_timer is not None:
-            self._stall_timer.begin()
-
-    def resume_writing(self) -> None:
-        """Stop the timer."""
-        if self._stall_timer is not None:
-            self._stall_timer.end()
-        super().resume_writing()
 
     def shutdown(self) -> None:
         """End with the service: a request that has not arrived yet is waited for no more."""

@@ -1,6 +1,5 @@
 """Bounds on a WebSocket: what its client may send, and how long it may read nothing."""
 
-import asyncio
 from typing import Any, Final
 
 from uvicorn.protocols.utils import ClientDisconnected
@@ -14,7 +13,7 @@ from websockets.typing import StatusLike
 from transientcam import wire
 from transientcam_server.api import SECURITY_HEADERS
 from transientcam_server.daemon._rate_limit import BURST_S, RateLimiter
-from transientcam_server.daemon._stalls import StallTimer
+from transientcam_server.daemon._stalls import CutWhereStalled
 from transientcam_server.errors import Problem, kinds, problem_document
 from transientcam_server.settings import LimitSettings, StreamSettings
 
@@ -44,7 +43,7 @@ class Conversation(ServerProtocol):
         super().recv_frame(frame)
 
 
-class BoundedStream(WebSocketsSansIOProtocol):
+class BoundedStream(CutWhereStalled, WebSocketsSansIOProtocol):
     """One WebSocket, which is cut where its client sends too much or reads nothing any more.
 
     Frames of every kind count: messages, their parts, pings, pongs; and each KiB as one more.
@@ -66,20 +65,6 @@ class BoundedStream(WebSocketsSansIOProtocol):
         self._answered = False
         self._received_bytes = 0
         self._cut = False
-        self._stall_timer: StallTimer | None = None
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Register the connection."""
-        super().connection_made(transport)
-        self._stall_timer = StallTimer(
-            self.transport, limit_s=self._limits.stalled_s, loop=self.loop
-        )
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        """Stop the timer."""
-        if self._stall_timer is not None:
-            self._stall_timer.end()
-        super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
         """Read frames, and count them."""
@@ -94,18 +79,6 @@ class BoundedStream(WebSocketsSansIOProtocol):
             super().handle_events()
         else:
             self._cut_off()
-
-    def pause_writing(self) -> None:
-        """Start the timer: the client does not read."""
-        super().pause_writing()
-        if self._stall_timer is not None:
-            self._stall_timer.begin()
-
-    def resume_writing(self) -> None:
-        """Stop the timer."""
-        if self._stall_timer is not None:
-            self._stall_timer.end()
-        super().resume_writing()
 
     def shutdown(self) -> None:
         """End with the service; without waiting for a client that reads nothing."""

@@ -117,7 +117,7 @@ def reconstruct_recording(
     else:
         try:
             with open_to_write(part, "x") as (file, _):
-                _lay_out(file, recording, reconstructor, document)
+                _lay_out(file, content_of(recording, reconstructor, document))
         except BaseException:
             part.unlink(missing_ok=True)  # nothing is in it that could be gone on with
             raise
@@ -208,32 +208,21 @@ def content_of(
     return Content(columns, blocks, {**document, "versions": versions})
 
 
-def _lay_out(
-    file: swmr.File,
-    recording: Recording,
-    reconstructor: BatchReconstructor,
-    document: Mapping[str, str],
-) -> None:
-    file.attrs.update(document)
-    file.attrs["versions"] = json.dumps(dict(recording.header.versions))
-    swmr.create_series(file, "device_time_s", "<f8", units="s")
-    swmr.create_series(file, "host_time_s", "<f8", units="s")
+def _lay_out(file: swmr.File, content: Content) -> None:
+    """Create everything that a file of products holds, of no frame yet."""
+    file.attrs.update(content.attributes)
     swmr.create_series(file, "frame", "<u8")
     file["frame"].make_scale("frame")
-    for name in ("device_time_s", "host_time_s"):
-        file[name].dims[0].attach_scale(file["frame"])
-    for product in reconstructor.products:
-        description, shape = product.description, reconstructor.shape(product)
-        blocks = swmr.create_blocks(
-            file, product.name, shape, description.dtype, units=description.unit
-        )
-        blocks.attrs["long_name"] = description.summary
-        axes = ("frame", *description.axes)
-        for axis, (name, size) in enumerate(zip(axes, (0, *shape), strict=True)):
-            if name not in file:
-                values = reconstructor.time_s if name == "time" else np.arange(size)
-                file.create_dataset(name, data=values).make_scale(name)
-            blocks.dims[axis].attach_scale(file[name])
+    for name, column in content.columns.items():
+        if column.axes == ("frame",):
+            swmr.create_series(file, name, "<f8", **column.attributes)
+            file[name].dims[0].attach_scale(file["frame"])
+        else:
+            file.create_dataset(name, data=column.values).make_scale(name)
+    for name, block in content.blocks.items():
+        blocks = swmr.create_blocks(file, name, block.shape[1:], block.dtype, **block.attributes)
+        for axis, along in enumerate(block.axes):
+            blocks.dims[axis].attach_scale(file[along])
 
 
 def _repair(part: Path, document: Mapping[str, str]) -> None:

@@ -50,10 +50,6 @@ class CheckedReader(io.RawIOBase):
         self._at = begin + offset
         return self._at
 
-    def tell(self) -> int:
-        """Return where the next read begins."""
-        return self._at
-
     def readinto(self, buffer: "WriteableBuffer", /) -> int:
         """Fill a buffer as far as the file goes; return how many bytes that were.
 

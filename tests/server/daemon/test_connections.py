@@ -17,7 +17,7 @@ from tests.serving import Served, serving
 from transientcam_server.api import SECURITY_HEADERS
 from transientcam_server.daemon._connections import BoundedConnection
 from transientcam_server.daemon._read_limiter import PORTION_BYTES
-from transientcam_server.daemon._stalls import StallTimer
+from transientcam_server.daemon._stalls import CutWhereStalled
 from transientcam_server.settings import LimitSettings
 
 PATIENCE_S = 60.0
@@ -421,13 +421,15 @@ class Connection:
         self.timers[-1].ring()
 
 
-def stall_timer(connection: Connection) -> StallTimer:
-    return StallTimer(cast("Any", connection), limit_s=LIMIT_S, loop=cast("Any", connection))
+class Writing(CutWhereStalled):
+    def __init__(self, connection: Connection) -> None:
+        self.loop = self.transport = cast("Any", connection)
+        self._limits = LimitSettings(stalled_s=LIMIT_S)
 
 
 def test_a_connection_that_takes_nothing_is_cut() -> None:
     connection = Connection(100_000)
-    stall_timer(connection).begin()
+    Writing(connection).pause_writing()
     connection.wait()
 
     assert connection.aborted
@@ -435,7 +437,7 @@ def test_a_connection_that_takes_nothing_is_cut() -> None:
 
 def test_one_that_takes_a_little_is_waited_for_until_it_takes_nothing() -> None:
     connection = Connection(100_000)
-    stall_timer(connection).begin()
+    Writing(connection).pause_writing()
     for left_bytes in (99_999, 50_000, 10):
         connection.left_bytes = left_bytes
         connection.wait()
@@ -447,7 +449,7 @@ def test_one_that_takes_a_little_is_waited_for_until_it_takes_nothing() -> None:
 
 def test_one_to_which_only_more_was_added_took_nothing() -> None:
     connection = Connection(100_000)
-    stall_timer(connection).begin()
+    Writing(connection).pause_writing()
     connection.left_bytes += 6  # a ping
     connection.wait()
 
@@ -456,10 +458,10 @@ def test_one_to_which_only_more_was_added_took_nothing() -> None:
 
 def test_nothing_happens_once_everything_is_taken() -> None:
     connection = Connection(100_000)
-    waiting = stall_timer(connection)
-    waiting.begin()
-    waiting.end()
-    waiting.end()
+    writing = Writing(connection)
+    writing.pause_writing()
+    writing.resume_writing()
+    writing.resume_writing()
 
     assert connection.timers[0].cancelled
     assert not connection.aborted
@@ -467,8 +469,8 @@ def test_nothing_happens_once_everything_is_taken() -> None:
 
 def test_each_time_counts_for_itself() -> None:
     connection = Connection(100_000)
-    waiting = stall_timer(connection)
-    waiting.begin()
-    waiting.begin()
+    writing = Writing(connection)
+    writing.pause_writing()
+    writing.pause_writing()
 
     assert [timer.cancelled for timer in connection.timers] == [True, False]

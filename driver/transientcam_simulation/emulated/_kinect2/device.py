@@ -1,15 +1,23 @@
 """The cable of an emulated Kinect v2: a link at a time, its packets, faults, and a plug."""
 
+import threading
 from collections.abc import Callable, Iterator
 from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.cameras.kinect2 import FRAME_RATE_HZ, MEASURED, TICK_S, encoder
+from transientcam_driver.cameras.kinect2 import (
+    FRAME_RATE_HZ,
+    MEASURED,
+    TICK_S,
+    FailureTaker,
+    PacketTaker,
+    encoder,
+)
 from transientcam_driver.clock import Clock
+from transientcam_driver.errors import CameraLost
 from transientcam_simulation.emulated._kinect2.firmware import EmulatedFirmware
-from transientcam_simulation.emulated._kinect2.link import EmulatedLink
 from transientcam_simulation.emulated._open_usb import Fault
 from transientcam_simulation.emulated._plugged_camera import PluggedCamera
 
@@ -26,7 +34,7 @@ class Pixels(Protocol):
         ...
 
 
-class EmulatedKinect2(PluggedCamera[EmulatedLink]):
+class EmulatedKinect2(PluggedCamera["EmulatedLink"]):
     """An emulated camera, and its cable; a fault loses or shortens a packet of an image.
 
     Parameters
@@ -53,7 +61,7 @@ class EmulatedKinect2(PluggedCamera[EmulatedLink]):
     def _power_on(self) -> None:
         self.firmware = self._firmware_of_power_on()
 
-    def _new_link(self) -> EmulatedLink:
+    def _new_link(self) -> "EmulatedLink":
         return EmulatedLink(self)
 
     @property
@@ -98,3 +106,79 @@ class EmulatedKinect2(PluggedCamera[EmulatedLink]):
     def _takes(self, fault: Fault) -> bool:
         with self.changed:
             return self._faults.take(fault)
+
+
+class EmulatedLink:
+    """One opening of an emulated camera; it stays dead once the cable was pulled."""
+
+    node = ""
+
+    def __init__(self, plug: EmulatedKinect2) -> None:
+        self._plug = plug
+        self._enabled = False
+        self._thread: threading.Thread | None = None
+
+    def write(self, data: bytes) -> None:
+        """Send a request."""
+        with self._plug.changed:
+            self._plug.require(self)
+            self._plug.firmware.write(data)
+            self._plug.changed.notify_all()  # it may have been to start or to stop
+
+    def read(self, most_bytes: int) -> bytes:
+        """Return the next transfer of the answer endpoint."""
+        with self._plug.changed:
+            self._plug.require(self)
+            return self._plug.firmware.read(most_bytes)
+
+    def set_suspended(self, suspended: bool) -> None:
+        """Suspend the function of the depth camera, or wake it up."""
+        with self._plug.changed:
+            self._plug.require(self)
+            self._plug.firmware.suspended = suspended
+
+    def set_stream_enabled(self, enabled: bool) -> None:
+        """Give the stream its bandwidth, or take it away."""
+        with self._plug.changed:
+            self._plug.require(self)
+            self._enabled = enabled
+
+    def start_images(self, received: PacketTaker, failed: FailureTaker) -> None:
+        """Hand over packets on a thread, until `stop_images`."""
+        with self._plug.changed:
+            self._plug.require(self)
+        thread = threading.Thread(
+            target=self._stream, args=(received, failed), name="kinect2-packets", daemon=True
+        )
+        self._thread = thread
+        thread.start()
+
+    def stop_images(self) -> None:
+        """Hand over nothing more once this returns."""
+        with self._plug.changed:
+            thread, self._thread = self._thread, None
+            self._plug.changed.notify_all()
+        if thread is not None:
+            thread.join()
+
+    def close(self) -> None:
+        """Give the camera back."""
+        self.stop_images()
+        self._plug.release(self)
+
+    def _stream(self, received: PacketTaker, failed: FailureTaker) -> None:
+        own = threading.current_thread()
+
+        def wanted() -> bool:
+            return self._thread is own and self._plug.is_at(self)
+
+        due_s: float | None = None
+        while (due_s := self._plug.wait_for_frame(due_s, wanted)) is not None:
+            if not (self._enabled and self._plug.firmware.lit):
+                continue
+            for packet in self._plug.frame():
+                if not wanted():
+                    break
+                received(packet)
+        if self._thread is own:
+            failed(CameraLost("it was unplugged"))

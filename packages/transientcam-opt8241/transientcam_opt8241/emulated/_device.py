@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.clock import Clock
-from transientcam_driver.errors import CameraLost
 from transientcam_opt8241 import Request
 from transientcam_opt8241.emulated._firmware import EmulatedRegisters
 from transientcam_simulation.emulated import ZERO_DN, Fault, PluggedCamera
@@ -68,11 +67,6 @@ class EmulatedOpt8241(PluggedCamera["EmulatedLink"]):
         return EmulatedLink(self)
 
     # --- at the other end of a link ----------------------------------------------------------
-
-    def require(self, link: "EmulatedLink") -> None:
-        """Refuse a link that does not lead here any more (CameraLost)."""
-        if not self.is_at(link):
-            raise CameraLost("it is not plugged in any more")
 
     def write(self, request: int, value: int, index: int, data: bytes) -> None:
         """Take a request, under the lock; it may start or stop the sensor."""

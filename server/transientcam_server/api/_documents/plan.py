@@ -2,15 +2,15 @@
 
 from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from transientcam_server.api._documents.document import Document, RequestDocument
 from transientcam_server.api._documents.frame import FrameDocument
 from transientcam_server.api._documents.sequence import SequenceDocument
 
 
-class _StrictDocument(RequestDocument, allow_inf_nan=False):
-    pass
+class _StrictDocument(RequestDocument):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 class TargetDocument(_StrictDocument):
@@ -59,16 +59,18 @@ class SceneDocument(_StrictDocument):
     )
 
 
-class PlanRequest(
-    _StrictDocument,
-    json_schema_extra={
-        "examples": [
-            {"target": {"range_error_m": 0.005}},
-            {"budget": {"frame_rate_hz": 15.0}, "fixed": {"zeroth": "low-frequency"}},
-        ]
-    },
-):
+class PlanRequest(_StrictDocument):
     """What a sequence is wanted for."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {"target": {"range_error_m": 0.005}},
+                {"budget": {"frame_rate_hz": 15.0}, "fixed": {"zeroth": "low-frequency"}},
+            ]
+        },
+    )
 
     target: TargetDocument = TargetDocument()
     budget: BudgetDocument = BudgetDocument()
@@ -229,8 +231,12 @@ AccuracyName = Literal["range_error_m", "range_std_m", "bound_width"]
 """Which accuracy capture time is held against."""
 
 
-class TradeoffRequest(_StrictDocument, json_schema_extra={"examples": [{"by": "range_error_m"}]}):
+class TradeoffRequest(_StrictDocument):
     """What the front is wanted for."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"by": "range_error_m"}]}
+    )
 
     by: AccuracyName = "range_error_m"
     """The accuracy that capture time is held against."""

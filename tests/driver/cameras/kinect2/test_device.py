@@ -11,7 +11,7 @@ from transientcam_driver.cameras.kinect2 import Kinect2
 from transientcam_driver.cameras.kinect2._device import READY_TRIES
 from transientcam_driver.errors import TransferStalled
 from transientcam_simulation.emulated._kinect2 import EmulatedKinect2
-from transientcam_simulation.emulated._kinect2.link import EmulatedLink
+from transientcam_simulation.emulated._kinect2.device import EmulatedLink
 
 # libfreenect2 @ fd64c5d, src/libfreenect2.cpp; numbers are commands with their parameters
 IDENTIFY = ["awake", "2", "14", "22 1", "22 3", "22 2", "22 4"]

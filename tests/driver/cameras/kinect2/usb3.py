@@ -20,8 +20,7 @@ from tests.driver.cameras.open_usb.usbfs.usbfs import (
     UsbfsMount,
 )
 from transientcam_driver.errors import CameraError, CameraLost
-from transientcam_simulation.emulated._kinect2.device import EmulatedKinect2
-from transientcam_simulation.emulated._kinect2.link import EmulatedLink
+from transientcam_simulation.emulated._kinect2.device import EmulatedKinect2, EmulatedLink
 from transientcam_simulation.emulated._open_usb.descriptors import string_descriptors
 
 SUPER_SPEED_MBIT, SUPER_SPEED = 5000, 5
