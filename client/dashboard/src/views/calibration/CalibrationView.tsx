@@ -1,5 +1,5 @@
 import { useSignal } from "@preact/signals";
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect } from "preact/hooks";
 import { fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
 import type { CalibrationDocument, JobDocument } from "../../stream/documents";
@@ -8,6 +8,7 @@ import { Check, Form, NumberField, TextField } from "../../ui/controls";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
+import { chooseFile } from "../files/openFile";
 import { CalibrationRow, NominalRow } from "./CalibrationRow";
 import "../recordings/RecordForm.css";
 import "./CalibrationView.css";
@@ -86,7 +87,7 @@ function MeasureForm({ task }: { task: Task }) {
         value={frames.value}
         onType={(text) => (frames.value = text)}
       />
-      <div class="record-actions">
+      <div class="record-actions row">
         <Steer submit primary title="Measure with the present sequence; no frames come meanwhile" disabled={!sensible} task={task}>
           Measure
         </Steer>
@@ -156,30 +157,16 @@ function Measuring({ job, task }: { job: JobDocument; task: Task }) {
 
 /** Takes in a file that was exported elsewhere. */
 function Import({ task }: { task: Task }) {
-  const { calibrations } = useStore();
-  const input = useRef<HTMLInputElement>(null);
+  const store = useStore();
+  const take = (file: File): void => void task.run(`Taking in ${file.name}…`, () => store.calibrations.take(file));
   return (
-    <>
-      <input
-        ref={input}
-        type="file"
-        accept=".npz"
-        hidden
-        aria-label="File of a calibration"
-        onChange={(event) => {
-          const file = event.currentTarget.files?.[0];
-          event.currentTarget.value = "";
-          if (file !== undefined) void task.run(`Taking in ${file.name}…`, () => calibrations.take(file));
-        }}
-      />
-      <button
-        type="button"
-        title="Take in a calibration that was exported elsewhere"
-        disabled={task.busy.value !== null}
-        onClick={() => input.current?.click()}
-      >
-        Import…
-      </button>
-    </>
+    <button
+      type="button"
+      title="Take in a calibration that was exported elsewhere"
+      disabled={task.busy.value !== null}
+      onClick={() => chooseFile(store, ".npz", take)}
+    >
+      Import…
+    </button>
   );
 }

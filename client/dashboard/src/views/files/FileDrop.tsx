@@ -26,14 +26,11 @@ export function FileDrop() {
       over.value = false;
       for (const file of event.dataTransfer?.files ?? []) void openFile(store, file);
     };
-    window.addEventListener("dragover", onOver);
-    window.addEventListener("dragleave", onLeave);
-    window.addEventListener("drop", onDrop);
-    return () => {
-      window.removeEventListener("dragover", onOver);
-      window.removeEventListener("dragleave", onLeave);
-      window.removeEventListener("drop", onDrop);
-    };
+    const end = new AbortController();
+    window.addEventListener("dragover", onOver, end);
+    window.addEventListener("dragleave", onLeave, end);
+    window.addEventListener("drop", onDrop, end);
+    return () => end.abort();
   }, [store, over]);
   if (!over.value) return null;
   return (
