@@ -3,8 +3,8 @@ import { useEffect } from "preact/hooks";
 import { fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
 import type { CalibrationDocument, JobDocument } from "../../stream/documents";
-import { Confirm } from "../../ui/Confirm";
 import { Check, Form, NumberField, TextField } from "../../ui/controls";
+import { Deletion } from "../../ui/Deletion";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
@@ -25,7 +25,6 @@ export function CalibrationView() {
   const known = calibrations.document.value;
   const job = calibrations.job.value;
   const outcome = calibrations.outcome.value;
-  const doomed = deleting.value;
   return (
     <Panel name="calibration" title={<h2>Calibration</h2>} tools={<Import task={task} />}>
       <div class="panel-body column fades">
@@ -50,19 +49,13 @@ export function CalibrationView() {
           </ul>
         )}
       </div>
-      <Confirm
-        open={doomed !== null}
-        title="Delete this calibration?"
-        word="Delete"
-        onClose={() => (deleting.value = null)}
-        work={async () => {
-          if (doomed !== null) await calibrations.remove(doomed.id);
-        }}
-      >
-        <p>
-          <strong>{doomed?.name || doomed?.id}</strong>: its images cannot be captured again as the camera was then.
-        </p>
-      </Confirm>
+      <Deletion doomed={deleting} kind="calibration" remove={({ id }) => calibrations.remove(id)}>
+        {({ name, id }) => (
+          <p>
+            <strong>{name || id}</strong>: its images cannot be captured again as the camera was then.
+          </p>
+        )}
+      </Deletion>
     </Panel>
   );
 }

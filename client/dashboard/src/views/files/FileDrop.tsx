@@ -27,9 +27,10 @@ export function FileDrop() {
       for (const file of event.dataTransfer?.files ?? []) void openFile(store, file);
     };
     const end = new AbortController();
-    window.addEventListener("dragover", onOver, end);
-    window.addEventListener("dragleave", onLeave, end);
-    window.addEventListener("drop", onDrop, end);
+    const { signal } = end;
+    window.addEventListener("dragover", onOver, { signal });
+    window.addEventListener("dragleave", onLeave, { signal });
+    window.addEventListener("drop", onDrop, { signal });
     return () => end.abort();
   }, [store, over]);
   if (!over.value) return null;
