@@ -126,13 +126,19 @@ def test_one_is_exported_deleted_and_imported(page: Page, served: Served, tmp_pa
     confirm.get_by_role("button", name="Delete").click()
     expect(row).to_have_count(0)
     assert httpx.get(url).json()["calibrations"] == []
-    panel.get_by_label("File of a calibration").set_input_files(exported)
+    import_file(page, exported)
     expect(row).to_contain_text("bench")
     row.get_by_role("button", name="Use").click()
     expect(row).to_contain_text("in use")
     assert httpx.get(url).json()["active"] == identity
     panel.locator("[data-calibration=nominal]").get_by_role("button", name="Use").click()
     expect(panel.locator("[data-calibration=nominal]")).to_contain_text("in use")
+
+
+def import_file(page: Page, file: Path) -> None:
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Import…").click()
+    chooser.value.set_files(file)
 
 
 def test_a_measurement_is_cancelled(page: Page, served: Served) -> None:
@@ -155,7 +161,7 @@ def test_a_file_that_is_no_calibration_is_refused_in_words(
     watch.refusals_expected = True
     wrong = tmp_path / "wrong.npz"
     wrong.write_bytes(b"PK\x03\x04 and no more")
-    page.get_by_label("File of a calibration").set_input_files(wrong)
+    import_file(page, wrong)
     expect(page.locator("[data-field=calibration-status].refusal")).to_have_text(
         re.compile(".{10,}")
     )

@@ -1,7 +1,7 @@
 /** What is measured in the pictures by hand: pixels that are kept, and a region. */
 import type { Signal } from "@preact/signals";
-
 import { statistics } from "../physics/statistics";
+
 import { type Pixel, pixelOf, pixelText } from "./pixel";
 import type { Settings } from "./settings";
 

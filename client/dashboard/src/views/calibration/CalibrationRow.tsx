@@ -19,7 +19,7 @@ export function NominalRow({ active, task }: { active: boolean; task: Task }) {
     <li class={active ? "row recording recording-shown" : "row recording"} data-calibration="nominal">
       <div class="recording-words">
         <p class="recording-name">Nominal gains {active && <em class="tag tag-good">in use</em>}</p>
-        <p class="quiet recording-figures">those of an ideal modulation; nothing was measured</p>
+        <p class="small quiet recording-figures">those of an ideal modulation; nothing was measured</p>
       </div>
       {!active && (
         <Steer task={task} onClick={() => void task.run("Switching…", () => calibrations.activate("nominal"))}>
@@ -60,7 +60,7 @@ export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
             </em>
           )}
         </p>
-        <p class="quiet recording-figures">
+        <p class="small quiet recording-figures">
           <span title={clock(calibration.created_at)}>{ageOf(calibration.age_s)}</span>
           <span>{fixed(calibration.temperature_c, 1, "°C")}</span>
           <span>{sequenceOf(calibration)}</span>
@@ -80,7 +80,7 @@ export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
           </div>
         )}
         {drifted !== null && (
-          <p class={drifted.grown ? "refusal" : "recording-notes"} data-field="drift">
+          <p class={drifted.grown ? "refusal" : "small recording-notes"} data-field="drift">
             {drifted.words}
           </p>
         )}

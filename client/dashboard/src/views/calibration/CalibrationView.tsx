@@ -1,13 +1,14 @@
 import { useSignal } from "@preact/signals";
-import { useEffect, useRef } from "preact/hooks";
+import { useEffect } from "preact/hooks";
 import { fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
 import type { CalibrationDocument, JobDocument } from "../../stream/documents";
-import { Confirm } from "../../ui/Confirm";
 import { Check, Form, NumberField, TextField } from "../../ui/controls";
+import { Deletion } from "../../ui/Deletion";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
+import { chooseFile } from "../files/openFile";
 import { CalibrationRow, NominalRow } from "./CalibrationRow";
 import "../recordings/RecordForm.css";
 import "./CalibrationView.css";
@@ -24,7 +25,6 @@ export function CalibrationView() {
   const known = calibrations.document.value;
   const job = calibrations.job.value;
   const outcome = calibrations.outcome.value;
-  const doomed = deleting.value;
   return (
     <Panel name="calibration" title={<h2>Calibration</h2>} tools={<Import task={task} />}>
       <div class="panel-body column fades">
@@ -49,19 +49,13 @@ export function CalibrationView() {
           </ul>
         )}
       </div>
-      <Confirm
-        open={doomed !== null}
-        title="Delete this calibration?"
-        word="Delete"
-        onClose={() => (deleting.value = null)}
-        work={async () => {
-          if (doomed !== null) await calibrations.remove(doomed.id);
-        }}
-      >
-        <p>
-          <strong>{doomed?.name || doomed?.id}</strong>: its images cannot be captured again as the camera was then.
-        </p>
-      </Confirm>
+      <Deletion doomed={deleting} kind="calibration" remove={({ id }) => calibrations.remove(id)}>
+        {({ name, id }) => (
+          <p>
+            <strong>{name || id}</strong>: its images cannot be captured again as the camera was then.
+          </p>
+        )}
+      </Deletion>
     </Panel>
   );
 }
@@ -86,7 +80,7 @@ function MeasureForm({ task }: { task: Task }) {
         value={frames.value}
         onType={(text) => (frames.value = text)}
       />
-      <div class="record-actions">
+      <div class="record-actions row">
         <Steer submit primary title="Measure with the present sequence; no frames come meanwhile" disabled={!sensible} task={task}>
           Measure
         </Steer>
@@ -156,30 +150,16 @@ function Measuring({ job, task }: { job: JobDocument; task: Task }) {
 
 /** Takes in a file that was exported elsewhere. */
 function Import({ task }: { task: Task }) {
-  const { calibrations } = useStore();
-  const input = useRef<HTMLInputElement>(null);
+  const store = useStore();
+  const take = (file: File): void => void task.run(`Taking in ${file.name}…`, () => store.calibrations.take(file));
   return (
-    <>
-      <input
-        ref={input}
-        type="file"
-        accept=".npz"
-        hidden
-        aria-label="File of a calibration"
-        onChange={(event) => {
-          const file = event.currentTarget.files?.[0];
-          event.currentTarget.value = "";
-          if (file !== undefined) void task.run(`Taking in ${file.name}…`, () => calibrations.take(file));
-        }}
-      />
-      <button
-        type="button"
-        title="Take in a calibration that was exported elsewhere"
-        disabled={task.busy.value !== null}
-        onClick={() => input.current?.click()}
-      >
-        Import…
-      </button>
-    </>
+    <button
+      type="button"
+      title="Take in a calibration that was exported elsewhere"
+      disabled={task.busy.value !== null}
+      onClick={() => chooseFile(store, ".npz", take)}
+    >
+      Import…
+    </button>
   );
 }

@@ -26,14 +26,12 @@ export function FileDrop() {
       over.value = false;
       for (const file of event.dataTransfer?.files ?? []) void openFile(store, file);
     };
-    window.addEventListener("dragover", onOver);
-    window.addEventListener("dragleave", onLeave);
-    window.addEventListener("drop", onDrop);
-    return () => {
-      window.removeEventListener("dragover", onOver);
-      window.removeEventListener("dragleave", onLeave);
-      window.removeEventListener("drop", onDrop);
-    };
+    const end = new AbortController();
+    const { signal } = end;
+    window.addEventListener("dragover", onOver, { signal });
+    window.addEventListener("dragleave", onLeave, { signal });
+    window.addEventListener("drop", onDrop, { signal });
+    return () => end.abort();
   }, [store, over]);
   if (!over.value) return null;
   return (

@@ -63,14 +63,18 @@ export function recordingIn(
   return alike.length === 1 ? alike[0] : null;
 }
 
-/** Lets the user choose a file, by default of any kind that can be opened, and opens it. */
-export function chooseFile(store: Store, kind = Object.keys(OPENERS).join()): void {
+/** Lets the user choose a file, by default of any kind that can be opened, and opens it, or has it taken otherwise. */
+export function chooseFile(
+  store: Store,
+  kind = Object.keys(OPENERS).join(),
+  take = (file: File): void => void openFile(store, file),
+): void {
   const input = document.createElement("input");
   input.type = "file";
   input.accept = kind;
   input.onchange = () => {
     const file = input.files?.[0];
-    if (file !== undefined) void openFile(store, file);
+    if (file !== undefined) take(file);
   };
   input.click();
 }

@@ -37,7 +37,7 @@ export function RecordForm({ task }: { task: Task }) {
         {number("Size", "MB", size_mb, "size_mb")}
         {number("Frames", "", frames, "frames")}
       </fieldset>
-      <div class="record-actions">
+      <div class="record-actions row">
         <button
           type="submit"
           class="record"

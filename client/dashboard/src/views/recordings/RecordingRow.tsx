@@ -55,14 +55,14 @@ export function RecordingRow({ recording, task, onAnnotate, onDelete }: RowProps
         <p class="recording-name">
           {name} {STATES[state] !== null && <em class={state === "damaged" ? "tag tag-bad" : "tag"}>{STATES[state]}</em>}
         </p>
-        <p class="quiet recording-figures" title={why === null ? undefined : `It ${why}.`}>
+        <p class="small quiet recording-figures" title={why === null ? undefined : `It ${why}.`}>
           <span>{clock(recording.started_s)}</span>
           <span data-field="duration">{duration(recording.duration_s)}</span>
           <span data-field="frames">{grouped(recording.frames)} frames</span>
           <span data-field="size">{bytes(recording.size_bytes)}</span>
           {recording.dropped_frames > 0 && <span class="refusal">{grouped(recording.dropped_frames)} left out</span>}
         </p>
-        {notes.length > 0 && <p class="recording-notes">{notes.join(" · ")}</p>}
+        {notes.length > 0 && <p class="small recording-notes">{notes.join(" · ")}</p>}
         {recording.problem !== null && <p class="refusal">{recording.problem}</p>}
       </div>
       <button

@@ -3,7 +3,7 @@ import { useEffect } from "preact/hooks";
 import { grouped } from "../../scales/format";
 import { useStore } from "../../store/store";
 import type { RecordingDocument } from "../../stream/documents";
-import { Confirm } from "../../ui/Confirm";
+import { Deletion } from "../../ui/Deletion";
 import { Panel } from "../../ui/Panel";
 import { TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
@@ -23,7 +23,10 @@ export function RecordingsView() {
   const deleting = useSignal<RecordingDocument | null>(null);
   useEffect(() => void recordings.refresh(), [recordings]);
   const known = recordings.document.value;
-  const doomed = deleting.value;
+  const remove = (id: string): Promise<void> => {
+    if (store.replay.recording.peek()?.id === id) store.replay.leave();
+    return recordings.remove(id);
+  };
   return (
     <Panel
       name="recordings"
@@ -59,22 +62,13 @@ export function RecordingsView() {
         </ul>
       </div>
       {annotating.value !== null && <Annotations recording={annotating.value} onClose={() => (annotating.value = null)} />}
-      <Confirm
-        open={doomed !== null}
-        title="Delete this recording?"
-        word="Delete"
-        onClose={() => (deleting.value = null)}
-        work={async () => {
-          if (doomed === null) return;
-          if (store.replay.recording.peek()?.id === doomed.id) store.replay.leave();
-          await recordings.remove(doomed.id);
-        }}
-      >
-        <p>
-          <strong>{doomed?.name}</strong>, {grouped(doomed?.frames ?? 0)} frames of {duration(doomed?.duration_s ?? 0)}. What it shows
-          cannot be captured again.
-        </p>
-      </Confirm>
+      <Deletion doomed={deleting} kind="recording" remove={({ id }) => remove(id)}>
+        {({ name, frames, duration_s }) => (
+          <p>
+            <strong>{name}</strong>, {grouped(frames)} frames of {duration(duration_s)}. What it shows cannot be captured again.
+          </p>
+        )}
+      </Deletion>
     </Panel>
   );
 }

@@ -24,7 +24,7 @@ export function ReplayBar() {
           {replay.trouble.value ?? <CapturedAt started_s={timeline.host_time_s ?? recording.started_s} replay={replay} />}
         </span>
       </div>
-      <div class="replay-controls">
+      <div class="replay-controls row">
         <button type="button" class="play" aria-label="One frame back" title="One frame back ([)" onClick={() => replay.step(-1)}>
           <StepIcon back />
         </button>
