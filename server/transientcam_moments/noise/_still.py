@@ -21,6 +21,8 @@ DRIFTED: Final = 5.0
 DOUBTFUL: Final = 2.0
 """The same of a pixel with `BESIDE` others around it that have changed."""
 BESIDE: Final = 2
+AMIDST: Final = 5
+"""Pixels around one, of eight, that have changed, with which it has changed, too."""
 RECENT: Final = 16
 LIT: Final = 20.0
 """Least size of the mean over its noise, from which on its brightness is tested by itself."""
@@ -176,12 +178,14 @@ def _changed(
         block = np.s_[..., start : start + _BLOCK_PIXELS]
         parts = [each[block] for each in flat], [each[block] for each in pixels]
         changed[block], doubtful[block] = _judged(*parts, order[:, None], numbers, sums[block])
+    sums = np.concatenate([sums, sums != 0])  # of deviations, and how many
     changed, doubtful, sums = (each.reshape((-1, *shape)) for each in (changed, doubtful, sums))
     for step in (1, 3):  # 3 x 3 pixels, then 3 x 3 of these; what has changed is not among them
-        sums = _summed(np.where(changed, 0, sums), step) / 3
-        changed = changed | (abs(sums) > DRIFTED).any(axis=0)
-    beside = _summed((changed[0] & among).astype(np.int8), 1) >= BESIDE
-    return changed[0] | (doubtful[0] & beside)
+        sums = _summed(np.where(changed, 0, sums), step)
+        changed = changed | (sums[:4] ** 2 > DRIFTED**2 * np.maximum(sums[4:], 1)).any(axis=0)
+    found = changed[0] & among
+    found |= doubtful[0] & (_summed(found.astype(np.int8), 1) >= BESIDE)
+    return found | (_summed(found.astype(np.int8), 1) >= AMIDST)
 
 
 def _judged(

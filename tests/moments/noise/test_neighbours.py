@@ -260,3 +260,21 @@ def test_other_shapes_are_refused(field: str, arguments: dict[str, Any]) -> None
 
     with pytest.raises(tm.ShapeError, match=field):
         tm.average_neighbours(**(usual | arguments))
+
+
+def test_pixels_count_as_often_as_they_have_frames() -> None:
+    b = wall(np.full((24, 24), 2.0), seed=None)
+    frames = np.ones((24, 24))
+    frames[:, 12:] = 100.0
+    random = np.random.default_rng(4)
+    parts = STD / np.sqrt(frames) * random.normal(size=(2, *b.shape))
+    own = tm.noise.MomentNoise(np.broadcast_to(STD**2 / frames, b.shape))
+
+    found = tm.average_neighbours(b + parts[0] + 1j * parts[1], own, frames=frames)
+
+    beside = found.noise.variance[1][4:-4, 9:12]
+    assert (beside < STD**2 / 100).all(), "of one frame, beside pixels with a hundred"
+    z = (found.moments - b)[1:] / np.sqrt(found.noise.variance[1:])
+    assert np.mean(abs(z) ** 2) / 2 < 1.5
+    whole = tm.average_neighbours(b + parts[0], noise(b), frames=np.full((24, 24), 7.0))
+    assert np.allclose(whole.share, averaged(b + parts[0]).share)

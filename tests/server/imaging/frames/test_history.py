@@ -142,7 +142,7 @@ def test_whatever_comes_the_limits_hold_and_every_frame_between_first_and_last_i
         assert history.first is not None
         found = [history.frame(each) for each in range(history.first, number + 1)]
         assert [each.number for each in found] == list(range(history.first, number + 1))
-        kept = sum(each.raw.size_bytes for each in found)
+        kept = sum(each.size_bytes for each in found)
         assert history.size_bytes == (kept if size <= max_bytes else 0)
 
 
