@@ -160,7 +160,13 @@ class Service:
         )
         simulated = camera.simulation is not None
         twin = partial(snapshot_of, camera, settings.camera) if simulated else None
-        self.looks = Looks(self.planner, self.workers, self.planning, twin)
+        self.looks = Looks(
+            self.planner,
+            self.workers,
+            self.planning,
+            twin,
+            calibrated_c=self._calibrated_c,
+        )
         self.fronts = FrontCache(
             self.planner, self.workers, self.planning, self.looks, simulated=simulated
         )
@@ -210,6 +216,10 @@ class Service:
         self.recorded_frames = RecordedFramesCache(
             self.recordings, self.pipeline, lens=settings.lens
         )
+
+    def _calibrated_c(self) -> float | None:
+        calibration = self.pipeline.calibration
+        return None if calibration is None else calibration.gains.temperature_c
 
     @property
     def identity(self) -> dict[str, Any]:

@@ -4,6 +4,7 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 """
 
 import json
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -101,8 +102,9 @@ def plan(
 ) -> None:
     """Find the sequence and estimator for a target accuracy or a budget of time.
 
-    Where the target is out of reach what limits it is printed, and the exit code is 1. Ctrl-C ends
-    the work, also that of a daemon.
+    Where the target is out of reach what limits it is printed, and the exit code is 1; it is 3
+    where the frame of a camera that is not simulated does not tell. Ctrl-C ends the work, also that
+    of a daemon.
     """
     target = {"range_error_m": range_error_m, "range_std_m": range_std_m}
     target |= {"separation_m": separation_m, "bound_width": bound_width}
@@ -174,7 +176,7 @@ def _by_camera(
             console.print(problem.detail, style="red", soft_wrap=True)
             takes: Any = problem.extensions.get("takes", [])
             print_takes(takes)
-        raise typer.Exit(1) from problem
+        raise typer.Exit(_code(problem.extensions)) from problem
 
 
 def _by_daemon(
@@ -193,7 +195,11 @@ def _by_daemon(
             console.print(problem.detail, style="red", soft_wrap=True)
             takes: Any = problem.document.get("takes", [])
             print_takes(takes)
-        raise typer.Exit(1) from problem
+        raise typer.Exit(_code(problem.document)) from problem
+
+
+def _code(refused: Mapping[str, Any]) -> int:
+    return 1 if refused.get("decided", True) else 3
 
 
 def _given(values: dict[str, Any]) -> dict[str, Any]:

@@ -87,7 +87,9 @@ def _print_scene(scene: Mapping[str, Any]) -> None:
         f"{scene['ambient_dn_per_s']:.3g} DN/s of ambient light"
     )
     if scene["moving_share"] > MOVING:
-        echo(f"{scene['moving_share']:.0%} of them move: what that costs is not predicted")
+        echo(
+            f"{scene['moving_share']:.0%} of them move: planned for the others, with what that adds"
+        )
     if not scene["ambiguity_checked"]:
         echo("whether ranges are short by a period was not checked")
 

@@ -30,6 +30,7 @@ class Looks:
 
     A simulated camera has a twin that looks in its place, so that frames go on undisturbed and no
     busy machine loses images. Of any other camera the current frame has to be enough.
+    ``calibrated_c`` returns the temperature of the camera at the calibration in use, if known.
     """
 
     def __init__(
@@ -39,14 +40,16 @@ class Looks:
         queue: PlanningQueue,
         twin: Callable[[], CameraTwin] | None,
         *,
+        calibrated_c: Callable[[], float | None] = lambda: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._planner = planner
         self._workers = workers
         self._queue = queue
         self._twin = twin
+        self._calibrated_c = calibrated_c
         self._clock = clock
-        self._cached: tuple[Sequence, float | None, float, SceneStatistics] | None = None
+        self._cached: tuple[tuple[object, ...], float, SceneStatistics] | None = None
         self._looking = asyncio.Lock()
 
     @property
@@ -67,22 +70,17 @@ class Looks:
         assert self._twin is not None  # noqa: S101 - callers look at `needs_frame`
         self._planner.require_possible()
         async with self._looking:
-            cached = self._cached
-            if (
-                cached is None
-                or cached[:2] != (base, ambient_dn_per_s)
-                or self._clock() > cached[2]
-            ):
+            cached, key = self._cached, (base, ambient_dn_per_s, self._calibrated_c())
+            if cached is None or cached[0] != key or self._clock() > cached[1]:
                 scene = await self._queue.run(
                     look_through,
                     self._planner,
                     self._twin(),
-                    base,
-                    ambient_dn_per_s,
+                    *key,
                     progress=progress,
                 )
-                cached = self._cached = (base, ambient_dn_per_s, self._clock() + CACHED_S, scene)
-            return cached[3]
+                cached = self._cached = (key, self._clock() + CACHED_S, scene)
+            return cached[2]
 
     async def of_frame(self, frame: Frame, ambient_dn_per_s: float | None) -> SceneStatistics:
         """Return the scene as far as one frame resolves it.
@@ -109,8 +107,15 @@ def look_through(
     twin: CameraTwin,
     base: Sequence,
     ambient_dn_per_s: float | None,
+    calibrated_c: float | None,
     progress: Progress,
 ) -> SceneStatistics:
     """Look at the scene before a camera that is opened for that."""
     with twin.open() as camera:
-        return planner.look(camera, base, ambient_dn_per_s=ambient_dn_per_s, progress=progress)
+        return planner.look(
+            camera,
+            base,
+            ambient_dn_per_s=ambient_dn_per_s,
+            calibrated_c=calibrated_c,
+            progress=progress,
+        )

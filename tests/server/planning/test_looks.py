@@ -29,7 +29,7 @@ def test_another_look_is_taken_for_another_base_or_ambient_light_or_scene() -> N
         assert await bench.looked(Sequence(harmonics=4), 50.0) == {"answer": 3}
         bench.looks.forget()
         assert await bench.looked(Sequence(harmonics=4), 50.0) == {"answer": 4}
-        assert bench.queue.asked[-1][1:] == ("twin", Sequence(harmonics=4), 50.0)
+        assert bench.queue.asked[-1][1:] == ("twin", Sequence(harmonics=4), 50.0, None)
 
     asyncio.run(looks())
 

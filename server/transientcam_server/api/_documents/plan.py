@@ -169,10 +169,21 @@ class SeenDocument(Document):
     dim_share: float
     """Share of those that are so dim, at their range, that other surfaces may light them alone."""
     moving_share: float
-    """Share of the lit pixels that changed while the scene was looked at: what moves is not
-    predicted."""
+    """Share of the lit pixels that changed while the scene was looked at. Plans are for the others,
+    with the error that the speed of what moves adds during a capture."""
     ambiguity_checked: bool
     """Whether a second base frequency showed that no range is short by a period."""
+    calibrated: bool
+    """Whether what was seen is known to be the scene's; of one frame by nominal gains it is not."""
+    uncalibrated_m: float
+    """How far nominal gains put the range of the median pixel off. Plans are for a camera that is
+    calibrated with their sequence."""
+    lost_share: float
+    """Share of the images that lose their synchronisation."""
+    drift_m: float
+    """By how much ranges may have drifted since the calibration in use, by the temperature."""
+    of_one_frame: bool
+    """Whether the current frame had to do in the place of a look."""
 
 
 class PlanDocument(ChoiceDocument):

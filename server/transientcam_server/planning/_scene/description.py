@@ -329,15 +329,18 @@ def _of_one_return(b: _Array, coarse: FrameAverages, pixels: _Array, base_hz: fl
 def _swing_m_per_s(quick: Sequence[FrameAverages], lit: _Array) -> _Array:
     """Return how fast ranges change, in `PIXELS` that stand for the lit ones (H, W), by chance.
 
-    Between two frames, beyond what noise does, and when more of them do.
+    Between two frames, beyond what noise does, and when more of them do. Twice as many as there
+    are: captures in succession see edges elsewhere.
     """
-    place, most = (np.arange(PIXELS) + 0.5) / PIXELS, np.zeros(PIXELS)
+    swings_m_per_s = []
     for two in quick:
         size = np.maximum(np.abs(two.moments[1]), 1e-9)
         noise = MOVED_DEVIATIONS * np.sqrt(2 * two.variance(two.mean_dn)[1]) / size
         turned = np.angle(two.last[1] * np.conj(two.first[1]))
         beyond = np.nan_to_num(np.sqrt(np.maximum(turned**2 - noise**2, 0.0)))[lit]
         applied = two.recipe.applied
-        swing_m = np.asarray(tm.range_m(np.quantile(beyond, place), two.recipe.base_frequency_hz))
-        most = np.maximum(most, swing_m * applied.frame_rate_hz)
-    return np.random.default_rng(0).permutation(most)
+        swing_m = np.asarray(tm.range_m(beyond, two.recipe.base_frequency_hz))
+        swings_m_per_s.append(swing_m * applied.frame_rate_hz)
+    place = 1 - (np.arange(PIXELS) + 0.5) / (2 * PIXELS)
+    typical = np.quantile(np.concatenate(swings_m_per_s), place)
+    return np.random.default_rng(0).permutation(typical)

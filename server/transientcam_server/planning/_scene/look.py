@@ -45,7 +45,7 @@ OF_THE_DEVICE: Final = frozenset(
     ("roll-off", "pixel-pattern", "modulation-harmonics", "thermal-drift", "outliers")
 )
 """Effects that a calibration shows."""
-STEPS: Final = 1 + 2 + 2 + STILL_FRAMES + 1
+STEPS: Final = 1 + 4 + 2 + STILL_FRAMES + 1
 """Of a look, at most, where the first exposure does not saturate."""
 FIRST_EXPOSURE_S: Final = 5e-4
 LONGEST_EXPOSURE_S: Final = 0.02
@@ -215,7 +215,7 @@ def look_at(
         frames: int,
         stage: str,
         *,
-        still_frames: int = 0,
+        more_if_still: int = 0,
         gains: Gains | None = None,
         more_of: _FrameSums | None = None,
     ) -> _FrameSums:
@@ -232,8 +232,8 @@ def look_at(
         camera.start()
         try:
             take(frames)
-            if still_frames and _still(sums.averages()):
-                take(still_frames - frames)
+            if more_if_still and _still(sums.averages()):
+                take(more_if_still)
         finally:
             camera.stop()
         return sums
@@ -299,9 +299,16 @@ def look_at(
     quick_sequence = replace(fine_sequence, base_frequency_hz=2 * fine_hz, harmonics=1, takes=1)
     quick = [captured(quick_sequence, 2, "motion").averages()]
     coarse = captured(coarse_sequence, 1, "coarse range")
-    fine = captured(
-        fine_sequence, FRAMES, "all frequencies", still_frames=STILL_FRAMES, gains=gains
-    ).averages()
+    sums = captured(fine_sequence, 1, "all frequencies", gains=gains)
+    quick.append(captured(quick_sequence, 2, "motion").averages())
+    captured(
+        fine_sequence,
+        FRAMES - 1,
+        "all frequencies",
+        more_if_still=STILL_FRAMES - FRAMES,
+        more_of=sums,
+    )
+    fine = sums.averages()
     captured(coarse_sequence, 1, "coarse range", more_of=coarse)
     moves = not _still(fine)
     if moves:

@@ -199,7 +199,8 @@ class SceneStatistics:
         late_m = np.where(counts, tm.SPEED_OF_LIGHT_M_S / 2 * np.nan_to_num(self.delay_s), 0.0)
         late = (late_m >= unambiguous_range_m).any(axis=0)
         direct = self.direct_m >= unambiguous_range_m
-        return bool(direct.mean() > AMBIGUOUS_SHARE or late.mean() > LATE_SHARE)
+        still = 1 - self.moving_share  # what moves is left out here, and not of the picture
+        return bool(still * direct.mean() > AMBIGUOUS_SHARE or still * late.mean() > LATE_SHARE)
 
     def _multiple(self, base_frequency_hz: float) -> int:
         """Return which multiple of the base frequency of the look this is; 0 where it is none."""

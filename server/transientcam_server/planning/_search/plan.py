@@ -127,7 +127,7 @@ def plan(
     best = best_choice(candidates, targets, leading)
     if best is None or best.relative_errors(targets)[1] > 1:
         missed = shortfall(goal, best, candidates, unlimited)
-        raise refusal(goal, missed)
+        raise refusal(goal, missed, of_one_frame=predictor.scene.of_one_frame)
     progress.at(0.7, "half the time")
     best, half_time = shortened(best, candidates, targets, leading)
     progress.at(0.8, "twice the accuracy")

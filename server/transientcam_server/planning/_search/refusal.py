@@ -12,8 +12,11 @@ _CLEARLY_LESS: Final = 0.8
 """Share of the best error that what is dearer has to stay below to be named."""
 
 
-def refusal(goal: Goal, shortfall: Shortfall) -> Problem:
-    """Return the problem ``target-unreachable`` of what falls short of a goal."""
+def refusal(goal: Goal, shortfall: Shortfall, *, of_one_frame: bool = False) -> Problem:
+    """Return the problem ``target-unreachable`` of what falls short of a goal.
+
+    A frame of another purpose, in the place of a look, decides nothing: a capture may do better.
+    """
     field, best = shortfall.field, shortfall.best
     limit, achieved = getattr(goal, field), _achieved(best, field)
     limited_by, words = _limits(shortfall)
@@ -21,10 +24,18 @@ def refusal(goal: Goal, shortfall: Shortfall) -> Problem:
     margin = ""
     if field.startswith("range") and achieved <= limit:
         margin = ", which leaves no margin"
+    decided = not (of_one_frame and field.startswith("range"))
+    verdict = (
+        f"This cannot be reached on this scene: {field} = {limit:g}. "
+        f"The best {named} is {achieved:.4g}{margin}."
+        if decided
+        else f"Whether this can be reached one frame does not tell: {field} = {limit:g}. By it the "
+        f"best {named} is {achieved:.4g}; a look at all frequencies may find less."
+    )
     return Problem(
         kinds.TARGET_UNREACHABLE,
-        f"This cannot be reached on this scene: {field} = {limit:g}. "
-        f"The best {named} is {achieved:.4g}{margin}. What limits it: {words}.",
+        f"{verdict} What limits it: {words}.",
+        decided=decided,
         field=field,
         value=limit,
         limit=achieved,

@@ -11,7 +11,7 @@ from benchmarks.accuracy.capturing import measured
 from tests.server.planning.looks import SETTINGS, looked
 from transientcam_driver import Sequence
 from transientcam_server.planning import Goal, Planner, SceneStatistics, uniform_scene
-from transientcam_server.planning._prediction.prediction import Predictor
+from transientcam_server.planning._prediction.prediction import SWING, Prediction, Predictor
 from transientcam_server.planning._scene.sampling import one_of_each
 
 FREQUENCY_HZ = 23e6
@@ -42,6 +42,32 @@ def test_deviation_of_one_return_at_one_frequency_is_the_closed_form() -> None:
     assert predictor.least_noise_m(
         "single-frequency", sequence, predictor.noise_scale(sequence)
     ) == pytest.approx(expected_m, rel=1e-3)
+
+
+def test_what_the_camera_does_is_part_of_the_error() -> None:
+    sequence = Sequence(harmonics=1, exposure_s=0.001, zeroth="estimated")
+    plain = uniform_scene(4e5, [(2.0, 1.0)])
+
+    def predicted(takes: int = 1, capture_s: float = 0.0, **device: Any) -> Prediction:
+        scene = dataclasses.replace(plain, base_frequency_hz=FREQUENCY_HZ, **device)
+        predictor = Predictor(scene, tm.noise.Sensor(), SETTINGS)
+        captured = dataclasses.replace(sequence, takes=takes)
+        return predictor.predict("single-frequency", captured, capture_s=capture_s)
+
+    ideal = predicted()
+    assert predicted(contrast=(1.0, 0.5)).range_std.median == pytest.approx(
+        2 * ideal.range_std.median, rel=0.02
+    )
+    drifted = predicted(drift_m=0.4)
+    assert drifted.range_bias_m == pytest.approx(0.2, rel=0.05)
+    assert drifted.range_error.low < 1.5 * ideal.range_error.high
+    assert drifted.range_error.high > 0.4
+    speed_m_per_s = np.linspace(0.0, 40.0, plain.direct_m.size)
+    moving = predicted(capture_s=0.1, swing_m_per_s=speed_m_per_s)
+    assert moving.range_error.p90 == pytest.approx(SWING * 0.1 * 36.0, rel=0.02)
+    # every image out of step: a range is anywhere; of several takes the others are left
+    assert predicted(lost_share=1.0).range_std.median > 10 * ideal.range_std.median
+    assert predicted(takes=3, lost_share=0.2).range_std == predicted(takes=3).range_std
 
 
 def test_more_pixels_know_an_error_more_closely() -> None:

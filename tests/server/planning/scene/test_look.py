@@ -77,6 +77,7 @@ class Carried:
     def __init__(self, camera: Camera, pixels: int) -> None:
         self.capabilities = camera.capabilities
         self.start, self.stop = camera.start, camera.stop
+        self.applied, self.simulation = camera.applied, None
         self.asked: list[Sequence] = []
         self.waited_s: list[float] = []
         self._camera, self._pixels, self._read = camera, pixels, 0
@@ -112,17 +113,73 @@ def test_only_what_stands_still_is_looked_at_for_long(
         highest_hz = camera.capabilities.max_frequency_hz
         rates_hz = [camera.capabilities.apply(each).frame_rate_hz for each in carried.asked]
 
-    first, coarse, fine = carried.asked
+    first, quick, coarse, fine, *later = carried.asked
+    # what is captured before the fine frames is captured after them, too
+    assert later == [quick, fine, coarse, *([quick] if pixels else [])]
     assert (first.base_frequency_hz, first.harmonics, first.exposure_s) == (2e6, 1, 5e-4)
+    assert (quick.base_frequency_hz, quick.harmonics, quick.takes) == (23e6, 1, 1)
     assert (coarse.base_frequency_hz, coarse.harmonics) == (2e6, 1)
     assert fine.base_frequency_hz == Sequence().base_frequency_hz / 2
     assert fine.harmonics == highest_hz // fine.base_frequency_hz
-    assert fine.exposure_s == coarse.exposure_s
-    assert {(each.takes, each.zeroth) for each in carried.asked} == {(1, "estimated")}
+    assert fine.exposure_s == coarse.exposure_s == quick.exposure_s
+    assert {each.zeroth for each in carried.asked} == {"estimated"}
     # four frames more than the ten seconds that a camera may need anyhow
     patience_s = [10 + 4 / rate_hz for rate_hz in rates_hz]
-    expected_s = np.repeat(patience_s, [1, 4, frames])
+    expected_s = np.repeat(patience_s, [1, 2, 1, 1, 2, frames - 1, 1, *([2] if pixels else [])])
     assert carried.waited_s == pytest.approx(expected_s)
-    assert (steps.count("exposure"), steps.count("coarse range")) == (1, 4)
+    assert (steps.count("exposure"), steps.count("coarse range")) == (1, 2)
     assert steps.count("all frequencies") == frames
     assert (scene.moving_share > STILL_SHARE) == (frames == FRAMES)
+
+
+def test_what_a_device_does_is_not_taken_for_the_scene() -> None:
+    """High frequencies are modulated less, pixels have delays, images are lost, and it is warm."""
+    with open_camera("sim:wall?device=prototype&seed=7", clock=VirtualClock()) as camera:
+        planner = Planner(camera.capabilities, sensor_of(camera, SensorSettings()), SETTINGS)
+        scene = planner.look(camera, Sequence(), calibrated_c=15.0)
+        assert camera.simulation is not None
+        true_m = camera.simulation.truth().range_m
+
+    # of its profile: amplitudes at 11.5, 46 and 92 MHz; the delays of its pixels are 1.2 ns
+    assert np.array(scene.contrast)[[1, 4, 8]] == pytest.approx([1.0, 0.951, 0.553], abs=0.02)
+    assert scene.lost_share == pytest.approx(0.07, abs=0.02)
+    assert 0.03 < scene.uncalibrated_m < 0.18
+    assert scene.disagreement_m < 1e-3
+    assert np.median(scene.direct_m) == pytest.approx(np.median(true_m), abs=0.01)
+    # 25 degrees Celsius when it is switched on, and 1.5 mm for each degree at most
+    assert scene.drift_m == pytest.approx(0.015, abs=0.002)
+    assert "Calibrate with this sequence" in scene.conditions
+    assert "drifted" in scene.conditions
+
+
+BALL = """
+[[motion]]
+name = "roll"
+period_s = 3.2
+repeat = "back"
+path_m = [[-0.8, 0.0, 0.0], [0.8, 0.0, 0.0]]
+[[surface]]
+name = "ball"
+kind = "diffuse"
+shape = "sphere"
+centre_m = [0.0, 1.2, 0.0]
+radius_m = 0.18
+albedo = 0.7
+motion = "roll"
+[transport]
+diffuse_bounces = 0
+"""
+
+
+def test_what_moves_is_not_taken_for_what_is_far(tmp_path: Any) -> None:
+    path = tmp_path / "ball.toml"
+    wall = SCENE.format(light=4e7, ambient=0.0, away_m=2.0, width_m=3.0)
+    path.write_text(wall + BALL)
+
+    _, scene = looked(f"sim:{path}?seed=7")
+
+    assert scene.moving_share > 0.1
+    # the corners of the wall are farthest
+    assert scene.direct_m.min() > 1.9
+    assert scene.direct_m.max() < 2.4
+    assert scene.swing_m_per_s is not None

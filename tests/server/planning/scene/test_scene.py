@@ -171,6 +171,11 @@ def test_a_scene_is_stated_by_its_median_pixel() -> None:
         "dim_share": 0.125,
         "moving_share": 0.25,
         "ambiguity_checked": False,
+        "calibrated": True,
+        "uncalibrated_m": 0.0,
+        "lost_share": 0.0,
+        "drift_m": 0.0,
+        "of_one_frame": False,
     }
     assert scene.disagreement_m == pytest.approx(0.01)
 
@@ -178,3 +183,11 @@ def test_a_scene_is_stated_by_its_median_pixel() -> None:
 @pytest.mark.parametrize(("share", "in_part"), [(0.0, False), (0.249, False), (0.25, True)])
 def test_a_quarter_of_dim_pixels_makes_all_ranges_uncertain(share: float, *, in_part: bool) -> None:
     assert dataclasses.replace(measured(100), dim_share=share).lit_in_part == in_part
+
+
+def test_contrast_is_told_between_the_frequencies_of_a_look() -> None:
+    scene = dataclasses.replace(measured(100), contrast=(1.0, 1.0, 0.5, 0.25))
+
+    assert scene.contrast_at(2, HZ) == pytest.approx([1.0, 1.0, 0.5])
+    assert scene.contrast_at(2, 1.5 * HZ) == pytest.approx([1.0, 0.75, 0.25])
+    assert measured(100).contrast_at(2, HZ) == pytest.approx([1.0, 1.0, 1.0])

@@ -44,6 +44,19 @@ def test_noise_and_bias_are_named_by_which_is_larger(capabilities: Capabilities)
     )
 
 
+@pytest.mark.parametrize(("of_one_frame", "decided"), [(True, False), (False, True)])
+def test_one_frame_of_another_purpose_decides_nothing(
+    *, of_one_frame: bool, decided: bool, capabilities: Capabilities
+) -> None:
+    shortfall = Shortfall("range_error_m", choice(capabilities, std_m=3e-3, bias_m=4e-3))
+
+    found = refusal(Goal(range_error_m=1e-3), shortfall, of_one_frame=of_one_frame)
+
+    assert found.extensions["decided"] == decided
+    assert ("cannot be reached" in found.detail) == decided
+    assert ("a look at all frequencies may find less" in found.detail) != decided
+
+
 @pytest.mark.parametrize(("limit_m", "margin"), [(4.9e-3, False), (5.0e-3, True), (6e-3, True)])
 def test_a_target_that_is_reached_without_margin_is_said_to_be(
     limit_m: float, *, margin: bool, capabilities: Capabilities
