@@ -1,6 +1,6 @@
 """Surfaces cut into patches, and the share of its light that each patch gives to each other one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,12 +38,12 @@ class Patches:
         return len(self.area)
 
     @classmethod
-    def of(cls, scene: Scene, per_side: int) -> "Patches":
-        """Cut the longest side of all surfaces into so many patches, the others as finely."""
+    def of(cls, scene: Scene, per_side: int, *, moving: int = 0) -> "Patches":
+        """Cut the longest side of all surfaces into so many patches: see `patch_edges_m`."""
         scattering = {k: each for k, each in enumerate(scene.surfaces) if each.scatters}
         cells = {
             index: scattering[index].shape.cells(edge_m)
-            for index, edge_m in patch_edges_m(scene, per_side).items()
+            for index, edge_m in patch_edges_m(scene, per_side, moving=moving).items()
         }
         counts = {index: len(grid.area) for index, grid in cells.items()}
         first = dict(zip(counts, np.cumsum([0, *counts.values()]).tolist(), strict=False))
@@ -58,6 +58,12 @@ class Patches:
             cells,
             first,
         )
+
+    def moved(self, by_m: Points) -> "Patches":
+        """Return them where surfaces (S, 3) are moved."""
+        by_m = by_m[self.surface]
+        corners = self.corners + by_m[:, None]
+        return replace(self, centre=self.centre + by_m, corners=corners)
 
 
 def form_factors(scene: Scene, patches: Patches, at: Points, normal: Points) -> NDArray[np.float64]:
