@@ -10,7 +10,7 @@ Cells = NDArray[np.int32]
 _HALF, _TURN = np.float32(0.5), np.float32(2 * np.pi)
 _FIRST, _THIRD = np.float32(-0.327622764), np.float32(0.15931422)
 _FIFTH = np.float32(-0.0464964749)
-"""Of the arc tangent of what is between 0 and 1, which they give within 0.002: a thousandth of a cell."""
+"""Of the arc tangent of what is between 0 and 1, which they give within 0.002."""
 
 
 @inner

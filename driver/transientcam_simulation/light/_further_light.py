@@ -7,7 +7,7 @@ patches are, and with them how long steps, is chosen by the noise (`SceneFacts.p
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.light._exchange import Exchange
-from transientcam_simulation.light._patches import Patches
+from transientcam_simulation.light._patches import Patches, form_factors
+from transientcam_simulation.light._paths import blocked
 from transientcam_simulation.light._recent import Recent
 from transientcam_simulation.scene import Points, Scene, patch_edges_m
 
@@ -26,6 +27,10 @@ HELD_STEPS: Final = 0.5
 _LONGEST_S = 3600.0  # of a step
 _COSTS_S = 3e-7, 3e-8, 1e-7, 1e-7  # of each kind of `Work`
 _EXCHANGES, _SOLVED = 3, 128  # kept
+
+
+_Alike = tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]
+"""Surfaces (S) that move otherwise, and receivers, givers and form factors of patches."""
 
 
 class FurtherLight:
@@ -70,6 +75,36 @@ class FurtherLight:
         one, other = (self.solution(at_s, frequency_hz) for at_s in (first_s, last_s))
         return (1 - later) * one + later * other
 
+    @cached_property
+    def _groups(self) -> NDArray[np.intp]:
+        """By surface (S): which of them move alike."""
+        kinds = [tuple(map(id, each.motions)) for each in self._scene.surfaces]
+        return np.array([kinds.index(kind) for kind in kinds])
+
+    @cached_property
+    def _alike(self) -> list[_Alike]:
+        """Form factors between patches that move alike, but for what comes between them."""
+        found, patches, groups = [], self.patches, self._groups
+        for group in np.unique(groups[patches.surface]):
+            mine = np.flatnonzero(groups[patches.surface] == group)
+            ends = patches.centre[mine], patches.normal[mine]
+            wanted = np.broadcast_to(groups[patches.surface] == group, (len(mine), len(patches)))
+            near = _some(self._scene, groups == group)
+            factors = form_factors(near, patches, *ends, wanted)
+            p, n = np.nonzero(factors)
+            found.append((groups != group, mine[p], n, factors[p, n]))
+        return found
+
+    def _factors(self, now: Scene, patches: Patches) -> NDArray[np.float64]:
+        """Form factors of patches at their places, of which those that move alike are kept."""
+        group = self._groups[patches.surface]
+        apart = group[:, None] != group
+        factors = form_factors(now, patches, patches.centre, patches.normal, apart)
+        for others, p, n, kept in self._alike:
+            hidden = blocked(_some(now, others), patches.centre[p], patches.centre[n])
+            factors[p, n] = np.where(hidden, 0.0, kept)
+        return factors
+
     def _offsets(self, time_s: float) -> Points:
         """How far each surface is from its place, (S, 3)."""
         return np.array([each.offset_m(time_s) for each in self._scene.surfaces])
@@ -78,8 +113,8 @@ class FurtherLight:
         """Solve it at a time, or find what is kept."""
 
         def exchange() -> tuple[Exchange, int]:
-            patches = self.patches.moved(self._offsets(time_s))
-            between = Exchange.between(self._scene.at(time_s), patches)
+            now, patches = self._scene.at(time_s), self.patches.moved(self._offsets(time_s))
+            between = Exchange.between(now, patches, self._factors(now, patches))
             return between, between.bounces(self._tolerance)
 
         def solve() -> NDArray[np.complex128]:
@@ -87,6 +122,12 @@ class FurtherLight:
             return between.irradiance(frequency_hz, bounces)
 
         return self._solved.get((time_s, frequency_hz), solve)
+
+
+def _some(scene: Scene, wanted: NDArray[np.bool_]) -> Scene:
+    """Return a scene with only some of its surfaces."""
+    pairs = zip(scene.surfaces, wanted, strict=True)
+    return replace(scene, surfaces=tuple(each for each, is_wanted in pairs if is_wanted))
 
 
 @dataclass(frozen=True, slots=True)
