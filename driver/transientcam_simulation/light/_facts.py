@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from transientcam_simulation.base import PINHOLE
 from transientcam_simulation.effects import (
-    CALLED_ABOVE,
     WORST_ABOVE,
     Glimpse,
     Noise,
@@ -18,7 +17,7 @@ from transientcam_simulation.effects import (
     over_noise,
 )
 from transientcam_simulation.light._exchange import Exchange
-from transientcam_simulation.light._held_light import FurtherLight, Work
+from transientcam_simulation.light._further_light import HELD_STEPS, FurtherLight, Work
 from transientcam_simulation.light._paths import Lit, light_rays
 from transientcam_simulation.light._radiosity import Gathering, Interreflection
 from transientcam_simulation.light._rays import places_within, rays_through
@@ -36,6 +35,7 @@ _FREQUENCIES = 8  # judged at most; the highest one always
 _ROUNDING = 1e-9
 _KEPT = 32  # changes by effects, for the last few sequences
 _PATCHES = (6, 9, 13, 18)  # a side, where something moves, if they are fine enough
+_BEYOND = 0.01  # of the pixels, which coarser patches may put off by more
 _ROUGH_PATCHES = 6  # a side, to estimate interreflection
 _ROUGH_ERROR = 1.5  # by which that may be too low
 
@@ -271,17 +271,17 @@ class SceneFacts:
         return self.further_work(noise, moments=moments, image_period_s=image_period_s).cost_s
 
     def patches_a_side(self, noise: Noise) -> int:
-        """Return how finely surfaces must be cut where they move: up to errors below the noise.
+        """Return how finely surfaces must be cut where some move: up to errors below the noise.
 
-        Coarser patches have longer steps of time (`FurtherLight`), whose errors count, too.
+        Up to more than a quarter of it in a hundredth of the pixels. Coarser patches have longer
+        steps of time (`FurtherLight`), whose errors count, too.
         """
         most = self._scene.transport.patches
 
         def negligible(changes: tuple[Values, ...]) -> bool:
             pairs = zip(self._glimpses, changes, strict=True)
             over = np.array([over_noise(noise, *each) for each in pairs])
-            rms = np.sqrt(np.mean(over**2, axis=1)).max()
-            return bool(rms < CALLED_ABOVE and over.max() < WORST_ABOVE)
+            return bool(np.quantile(over, 1 - _BEYOND, axis=1).max() < WORST_ABOVE)
 
         light = self._further_light
         if not light or negligible(light):
@@ -299,8 +299,10 @@ class SceneFacts:
             seen = self._seen[when]
             light = FurtherLight(self._scene, per_side=per_side)
             ends = Gathering(seen.scene, light.patches, seen.lits[0])
-            around_s = [self._times_s[when] + by * light.step_s for by in (-0.5, 0.5)]
-            coarse = ends.moments(np.mean([light.solution(t, 0.0) for t in around_s], axis=0), 0.0)
+            around_s = (self._times_s[when] + by * light.step_s for by in (-0.5, 0.5))
+            one, other = (light.solution(time_s, 0.0) for time_s in around_s)
+            late = HELD_STEPS / 4  # of a step, that light which stands is off, on average
+            coarse = ends.moments((0.5 - late) * one + (0.5 + late) * other, 0.0)
             if self._full is None:
                 self._full = self._further(seen, self._scene.transport.patches)
             errors = [np.zeros(len(self._rows)) for _ in self._seen]

@@ -15,10 +15,9 @@ from transientcam_simulation.light import (
 )
 from transientcam_simulation.light._bundle import Region, inside, numbers
 from transientcam_simulation.light._coverage import Plane
-from transientcam_simulation.light._held_light import HeldLight
+from transientcam_simulation.light._held_light import HeldLight, SeenPatches
 from transientcam_simulation.light._hit_points import LitEnds
 from transientcam_simulation.light._paths import Lit, scatter_of, sparse_image
-from transientcam_simulation.light._radiosity import Gathering
 from transientcam_simulation.light._still import StillLight
 from transientcam_simulation.scene import Scene
 
@@ -117,7 +116,7 @@ class MovingResponses:
         self._found: dict[float, Moments] = {}
         self._shape = still.height, still.width
         self._layers = layers
-        self._ends: Gathering | None = None
+        self._seen: SeenPatches | None = None
         self._uncovered = uncovered
         self._dimmed = _Dimmed.by(shadows, uncovered)
 
@@ -176,9 +175,9 @@ class MovingResponses:
         direct = self._direct_of_layers(layers, frequency_hz)
         if self.held is None:
             return direct
-        if self._ends is None:
-            self._ends = self.held.ends(self.scene, layers.lit.all())
-        return direct + self.held.on(self._ends, frequency_hz)
+        if self._seen is None:
+            self._seen = self.held.seen(layers.lit)
+        return direct + self.held.on(self._seen, frequency_hz)
 
     def _direct_of_layers(self, layers: Layers, frequency_hz: float) -> Moments:
         if not frequency_hz:

@@ -1,6 +1,6 @@
 """Surfaces cut into patches, and the share of its light that each patch gives to each other one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,12 +38,12 @@ class Patches:
         return len(self.area)
 
     @classmethod
-    def of(cls, scene: Scene, per_side: int) -> "Patches":
-        """Cut the longest side of all surfaces into so many patches, the others as finely."""
+    def of(cls, scene: Scene, per_side: int, *, moving: int = 0) -> "Patches":
+        """Cut the longest side of all surfaces into so many patches: see `patch_edges_m`."""
         scattering = {k: each for k, each in enumerate(scene.surfaces) if each.scatters}
         cells = {
             index: scattering[index].shape.cells(edge_m)
-            for index, edge_m in patch_edges_m(scene, per_side).items()
+            for index, edge_m in patch_edges_m(scene, per_side, moving=moving).items()
         }
         counts = {index: len(grid.area) for index, grid in cells.items()}
         first = dict(zip(counts, np.cumsum([0, *counts.values()]).tolist(), strict=False))
@@ -59,9 +59,23 @@ class Patches:
             first,
         )
 
+    def moved(self, by_m: Points) -> "Patches":
+        """Return them where surfaces (S, 3) are moved."""
+        by_m = by_m[self.surface]
+        corners = self.corners + by_m[:, None]
+        return replace(self, centre=self.centre + by_m, corners=corners)
 
-def form_factors(scene: Scene, patches: Patches, at: Points, normal: Points) -> NDArray[np.float64]:
+
+def form_factors(
+    scene: Scene,
+    patches: Patches,
+    at: Points,
+    normal: Points,
+    wanted: NDArray[np.bool_] | None = None,
+) -> NDArray[np.float64]:
     """Irradiance (P, N) at points by each patch of radiosity 1: Lambert's contour integral.
+
+    Of the pairs that are ``wanted`` (P, N), by default all; 0 of others.
 
     Patches that face away, stand behind the point's surface, or are hidden, give nothing. A patch
     that the point's horizon cuts counts by its centre.
@@ -75,7 +89,8 @@ def form_factors(scene: Scene, patches: Patches, at: Points, normal: Points) -> 
         way = patches.centre[None, :, :] - at[block, None, :]
         towards = np.einsum("pnc,pc->pn", way, normal[block]) > 1e-9
         back = np.einsum("pnc,nc->pn", way, patches.normal) < -1e-9
-        p, n = np.nonzero(towards & back)
+        seen = towards & back
+        p, n = np.nonzero(seen if wanted is None else seen & wanted[block])
         if hides:
             clear = ~_blocked(scene, patches, at[block][p], n)
             p, n = p[clear], n[clear]
@@ -101,15 +116,18 @@ def _convex(scene: Scene) -> bool:
 
 def _contour(corners: Points, normal: Points) -> NDArray[np.float64]:
     """Form factor of polygons (P, 4, 3), relative to points with normals (P, 3)."""
-    unit = corners / np.linalg.norm(corners, axis=-1, keepdims=True)
-    following = np.roll(unit, -1, axis=1)
-    cross = np.cross(unit, following)
-    sine = np.linalg.norm(cross, axis=-1)
-    cosine = np.einsum("pkc,pkc->pk", unit, following)
+    unit = np.ascontiguousarray(corners.transpose(1, 2, 0))  # long rows, along the polygons
+    unit /= np.sqrt(np.einsum("kcp,kcp->kp", unit, unit))[:, None]
+    following = np.roll(unit, -1, axis=0)
+    cross = np.roll(unit, -1, axis=1) * np.roll(following, 1, axis=1)
+    cross -= np.roll(unit, 1, axis=1) * np.roll(following, -1, axis=1)
+    sine = np.sqrt(np.einsum("kcp,kcp->kp", cross, cross))
+    cosine = np.einsum("kcp,kcp->kp", unit, following)
     angle = np.arctan2(sine, cosine)
     with np.errstate(divide="ignore", invalid="ignore"):
         edge = np.where(sine > 0, angle / sine, 0.0)
     # counter-clockwise from the patch's front is clockwise around the normal at the point
-    total = -np.einsum("pk,pkc,pc->p", edge, cross, normal) / (2 * np.pi)
+    above = np.einsum("kcp,cp->kp", cross, np.ascontiguousarray(normal.T))
+    total = -np.einsum("kp,kp->p", edge, above) / (2 * np.pi)
     clipped: NDArray[np.float64] = np.clip(total, 0.0, 1.0)
     return clipped

@@ -26,7 +26,7 @@ from transientcam_simulation.light._bundle import Region
 from transientcam_simulation.light._compiler import load_compiled
 from transientcam_simulation.light._facts import SceneFacts, cosine_to_axis
 from transientcam_simulation.light._followed import FollowedRays, Within
-from transientcam_simulation.light._held_light import FurtherLight, HeldLight, HeldLights
+from transientcam_simulation.light._further_light import FurtherLight
 from transientcam_simulation.light._paths import Lit, light_rays
 from transientcam_simulation.light._radiosity import Interreflection, WithInterreflection
 from transientcam_simulation.light._rays import camera_rays
@@ -270,6 +270,7 @@ class SurfaceScenery:
 
             return Views(lambda _time_s: view, lambda _time_s: responses, seen)
         load_compiled()
+        from transientcam_simulation.light._held_light import HeldLight, HeldLights
         from transientcam_simulation.light._moving import MovingLight
         from transientcam_simulation.light._time_interpolation import Steps
 

@@ -36,18 +36,25 @@ class Cost:
     patches: int
 
 
-def patch_edges_m(scene: Scene, per_side: int) -> dict[int, float]:
+def patch_edges_m(scene: Scene, per_side: int, *, moving: int = 0) -> dict[int, float]:
     """Return how long the edges of the patches of each scattering surface are, by its index.
 
-    The longest side of all surfaces is cut into ``per_side`` patches, the others as finely.
+    The longest side of all surfaces is cut into ``per_side`` patches, the others as finely; what
+    moves as if there were ``moving`` of them, if these are more.
     """
     sides_m = {
         index: float(np.ptp(each.shape.extent(), axis=0).max())
         for index, each in enumerate(scene.surfaces)
         if each.scatters
     }
-    edge_m = max(sides_m.values(), default=0.0) / per_side
-    return {index: min(edge_m, side_m / _LEAST_PER_SIDE) for index, side_m in sides_m.items()}
+    longest_m = max(sides_m.values(), default=0.0)
+    return {
+        index: min(
+            longest_m / max(per_side, moving if scene.surfaces[index].motions else 0),
+            side_m / _LEAST_PER_SIDE,
+        )
+        for index, side_m in sides_m.items()
+    }
 
 
 def patches_of(scene: Scene, per_side: int) -> int:

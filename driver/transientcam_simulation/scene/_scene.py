@@ -103,12 +103,15 @@ class Surface:
         """Whether light that falls on it goes in all directions."""
         return self.kind in ("diffuse", "translucent")
 
+    def offset_m(self, time_s: float) -> Points:
+        """Return how far it has moved at a time."""
+        return sum((motion.offset_m(time_s) for motion in self.motions), np.zeros(3))
+
     def at(self, time_s: float) -> "Surface":
         """Return it at its place at a time."""
         if not self.motions:
             return self
-        by = sum((motion.offset_m(time_s) for motion in self.motions), np.zeros(3))
-        return replace(self, shape=self.shape.moved(by), motions=())
+        return replace(self, shape=self.shape.moved(self.offset_m(time_s)), motions=())
 
 
 @dataclass(frozen=True, slots=True)
