@@ -39,7 +39,7 @@ class Halves(NamedTuple):
 SCENES: Final = {
     "black": Halves(0.0, 1.0, 2.0),
     "dim": Halves(0.004, 2.0, 2.0),
-    "sunny": Halves(0.0, 1.0, 2.0, 2e7),
+    "sunny": Halves(0.0, 1.0, 2.0, 4e6),
     "far": Halves(0.0, 1.0, 7.4),
 }
 

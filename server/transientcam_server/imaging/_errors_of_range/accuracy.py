@@ -19,7 +19,10 @@ from transientcam.documents import RangeAccuracyDocument, TrustCountsDocument
 from transientcam.wire import Trust
 from transientcam_driver import RawFrame
 from transientcam_moments.reconstruction import least_harmonics
-from transientcam_server.imaging._errors_of_range.deviation import typical_deviation
+from transientcam_server.imaging._errors_of_range.deviation import (
+    MEDIAN_OF_NORMAL,
+    typical_deviation,
+)
 from transientcam_server.imaging._errors_of_range.evidence import median_around
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.imaging._errors_of_range.ranging import ranges_m
@@ -36,6 +39,10 @@ SPARSE_PX: Final = 4
 _OTHERS: Final = ("likelihood", "pisarenko")
 _QUICK: Final = ("likelihood", "pisarenko", "single-frequency")
 """Estimators that compiled kernels make quick."""
+_UNMOVED: Final = ("likelihood", "single-frequency")
+"""Estimators whose range noise scatters around where it would be without."""
+OF_FEW_DRAWS: Final = 1.06
+"""So that two thirds of normal errors are within a deviation that few copies tell."""
 _SEED: Final = 0
 
 
@@ -131,7 +138,12 @@ def range_accuracy(
     def shift_m(other_m: _Array) -> _Array:  # whatever turn a range is in
         return np.remainder(other_m - range_m[seen] + turn_m / 2, turn_m) - turn_m / 2
 
-    std_m = _placed(typical_deviation(shift_m(frame.drawn_m())), seen)
+    drawn_m = shift_m(frame.drawn_m())
+    if recipe.technique in _UNMOVED:
+        std_m = typical_deviation(drawn_m)
+    else:  # a copy is off as the frame itself is
+        std_m = np.median(np.nan_to_num(np.abs(drawn_m)), axis=0) / MEDIAN_OF_NORMAL
+    std_m = _placed(OF_FEW_DRAWS * std_m, seen)
     shifts_m = [_placed(shift_m(other_m), seen) for other_m in frame.others_m()]
     unknown = np.full(seen.shape, np.nan, dtype=np.float32)
     bias_m = np.max([np.abs(median_around(each)) for each in shifts_m], axis=0, initial=0.0)
