@@ -92,11 +92,7 @@ def spacing_px(recipe: Recipe, *, ready: Callable[[str, int], bool] = tm.kernels
 
     All of them where every estimator that is needed is compiled (0.1 s at 163 x 120 pixels); in
     NumPy, and by maximum entropy, that takes 1 to 5 s, and `SPARSE_PX` a sixteenth of it.
-
-    Parameters
-    ----------
-    ready
-        Says whether the kernel of an estimator and an order is compiled, and prepares it.
+    ``ready`` says whether the kernel of an estimator and an order is compiled, and prepares it.
     """
     m, own = recipe.applied.sequence.harmonics, recipe.technique
     orders = [m] if m > 1 else []  # nothing else is asked where m = 1
@@ -109,18 +105,10 @@ def spacing_px(recipe: Recipe, *, ready: Callable[[str, int], bool] = tm.kernels
 def range_accuracy(
     recipe: Recipe, found: tm.Reconstruction, every_px: int = 1, raw: RawFrame | None = None
 ) -> RangeAccuracy:
-    """Predict noise and bias of a frame's range, and judge each pixel.
+    """Predict noise and bias of a frame's range (H, W), and judge each pixel.
 
-    Parameters
-    ----------
-    recipe
-        With a sensor.
-    found
-        (H, W) pixels.
-    every_px
-        One pixel in so many rows and columns is predicted, and stands for those around it.
-    raw
-        The capture, for its temperature and what its images show of motion; None leaves these out.
+    By a recipe with a sensor. One pixel in every ``every_px`` rows and columns stands for those
+    around it. Temperature and motion are those of ``raw``, the capture; None leaves these out.
     """
     if not recipe.applied.sequence.sampling.consecutive:
         return _of_gaps(found)
