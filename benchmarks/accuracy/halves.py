@@ -26,10 +26,10 @@ ESTIMATORS: Final = ("likelihood", "pisarenko", "maximum-entropy", "single-frequ
 _SCENE: Final = """
 camera = {{ position_m = [0.0, 0.0, 0.0], look_at_m = [0.0, 2.0, 0.0], field_of_view_deg = 60.0 }}
 ambient = {{ electrons_per_s = {3} }}
-light = {{ position_m = [0.0, 0.0, 0.0], aim_at_m = [0.0, 2.0, 0.0], electrons_per_s = 5.0e7 }}
+light = {{ position_m = [0.0, 0.0, 0.0], aim_at_m = [0.0, 2.0, 0.0], electrons_per_s = 5e7 }}
 surface = [
- {{ kind = "diffuse", normal = [0, -1, 0], centre_m = [-4, {1}, 0], size_m = [8, 9], albedo = {0} }},
- {{ kind = "diffuse", normal = [0, -1, 0], centre_m = [50, {2}, 0], size_m = [99, 99], albedo = 1 }}
+{{ kind = "diffuse", normal = [0, -1, 0], centre_m = [-4, {1}, 0], size_m = [8, 9], albedo = {0} }},
+{{ kind = "diffuse", normal = [0, -1, 0], centre_m = [50, {2}, 0], size_m = [99, 99], albedo = 1 }}
 ]
 """
 SCENES: Final = {
