@@ -1010,6 +1010,10 @@ export interface ReconstructionDocument {
   readonly bias: number;
   /** Weight from which a return counts as the first, over the pixel's strongest return. */
   readonly return_threshold: number;
+  /** The sensor's, from which ranges count: what is nearer is taken for what is one unambiguous
+   * range farther. For 0 strong light in the last 64th of that range is below 0, so that noise puts
+   * nothing that is at 0 m to the far end. */
+  readonly least_range_m: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
    * least over the scenes of docs/likelihood.md together; each frame names its `estimator`. The
    * paper's are `pisarenko` and `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase`
@@ -1059,6 +1063,10 @@ export interface ReconstructionRequest {
   readonly bias?: number;
   /** Weight from which a return counts as the first, over the pixel's strongest return. */
   readonly return_threshold?: number;
+  /** The sensor's, from which ranges count: what is nearer is taken for what is one unambiguous
+   * range farther. For 0 strong light in the last 64th of that range is below 0, so that noise puts
+   * nothing that is at 0 m to the far end. */
+  readonly least_range_m?: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
    * least over the scenes of docs/likelihood.md together; each frame names its `estimator`. The
    * paper's are `pisarenko` and `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase`
