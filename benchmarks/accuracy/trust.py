@@ -41,17 +41,10 @@ class Judged(NamedTuple):
 
 
 def tables(
-    *,
-    scenes: int = 8,
-    seed: int = 9,
-    directory: str = "",
-    names: tuple[str, ...] = BUILT_IN,
+    *, scenes: int = 8, seed: int = 9, directory: str = "", names: tuple[str, ...] = BUILT_IN,
     exposures_s: tuple[float, ...] = halves.EXPOSURES_S,
-) -> Iterator[Table]:
-    """Judge random scenes of a seed, those of a directory, and built-in ones by their names.
-
-    And which pixels have a range, of pictures whose halves are lit and not, at some exposures.
-    """
+) -> Iterator[Table]:  # fmt: skip
+    """Judge scenes of a seed, a directory, and built-in ones; and halves at some exposures."""
     table = Table(
         "What pixels say of themselves",
         heads(

@@ -500,11 +500,8 @@ class Reconstruction:
         return self._first(found, sharp.phase_rad, sharp.weight)
 
     def _first(self, found: Separation, phase: Array, weight: Array) -> Separation:
-        """Return the first of several returns from the least range on.
-
-        Where none is stated light just below 0 has to be strong: it may be later light.
-        """
-        least = self.settings.threshold if self.settings.least_range_m is not None else 0.75
+        """Return the first of several; strong just below 0 where the least range is 0."""
+        least = self.settings.threshold if self.settings.least_range_m else 0.75
         return beginning_at(self.settings.start_rad, found, phase, weight, least)
 
     def _lone(self, found: Separation) -> Separation:

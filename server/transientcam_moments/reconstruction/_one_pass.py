@@ -58,7 +58,7 @@ class PassedReconstruction(Reconstruction):
         if settings.technique == "pisarenko":  # else it follows from another estimate
             self.uniform = planes.uniform
         # in a turn that begins elsewhere, or with others before it, another return may be first
-        end = settings.start_rad + 2 * np.pi if settings.least_range_m is None else 0.0
+        end = 0.0 if settings.least_range_m else settings.start_rad + 2 * np.pi
         usual = self._low is None and not (planes.phase_rad >= end).any()
         if settings.technique == "pisarenko" and usual:
             self.direct = planes.direct

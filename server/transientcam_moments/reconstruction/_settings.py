@@ -90,9 +90,9 @@ class Settings:
         1 to `noise.MOST_FRAMES`. A frame by itself never uses others.
     smoothing_sigma_px : float
         Of the Gaussian; 0 for none.
-    least_range_m : float, optional
-        Of the sensor, where a turn of the phase, c / (2 f), begins, and so "first". When left out,
-        strong first light in the last 64th is below 0: noise puts nothing at 0 m to the far end.
+    least_range_m : float
+        Of the sensor, where a turn of the phase, c / (2 f), begins, and so "first". For 0 strong
+        first light in the last 64th is below 0: noise puts nothing at 0 m to the far end.
     threshold : float
         The range is that of the first return, or peak, with this share of the strongest one's
         weight, or density.
@@ -133,7 +133,7 @@ class Settings:
     sensor: Sensor | None = None
     low_frequency_hz: float | None = None
     still_frames: int = 1
-    least_range_m: float | None = None
+    least_range_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what no stage could work with (ParameterError)."""
@@ -155,8 +155,7 @@ class Settings:
         chosen("neighbours", self.neighbours, NEIGHBOURS)
         in_range("still_frames", self.still_frames, 1, MOST_FRAMES, f"1 to {MOST_FRAMES}")
         in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
-        if self.least_range_m is not None:
-            in_range("least_range_m", self.least_range_m, -1000.0, 1000.0, "-1000 to 1000 m")
+        in_range("least_range_m", self.least_range_m, -1000.0, 1000.0, "-1000 to 1000 m")
         in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
         chosen("estimator", self.estimator, ("automatic", *ESTIMATORS))
         chosen("spoilt_images", self.spoilt_images, CORRUPT_IMAGES)
@@ -178,7 +177,7 @@ class Settings:
     @property
     def start_rad(self) -> float:
         """Phase at the base frequency where a turn begins."""
-        if self.least_range_m is None or self.base_frequency_hz is None:
+        if not self.least_range_m or self.base_frequency_hz is None:
             return -2 * np.pi / 64
         return self.least_range_m / float(range_m(1.0, self.base_frequency_hz))
 

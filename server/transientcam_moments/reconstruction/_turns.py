@@ -47,9 +47,9 @@ def begun(phase: Array, start_rad: float, turn_rad: float = _TURN) -> Array:
 def beginning_at(
     start_rad: float, found: Separation, phase: Array, weight: Array, threshold: float
 ) -> Separation:
-    """Return light of a turn from 0 on as that of a turn which begins at a phase.
+    """Return light of a turn from 0 on as that of one which begins at a phase.
 
-    Returns (K, ...) that so come first have at least a share ``threshold`` of the strongest light.
+    Returns (K, ...) that so come first have a share ``threshold`` of the strongest one's light.
     """
     xp, seam = namespace(found.phase_rad), start_rad % _TURN
     early = (phase >= seam) & (weight >= threshold * weight.max(axis=0)) & (weight > 0)

@@ -50,7 +50,7 @@ def captured(
 
 
 def found(
-    estimator: str, *args: Any, least_range_m: float | None = None, **options: Any
+    estimator: str, *args: Any, least_range_m: float = 0.0, **options: Any
 ) -> tm.Reconstruction:
     """Reconstruct such images with nominal gains."""
     images, labels = captured(*args, **options)
@@ -119,23 +119,23 @@ def test_light_of_two_turns_that_one_phase_mixes_has_no_range_and_a_flag() -> No
 
 
 @pytest.mark.parametrize("estimator", FOUR)
-@pytest.mark.parametrize("least_range_m", [None, 0.3])
-def test_noise_puts_no_wall_to_the_other_end(estimator: str, least_range_m: float | None) -> None:
+@pytest.mark.parametrize("least_range_m", [0.0, 0.3])
+def test_noise_puts_no_wall_to_the_other_end(estimator: str, least_range_m: float) -> None:
     turn_m = tm.SPEED_OF_LIGHT_M_S / 2 / 23e6
     images, labels = captured((turn_m,), snr=50.0)
     images, labels = images[4:], {name: values[4:] for name, values in labels.items()}
     gain = tm.nominal_calibration(4, zeroth="estimated")
     settings = tm.Settings(estimator=estimator, full_scale=65535, least_range_m=least_range_m)
     image = tm.reconstruct(images, settings, **labels, calibration=gain)
-    expected_m = 0.0 if least_range_m is None else turn_m
+    expected_m = turn_m if least_range_m else 0.0
     np.testing.assert_allclose(np.median(image.range_m), expected_m, atol=0.01)
     assert np.ptp(np.asarray(image.range_m)) < 0.6
 
 
 @pytest.mark.parametrize("estimator", ["likelihood", "pisarenko", "two-returns"])
-@pytest.mark.parametrize(("least_range_m", "weight"), [(None, 1.0), (-0.1, 0.4)])
+@pytest.mark.parametrize(("least_range_m", "weight"), [(0.0, 1.0), (-0.1, 0.4)])
 def test_light_just_before_zero_comes_before_light_behind_it(
-    estimator: str, least_range_m: float | None, weight: float
+    estimator: str, least_range_m: float, weight: float
 ) -> None:
     image = found(estimator, (-0.01, 1.04), (weight, 1.0), snr=200.0, least_range_m=least_range_m)
     assert (abs(np.asarray(image.range_m) + 0.01) < 0.1).mean() > 0.98

@@ -24,17 +24,8 @@ def typical_deviation(values: _Array) -> _Array:
     """Return the deviation (P) between captures (D, P), which outliers do not blow up.
 
     It is the median difference of two captures, as the deviation of the normal variable whose
-    median difference is the same in the median pixel with as many captures.
-
-    Parameters
-    ----------
-    values
-        (D, P), NaN where a capture has none.
-
-    Returns
-    -------
-    array, shape (P)
-        NaN where there are not two.
+    median difference is the same in the median pixel with as many captures. Captures without a
+    value are NaN; so is the deviation where there are not two with one.
     """
     first, second = np.triu_indices(len(values), 1)
     apart = np.abs(values[first] - values[second])

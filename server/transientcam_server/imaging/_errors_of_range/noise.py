@@ -106,16 +106,11 @@ def _of_pixels(
 
 
 def contradictions(recipe: Recipe, found: tm.Reconstruction) -> _Array | None:
-    """Return where a frame's moments contradict each other by more than its noise explains.
+    """Return where (H, W) a frame's moments contradict each other by more than its noise explains.
 
     They do where gain or phase of the frequencies do not go together any more: thermal drift after
-    calibration (Sec. 6.4), images out of step, light that moved.
-
-    Returns
-    -------
-    boolean array, shape (H, W)
-        None where that cannot be known: without a sensor, where b_0 is estimated, as any moments
-        then agree, and where their frequencies are not consecutive multiples.
+    calibration (Sec. 6.4), images out of step, light that moved. None where that cannot be known:
+    without a sensor, where b_0 is estimated, as any moments then agree, and for gaps.
     """
     sequence = recipe.applied.sequence
     if recipe.sensor is None or sequence.zeroth == "estimated":

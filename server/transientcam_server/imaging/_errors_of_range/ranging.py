@@ -22,14 +22,8 @@ def ranges_m(
 ) -> _Array:
     """Return the range (...) that an estimator gives of smoothed moments (m + 1, ...).
 
-    Parameters
-    ----------
-    b
-        Moments in any unit.
-    variance
-        (m + 1, ...) of their parts, in the square of that unit.
-    settings
-        Biasing and threshold; the estimator is the one given.
+    ``b`` is in any unit, ``variance`` (m + 1, ...) of its parts in the square of that; biasing and
+    threshold are those of the settings, the estimator is the one given.
     """
     if estimator == "single-frequency":
         phase = np.remainder(np.angle(b[1]), 2 * np.pi)
