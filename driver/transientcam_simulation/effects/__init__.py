@@ -31,6 +31,14 @@ from transientcam_simulation.effects._gloss import Gloss
 from transientcam_simulation.effects._interreflection import DiffuseInterreflection
 from transientcam_simulation.effects._lens_scatter import LensScatter
 from transientcam_simulation.effects._mirror_paths import MirrorPaths
+from transientcam_simulation.effects._missing import (
+    BLUR,
+    COARSE_PATCHES,
+    FURTHER_BOUNCES,
+    GLOSS_OF_SURROUNDINGS,
+    MIRRORS_BETWEEN,
+    missing_calls,
+)
 from transientcam_simulation.effects._mixed_pixels import MixedPixels
 from transientcam_simulation.effects._modulation_harmonics import (
     ModulationHarmonics,
@@ -77,10 +85,15 @@ EFFECTS: tuple[type[Effect], ...] = (
 """In the order in which they happen."""
 
 __all__ = [
+    "BLUR",
     "CALLED_ABOVE",
     "CHOICES",
+    "COARSE_PATCHES",
     "EFFECTS",
     "FEW_E",
+    "FURTHER_BOUNCES",
+    "GLOSS_OF_SURROUNDINGS",
+    "MIRRORS_BETWEEN",
     "NOISE",
     "WORST_ABOVE",
     "Call",
@@ -113,5 +126,6 @@ __all__ = [
     "Values",
     "draw_few",
     "measured_harmonics",
+    "missing_calls",
     "read_offsets_rad",
 ]

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.base import PINHOLE
-from transientcam_simulation.effects import Glimpse, Values
+from transientcam_simulation.effects import BLUR, Glimpse, Values
 from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._missing import SampledWays, sampled_glimpses
 from transientcam_simulation.light._paths import Lit, light_rays
 from transientcam_simulation.light._radiosity import Interreflection
 from transientcam_simulation.light._rays import places_within, rays_through
@@ -94,6 +95,38 @@ class SceneFacts:
         """Return how far leaving out an effect moves each pixel's moments, at most, by time."""
         key = effect, _some(frequencies_hz), during_s if effect == "motion" else 0.0
         return self._found.get(key, lambda: self._changes(*key))
+
+    def missing(
+        self, kind: str, frequencies_hz: tuple[float, ...], *, during_s: float
+    ) -> tuple[tuple[Glimpse, ...], tuple[Values, ...]]:
+        """Return some pixels, and how far their moments lack light of a kind, at most, by time."""
+        if kind == BLUR.name:
+            # an image is an instant within its exposure
+            changes = self.changes("motion", frequencies_hz, during_s=during_s)
+            return self.glimpses, tuple(each / 2 for each in changes)
+        if self._flat and not any(each.kind == "mirror" for each in self._scene.surfaces):
+            return (), ()
+        ways, glimpses = self._sampled
+        some = _some(frequencies_hz)
+        return glimpses, self._found.get(
+            (kind, some, 0.0), lambda: tuple(each.change(kind, some) for each in ways)
+        )
+
+    @cached_property
+    def _sampled(self) -> tuple[tuple[SampledWays, ...], tuple[Glimpse, ...]]:
+        rays = self._rays(self._camera)
+        return sampled_glimpses(
+            tuple(
+                (seen.scene, rays, glimpse)
+                for seen, glimpse in zip(self._seen, self.glimpses, strict=True)
+            )
+        )
+
+    @property
+    def _flat(self) -> bool:
+        """Whether no surface lights another, or itself."""
+        scattering = [each.shape for each in self._scene.surfaces if each.scatters]
+        return not scattering or (len(scattering) == 1 and isinstance(scattering[0], Rectangle))
 
     def further_bounces(self, tolerance: float) -> int:
         """Return how often light goes from surface to surface until less than this is left."""
@@ -240,10 +273,7 @@ class SceneFacts:
 
     def _further_light(self) -> tuple[Values, ...]:
         """Estimate the brightness of light over several surfaces, which bounds its moments."""
-        transport = self._scene.transport
-        scattering = [each for each in self._scene.surfaces if each.scatters]
-        flat = len(scattering) == 1 and isinstance(scattering[0].shape, Rectangle)
-        if flat or not scattering or transport.diffuse_bounces == 0:
+        if self._flat or self._scene.transport.diffuse_bounces == 0:
             return ()
         height, width = self._shape
         found = []
