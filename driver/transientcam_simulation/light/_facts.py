@@ -104,8 +104,6 @@ class SceneFacts:
             # an image is an instant within its exposure
             changes = self.changes("motion", frequencies_hz, during_s=during_s)
             return self.glimpses, tuple(each / 2 for each in changes)
-        if self._flat and not any(each.kind == "mirror" for each in self._scene.surfaces):
-            return (), ()
         ways, glimpses = self._sampled
         some = _some(frequencies_hz)
         return glimpses, self._found.get(
@@ -121,12 +119,6 @@ class SceneFacts:
                 for seen, glimpse in zip(self._seen, self.glimpses, strict=True)
             )
         )
-
-    @property
-    def _flat(self) -> bool:
-        """Whether no surface lights another, or itself."""
-        scattering = [each.shape for each in self._scene.surfaces if each.scatters]
-        return not scattering or (len(scattering) == 1 and isinstance(scattering[0], Rectangle))
 
     def further_bounces(self, tolerance: float) -> int:
         """Return how often light goes from surface to surface until less than this is left."""
@@ -273,7 +265,10 @@ class SceneFacts:
 
     def _further_light(self) -> tuple[Values, ...]:
         """Estimate the brightness of light over several surfaces, which bounds its moments."""
-        if self._flat or self._scene.transport.diffuse_bounces == 0:
+        transport = self._scene.transport
+        scattering = [each for each in self._scene.surfaces if each.scatters]
+        flat = len(scattering) == 1 and isinstance(scattering[0].shape, Rectangle)
+        if flat or not scattering or transport.diffuse_bounces == 0:
             return ()
         height, width = self._shape
         found = []

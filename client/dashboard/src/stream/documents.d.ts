@@ -358,7 +358,7 @@ export interface EffectDocument {
   readonly effect: string;
   /** The effect in a few words. */
   readonly what: string;
-  readonly choice: "auto" | "on" | "off" | "always";
+  readonly choice: "auto" | "on" | "off" | "always" | "never";
   readonly called_for: boolean;
   readonly built: boolean;
   readonly reason: string;
@@ -384,6 +384,8 @@ export interface ExplanationDocument {
   /** And above this share of its noise in any pixel. */
   readonly called_above_worst: number;
   readonly effects: readonly EffectDocument[];
+  /** Light that the scene has and the simulation cannot make; images lack it where called for. */
+  readonly not_made: readonly EffectDocument[];
 }
 
 /** What should go wrong. */
