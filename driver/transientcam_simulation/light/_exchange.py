@@ -49,7 +49,7 @@ class Exchange:
             - 2 * patches.centre @ patches.centre.T,
             0,
         )
-        delay_s, radiosity = _direct(scene, patches)
+        delay_s, radiosity = direct_light(scene, patches)
         return cls(
             scene,
             patches,
@@ -151,7 +151,7 @@ def _spread(
     return np.convolve(given, np.diff(Scatter(width_s, decay_s).cumulated(edges_s)))
 
 
-def _direct(scene: Scene, patches: Patches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def direct_light(scene: Scene, patches: Patches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Direct light on samples of each patch, as the share of the patch's radiosity it makes."""
     middles = (2 * np.arange(_SAMPLES) + 1) / (2 * _SAMPLES)
     u, w = (grid.ravel() for grid in np.meshgrid(middles, middles))

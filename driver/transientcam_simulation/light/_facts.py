@@ -101,9 +101,11 @@ class SceneFacts:
     ) -> tuple[tuple[Glimpse, ...], tuple[Values, ...]]:
         """Return some pixels, and how far their moments lack light of a kind, at most, by time."""
         if kind == BLUR.name:
-            # an image is an instant within its exposure
-            changes = self.changes("motion", frequencies_hz, during_s=during_s)
-            return self.glimpses, tuple(each / 2 for each in changes)
+            # an image is an instant of its exposure; edges pass pixels by shares, not at once
+            pixel_s = 1 / max(self._fastest_pixels_per_s, 1e-9)
+            over_s = max(during_s, min(pixel_s, self._period_s / _TIMES))
+            changes = self.changes("motion", frequencies_hz, during_s=over_s)
+            return self.glimpses, tuple(during_s / over_s / 2 * each for each in changes)
         ways, glimpses = self._sampled
         some = _some(frequencies_hz)
         return glimpses, self._found.get(

@@ -6,7 +6,7 @@ for the kind of way it took: over a mirror between two scattering surfaces, by g
 but the lamp, over more surfaces than the scene's file allows, or as radiosity follows it.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ from transientcam_simulation.effects import (
     Glimpse,
     Values,
 )
+from transientcam_simulation.light._exchange import direct_light
+from transientcam_simulation.light._patches import Patches, form_factors
 from transientcam_simulation.light._paths import (
     RayEnds,
     first_scattering,
@@ -30,7 +32,6 @@ from transientcam_simulation.light._paths import (
     light_rays,
     normals_at,
 )
-from transientcam_simulation.light._radiosity import Interreflection
 from transientcam_simulation.light._variants import without_scattering
 from transientcam_simulation.scene import Points, Scene
 
@@ -40,7 +41,7 @@ _PATHS = 512  # in each of two halves, by pixel
 _FURTHER = 3  # surfaces behind the one that is seen
 _PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])  # even places in two dimensions
 _SURE = 3.0  # standard errors by which patches must differ from paths
-_FOLLOWED, _MIRRORS, _GLOSS, _BOUNCES = range(4)
+_FIRST, _FOLLOWED, _MIRRORS, _GLOSS, _BOUNCES = range(5)  # ``_FIRST`` by radiosity, too
 _KINDS = {
     MIRRORS_BETWEEN.name: _MIRRORS,
     GLOSS_OF_SURROUNDINGS.name: _GLOSS,
@@ -96,7 +97,7 @@ class SampledWays:
             slot, weight, length_m = slot[on], sent[on], length_m[on] + ends.distance_m
             normal = normals_at(scene, ends.point, ends.surface)
             albedo = ends.throughput * _of(scene, "reflectivity")[ends.surface]
-            cut = _FOLLOWED if most is None or further <= most else _BOUNCES
+            cut = _BOUNCES if most is not None and further > most else min(further - 1, _FOLLOWED)
             kind = np.where(glossy, _GLOSS, np.where(over, _MIRRORS, cut))
             for light in lights:
                 far_m, irradiance = light_on(scene, light, ends.point, normal)
@@ -113,7 +114,8 @@ class SampledWays:
     @property
     def followed(self) -> Values:
         """Brightness (P) of light that radiosity follows."""
-        return self._moments(_FOLLOWED, 0.0).real.mean(axis=0)
+        both = self._moments(_FIRST, 0.0) + self._moments(_FOLLOWED, 0.0)
+        return np.asarray(both.real.mean(axis=0))
 
     def change(self, kind: str, frequencies_hz: tuple[float, ...]) -> Values:
         """Size (P) of the moments that are missing, at most."""
@@ -134,20 +136,33 @@ class SampledWays:
         return halves
 
     def _by_patches(self, frequency_hz: float) -> Values:
-        """Difference (P) of radiosity from paths; 0 where these cannot tell."""
-        none = np.zeros(len(self.rays))
-        if self.scene.moves or not (self.kind == _FOLLOWED).any():
-            return none
-        most = self.scene.transport.diffuse_bounces
-        bounces = _FURTHER if most is None else min(most, _FURTHER)
-        transport = replace(self.scene.transport, diffuse_bounces=bounces)
-        scene = without_scattering(replace(self.scene, transport=transport))
+        """Difference (P) of radiosity from paths, by the first bounce; 0 where they cannot tell."""
+        if self.scene.moves or not (self.kind == _FIRST).any():
+            return np.zeros(len(self.rays))
+        scene = without_scattering(self.scene)
         lit = light_rays(scene, self.rays)
-        patches = Interreflection(scene, lit, width=len(self.rays), height=1).moments(frequency_hz)
-        one, other = self._moments(_FOLLOWED, frequency_hz)
-        power = _power(one - patches[0], other - patches[0])
+        patches = Patches.of(scene, scene.transport.patches)
+        near, weights = np.zeros((len(self.rays), 4), dtype=np.intp), np.zeros((len(self.rays), 4))
+        for k, cells in patches.cells.items():
+            mine, shape = lit.surface == k, scene.surfaces[k].shape
+            near[mine], weights[mine] = shape.between_cells(
+                lit.point[mine], cells.rows, cells.columns
+            )
+            near[mine] += patches.first[k]
+        at, where = np.unique(near, return_inverse=True)
+        factors = form_factors(scene, patches, patches.centre[at], patches.normal[at])
+        delay_s, radiosity = direct_light(scene, patches)
+        turn = 2j * np.pi * frequency_hz
+        given = np.einsum("kns,kns->n", radiosity, np.exp(turn * delay_s))
+        far_m = np.linalg.norm(patches.centre[at][:, None] - patches.centre, axis=-1)
+        got = (factors * np.exp(turn / SPEED_OF_LIGHT_M_S * far_m)) @ given
+        seen = np.einsum("pk,pk->p", weights, got[where.reshape(near.shape)])
+        seen *= lit.reflectance * np.exp(turn / SPEED_OF_LIGHT_M_S * lit.distance_m)
+        one, other = self._moments(_FIRST, frequency_hz)
+        power = _power(one - seen, other - seen)
         error = np.abs(one - other) ** 2 / 4
-        return np.sqrt(np.where(power > _SURE**2 * error.mean(), power, 0.0))
+        of_all = self.followed.sum() / self._moments(_FIRST, 0.0).real.mean(axis=0).sum()
+        return of_all * np.sqrt(np.where(power > _SURE**2 * error.mean(), power, 0.0))
 
 
 def sampled_glimpses(
