@@ -163,7 +163,7 @@ _ALL: Final = (
             "costs": "costs:tables",
             "rules": "rules:tables",
             "left_out": "accuracy:tables",
-            "bounces": "bounces:tables",
+            "judged": "judge:tables",
             "noise": "noise:tables",
         }.items()
     ),

@@ -107,7 +107,7 @@ class ExplainedEffect:
     what
         The effect in a few words.
     choice
-        "auto", "on" or "off"; "always" where there is no choice.
+        "auto", "on" or "off"; "always" where there is no choice, "never" of what cannot be made.
     called_for, built
         Whether the conditions call for the effect, and whether the choice lets it be built.
     size_dn, relative
@@ -130,6 +130,10 @@ class ExplainedEffect:
     worst: float
     cost_s: float
 
+    def to_document(self) -> dict[str, Any]:
+        """Return it as a JSON document."""
+        return {name: getattr(self, name) for name in self.__slots__}
+
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
@@ -137,7 +141,9 @@ class Explanation:
 
     ``floor_dn`` is the noise floor of one moment of a typical pixel: shot noise, read noise and
     rounding, averaged over the takes. An effect is called for above ``threshold`` of the noise as a
-    root mean square, or above ``threshold_of_worst`` of its noise in any pixel.
+    root mean square, or above ``threshold_of_worst`` of its noise in any pixel. ``not_made`` is
+    light that the scene has and the simulation cannot make; where it is called for, images lack it.
+    ``device`` names the profile, and what of the device differs from it.
     """
 
     scene: str
@@ -145,6 +151,7 @@ class Explanation:
     sequence: Sequence
     floor_dn: float
     effects: tuple[ExplainedEffect, ...]
+    not_made: tuple[ExplainedEffect, ...]
     threshold: float
     threshold_of_worst: float
 
@@ -157,10 +164,8 @@ class Explanation:
             "noise_floor_dn": self.floor_dn,
             "called_above": self.threshold,
             "called_above_worst": self.threshold_of_worst,
-            "effects": [
-                {name: getattr(each, name) for name in ExplainedEffect.__slots__}
-                for each in self.effects
-            ],
+            "effects": [each.to_document() for each in self.effects],
+            "not_made": [each.to_document() for each in self.not_made],
         }
 
 

@@ -129,6 +129,14 @@ class DeviceProfile:
     dark_current: DarkCurrent | None = None
     seed: int = 0
 
+    def described(self, lens: Lens) -> str:
+        """Name the profile, and what of this unit and its lens differs from it."""
+        profile = replace(PROFILES[self.name], seed=self.seed)
+        own = [name for name in self.__slots__ if getattr(self, name) != getattr(profile, name)]
+        own += ["lens"] if lens != PINHOLE else []
+        words = ", ".join(own).replace("_", " ")
+        return f"{self.name} (but for {words})" if own else self.name
+
 
 IDEAL = DeviceProfile("ideal")
 

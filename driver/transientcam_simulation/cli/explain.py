@@ -15,11 +15,13 @@ from transientcam_driver.errors import DriverError, SpecError
 from transientcam_driver.sequence import Sequence
 from transientcam_driver.texts import read_text
 from transientcam_simulation import list_scenes, world_of
+from transientcam_simulation.effects import NOISE, Quantisation
 from transientcam_simulation.emulated import MEASURED, prototype
 from transientcam_simulation.entries.sim import resolution, scene_of
 
 _BAD_USAGE = 2
 _COLUMNS = 80
+_ALWAYS = [each.name for each in (*NOISE, Quantisation)]
 
 
 def explain(
@@ -49,7 +51,7 @@ def explain(
     takes: Annotated[int | None, typer.Option("--takes", help="Takes to average.")] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Say which effects a scene calls for, why, how large each is, and what it costs."""
+    """Say which effects a scene calls for, why, how large each is, its cost, and what it lacks."""
     options = {
         "base_frequency_hz": base_frequency_hz,
         "harmonics": harmonics,
@@ -105,7 +107,10 @@ def _explained(name: str, sequence: Sequence) -> Explanation:
 
 
 def described(explanation: Explanation) -> str:
-    """Return an explanation as text of 80 columns: what is built, and what is left out."""
+    """Return an explanation as text of 80 columns, in three lists.
+
+    What is called for, what is not, and what is called for and cannot be made.
+    """
     sequence = explanation.sequence
     head = (
         f"{explanation.scene}, {explanation.device} device: m = {sequence.harmonics} at "
@@ -115,27 +120,35 @@ def described(explanation: Explanation) -> str:
         f"pixels, or above {explanation.threshold_of_worst:g} of it in any pixel."
     )
     lines = textwrap.wrap(head, _COLUMNS)
+    always = [each for each in explanation.effects if each.built and each.effect in _ALWAYS]
+    there = [each for each in explanation.effects if each.built or each.size_dn]
+    there = [each for each in [*there, *explanation.not_made] if each not in always]
+    made = [each for each in there if each.choice != "never"]
     parts = (
-        ("Built:", [each for each in explanation.effects if each.built]),
-        ("Left out:", [each for each in explanation.effects if not each.built and each.size_dn]),
+        ("Called for:", [each for each in made if each.called_for]),
+        ("Not called for:", [each for each in there if not each.called_for]),
+        ("Called for, and cannot be made:", [each for each in there if each not in made]),
     )
     for title, effects in parts:
-        lines += ["", title] if effects else []
-        for each in effects:
+        listed = [each for each in effects if each.called_for or "Not" in title]
+        lines += ["", title] if listed else []
+        for each in listed:
             lines += _lines(each)
     absent = [each.effect for each in explanation.effects if not each.built and not each.size_dn]
-    lines += ["", *textwrap.wrap("Not there: " + ", ".join(absent) + ".", _COLUMNS)]
+    sizes = (f"{each.effect} ({_figure(each.relative)} x the noise)" for each in always)
+    for title, names in (("Always there", sizes), ("Not there", absent)):
+        lines += ["", *textwrap.wrap(f"{title}: {', '.join(names)}.", _COLUMNS)]
     return "\n".join(lines)
 
 
 def _lines(each: ExplainedEffect) -> list[str]:
     """Say what an effect is, how large, at what cost, by whose choice, and why."""
     size = f"{_figure(each.relative)} x the noise, at most {_figure(each.worst)} x"
-    cost = f"{each.cost_s * 1e3:.2g} ms a frame" if each.cost_s else "no time a frame"
-    choice = "" if each.choice in ("auto", "always") else f"; switched {each.choice}"
+    cost = f"; {each.cost_s * 1e3:.2g} ms a frame" if each.cost_s else "; no time a frame"
+    choice = f"; switched {each.choice}" if each.choice in ("on", "off") else ""
     return [
-        f"  {each.effect}: {each.what}",
-        f"      {size}; {cost}{choice}",
+        *textwrap.wrap(f"  {each.effect}: {each.what}", _COLUMNS, subsequent_indent="      "),
+        f"      {size}{cost if each.choice != 'never' else ''}{choice}",
         *textwrap.wrap(each.reason, _COLUMNS, initial_indent="      ", subsequent_indent="      "),
     ]
 
@@ -148,9 +161,17 @@ def scenes_table(explanations: list[Explanation]) -> str:
         for k, name in enumerate(names)
         if any(explanation.effects[k].size_dn for explanation in explanations)
     ]
-    rows = ["| scene | " + " | ".join(there) + " |", "|---" * (1 + len(there)) + "|"]
+    rows = [
+        "| scene | " + " | ".join(there) + " | cannot be made |",
+        "|---" * (2 + len(there)) + "|",
+    ]
     for explanation in explanations:
         cells = [_cell(each) for each in explanation.effects if each.effect in there]
+        cells.append(
+            ", ".join(
+                f"{each.effect} {_cell(each)}" for each in explanation.not_made if each.called_for
+            )
+        )
         rows.append(f"| {explanation.scene} | " + " | ".join(cells) + " |")
     return "\n".join(rows)
 

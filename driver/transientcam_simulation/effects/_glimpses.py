@@ -96,6 +96,15 @@ class Facts(Protocol):
         """
         ...
 
+    def missing(
+        self, kind: str, frequencies_hz: tuple[float, ...], *, during_s: float
+    ) -> tuple[tuple[Glimpse, ...], tuple[Values, ...]]:
+        """Return pixels, and how far their moments lack light of a kind of ``MISSING``, by time.
+
+        ``during_s`` is the time that an image is exposed.
+        """
+        ...
+
     def further_bounces(self, tolerance: float) -> int:
         """Return how often light goes from surface to surface until less than this is left."""
         ...

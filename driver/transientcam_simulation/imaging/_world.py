@@ -28,6 +28,7 @@ from transientcam_simulation.effects import (
     Shot,
     ShotEffect,
     ThermalDrift,
+    missing_calls,
 )
 from transientcam_simulation.imaging._quadratures import Canvas, Quadratures
 from transientcam_simulation.imaging._readout import ReadOut
@@ -215,7 +216,7 @@ class World:
         """Explain what a sequence calls for, by default the one that is set."""
         if sequence is None:
             sequence = self._configured().sequence
-        floor_dn = self.conditions(sequence).floor_dn
+        conditions = self.conditions(sequence)
         effects = []
         for effect, call in zip(EFFECTS, self.calls(sequence).values(), strict=True):
             choice = self.choice(effect)
@@ -232,12 +233,31 @@ class World:
                 cost_s=call.cost_s * sequence.images,
             )
             effects.append(explained)
+        not_made = (
+            ExplainedEffect(
+                effect=kind.name,
+                what=kind.what,
+                choice="never",
+                called_for=bool(call.called),
+                built=False,
+                reason=call.reason,
+                size_dn=float(call.size_dn),
+                relative=float(call.relative),
+                worst=float(call.worst),
+                cost_s=0.0,
+            )
+            for kind, call in missing_calls(conditions)
+        )
+        forced = conditions
+        for effect in EFFECTS:
+            forced = self._forced(effect, forced)
         return Explanation(
             scene,
-            self._device.name,
+            forced.device.described(forced.lens),
             sequence,
-            floor_dn,
+            conditions.floor_dn,
             tuple(effects),
+            tuple(not_made),
             CALLED_ABOVE,
             WORST_ABOVE,
         )

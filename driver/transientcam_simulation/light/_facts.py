@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from transientcam_simulation.base import PINHOLE
 from transientcam_simulation.effects import (
+    BLUR,
     WORST_ABOVE,
     Glimpse,
     Noise,
@@ -18,6 +19,7 @@ from transientcam_simulation.effects import (
 )
 from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._further_light import HELD_STEPS, FurtherLight, Work
+from transientcam_simulation.light._missing import SampledWays, sampled_glimpses
 from transientcam_simulation.light._paths import Lit, light_rays
 from transientcam_simulation.light._radiosity import Gathering, Interreflection
 from transientcam_simulation.light._rays import places_within, rays_through
@@ -107,6 +109,32 @@ class SceneFacts:
             return self._further_light
         key = effect, _some(frequencies_hz), during_s if effect == "motion" else 0.0
         return self._found.get(key, lambda: self._changes(*key))
+
+    def missing(
+        self, kind: str, frequencies_hz: tuple[float, ...], *, during_s: float
+    ) -> tuple[tuple[Glimpse, ...], tuple[Values, ...]]:
+        """Return some pixels, and how far their moments lack light of a kind, at most, by time."""
+        if kind == BLUR.name:
+            # an image is an instant of its exposure; edges pass pixels by shares, not at once
+            pixel_s = 1 / max(self._fastest_pixels_per_s, 1e-9)
+            over_s = max(during_s, min(pixel_s, self._period_s / _TIMES))
+            changes = self.changes("motion", frequencies_hz, during_s=over_s)
+            return self.glimpses, tuple(during_s / over_s / 2 * each for each in changes)
+        ways, glimpses = self._sampled
+        some = _some(frequencies_hz)
+        return glimpses, self._found.get(
+            (kind, some, 0.0), lambda: tuple(each.change(kind, some) for each in ways)
+        )
+
+    @cached_property
+    def _sampled(self) -> tuple[tuple[SampledWays, ...], tuple[Glimpse, ...]]:
+        rays = self._rays(self._camera)
+        return sampled_glimpses(
+            tuple(
+                (seen.scene, rays, glimpse)
+                for seen, glimpse in zip(self._seen, self.glimpses, strict=True)
+            )
+        )
 
     def further_bounces(self, tolerance: float) -> int:
         """Return how often light goes from surface to surface until less than this is left."""

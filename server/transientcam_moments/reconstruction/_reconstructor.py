@@ -235,9 +235,7 @@ class Reconstructor:
             if self._bad is not None:  # their own values are not used
                 saturated_pixels = saturated_pixels & ~self._bad
         corrupt = repaired is not None and any(bool(np.any(each)) for each in repaired[1:])
-        return Measured(
-            moments, saturated_pixels, kept, repaired, images, low=low, corrupt=corrupt
-        )
+        return Measured(moments, saturated_pixels, kept, repaired, images, low=low, corrupt=corrupt)
 
     def _require_labels(self) -> tuple[str, int]:
         """Return how b_0 was measured and the number of takes, where raw images can be read."""

@@ -19,8 +19,9 @@ const effect = (name: string, relative: number, built: boolean): EffectDocument 
 describe("the table of effects", () => {
   it("shows what is computed first, and the largest of these before all", () => {
     const effects = [effect("small", 0.2, true), effect("absent", 0, false), effect("suppressed", 5, false), effect("large", 3, true)];
-    const names = ordered({ effects } as unknown as ExplanationDocument).map((each) => each.effect);
-    expect(names).toEqual(["large", "small", "suppressed", "absent"]);
+    const not_made = [{ ...effect("lacking", 6, false), called_for: true }, effect("tiny", 0.01, false)];
+    const names = ordered({ effects, not_made } as unknown as ExplanationDocument).map((each) => each.effect);
+    expect(names).toEqual(["large", "small", "lacking", "suppressed", "absent"]);
   });
 
   it("draws the threshold in the middle, two decades to either side, and nothing for nothing", () => {

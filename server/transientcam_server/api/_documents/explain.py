@@ -12,7 +12,7 @@ class EffectDocument(Document):
     effect: str
     what: str
     """The effect in a few words."""
-    choice: Literal["auto", "on", "off", "always"]
+    choice: Literal["auto", "on", "off", "always", "never"]
     called_for: bool
     built: bool
     reason: str
@@ -39,3 +39,5 @@ class ExplanationDocument(Document):
     called_above_worst: float
     """And above this share of its noise in any pixel."""
     effects: list[EffectDocument]
+    not_made: list[EffectDocument]
+    """Light that the scene has and the simulation cannot make; images lack it where called for."""

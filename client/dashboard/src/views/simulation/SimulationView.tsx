@@ -7,7 +7,7 @@ import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
 import { OpenButton } from "../files/OpenButton";
-import { effectWords, FAULTS, ordered, possible, sizeShare, sizeWords } from "./words";
+import { effectWords, FAULTS, lacking, ordered, possible, sizeShare, sizeWords } from "./words";
 import "./SimulationView.css";
 
 /** The scene of a simulated camera, which effects it calls for, and what can be made to go wrong. */
@@ -101,6 +101,7 @@ function Effects({ task }: { task: Task }) {
           </span>{" "}
           effects are computed: those above {explanation.called_above} of the noise floor, which is{" "}
           {engineering(explanation.noise_floor_dn, "DN")}.{" "}
+          {lacking(explanation.not_made).length > 0 && "Images lack light that the scene calls for and that cannot be made. "}
           {chosen && (
             <Steer task={task} onClick={() => void task.run("Leaving all effects to the scene…", () => simulation.set({ effects: {} }))}>
               Leave all to the scene
@@ -137,8 +138,8 @@ function EffectRow({ effect, calledAbove, task }: { effect: EffectDocument; call
         {sizeWords(effect)}
       </td>
       <td>
-        {effect.choice === "always" ? (
-          <span class="quiet">always</span>
+        {effect.choice === "always" || effect.choice === "never" ? (
+          <span class="quiet">{effect.choice === "always" ? "always" : "cannot be made"}</span>
         ) : (
           <select
             name={effect.effect}

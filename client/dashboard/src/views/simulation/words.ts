@@ -35,7 +35,12 @@ export function sizeShare({ relative }: EffectDocument, calledAbove: number): nu
   return Math.min(1, Math.max(0, 0.5 + decades / 4));
 }
 
-/** The largest first; what is built before what is not. */
-export function ordered({ effects }: ExplanationDocument): EffectDocument[] {
-  return [...effects].sort((a, b) => Number(b.built) - Number(a.built) || b.relative - a.relative);
+/** Light that the scene calls for, and that cannot be made. */
+export function lacking(notMade: readonly EffectDocument[]): EffectDocument[] {
+  return notMade.filter(({ called_for }) => called_for);
+}
+
+/** The largest first; what is built before what is not, and what cannot be made among that if it is called for. */
+export function ordered({ effects, not_made }: ExplanationDocument): EffectDocument[] {
+  return [...effects, ...lacking(not_made)].sort((a, b) => Number(b.built) - Number(a.built) || b.relative - a.relative);
 }

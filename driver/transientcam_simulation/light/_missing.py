@@ -1,0 +1,218 @@
+"""Light that a scene has and the simulation does not follow, sized by a few thousand paths.
+
+A path starts where the ray through a pixel's centre ends, and is sent on at random by a few more
+surfaces, each of which takes the lamp's light, straight and over mirrors. What it brings counts
+for the kind of way it took: over a mirror between two scattering surfaces, by gloss of anything
+but the lamp, over more surfaces than the scene's file allows, or as radiosity follows it.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
+from transientcam_simulation.base import ask
+from transientcam_simulation.effects import (
+    COARSE_PATCHES,
+    FURTHER_BOUNCES,
+    GLOSS_OF_SURROUNDINGS,
+    MIRRORS_BETWEEN,
+    Glimpse,
+    Values,
+)
+from transientcam_simulation.light._exchange import direct_light
+from transientcam_simulation.light._patches import Patches, form_factors
+from transientcam_simulation.light._paths import (
+    RayEnds,
+    first_scattering,
+    highlight,
+    image_lights,
+    light_on,
+    light_rays,
+    normals_at,
+)
+from transientcam_simulation.light._variants import without_scattering
+from transientcam_simulation.scene import Points, Scene
+
+PIXELS = 64
+"""At all times of a scene's life together."""
+_PATHS = 512  # in each of two halves, by pixel
+_FURTHER = 3  # surfaces behind the one that is seen
+_PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])  # even places in two dimensions
+_SURE = 3.0  # standard errors by which patches must differ from paths
+_FIRST, _FOLLOWED, _MIRRORS, _GLOSS, _BOUNCES = range(5)  # ``_FIRST`` by radiosity, too
+_KINDS = {
+    MIRRORS_BETWEEN.name: _MIRRORS,
+    GLOSS_OF_SURROUNDINGS.name: _GLOSS,
+    FURTHER_BOUNCES.name: _BOUNCES,
+}
+
+
+@dataclass(frozen=True)
+class SampledWays:
+    """Light that paths bring to some pixels: by pixel and half of the paths, and by kind.
+
+    Attributes
+    ----------
+    scene, rays
+        What is seen, and the rays (P, 3) through the pixels' centres.
+    slot
+        (N) index of the pixel, and P more in the second half of the paths.
+    length_m, weight, kind
+        (N) whole way from the lamp to the camera, brightness, and by what way.
+    """
+
+    scene: Scene
+    rays: Points
+    slot: NDArray[np.intp]
+    length_m: Values
+    weight: Values
+    kind: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, scene: Scene, rays: Points, *, paths: int = _PATHS) -> "SampledWays":
+        """Follow so many random paths from where each ray of the camera ends, twice."""
+        assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
+        pixels, random = len(rays), np.random.default_rng(0)
+        ends = first_scattering(scene, scene.camera.position_m, rays)
+        # each half has places of its own for the first direction, shifted for each pixel
+        shifts = random.random((len(ends.ray), 2, 1, 2))
+        places = ((shifts + np.arange(paths)[:, None] * _PLASTIC) % 1.0).reshape(-1, 2)
+        ends = _some(ends, np.repeat(np.arange(len(ends.ray)), 2 * paths))
+        slot = ends.ray + pixels * (np.arange(len(ends.ray)) // paths % 2)
+        length_m, weight = ends.distance_m, ends.throughput / paths
+        over, glossy = np.zeros((2, len(slot)), dtype=bool)
+        lights, most = tuple(image_lights(scene)), scene.transport.diffuse_bounces
+        found: list[tuple[NDArray[np.intp], Values, Values, NDArray[np.intp]]] = []
+        for further in range(1, _FURTHER + 1):
+            ask()
+            way, factor, lobe = _sent_on(scene, ends, places, random.random(len(slot)))
+            sent = weight * factor
+            goes = np.flatnonzero(sent > 0)
+            ends = first_scattering(scene, ends.point[goes] + 1e-9 * way[goes], way[goes])
+            on = goes[ends.ray]
+            # a mirror turns rays
+            over, glossy = over[on] | (ends.direction != way[on]).any(axis=1), glossy[on] | lobe[on]
+            slot, weight, length_m = slot[on], sent[on], length_m[on] + ends.distance_m
+            normal = normals_at(scene, ends.point, ends.surface)
+            albedo = ends.throughput * _of(scene, "reflectivity")[ends.surface]
+            cut = _BOUNCES if most is not None and further > most else min(further - 1, _FOLLOWED)
+            kind = np.where(glossy, _GLOSS, np.where(over, _MIRRORS, cut))
+            for light in lights:
+                far_m, irradiance = light_on(scene, light, ends.point, normal)
+                gloss = highlight(scene, light, ends, normal)
+                for sends, by in ((albedo, kind), (gloss, np.full(len(gloss), _GLOSS))):
+                    brings = weight * irradiance * sends
+                    lit = brings > 0
+                    found.append((slot[lit], length_m[lit] + far_m[lit], brings[lit], by[lit]))
+            weight = weight * ends.throughput
+            places = random.random((len(slot), 2))
+        joined = [np.concatenate(each) for each in zip(*found, strict=True)]
+        return cls(scene, rays, joined[0], joined[1], joined[2], joined[3])
+
+    @property
+    def followed(self) -> Values:
+        """Brightness (P) of light that radiosity follows."""
+        both = self._moments(_FIRST, 0.0) + self._moments(_FOLLOWED, 0.0)
+        return np.asarray(both.real.mean(axis=0))
+
+    def change(self, kind: str, frequencies_hz: tuple[float, ...]) -> Values:
+        """Size (P) of the moments that are missing, at most."""
+        if kind == COARSE_PATCHES.name:
+            return self._by_patches(max(frequencies_hz))
+        sizes = [self._moments(_KINDS[kind], each) for each in frequencies_hz]
+        return np.sqrt(np.max([_power(one, other) for one, other in sizes], axis=0).clip(0))
+
+    def _moments(self, kind: int, frequency_hz: float) -> NDArray[np.complex128]:
+        """Moments (2, P) of pixels by each half of the paths, which know nothing of each other."""
+        mine, pixels = self.kind == kind, len(self.rays)
+        phase = 2 * np.pi * frequency_hz / SPEED_OF_LIGHT_M_S * self.length_m[mine]
+        real, imag = (
+            np.bincount(self.slot[mine], self.weight[mine] * part, 2 * pixels)
+            for part in (np.cos(phase), np.sin(phase))
+        )
+        halves: NDArray[np.complex128] = (real + 1j * imag).reshape(2, pixels)
+        return halves
+
+    def _by_patches(self, frequency_hz: float) -> Values:
+        """Difference (P) of radiosity from paths, by the first bounce; 0 where they cannot tell."""
+        if self.scene.moves or not (self.kind == _FIRST).any():
+            return np.zeros(len(self.rays))
+        scene = without_scattering(self.scene)
+        lit = light_rays(scene, self.rays)
+        patches = Patches.of(scene, scene.transport.patches)
+        near, weights = np.zeros((len(self.rays), 4), dtype=np.intp), np.zeros((len(self.rays), 4))
+        for k, cells in patches.cells.items():
+            mine, shape = lit.surface == k, scene.surfaces[k].shape
+            near[mine], weights[mine] = shape.between_cells(
+                lit.point[mine], cells.rows, cells.columns
+            )
+            near[mine] += patches.first[k]
+        at, where = np.unique(near, return_inverse=True)
+        factors = form_factors(scene, patches, patches.centre[at], patches.normal[at])
+        delay_s, radiosity = direct_light(scene, patches)
+        turn = 2j * np.pi * frequency_hz
+        given = np.einsum("kns,kns->n", radiosity, np.exp(turn * delay_s))
+        far_m = np.linalg.norm(patches.centre[at][:, None] - patches.centre, axis=-1)
+        got = (factors * np.exp(turn / SPEED_OF_LIGHT_M_S * far_m)) @ given
+        seen = np.einsum("pk,pk->p", weights, got[where.reshape(near.shape)])
+        seen *= lit.reflectance * np.exp(turn / SPEED_OF_LIGHT_M_S * lit.distance_m)
+        one, other = self._moments(_FIRST, frequency_hz)
+        power = _power(one - seen, other - seen)
+        error = np.abs(one - other) ** 2 / 4
+        of_all = self.followed.sum() / self._moments(_FIRST, 0.0).real.mean(axis=0).sum()
+        return of_all * np.sqrt(np.where(power > _SURE**2 * error.mean(), power, 0.0))
+
+
+def sampled_glimpses(
+    seen: tuple[tuple[Scene, Points, Glimpse], ...],
+) -> tuple[tuple[SampledWays, ...], tuple[Glimpse, ...]]:
+    """Sample scenes at some times: of the pixels judged then, by their rays, a few drawn once."""
+    ways, glimpses = [], []
+    for scene, rays, glimpse in seen:
+        count = min(len(rays), PIXELS // len(seen))
+        some = np.sort(np.random.default_rng(1).choice(len(rays), count, replace=False))
+        ways.append(SampledWays.of(scene, rays[some]))
+        bright = glimpse.brightness[some] + ways[-1].followed
+        part = Glimpse(bright, glimpse.reflectance[some], glimpse.cosine[some], (1, count))
+        glimpses.append(part)
+    return tuple(ways), tuple(glimpses)
+
+
+def _power(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> Values:
+    """Square of a magnitude, without what the error of either estimate would add to it."""
+    return np.asarray((one * np.conj(other)).real)
+
+
+def _sent_on(
+    scene: Scene, ends: RayEnds, places: Values, choice: Values
+) -> tuple[Points, Values, NDArray[np.bool_]]:
+    """Directions, the share of light that goes on so, and whether gloss sends it."""
+    normal = normals_at(scene, ends.point, ends.surface)
+    albedo, gloss, power = (
+        _of(scene, name)[ends.surface] for name in ("reflectivity", "gloss", "gloss_exponent")
+    )
+    part = np.divide(gloss, albedo + gloss, out=np.zeros(len(gloss)), where=gloss > 0)
+    lobe = choice < part
+    cosine = np.where(lobe, places[:, 0] ** (1 / (power + 1)), np.sqrt(places[:, 0]))
+    across = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    turn, sine = 2 * np.pi * places[:, 1:], np.sqrt(1 - cosine**2)[:, None]
+    aside = np.cos(turn) * across + np.sin(turn) * np.cross(normal, across)
+    axis = cosine[:, None] * normal + sine * aside
+    facing = -np.einsum("pc,pc->p", axis, ends.direction)
+    way = np.where(lobe[:, None], ends.direction + 2 * facing[:, None] * axis, axis)
+    rising = np.einsum("pc,pc->p", way, normal).clip(0)
+    of_lobe = gloss * (power + 8) / (power + 1) * facing.clip(0) * rising
+    share = np.divide(of_lobe, part, out=np.zeros(len(part)), where=lobe)
+    share = np.where(lobe, share, albedo / np.maximum(1 - part, 1e-12))
+    return way, np.where(rising > 0, share, 0.0), lobe
+
+
+def _of(scene: Scene, name: str) -> Values:
+    return np.array([getattr(surface, name) for surface in scene.surfaces], dtype=float)
+
+
+def _some(ends: RayEnds, index: NDArray[np.intp]) -> RayEnds:
+    return RayEnds(*(getattr(ends, each.name)[index] for each in fields(ends)))
