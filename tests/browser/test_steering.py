@@ -76,7 +76,8 @@ def test_a_change_that_is_refused_for_the_lease_names_its_holder(
     expect(page.get_by_role("button", name="Stop", exact=True)).to_be_disabled()
     # as a page that has no notice of it yet
     words = page.evaluate(
-        "() => transientcam.store.api.ask('PUT /acquisition', { body: { running: false } }).catch((error) => error.message)"
+        "() => transientcam.store.api.ask('PUT /acquisition', { body: { running: false } })"
+        ".catch((error) => error.message)"
     )
     assert words.startswith("the night shift controls the camera")
 

@@ -127,7 +127,7 @@ __all__ = [
     "Values",
     "draw_few",
     "measured_harmonics",
-    "over_noise",
     "missing_calls",
+    "over_noise",
     "read_offsets_rad",
 ]
