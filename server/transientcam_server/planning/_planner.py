@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import Capabilities, Sequence, Truth
@@ -77,19 +78,41 @@ class Planner:
     def plan(self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None) -> Plan:
         """Recommend a sequence; see `planning.plan`. What is raised by ``progress`` ends it."""
         progress = progress or Progress()
-        predictor = self._predictor(scene, progress)
+        predictor = self._predictor(goal, scene, progress)
         timed = self._computing_time(goal, progress)
         return plan(goal, predictor, self._capabilities, timed=timed, progress=progress)
 
-    def plan_document(
-        self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
-    ) -> dict[str, Any]:
-        """Return `plan` as JSON."""
-        return self.plan(goal, scene, progress).to_document()
+    def planned(
+        self,
+        goal: Goal,
+        scene: SceneStatistics,
+        mapped: bool = False,  # noqa: FBT001, FBT002 - by place, for the planning process
+        progress: Progress | None = None,
+    ) -> tuple[dict[str, Any], NDArray[np.float32] | None]:
+        """Return `plan` as JSON, and, where it is wanted, the map of its errors."""
+        progress = progress or Progress()
+        found = self.plan(goal, scene, progress.part(0.0, 0.7 if mapped else 1.0))
+        if not mapped:
+            return found.to_document(), None
+        progress.at(0.7, "error of each pixel")
+        return found.to_document(), self.map_m(found.recommended, scene, progress)
+
+    def map_m(
+        self, choice: Choice, scene: SceneStatistics, progress: Progress | None = None
+    ) -> NDArray[np.float32]:
+        """Predict the error of each pixel (H, W) in m, noise and bias together; NaN if not lit."""
+        every = scene.within(None, every=True)
+        predictor = Predictor(
+            every, self._sensor, self._settings, go_on=progress or Progress(), closely=True
+        )
+        assert every.pixels is not None  # noqa: S101 - it was seen
+        error_m = np.full(every.shape, np.nan, np.float32)
+        error_m.flat[every.pixels] = predictor.map_m(choice.estimator, choice.applied.sequence)
+        return error_m
 
     def families(self, goal: Goal, scene: SceneStatistics) -> list[Family]:
         """Return all that is searched for a goal; see `planning.families`."""
-        return families(goal, self._predictor(scene), self._capabilities)
+        return families(goal, self._predictor(goal, scene), self._capabilities)
 
     def tradeoff_document(
         self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
@@ -100,7 +123,8 @@ class Planner:
         raises ends the work.
         """
         progress = progress or Progress()
-        predictor = self._predictor(scene, progress)
+        predictor = self._predictor(goal, scene, progress)
+        scene = predictor.scene
         found = families(goal, predictor, self._capabilities)
         candidates = curves(found, goal, predictor, self._computing_time(goal, progress))
         choices: list[Choice] = []
@@ -110,9 +134,10 @@ class Planner:
         return tradeoff_document(choices, lines(candidates, choices), scene)
 
     def _predictor(
-        self, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
+        self, goal: Goal, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
     ) -> Predictor:
-        return Predictor(scene, self._sensor, self._settings, go_on=go_on)
+        seen = scene.within(goal.region)
+        return Predictor(seen, self._sensor, self._settings, go_on=go_on, share=goal.share)
 
     def _computing_time(self, goal: Goal, progress: Progress) -> ComputingTime:
         """Return what times frames; a budget of computing time needs kernels that are compiled."""

@@ -1,15 +1,15 @@
 """What accuracy a sequence will have on a scene, before it is captured.
 
 Noisy moments are drawn around those of the scene and go through the estimator itself, so that
-noise, bias and outliers come from one computation, whatever the estimator. What is drawn depends on
+noise, bias and shares come from one computation, whatever the estimator. What is drawn depends on
 a sequence by its frequencies and by how noisy it is: a few steps of noise serve every exposure and
 number of takes.
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
 from statistics import NormalDist
 from typing import Any, Final
 
@@ -47,6 +47,8 @@ STEP: Final = 4.0
 """Factor between steps of noise."""
 NOMINAL: Final = Sequence(exposure_s=1e-3, zeroth="estimated")
 """The steps are multiples of its noise."""
+_SHARES: Final = np.linspace(0.0, 1.0, 201)
+"""For which it is stated how far ranges are off."""
 _HARDLY: Final = 0.8
 _NORMAL: Final = np.array([NormalDist().inv_cdf(0.5 + (k + 0.5) / 64) for k in range(32)])
 """Absolute values of a standard normal variable, each as likely."""
@@ -62,22 +64,29 @@ class Prediction:
         Noise, and the root sum of squares of noise and bias, pixel by pixel.
     range_bias_m
         Systematic error of the median pixel.
-    outlier_share
-        Share of the ranges beyond five standard deviations.
     most_bias_m
         Bias of the median pixel if the light begins where the moments only just allow it.
     bias_known
         Whether the moments tell the bias: not where shapes of light that explain them alike put
         the range elsewhere, nor where estimators disagree about the direct range at all
         frequencies, nor where many pixels may be lit by other surfaces alone.
+    off_m
+        How far the ranges of a capture are off, without sign, in equal shares by rising value.
+    within
+        What the share of a goal of them is within; None where a goal is of the median pixel.
     """
 
     range_std: Figure
     range_error: Figure
     range_bias_m: float
-    outlier_share: float
     most_bias_m: float
     bias_known: bool
+    off_m: tuple[float, ...] = ()
+    within: Figure | None = None
+
+    def share_within(self, tolerance_m: float) -> float:
+        """Return the share of a capture's ranges that are off by no more than that."""
+        return float(np.interp(tolerance_m, self.off_m, _SHARES, left=0.0))
 
 
 class Predictor:
@@ -97,6 +106,9 @@ class Predictor:
         Called several times a second while this computes; whatever it raises ends that.
     closely
         Predict with all pixels of the scene, and not with few of them.
+    share
+        Of the ranges of a capture whose largest error is predicted; None for noise and bias
+        together of the median pixel.
     """
 
     def __init__(
@@ -108,7 +120,9 @@ class Predictor:
         seed: int = 0,
         go_on: Callable[[], None] = lambda: None,
         closely: bool = False,
+        share: float | None = None,
     ) -> None:
+        self._share = share
         self._go_on = go_on
         self._whole = scene
         self.scene = scene if closely else scene.few()
@@ -131,7 +145,7 @@ class Predictor:
         return float(np.median(self.relative_noise(sequence) / self._nominal))
 
     def quick(self, estimator: str, sequence: Sequence, scale: float) -> tuple[float, float, float]:
-        """Return deviation, bias and error in m of the median pixel at a scale of noise.
+        """Return deviation and bias in m of the median pixel, and the error, at a scale of noise.
 
         Between the steps that were drawn the logarithms of each pixel's errors are interpolated.
         """
@@ -144,27 +158,40 @@ class Predictor:
             np.exp((1 - part) * np.log(one) + part * np.log(other))
             for one, other in ((low[0], high[0]), (low[1], high[1]))
         )
-        return float(_typical(std)), float(np.median(bias)), float(np.median(np.hypot(std, bias)))
+        if self._share is None:
+            error_m = np.median(np.hypot(std, bias))
+        else:
+            both = np.concatenate([_NORMAL, -_NORMAL])
+            error_m = np.quantile(np.abs(bias + both[:, None] * std), self._share)
+        return float(_typical(std)), float(np.median(bias)), float(error_m)
 
     def least_noise_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
         """Return a bound in m on the noise of the median pixel: that of Cramer and Rao.
 
-        Of one return with all the light; the sum of squares of 1 to m is in it.
+        Of one return with all the light; the sum of squares of 1 to m is in it. Half of the pixels
+        are noisier than the median one: the share s of all ranges that is off by least reaches at
+        least as far as the share 2 s - 1 of the median pixel's.
         """
         m = self._harmonics(estimator, sequence)
         noise = float(np.median(self._nominal)) * scale
         std_rad = noise / math.sqrt(m * (m + 1) * (2 * m + 1) / 6)
+        if self._share is not None:
+            std_rad *= NormalDist().inv_cdf(max(self._share, 0.5))
         return float(tm.range_m(std_rad, sequence.base_frequency_hz))
 
     def least_bias_m(self, estimator: str, sequence: Sequence) -> float:
-        """Return what the bias of the median pixel hardly falls below: that without noise."""
+        """Return what the bias hardly lets the error fall below: that without noise.
+
+        Of the median pixel, or of a share s of the ranges: of a pixel that is off at least half of
+        the ranges are further off, so that it is that of the share 2 s - 1 of the pixels.
+        """
         m = self._harmonics(estimator, sequence)
         return self._exact(estimator, m, sequence.base_frequency_hz)
 
     def _bias_without_noise(
         self, estimator: str, harmonics: int, base_frequency_hz: float
     ) -> float:
-        """Bias in m of the median pixel that no exposure and no takes reduce."""
+        """Bias in m that no exposure and no takes reduce."""
         self._go_on()
         scene = self.scene
         b = scene.relative_moments(harmonics, base_frequency_hz)[:, FEW]
@@ -173,7 +200,9 @@ class Predictor:
         range_m = ranges_m(b, variance, estimator, base_frequency_hz, self.settings)
         bias_m = np.hypot(range_m - scene.direct_m[FEW], scene.uncertainty_m[FEW])
         # noise of the look itself is in this, and in the direct range
-        return _HARDLY * float(np.median(np.nan_to_num(bias_m, nan=math.inf)))
+        share = 0.5 if self._share is None else max(0.0, 2 * self._share - 1)
+        known = np.sort(np.nan_to_num(bias_m, nan=math.inf))
+        return _HARDLY * float(known[int(share * (known.size - 1))])
 
     def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
         """Predict the errors of a sequence and an estimator, with intervals.
@@ -194,14 +223,39 @@ class Predictor:
             and _median(np.hypot(errors.std_m, farthest_m)) <= DOUBTFUL * _median(errors.error_m)
         )
         picks = resampled(noise.size, RESAMPLED, self._seed)
+        most_m = None if known else farthest_m
+        within = None
+        if self._share is not None:
+            within = _error(errors.off_m, partial(_quantile, self._share), errors, most_m, picks)
         return Prediction(
             figure(errors.std_m, _typical, picks),
-            _error(errors, None if known else farthest_m, picks),
+            _error(lambda bias_m: np.hypot(errors.std_m, bias_m), _median, errors, most_m, picks),
             float(_median(errors.bias_m)),
-            errors.outlier_share,
             float(_median(farthest_m)),
-            bias_known=known,
+            known,
+            tuple(_ordered(errors.off_m(errors.bias_m))),
+            within,
         )
+
+    def map_m(self, estimator: str, sequence: Sequence, draws: int = FINE_DRAWS) -> _Array:
+        """Predict noise and bias together of each pixel of the scene, in m (P)."""
+        harmonics, noise = self._harmonics(estimator, sequence), self.relative_noise(sequence)
+        frequency_hz = sequence.base_frequency_hz
+        return self._errors(
+            estimator, harmonics, frequency_hz, noise, draws, sequence.zeroth
+        ).error_m
+
+    def brighter(self, times: float) -> "Predictor":
+        """Return the predictor of the same scene with so many times the camera's own light."""
+        scene = self._whole
+        ambient = float(np.median(scene.ambient_dn_per_s))
+        lit = replace(
+            scene,
+            brightness_dn_per_s=times * scene.brightness_dn_per_s,
+            brightest_dn_per_s=times * max(scene.brightest_dn_per_s - ambient, 0.0) + ambient,
+        )
+        arguments = lit, self.sensor, self.settings
+        return Predictor(*arguments, seed=self._seed, go_on=self._go_on, share=self._share)
 
     def beyond_scene(self, sequence: Sequence) -> bool:
         """Whether a sequence sees more of the scene than the look that describes it."""
@@ -239,7 +293,9 @@ class Predictor:
     @cached_property
     def _closer(self) -> "Predictor":
         arguments = self._whole, self.sensor, self.settings
-        return Predictor(*arguments, seed=self._seed, go_on=self._go_on, closely=True)
+        return Predictor(
+            *arguments, seed=self._seed, go_on=self._go_on, closely=True, share=self._share
+        )
 
     def _harmonics(self, estimator: str, sequence: Sequence) -> int:
         """How many harmonics the estimator looks at."""
@@ -288,17 +344,43 @@ class Predictor:
         )
 
 
-def _error(errors: PixelErrors, farthest_m: _Array | None, picks: _Array) -> Figure:
-    """Return the figure of the error; ``farthest_m`` (P) is the most bias, where none is known."""
+def _error(
+    of_bias: Callable[[_Array], _Array],
+    value: Callable[[_Array], _Array],
+    errors: PixelErrors,
+    farthest_m: _Array | None,
+    picks: _Array,
+) -> Figure:
+    """Return the figure of an error; ``farthest_m`` (P) is the most bias, where none is known.
+
+    Parameters
+    ----------
+    of_bias
+        Returns the errors of pixels (P, ...) were their bias (P) the one given.
+    value
+        Of errors (..., P, ...), the figure (...).
+    """
     reach = KNOWN if farthest_m is None else UNKNOWN
     least_m, most_m = reach.least_bias * errors.bias_m, reach.most_bias * errors.bias_m
     if farthest_m is not None:
         most_m = np.maximum(most_m, farthest_m)
     least, most = (
-        figure(np.hypot(errors.std_m, bias_m), _median, picks, reach.spread)
-        for bias_m in (least_m, most_m)
+        figure(of_bias(bias_m), value, picks, reach.spread) for bias_m in (least_m, most_m)
     )
-    return between(figure(errors.error_m, _median, picks), least, most)
+    return between(figure(of_bias(errors.bias_m), value, picks), least, most)
+
+
+def _quantile(share: float, off_m: _Array) -> _Array:
+    """Return what a share of the ranges (..., P, D) is within (...)."""
+    flat = off_m.reshape((*off_m.shape[:-2], -1))
+    place = min(int(share * flat.shape[-1]), flat.shape[-1] - 1)
+    return np.asarray(np.partition(flat, place, axis=-1)[..., place])
+
+
+def _ordered(off_m: _Array) -> _Array:
+    """Return how far equal shares of all ranges (P, D) are off, by rising value."""
+    flat = np.sort(off_m, axis=None)
+    return np.asarray(flat[np.rint(_SHARES * (flat.size - 1)).astype(int)])
 
 
 def _typical(deviations: _Array) -> _Array:

@@ -1,6 +1,7 @@
 """From the moments of a look to the statistics of a scene."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -26,6 +27,8 @@ DIM: Final = 0.2
 """What a surface gets from a lit one beside it, over what that one gets, is hardly more."""
 BRIGHT_SHARE: Final = 0.95
 """All but the brightest pixels, which may be a mirror's."""
+BRIGHTEST_SHARE: Final = 0.999
+"""Share of the pixels that nothing planned may saturate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,8 +49,8 @@ class FrameAverages:
         (m + 1, H, W) moments that are not smoothed, averaged over the frames.
     mean_dn
         (H, W) mean of all four-bucket images above the dark level.
-    brightest_dn
-        What the brightest pixels hold above the dark level.
+    highest_dn
+        (H, W) the most that an image holds above the dark level.
     usable
         (H, W) which pixels are not saturated.
     """
@@ -59,8 +62,13 @@ class FrameAverages:
     moved: _Array
     single: _Array
     mean_dn: _Array
-    brightest_dn: float
+    highest_dn: _Array
     usable: _Array
+
+    def brightest_dn(self, within: _Array | None = None) -> float:
+        """Return what the brightest pixels, of those within (H, W), hold above the dark level."""
+        chosen = self.highest_dn if within is None else self.highest_dn[within]
+        return float(np.quantile(chosen, BRIGHTEST_SHARE))
 
     @property
     def exposure_s(self) -> float:
@@ -120,15 +128,43 @@ def describe(
     lit = lit_pixels(averages)
     if coarse is not None:
         lit &= lit_pixels(coarse)
+        coarse = _kept(coarse)
+    moving = moving_share(averages, lit) if lit.any() else 0.0
+    seen = partial(_described, _kept(averages), settings, coarse, ambient_dn_per_s, lit, moving)
+    scene = seen()
+    return None if scene is None else replace(scene, seen=seen, shape=lit.shape)
+
+
+def _kept(averages: FrameAverages) -> FrameAverages:
+    """Return what other pixels of the same frames are described by."""
+    nothing = averages.moved[:0]
+    return replace(averages, moved=nothing, single=nothing)
+
+
+def _described(
+    averages: FrameAverages,
+    settings: ReconstructionSettings,
+    coarse: FrameAverages | None,
+    ambient_dn_per_s: float | None,
+    lit: _Array,
+    moving: float,
+    within: _Array | None = None,
+    *,
+    every: bool = False,
+) -> SceneStatistics | None:
+    """Describe typical lit pixels, or every one of them, of those within (H, W)."""
+    lit = lit if within is None else lit & within
     if not lit.any():
         return None
     there = np.flatnonzero(lit)
-    pixels = there[typical_pixels(averages.at(there)[0], PIXELS)]
+    pixels = there if every else there[typical_pixels(averages.at(there)[0], PIXELS)]
     b, mean_dn = averages.at(pixels)
     variance = averages.variance(mean_dn) / averages.frames
     base_hz = averages.recipe.base_frequency_hz
     direct_m, uncertainty_m = direct_range(b, variance, base_hz, settings)
-    earliest_m, latest_m = _plausible_by_kind(b, variance, base_hz, direct_m, uncertainty_m)
+    earliest_m, latest_m = direct_m, direct_m
+    if not every:  # of maps nobody asks for it
+        earliest_m, latest_m = _plausible_by_kind(b, variance, base_hz, direct_m, uncertainty_m)
     light_dn = _brightness(b if coarse is None else coarse.at(pixels)[0], b)
     checked = coarse is not None
     if coarse is not None:
@@ -147,7 +183,7 @@ def describe(
     return SceneStatistics(
         brightness_dn_per_s=light_dn / averages.exposure_s,
         ambient_dn_per_s=ambient,
-        brightest_dn_per_s=averages.brightest_dn / averages.exposure_s,
+        brightest_dn_per_s=averages.brightest_dn(within) / averages.exposure_s,
         direct_m=direct_m,
         uncertainty_m=uncertainty_m,
         earliest_m=earliest_m,
@@ -157,10 +193,11 @@ def describe(
         base_frequency_hz=base_hz,
         measured=relative,
         relative_noise=np.sqrt(variance[1]) / light_dn,
-        lit_share=float(lit.mean()),
+        lit_share=float((lit if within is None else lit[within]).mean()),
         dim_share=dim_share(light_dn, direct_m),
-        moving_share=moving_share(averages, lit),
+        moving_share=moving,
         ambiguity_checked=checked,
+        pixels=pixels,
     )
 
 

@@ -37,8 +37,6 @@ LONGEST_EXPOSURE_S: Final = 0.02
 FILLED: Final = 0.6
 """How full the brightest pixels of the look are."""
 MOST_HARMONICS: Final = 16
-BRIGHT_SHARE: Final = 0.999
-"""Share of the pixels that nothing planned may saturate."""
 _SPARE_S: Final = 10.0
 _DARKER: Final = 8.0
 
@@ -114,7 +112,7 @@ class _FrameSums:
             moved=self._last - self._first,
             single=self._single / self._frames,
             mean_dn=self._sum_dn / self._images - sensor.dark_dn,
-            brightest_dn=float(np.quantile(self._highest_dn, BRIGHT_SHARE)) - sensor.dark_dn,
+            highest_dn=self._highest_dn - sensor.dark_dn,
             usable=self._highest_dn < sensor.highest_dn,
         )
 
@@ -188,7 +186,7 @@ def look_at(
     exposure_s = max(FIRST_EXPOSURE_S, capabilities.min_exposure_s)
     while True:
         first = captured(replace(coarse_sequence, exposure_s=exposure_s), 1, "exposure")
-        brightest_dn = first.brightest_dn
+        brightest_dn = first.brightest_dn()
         if brightest_dn < sensor.brightest:
             break
         if exposure_s <= capabilities.min_exposure_s:

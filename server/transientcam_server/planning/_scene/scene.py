@@ -1,6 +1,6 @@
 """The scene as predictions see it: light, returns and true range of typical pixels."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from typing import Any, Final
 
@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD
+from transientcam_server.errors import Problem, kinds
+from transientcam_server.planning._scene.region import Region
 from transientcam_server.planning._scene.sampling import STRATUM, one_of_each
 
 _Array = NDArray[Any]
@@ -59,6 +61,13 @@ class SceneStatistics:
         Share of the lit pixels that changed while the scene was looked at.
     ambiguity_checked
         Whether `direct_m` is known not to be short by a multiple of the unambiguous range.
+    pixels
+        (P) places of the pixels in the picture, row by row; None of a scene that is given.
+    shape
+        Height and width of the picture.
+    seen
+        Describes pixels within a mask (H, W), None for all: typical ones or, with ``every``, each
+        lit one; None of a scene that is given, or if none is lit.
     """
 
     brightness_dn_per_s: _Array
@@ -77,6 +86,9 @@ class SceneStatistics:
     dim_share: float = 0.0
     moving_share: float = 0.0
     ambiguity_checked: bool = True
+    pixels: _Array | None = None
+    shape: tuple[int, int] = (0, 0)
+    seen: "Callable[..., SceneStatistics | None] | None" = None
 
     def few(self) -> "SceneStatistics":
         """Return what fewer pixels show, `FEW_PIXELS` of them."""
@@ -91,6 +103,32 @@ class SceneStatistics:
             if isinstance(value, np.ndarray)
         }
         return replace(self, **of_pixels)
+
+    def within(self, region: Region | None, *, every: bool = False) -> "SceneStatistics":
+        """Return what is seen in a region, by typical pixels or by ``every`` lit one.
+
+        Raises
+        ------
+        Problem
+            ``invalid-request`` where the picture does not hold the region, or no picture was seen;
+            ``target-unreachable`` where nothing is lit in it.
+        """
+        if region is None and not every:
+            return self
+        if self.seen is None:
+            detail = "A scene that is given has no picture, and so no region of it."
+            raise Problem(kinds.INVALID_REQUEST, detail, field="region", value=None, limit=None)
+        mask = None if region is None else region.mask(*self.shape)
+        scene = self.seen(mask, every=every)
+        if scene is None:
+            raise Problem(
+                kinds.TARGET_UNREACHABLE,
+                "No pixel of the region has light that stands clear of the noise.",
+                field="region",
+                value=None if region is None else region.to_document(),
+                best=None,
+            )
+        return replace(scene, seen=self.seen, shape=self.shape)
 
     def to_document(self) -> dict[str, Any]:
         """Return what was seen, as JSON."""

@@ -18,12 +18,14 @@ def refusal(goal: Goal, shortfall: Shortfall) -> Problem:
     limit, achieved = getattr(goal, field), _achieved(best, field)
     limited_by, words = _limits(shortfall)
     named = "share of captures that find both" if field == "separation_m" else field
-    margin = ""
+    margin, of_share = "", ""
+    if field == "range_error_m" and goal.share is not None:
+        of_share = f" in {goal.share:.0%} of the pixels"
     if field.startswith("range") and achieved <= limit:
         margin = ", which leaves no margin"
     return Problem(
         kinds.TARGET_UNREACHABLE,
-        f"This cannot be reached on this scene: {field} = {limit:g}. "
+        f"This cannot be reached on this scene: {field} = {limit:g}{of_share}. "
         f"The best {named} is {achieved:.4g}{margin}. What limits it: {words}.",
         field=field,
         value=limit,
