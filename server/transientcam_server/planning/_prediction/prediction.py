@@ -8,7 +8,7 @@ number of takes.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache, partial
 from statistics import NormalDist
 from typing import Any, Final
@@ -41,6 +41,8 @@ DRAWS: Final = 6
 """Noisy captures of each pixel for a first prediction."""
 FINE_DRAWS: Final = 30
 """And for the one that is stated."""
+MAP_DRAWS: Final = 12
+"""And for each pixel of a map."""
 FEW: Final = slice(None, None, 2)
 """The pixels that first predictions are made of: every other one of each kind."""
 STEP: Final = 4.0
@@ -49,6 +51,8 @@ NOMINAL: Final = Sequence(exposure_s=1e-3, zeroth="estimated")
 """The steps are multiples of its noise."""
 _SHARES: Final = np.linspace(0.0, 1.0, 201)
 """For which it is stated how far ranges are off."""
+_FEW_DRAWS: Final = 3
+"""Every third draw tells the intervals of shares."""
 _HARDLY: Final = 0.8
 _NORMAL: Final = np.array([NormalDist().inv_cdf(0.5 + (k + 0.5) / 64) for k in range(32)])
 """Absolute values of a standard normal variable, each as likely."""
@@ -226,7 +230,7 @@ class Predictor:
         most_m = None if known else farthest_m
         within = None
         if self._share is not None:
-            within = _error(errors.off_m, partial(_quantile, self._share), errors, most_m, picks)
+            within = _within(self._share, errors, most_m, picks)
         return Prediction(
             figure(errors.std_m, _typical, picks),
             _error(lambda bias_m: np.hypot(errors.std_m, bias_m), _median, errors, most_m, picks),
@@ -237,7 +241,7 @@ class Predictor:
             within,
         )
 
-    def map_m(self, estimator: str, sequence: Sequence, draws: int = FINE_DRAWS) -> _Array:
+    def map_m(self, estimator: str, sequence: Sequence, draws: int = MAP_DRAWS) -> _Array:
         """Predict noise and bias together of each pixel of the scene, in m (P)."""
         harmonics, noise = self._harmonics(estimator, sequence), self.relative_noise(sequence)
         frequency_hz = sequence.base_frequency_hz
@@ -368,6 +372,17 @@ def _error(
         figure(of_bias(bias_m), value, picks, reach.spread) for bias_m in (least_m, most_m)
     )
     return between(figure(of_bias(errors.bias_m), value, picks), least, most)
+
+
+def _within(
+    share: float, errors: PixelErrors, farthest_m: _Array | None, picks: _Array
+) -> Figure:
+    """Return the figure of what a share of the ranges is within; few draws tell its interval."""
+    few = replace(errors, apart_m=errors.apart_m[::_FEW_DRAWS])
+    found = _error(few.off_m, partial(_quantile, share), few, farthest_m, picks)
+    whole = float(_quantile(share, errors.off_m(errors.bias_m)))
+    scale = whole / found.median if 0 < found.median < math.inf else 1.0
+    return Figure(*(scale * getattr(found, each.name) for each in fields(Figure)))
 
 
 def _quantile(share: float, off_m: _Array) -> _Array:

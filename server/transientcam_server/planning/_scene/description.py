@@ -138,7 +138,8 @@ def describe(
 def _kept(averages: FrameAverages) -> FrameAverages:
     """Return what other pixels of the same frames are described by."""
     nothing = averages.moved[:0]
-    return replace(averages, moved=nothing, single=nothing)
+    recipe = replace(averages.recipe)  # without what it keeps, which no process can be sent
+    return replace(averages, recipe=recipe, moved=nothing, single=nothing)
 
 
 def _described(

@@ -7,11 +7,11 @@ from typing import Any, Final
 from transientcam_driver import Capabilities
 from transientcam_server.planning._prediction.prediction import Predictor
 from transientcam_server.planning._scene.estimation import SEARCHED
-from transientcam_server.planning._search.candidates import ComputingTime, curves
+from transientcam_server.planning._search.candidates import ComputingTime, Curve, curves, longest
 from transientcam_server.planning._search.choice import Choice
 from transientcam_server.planning._search.families import families
 from transientcam_server.planning._search.goal import Goal
-from transientcam_server.planning._search.search import best_choice
+from transientcam_server.planning._search.search import first_within
 
 TWICE: Final = 2.0
 """How many times faster, or brighter, a changed camera is."""
@@ -46,30 +46,46 @@ class Change:
         return f"{subject} gives {times}"
 
 
-def changes(best: Choice, goal: Goal, predictor: Predictor, capabilities: Capabilities) -> list[Change]:
+def changes(
+    best: Choice, goal: Goal, predictor: Predictor, capabilities: Capabilities
+) -> list[Change]:
     """Plan anew for cameras of which one thing is better, and return what that gives, best first.
 
-    Each is predicted as any plan is; one that the same frequencies cannot use is left out.
+    Few draws find the quickest sequence that is as safely within the targets as the best choice is,
+    or without targets the longest within the budgets; many draws predict it. A camera that the
+    frequencies do not suit is left out.
     """
-    same = replace(goal, base=best.applied.sequence, fixed=goal.fixed | _SAME, estimator=best.estimator)
+    sequence = best.applied.sequence
+    same = replace(goal, base=sequence, fixed=goal.fixed | _SAME, estimator=best.estimator)
+    same = replace(same, computing_share=None)  # that is not of the capture
     cameras = {
         "readout": (predictor, _faster(capabilities)),
         "light": (predictor.brighter(TWICE), capabilities),
     }
+    present = _curve(same, predictor, capabilities)
+    own = min(present, key=lambda each: abs(each.capture_s - best.applied.capture_s))
+    limits = {
+        name: limit * own.error(name) / max(best.error_with_margin(name), 1e-12)
+        for name, limit in goal.limits.items()
+    }
     found = []
     for what, (of_scene, camera) in cameras.items():
-        # the time of computing changes in neither, and a budget of it is not of the capture
-        curve = curves(
-            families(same, of_scene, camera), replace(same, computing_share=None), of_scene, _unknown
-        )
-        choice = best_choice(curve, goal.limits, goal.leading)
-        if choice is None or choice.relative_errors(goal.limits)[1] > 1:
+        curve = _curve(same, of_scene, camera)
+        last = longest(curve)
+        place = last if last is None or not limits else first_within(curve, limits, 0, last)
+        if place is None:
             continue
+        choice = curve[place].choice()
         time_s, error = choice.applied.capture_s, choice.error(goal.leading)
         factors = best.applied.capture_s / time_s, best.error(goal.leading) / max(error, 1e-12)
         found.append(Change(what, time_s, error, *factors))
-    by = "time_factor" if goal.targets else "error_factor"
+    by = "time_factor" if limits else "error_factor"
     return sorted(found, key=lambda change: -float(getattr(change, by)))
+
+
+def _curve(goal: Goal, predictor: Predictor, capabilities: Capabilities) -> Curve:
+    (curve,) = curves(families(goal, predictor, capabilities), goal, predictor, lambda *_: None)
+    return curve
 
 
 def computing_s(best: Choice, timed: ComputingTime) -> dict[str, float | None]:
@@ -96,7 +112,3 @@ def _faster(capabilities: Capabilities) -> Capabilities:
         readout_s=capabilities.readout_s / TWICE,
         streaming_readout_s=capabilities.streaming_readout_s / TWICE,
     )
-
-
-def _unknown(*_: object) -> None:
-    return None
