@@ -82,32 +82,34 @@ class Planner:
         timed = self._computing_time(goal, progress)
         return plan(goal, predictor, self._capabilities, timed=timed, progress=progress)
 
-    def planned(
-        self,
-        goal: Goal,
-        scene: SceneStatistics,
-        mapped: bool = False,  # noqa: FBT001, FBT002 - by place, for the planning process
-        progress: Progress | None = None,
-    ) -> tuple[dict[str, Any], NDArray[np.float32] | None]:
-        """Return `plan` as JSON, and, where it is wanted, the map of its errors."""
-        progress = progress or Progress()
-        found = self.plan(goal, scene, progress.part(0.0, 0.7 if mapped else 1.0))
-        if not mapped:
-            return found.to_document(), None
-        progress.at(0.7, "error of each pixel")
-        return found.to_document(), self.map_m(found.recommended, scene, progress)
+    def plan_document(
+        self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
+    ) -> dict[str, Any]:
+        """Return `plan` as JSON."""
+        return self.plan(goal, scene, progress).to_document()
 
     def map_m(
-        self, choice: Choice, scene: SceneStatistics, progress: Progress | None = None
+        self,
+        scene: SceneStatistics,
+        estimator: str,
+        sequence: Sequence,
+        progress: Progress | None = None,
     ) -> NDArray[np.float32]:
-        """Predict the error of each pixel (H, W) in m, noise and bias together; NaN if not lit."""
+        """Predict the error of each pixel (H, W) in m, noise and bias together; NaN if not lit.
+
+        Raises
+        ------
+        Problem
+            ``invalid-request`` for a scene that is given, which has no pixels.
+        """
+        progress = progress or Progress()
+        progress.at(0.0, "error of each pixel")
         every = scene.within(None, every=True)
-        predictor = Predictor(
-            every, self._sensor, self._settings, go_on=progress or Progress(), closely=True
-        )
+        arguments = every, self._sensor, self._settings
+        found_m = Predictor(*arguments, go_on=progress, closely=True).map_m(estimator, sequence)
         assert every.pixels is not None  # noqa: S101 - it was seen
         error_m = np.full(every.shape, np.nan, np.float32)
-        error_m.flat[every.pixels] = predictor.map_m(choice.estimator, choice.applied.sequence)
+        error_m.flat[every.pixels] = np.where(np.isfinite(found_m), found_m, np.nan)
         return error_m
 
     def families(self, goal: Goal, scene: SceneStatistics) -> list[Family]:

@@ -171,6 +171,12 @@ export interface AppliedDocument {
   readonly data_rate_bytes_s: number;
 }
 
+/** How many pixels of a capture are further off. */
+export interface BeyondDocument {
+  readonly error_m: number;
+  readonly share: number;
+}
+
 /** What a request sends, where that has a name. */
 export interface Bodies {
   readonly "POST /lease": LeaseRequest;
@@ -297,6 +303,19 @@ export interface CameraDocument {
   readonly counters: Readonly<Record<string, number>>;
 }
 
+/** What a better camera would give with the same frequencies and estimator. */
+export interface ChangeDocument {
+  /** Read-out twice as fast, or twice as much light. */
+  readonly what: "readout" | "light";
+  readonly capture_s: number;
+  /** Of `compared_by`. */
+  readonly error: number;
+  /** How many times less time it takes. */
+  readonly time_factor: number;
+  /** How many times less its error is. */
+  readonly error_factor: number;
+}
+
 /** A sequence and what is predicted of it. */
 export interface ChoiceDocument {
   /** The body for `PUT /sequence`. */
@@ -312,6 +331,7 @@ export interface ChoiceDocument {
   readonly reconstruct_s: number | null;
   /** That over the time between two frames: what a core is busy with. */
   readonly computing_share: number | null;
+  readonly price: PriceDocument;
   readonly predicted: PredictedDocument;
 }
 
@@ -399,7 +419,7 @@ export interface FigureDocument {
   readonly low: number;
   /** And below this. */
   readonly high: number;
-  /** 90 % of the pixels are predicted to be better; fewer are where much light comes back close
+  /** Of 90 % of the pixels; fewer are better where much light comes back close
    * behind the direct one, as near the edge of a corner, and no frequency resolves it. */
   readonly p90: number;
 }
@@ -803,12 +823,21 @@ export interface PlanDocument {
   readonly reconstruct_s: number | null;
   /** That over the time between two frames: what a core is busy with. */
   readonly computing_share: number | null;
+  readonly price: PriceDocument;
   readonly predicted: PredictedDocument;
   /** The target that neighbours are compared by. */
   readonly compared_by: string;
   /** Noise and bias in a sentence, what half the error costs, and why a bias is not known. */
   readonly summary: string;
   readonly scene: SeenDocument;
+  /** Corners of the region whose pixels count. */
+  readonly region: readonly (readonly [number, number])[] | null;
+  /** Computing time of a frame of the sequence, by estimator; null as in `price`. */
+  readonly computing_s: Readonly<Record<string, number | null>>;
+  /** What better cameras would give, the best first: each is predicted, too. */
+  readonly changes: readonly ChangeDocument[];
+  /** What the time goes into, and what would buy most, in a sentence. */
+  readonly price_summary: string;
   /** What half the time gives; null where nothing is that quick. */
   readonly half_time: PlanNeighbourDocument | null;
   /** What half the error costs; null where nothing is that accurate. */
@@ -830,6 +859,7 @@ export interface PlanNeighbourDocument {
   readonly reconstruct_s: number | null;
   /** That over the time between two frames: what a core is busy with. */
   readonly computing_share: number | null;
+  readonly price: PriceDocument;
   readonly predicted: PredictedDocument;
   /** Its capture time over the recommended one's. */
   readonly time_factor: number;
@@ -841,6 +871,13 @@ export interface PlanNeighbourDocument {
 export interface PlanRequest {
   readonly target?: TargetDocument;
   readonly budget?: BudgetDocument;
+  /** Of the pixels of a capture that are to be within the target. Null plans for the error of the
+   * median pixel over many captures, which two of three pixels of a capture are within. */
+  readonly share?: number | null;
+  /** Whose lit pixels count; null for the whole picture. What is outside may saturate. */
+  readonly region?: readonly [number, number, number, number] | readonly (readonly [number, number])[] | null;
+  /** Whether a job is to predict the error of each pixel, too. */
+  readonly map?: boolean;
   /** Fields of the sequence that must stay as given here. */
   readonly fixed?: Readonly<Record<string, unknown>>;
   /** The only estimator to plan with; null considers all of these. */
@@ -857,6 +894,7 @@ export interface PointDocument {
   readonly capture_s: number;
   readonly range_std_m: number;
   readonly range_bias_m: number;
+  /** With a share what that is within, and of the median pixel without. */
   readonly range_error_m: number;
 }
 
@@ -876,9 +914,10 @@ export interface PredictedDocument {
    * nor where many pixels may be lit by other surfaces alone: then `range_bias_m` holds only for
    * the simplest light, and `summary` says why. */
   readonly bias_known: boolean;
-  /** Share of the ranges that are off by more than five times `range_error_m`; pixels whose bias
-   * none of the frequencies looked at shows are not in it. */
-  readonly outlier_share: number;
+  /** What the share of the goal is within; null where the goal is of the median pixel. */
+  readonly within: WithinDocument | null;
+  /** Shares of the pixels of a capture that are further off than some errors. */
+  readonly beyond: readonly BeyondDocument[];
   /** Whether it sees more of the scene than the look that the scene was judged by, so that the
    * prediction is a bound on how good it can be. */
   readonly beyond_scene: boolean;
@@ -895,6 +934,26 @@ export interface PredictedStdDocument {
   readonly p90: number;
   /** Share of the pixels where the noise model holds; that of the others is a rough figure. */
   readonly first_order_share: number;
+}
+
+/** What a capture takes until its ranges are there, item by item, and what else it costs. */
+export interface PriceDocument {
+  /** Exposure, with the light on. */
+  readonly light_s: number;
+  readonly readout_s: number;
+  /** After changes of the modulation frequency. */
+  readonly settling_s: number;
+  /** From the end of the capture to the arrival of the last image, by the newest frame; the least
+   * that a link ever took is not in it. Null where no frame tells. */
+  readonly transport_s: number | null;
+  /** From images to ranges on one core; null as long as kernels are not compiled. */
+  readonly computing_s: number | null;
+  /** Of all that is known. */
+  readonly sum_s: number;
+  /** Share of the capture with the light on: dose and heat go with it. */
+  readonly light_share: number;
+  /** Raw images of one capture. */
+  readonly data_bytes: number;
 }
 
 /** A problem as RFC 9457 describes it. */
@@ -1303,7 +1362,7 @@ export interface SubPhasesDocument {
 
 /** What has to be reached; all that is given. */
 export interface TargetDocument {
-  /** Noise and bias of the range together, of the median lit pixel, at most. */
+  /** How far the range is off, noise and bias together, at most; in `share` of the pixels. */
   readonly range_error_m?: number | null;
   /** Standard deviation of the range of a typical pixel, at most. */
   readonly range_std_m?: number | null;
@@ -1351,6 +1410,10 @@ export interface TradeoffDocument {
 export interface TradeoffRequest {
   /** The accuracy that capture time is held against. */
   readonly by?: "range_error_m" | "range_std_m" | "bound_width";
+  /** Of the pixels of a capture, whose error counts; null for that of the median pixel. */
+  readonly share?: number | null;
+  /** Whose pixels count; null for the whole picture. */
+  readonly region?: readonly [number, number, number, number] | readonly (readonly [number, number])[] | null;
 }
 
 /** How many pixels the product `trust` has under each code, in the order of the codes from 0. */
@@ -1415,6 +1478,22 @@ export interface VersionsDocument {
   readonly name: string;
   readonly version: string;
   readonly api: readonly ApiDocument[];
+}
+
+/** How many pixels of a capture are how close, noise and bias together. */
+export interface WithinDocument {
+  /** Of the pixels, as the goal has it. */
+  readonly share: number;
+  /** So many are within this. */
+  readonly error_m: number;
+  /** What is measured of `error_m` lies above this with 95 %. */
+  readonly low: number;
+  /** And below this. */
+  readonly high: number;
+  /** The largest error that the goal allows. */
+  readonly target_m: number | null;
+  /** So many are within that. */
+  readonly target_share: number | null;
 }
 
 export type Notice =

@@ -1,4 +1,4 @@
-"""Noise and bias of ranges, and shares within: one definition for what is predicted and what is measured."""
+"""Noise and bias of ranges: one definition for what is predicted and what is measured."""
 
 from dataclasses import dataclass
 from typing import Any, Final

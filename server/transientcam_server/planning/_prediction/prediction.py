@@ -374,9 +374,7 @@ def _error(
     return between(figure(of_bias(errors.bias_m), value, picks), least, most)
 
 
-def _within(
-    share: float, errors: PixelErrors, farthest_m: _Array | None, picks: _Array
-) -> Figure:
+def _within(share: float, errors: PixelErrors, farthest_m: _Array | None, picks: _Array) -> Figure:
     """Return the figure of what a share of the ranges is within; few draws tell its interval."""
     few = replace(errors, apart_m=errors.apart_m[::_FEW_DRAWS])
     found = _error(few.off_m, partial(_quantile, share), few, farthest_m, picks)

@@ -48,6 +48,23 @@ class Region:
             return cls(corners)
         raise _refused(list(value))
 
+    @classmethod
+    def parse(cls, text: str | None) -> "Region | None":
+        """Return the region that a text has: ``x,y,width,height`` or corners ``x,y/x,y/x,y``.
+
+        Raises
+        ------
+        Problem
+            ``invalid-request`` for anything else.
+        """
+        if text is None:
+            return None
+        try:
+            numbers = [[int(each) for each in part.split(",")] for part in text.split("/")]
+        except ValueError:
+            raise _refused([text]) from None
+        return cls.of(numbers[0] if len(numbers) == 1 else numbers)
+
     def mask(self, height: int, width: int) -> NDArray[np.bool_]:
         """Return which pixels (H, W) are within.
 
@@ -85,6 +102,4 @@ def _pixel(corner: tuple[Any, ...]) -> bool:
 
 def _refused(value: list[Any], where: str = "") -> Problem:
     detail = f"region must be {_WORDS}{where}."
-    return Problem(
-        kinds.INVALID_REQUEST, detail, field="region", value=value, limit=_WORDS + where
-    )
+    return Problem(kinds.INVALID_REQUEST, detail, field="region", value=value, limit=_WORDS + where)

@@ -41,7 +41,9 @@ class Change:
 
     def in_words(self, *, by_time: bool) -> str:
         """State what it gives: less time, or, where the time is given, less error."""
-        times = f"{self.time_factor:.2g} x" if by_time else f"{self.error_factor:.2g} x the accuracy"
+        times = (
+            f"{self.time_factor:.2g} x" if by_time else f"{self.error_factor:.2g} x the accuracy"
+        )
         subject = {"readout": "a read-out twice as fast", "light": "twice the light"}[self.what]
         return f"{subject} gives {times}"
 
