@@ -41,8 +41,10 @@ DRAWS: Final = 6
 """Noisy captures of each pixel for a first prediction."""
 FINE_DRAWS: Final = 30
 """And for the one that is stated."""
-MAP_DRAWS: Final = 12
+MAP_DRAWS: Final = 24
 """And for each pixel of a map."""
+_AT_ONCE: Final = 2048
+"""Pixels of a map whose draws are in memory together."""
 FEW: Final = slice(None, None, 2)
 """The pixels that first predictions are made of: every other one of each kind."""
 STEP: Final = 4.0
@@ -241,13 +243,14 @@ class Predictor:
             within,
         )
 
-    def map_m(self, estimator: str, sequence: Sequence, draws: int = MAP_DRAWS) -> _Array:
+    def map_m(self, estimator: str, sequence: Sequence) -> _Array:
         """Predict noise and bias together of each pixel of the scene, in m (P)."""
         harmonics, noise = self._harmonics(estimator, sequence), self.relative_noise(sequence)
-        frequency_hz = sequence.base_frequency_hz
-        return self._errors(
-            estimator, harmonics, frequency_hz, noise, draws, sequence.zeroth
-        ).error_m
+        arguments = estimator, harmonics, sequence.base_frequency_hz, noise, MAP_DRAWS
+        parts = [slice(k, k + _AT_ONCE) for k in range(0, noise.size, _AT_ONCE)]
+        return np.concatenate(
+            [self._errors(*arguments, sequence.zeroth, part).error_m for part in parts]
+        )
 
     def brighter(self, times: float) -> "Predictor":
         """Return the predictor of the same scene with so many times the camera's own light."""
