@@ -1,4 +1,4 @@
-"""The predicted error of each pixel as a file, or as a picture for eyes."""
+"""The predicted error of each pixel: as a plane, a file, or a picture for eyes."""
 
 import io
 from collections.abc import Callable, Mapping
@@ -7,8 +7,32 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
 
 from transientcam.notebook import palette
+
+_AROUND_PX: Final = 3
+
+
+def error_map(
+    amplification_m: NDArray[Any], bias_m: NDArray[Any], noise: NDArray[Any]
+) -> NDArray[np.float32]:
+    """Return noise and bias together of each pixel (H, W) in m; NaN where either is not known.
+
+    Parameters
+    ----------
+    amplification_m
+        (H, W) deviation of the range over ``noise``, by few draws; neighbours have nearly the same,
+        and their geometric mean is known better.
+    bias_m, noise
+        (H, W) of the range in m, and of the moments over the light.
+    """
+    there = np.isfinite(amplification_m) & (amplification_m > 0)
+    log = np.log(amplification_m, where=there, out=np.zeros_like(amplification_m))
+    count = uniform_filter(there.astype(float), _AROUND_PX)
+    mean = uniform_filter(log, _AROUND_PX) / np.maximum(count, 1e-9)
+    error_m = np.hypot(np.exp(mean) * noise, bias_m)
+    return np.where(there & np.isfinite(bias_m), error_m, np.nan).astype(np.float32)
 
 
 def npy(error_m: NDArray[Any], target_m: float | None) -> bytes:

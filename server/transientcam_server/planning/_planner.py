@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import Capabilities, Sequence, Truth
+from transientcam_server.planning._map import error_map
 from transientcam_server.planning._prediction.prediction import Predictor
 from transientcam_server.planning._prediction.timing import timer_of
 from transientcam_server.planning._process.progress import Progress
@@ -105,12 +106,11 @@ class Planner:
         progress = progress or Progress()
         progress.at(0.0, "error of each pixel")
         every = scene.within(None, every=True)
-        arguments = every, self._sensor, self._settings
-        found_m = Predictor(*arguments, go_on=progress, closely=True).map_m(estimator, sequence)
-        assert every.pixels is not None  # noqa: S101 - it was seen
-        error_m = np.full(every.shape, np.nan, np.float32)
-        error_m.flat[every.pixels] = np.where(np.isfinite(found_m), found_m, np.nan)
-        return error_m
+        predictor = Predictor(every, self._sensor, self._settings, go_on=progress, closely=True)
+        found = *predictor.of_each(estimator, sequence), predictor.relative_noise(sequence)
+        planes = np.full((len(found), *every.shape), np.nan)
+        planes.reshape((len(found), -1))[:, every.pixels] = found
+        return error_map(*planes)
 
     def families(self, goal: Goal, scene: SceneStatistics) -> list[Family]:
         """Return all that is searched for a goal; see `planning.families`."""

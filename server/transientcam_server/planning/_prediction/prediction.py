@@ -41,7 +41,7 @@ DRAWS: Final = 6
 """Noisy captures of each pixel for a first prediction."""
 FINE_DRAWS: Final = 30
 """And for the one that is stated."""
-MAP_DRAWS: Final = 24
+MAP_DRAWS: Final = 8
 """And for each pixel of a map."""
 _AT_ONCE: Final = 2048
 """Pixels of a map whose draws are in memory together."""
@@ -243,14 +243,18 @@ class Predictor:
             within,
         )
 
-    def map_m(self, estimator: str, sequence: Sequence) -> _Array:
-        """Predict noise and bias together of each pixel of the scene, in m (P)."""
+    def of_each(self, estimator: str, sequence: Sequence) -> tuple[_Array, _Array]:
+        """Predict noise over `relative_noise`, and bias in m, of each pixel of the scene (P)."""
         harmonics, noise = self._harmonics(estimator, sequence), self.relative_noise(sequence)
         arguments = estimator, harmonics, sequence.base_frequency_hz, noise, MAP_DRAWS
-        parts = [slice(k, k + _AT_ONCE) for k in range(0, noise.size, _AT_ONCE)]
-        return np.concatenate(
-            [self._errors(*arguments, sequence.zeroth, part).error_m for part in parts]
+        parts = [
+            self._errors(*arguments, sequence.zeroth, slice(first, first + _AT_ONCE))
+            for first in range(0, noise.size, _AT_ONCE)
+        ]
+        std_m, bias_m = (
+            np.concatenate([getattr(each, name) for each in parts]) for name in ("std_m", "bias_m")
         )
+        return std_m / noise, bias_m
 
     def brighter(self, times: float) -> "Predictor":
         """Return the predictor of the same scene with so many times the camera's own light."""
