@@ -1,6 +1,9 @@
 """The verb `transientcam plan` with a running daemon, and the front of all sequences."""
 
 import json
+import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
@@ -145,6 +148,33 @@ def test_an_interrupt_cancels_the_job_of_the_daemon(
         last = max(jobs_of(daemon), key=lambda job: float(job["created_at"]))
         assert last["kind"] == what
         assert camera.wait_for(last["id"])["state"] == "cancelled"
+
+
+@pytest.mark.usefixtures("kept")
+def test_a_command_that_is_ended_cancels_the_job_and_the_next_is_not_held_up(
+    daemon: Served, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    work = Endless()
+    monkeypatch.setattr(daemon.service.planning, "_process", Here())
+    monkeypatch.setattr(daemon.service.planner, "look", lambda *_, **__: None)
+    main = "from transientcam.cli import main; main()"
+    command = [sys.executable, "-c", main, "plan", "--daemon", daemon.url]
+
+    with monkeypatch.context() as patched:
+        patched.setattr(daemon.service.planner, "plan_document", work)
+        with subprocess.Popen([*command, "--capture-s", "0.05"]) as ended:
+            try:
+                assert work.began.wait(60)
+                ended.send_signal(signal.SIGTERM)
+                assert work.ended.wait(60)
+                assert ended.wait(60) == 128 + signal.SIGTERM
+            finally:
+                work.ended.set()
+                ended.kill()
+    daemon.service.fronts.forget()
+    monkeypatch.undo()
+    assert run(["plan", "--daemon", daemon.url, "--capture-s", "0.05", *FEW]) == 0
+    assert "captures in" in capsys.readouterr().out
 
 
 def test_what_a_daemon_refuses_is_printed_with_what_limits(

@@ -55,6 +55,8 @@ _SHARES: Final = np.linspace(0.0, 1.0, 201)
 """For which it is stated how far ranges are off."""
 _FEW_DRAWS: Final = 3
 """Every third draw tells the intervals of shares."""
+_OF_MEDIAN: Final = math.pi / 2
+"""Variance of the median of draws, which is in their bias, over that of one, times their number."""
 _HARDLY: Final = 0.8
 _NORMAL: Final = np.array([NormalDist().inv_cdf(0.5 + (k + 0.5) / 64) for k in range(32)])
 """Absolute values of a standard normal variable, each as likely."""
@@ -168,7 +170,8 @@ class Predictor:
             error_m = np.median(np.hypot(std, bias))
         else:
             both = np.concatenate([_NORMAL, -_NORMAL])
-            error_m = np.quantile(np.abs(bias + both[:, None] * std), self._share)
+            own = np.sqrt(np.maximum(bias**2 - _OF_MEDIAN / DRAWS * std**2, 0.0))
+            error_m = np.quantile(np.abs(own + both[:, None] * std), self._share)
         return float(_typical(std)), float(np.median(bias)), float(error_m)
 
     def least_noise_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
