@@ -94,6 +94,8 @@ def _print_price(price: Mapping[str, Any], computing_s: Mapping[str, float | Non
     """Print what a capture takes, item by item, and what else it costs."""
     times_s = [price[f"{name}_s"] for name in _ITEMS]
     cells = ["?" if each is None else f"{each * 1e3:.1f}" for each in times_s]
+    if None in times_s:
+        cells[-1] = f">={cells[-1]}"
     widths = [max(map(len, pair)) for pair in zip(_ITEMS, cells, strict=True)]
     for row in (_ITEMS, cells):
         padded = (cell.rjust(width) for cell, width in zip(row, widths, strict=True))

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
 
+import httpx
 import pytest
 from rich.status import Status
 
@@ -152,7 +153,7 @@ def test_an_interrupt_cancels_the_job_of_the_daemon(
 
 @pytest.mark.usefixtures("kept")
 def test_a_command_that_is_ended_cancels_the_job_and_the_next_is_not_held_up(
-    daemon: Served, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    daemon: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     work = Endless()
     monkeypatch.setattr(daemon.service.planning, "_process", Here())
@@ -171,10 +172,12 @@ def test_a_command_that_is_ended_cancels_the_job_and_the_next_is_not_held_up(
             finally:
                 work.ended.set()
                 ended.kill()
-    daemon.service.fronts.forget()
-    monkeypatch.undo()
-    assert run(["plan", "--daemon", daemon.url, "--capture-s", "0.05", *FEW]) == 0
-    assert "captures in" in capsys.readouterr().out
+    goal = {"budget": {"capture_s": 0.05}, "scene": {"brightness_dn_per_s": 8e5}}
+    goal |= {"fixed": {"harmonics": 1, "base_frequency_hz": 23e6}}
+    next_plan = httpx.post(f"{daemon.url}/api/v1/plan", json=goal, timeout=60)
+    assert next_plan.json()["capture_s"] <= 0.05
+    last = max(jobs_of(daemon), key=lambda job: float(job["created_at"]))
+    assert (last["kind"], last["state"]) == ("plan", "cancelled")
 
 
 def test_what_a_daemon_refuses_is_printed_with_what_limits(
