@@ -16,6 +16,8 @@ from transientcam_server.settings import ReconstructionSettings, SensorSettings
 SEED = 1
 LOOK_SEED, CAPTURE_SEED = 7, 11
 PIXELS = 2000
+OUTLIER_ERRORS = 5.0
+"""A range further off than so many times the error of the median pixel is an outlier."""
 _NO_LIGHT = 1e-12
 SETTINGS = ReconstructionSettings()
 
@@ -83,10 +85,11 @@ def measured(
             found_m = ranges_m(part, noise, estimator, recipe.base_frequency_hz, SETTINGS)
             errors_m.append(found_m - truth.range_m.ravel()[pixels])
     errors = pixel_errors(np.stack(errors_m), np.zeros_like(errors_m[0]))
+    off_m = errors.off_m(errors.bias_m)
     values = {
         "std": float(np.median(errors.std_m)),
         "bias": float(np.median(errors.bias_m)),
         "error": float(np.median(errors.error_m)),
-        "outliers": errors.outlier_share,
+        "outliers": float((off_m > OUTLIER_ERRORS * np.median(errors.error_m)).mean()),
     }
     return values, device_s, full

@@ -39,7 +39,7 @@ def _drawn(scene: str, folder: Path) -> tuple[Front, float]:
     """Draw a scene's picture; return the front, and the error of captures where it is priced."""
     name = Path(scene).stem
     planner, statistics = looked(scene)
-    document = planner.tradeoff_document(Goal(), statistics)
+    document = planner.tradeoff_document(Goal(share=None), statistics)
     values, device_s, _ = measured(scene, PRESENT, "likelihood", CAPTURES)
     figure = error_picture(document, name, (device_s, values["error"]))
     (folder / f"accuracy-{name}-error.png").write_bytes(saved(figure, "png"))

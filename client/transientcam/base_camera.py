@@ -75,6 +75,8 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         budget: Mapping[str, float] | None = None,
         fixed: Mapping[str, Any] | None = None,
         estimator: str | None = None,
+        share: float | None = None,
+        region: Sequence[Any] | None = None,
     ) -> _Document:
         """Return the sequence and estimator for a target, or the best within a budget.
 
@@ -87,7 +89,7 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         Parameters
         ----------
         target
-            What has to be reached: ``range_error_m`` (noise and bias), ``range_std_m``,
+            What has to be reached: ``range_error_m`` (noise and bias together), ``range_std_m``,
             ``separation_m``, ``bound_width``.
         budget
             What may be spent: ``capture_s``, ``frame_rate_hz``, ``computing_share``.
@@ -95,6 +97,11 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
             Fields of the sequence that must stay as given here.
         estimator
             The only one to plan with.
+        share
+            Of the pixels of a capture that are to be within ``range_error_m``; None for 0.9.
+        region
+            Whose pixels count: ``[x, y, width, height]``, or corners ``[[x, y], ...]`` of a
+            polygon; None for all.
 
         Raises
         ------
@@ -102,7 +109,14 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
             ``target-unreachable`` where nothing reaches the target; it says what limits.
         """
         return self._ask(
-            planning.plan(target=target, budget=budget, fixed=fixed, estimator=estimator)
+            planning.plan(
+                target=target,
+                budget=budget,
+                fixed=fixed,
+                estimator=estimator,
+                share=share,
+                region=region,
+            )
         )
 
     def start_plan(
@@ -112,6 +126,9 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         budget: Mapping[str, float] | None = None,
         fixed: Mapping[str, Any] | None = None,
         estimator: str | None = None,
+        share: float | None = None,
+        region: Sequence[Any] | None = None,
+        map: bool = False,  # noqa: A002 - as the document has it
     ) -> _Document:
         """Begin what `plan` returns as a job, and return that; arguments as in `plan`.
 
@@ -119,18 +136,51 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
 
             job = camera.start_plan({"range_error_m": 0.005})
             plan = camera.wait_for(job["id"], on_progress=print)["result"]
+
+        With ``map`` the error of each pixel is predicted, too: `plan_map`.
         """
         return self._ask(
-            planning.start_plan(target=target, budget=budget, fixed=fixed, estimator=estimator)
+            planning.start_plan(
+                target=target,
+                budget=budget,
+                fixed=fixed,
+                estimator=estimator,
+                share=share,
+                region=region,
+                map=map or None,
+            )
         )
 
-    def tradeoff(self, by: str = "range_error_m") -> _Document:
-        """Return what accuracy costs in time: the sequences that no other beats, in ``front``."""
-        return self._ask(planning.tradeoff(by))
+    def plan_map(self, job_id: str, form: str = "npy") -> _Bytes:
+        """Return the predicted error of each pixel that the job of a plan made, as a file.
 
-    def start_tradeoff(self, by: str = "range_error_m") -> _Document:
+        ``numpy.load`` reads it, in m, NaN without light; the form ``png`` is for eyes.
+        """
+        return self._ask(planning.plan_map(job_id, form))
+
+    def tradeoff(
+        self,
+        by: str = "range_error_m",
+        *,
+        share: float | None = None,
+        region: Sequence[Any] | None = None,
+    ) -> _Document:
+        """Return what accuracy costs in time: the sequences that no other beats, in ``front``.
+
+        Errors are of the median pixel, or of a ``share`` of the pixels of a ``region``, as in
+        `plan`.
+        """
+        return self._ask(planning.tradeoff(by, share=share, region=region))
+
+    def start_tradeoff(
+        self,
+        by: str = "range_error_m",
+        *,
+        share: float | None = None,
+        region: Sequence[Any] | None = None,
+    ) -> _Document:
         """Begin what `tradeoff` returns as a job, and return that; see `start_plan`."""
-        return self._ask(planning.start_tradeoff(by))
+        return self._ask(planning.start_tradeoff(by=by, share=share, region=region))
 
     @property
     def calibrations(self) -> Calibrations[_Document, _Bytes]:

@@ -1,37 +1,52 @@
 """Requests about accuracy and time: a sequence for a goal, and what accuracy costs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
+from urllib.parse import quote
 
-from transientcam.requests._request import Request, document
+from transientcam.requests._request import Request, document, file
 
+_MAP_TYPES: Final = {"npy": "application/octet-stream", "png": "image/png"}
 _PLANNED_S: Final = 120.0
 """How much longer than usual it takes to look at a scene and weigh all sequences, when busy."""
 
 
-def plan(**parts: Mapping[str, Any] | str | None) -> Request[dict[str, Any]]:
+def plan(**parts: Any) -> Request[dict[str, Any]]:
     """Build the request for a plan; parts that are None are left to the server."""
     return document("plan", method="POST", body=_body(parts), extra_timeout_s=_PLANNED_S)
 
 
-def start_plan(**parts: Mapping[str, Any] | str | None) -> Request[dict[str, Any]]:
+def start_plan(**parts: Any) -> Request[dict[str, Any]]:
     """Build the request for the job that makes a plan; parts as in `plan`."""
     return document("plan/jobs", method="POST", body=_body(parts))
 
 
-def _body(parts: Mapping[str, Mapping[str, Any] | str | None]) -> dict[str, Any]:
+def plan_map(job_id: str, form: str) -> Request[bytes]:
+    """Build the request for the predicted error of each pixel, as a file."""
+    return file(
+        f"jobs/{quote(job_id, safe='')}/map.{quote(form, safe='')}", _MAP_TYPES.get(form, "*/*")
+    )
+
+
+def tradeoff(by: str, share: float | None, region: Sequence[Any] | None) -> Request[dict[str, Any]]:
+    """Build the request for all sequences that no other beats."""
+    params: list[tuple[str, Any]] = [("by", by)]
+    if share is not None:
+        params.append(("share", share))
+    if region is not None:
+        each = region if isinstance(region[0], Sequence) else [region]
+        params.append(("region", "/".join(",".join(map(str, numbers)) for numbers in each)))
+    return document("tradeoff", params=params, extra_timeout_s=_PLANNED_S)
+
+
+def start_tradeoff(**parts: Any) -> Request[dict[str, Any]]:
+    """Build the request for the job that finds these; parts as in `plan`."""
+    return document("tradeoff/jobs", method="POST", body=_body(parts))
+
+
+def _body(parts: Mapping[str, Any]) -> dict[str, Any]:
     return {
         name: dict(part) if isinstance(part, Mapping) else part
         for name, part in parts.items()
         if part is not None
     }
-
-
-def tradeoff(by: str) -> Request[dict[str, Any]]:
-    """Build the request for all sequences that no other beats."""
-    return document("tradeoff", params=[("by", by)], extra_timeout_s=_PLANNED_S)
-
-
-def start_tradeoff(by: str) -> Request[dict[str, Any]]:
-    """Build the request for the job that finds these."""
-    return document("tradeoff/jobs", method="POST", body={"by": by})

@@ -55,10 +55,16 @@ async def for_request(http: Request, work: Work[_Answer]) -> _Answer:
         left.set()
 
 
-def as_job(service: Service, kind: str, work: Work[_Answer], response: Response) -> JobDocument:
+def as_job(
+    service: Service,
+    kind: str,
+    work: Work[_Answer],
+    response: Response,
+    files: dict[str, bytes] | None = None,
+) -> JobDocument:
     """Start a job that does the work beside those of the camera; its result is the answer.
 
-    While it runs, its result is what the work shows of it.
+    While it runs, its result is what the work shows of it. The work may fill in ``files``.
 
     Raises
     ------
@@ -71,6 +77,7 @@ def as_job(service: Service, kind: str, work: Work[_Answer], response: Response)
             job.report(job.progress, job.step)
 
         made = await _ended(work(Progress(job.report, show=job.show)), ask)
+        job.files = files or {}
         return made.model_dump(mode="json")
 
     return accepted(service.jobs.start(kind, run, in_turn=False), response)

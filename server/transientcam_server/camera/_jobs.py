@@ -22,6 +22,8 @@ MAX_UNFINISHED: Final = 8
 """Jobs that run or wait; one more is refused."""
 REMEMBERED: Final = 64
 """Finished jobs whose result is kept."""
+FILES_KEPT: Final = 8
+"""And those whose files are, which are larger."""
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
 
@@ -42,6 +44,8 @@ class Job:
         A document, once it is done; before, and where it was cancelled, what there is of it.
     problem
         Why it failed.
+    files
+        What it made beside its result, by format.
     cancelled, ended
         Set when it is to be cancelled, and when it has ended.
     """
@@ -56,6 +60,7 @@ class Job:
     result: dict[str, Any] | None = None
     problem: Problem | None = None
     finished_at: float | None = None
+    files: dict[str, bytes] = field(default_factory=dict, repr=False)
     cancelled: threading.Event = field(default_factory=threading.Event, repr=False)
     ended: asyncio.Event = field(default_factory=asyncio.Event, repr=False)
 
@@ -225,3 +230,5 @@ class Jobs:
         old = [each.id for each in self._jobs.values() if each.finished]
         for job_id in old[: max(0, len(old) - REMEMBERED)]:
             del self._jobs[job_id]
+        for job_id in old[max(0, len(old) - REMEMBERED) : -FILES_KEPT]:
+            self._jobs[job_id].files.clear()

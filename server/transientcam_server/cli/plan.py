@@ -5,6 +5,7 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,13 +16,36 @@ from transientcam_server.cli.plan_text import print_front, print_plan, print_tak
 
 if TYPE_CHECKING:
     from transientcam_server.cli.plan_here import View
-    from transientcam_server.planning import Goal
+    from transientcam_server.planning import Goal, Region
 
 
 def plan(
     range_error_m: Annotated[
         float | None,
-        typer.Option(help="Noise and bias of the range together, of the median pixel, at most."),
+        typer.Option(help="How far the range is off, noise and bias together, at most."),
+    ] = None,
+    share: Annotated[
+        float | None,
+        typer.Option(
+            help="Of the pixels of a capture, so many are to be within that.  [default: 0.9; with "
+            "--front: none, for the median pixel]"
+        ),
+    ] = None,
+    region: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,WIDTH,HEIGHT",
+            help="The pixels that count: a box, or the corners X,Y/X,Y/X,Y of a polygon.  "
+            "[default: all with light]",
+        ),
+    ] = None,
+    map_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--map",
+            metavar="FILE",
+            help="Write the predicted error of each pixel: .npy, in m, or .png, for eyes.",
+        ),
     ] = None,
     range_std_m: Annotated[
         float | None, typer.Option(help="Standard deviation of the range, at most.")
@@ -112,11 +136,14 @@ def plan(
     budget |= {"computing_share": computing_share}
     stays = _fields(fixed or [])
     if front:
-        goal_of_one = {"--fix": fixed or None, "--estimator": estimator}
+        goal_of_one = {"--fix": fixed or None, "--estimator": estimator, "--map": map_file}
         _refuse(
             goal_of_one | _options(target) | _options(budget),
             "is for one sequence, and --front shows all that no other beats",
         )
+    if map_file is not None and map_file.suffix not in (".npy", ".png"):
+        raise typer.BadParameter(f"{map_file} ends neither in .npy nor in .png", param_hint="--map")
+    of_pixels = _region(region)
     console = Terminal(stderr=True)
     if daemon is not None:
         here: dict[str, Any] = {"camera": camera, "real_time": real_time or None}
@@ -125,10 +152,14 @@ def plan(
         _refuse(_options(here), "is the daemon's")
         parts: dict[str, Any] = {"target": _given(target), "budget": _given(budget)}
         parts["target"] |= {"separation_share": separation_share} if separation_m else {}
-        parts |= {"fixed": stays, "estimator": estimator}
-        document = _by_daemon(daemon, token, None if front else parts, console, as_json=as_json)
+        wanted = {"share": share, "region": None if of_pixels is None else of_pixels.to_document()}
+        if not front:
+            parts |= {"fixed": stays, "estimator": estimator, "map": map_file is not None}
+            wanted |= parts
+        document, made = _by_daemon(daemon, token, wanted, console, map_file, as_json=as_json)
     else:
         from transientcam_server.cli.plan_here import View
+        from transientcam_server.planning import SHARE
 
         view = View(
             camera or "sim:mirrors",
@@ -138,9 +169,11 @@ def plan(
             ambient_dn_per_s,
         )
         asked = {**target, **budget, "separation_share": separation_share, "estimator": estimator}
-        document = _by_camera(
-            view, None if front else _goal(asked, stays), console, as_json=as_json
-        )
+        asked |= {"share": share if front or share is not None else SHARE, "region": of_pixels}
+        goal = _goal(asked, stays)
+        document, made = _by_camera(view, goal, console, map_file, front=front, as_json=as_json)
+    if map_file is not None:
+        map_file.write_bytes(made)
     if as_json:
         echo(json.dumps(document))
     elif front:
@@ -161,45 +194,66 @@ def _goal(asked: dict[str, Any], fixed: dict[str, Any]) -> "Goal":
 
 
 def _by_camera(
-    view: "View", goal: "Goal | None", console: Terminal, *, as_json: bool
-) -> dict[str, Any]:
+    view: "View",
+    goal: "Goal",
+    console: Terminal,
+    map_file: Path | None,
+    *,
+    front: bool,
+    as_json: bool,
+) -> tuple[dict[str, Any], bytes]:
     """Plan here; where that is refused print what limits, and end with exit code 1."""
     from transientcam_server.cli.plan_here import by_camera
     from transientcam_server.errors import Problem
 
     try:
-        return by_camera(view, goal, console)
+        return by_camera(view, goal, console, map_file, front=front)
     except Problem as problem:
-        if as_json:
-            echo(json.dumps({"detail": problem.detail, **problem.extensions}))
-        else:
-            console.print(problem.detail, style="red", soft_wrap=True)
-            takes: Any = problem.extensions.get("takes", [])
-            print_takes(takes)
-        raise typer.Exit(_code(problem.extensions)) from problem
+        document = {"detail": problem.detail, **problem.extensions}
+        raise _refused(problem.detail, document, console, as_json=as_json) from problem
 
 
 def _by_daemon(
-    url: str, token: str | None, parts: dict[str, Any] | None, console: Terminal, *, as_json: bool
-) -> dict[str, Any]:
+    url: str,
+    token: str | None,
+    wanted: dict[str, Any],
+    console: Terminal,
+    map_file: Path | None,
+    *,
+    as_json: bool,
+) -> tuple[dict[str, Any], bytes]:
     """Let a daemon plan; where it refuses that do the same."""
     from transientcam.errors import ProblemError
     from transientcam_server.cli.plan_daemon import by_daemon
 
     try:
-        return by_daemon(url, token, parts, console)
+        return by_daemon(url, token, wanted, console, map_file)
     except ProblemError as problem:
-        if as_json:
-            echo(json.dumps(problem.document))
-        else:
-            console.print(problem.detail, style="red", soft_wrap=True)
-            takes: Any = problem.document.get("takes", [])
-            print_takes(takes)
-        raise typer.Exit(_code(problem.document)) from problem
+        raise _refused(problem.detail, problem.document, console, as_json=as_json) from problem
 
 
-def _code(refused: Mapping[str, Any]) -> int:
-    return 1 if refused.get("decided", True) else 3
+def _refused(
+    detail: str, document: Mapping[str, Any], console: Terminal, *, as_json: bool
+) -> typer.Exit:
+    """Print why nothing was planned, and return what ends the command."""
+    if as_json:
+        echo(json.dumps(document))
+    else:
+        console.print(detail, style="red", soft_wrap=True)
+        print_takes(document.get("takes", []))
+    return typer.Exit(1 if document.get("decided", True) else 3)
+
+
+def _region(text: str | None) -> "Region | None":
+    if text is None:
+        return None
+    from transientcam_server.errors import Problem
+    from transientcam_server.planning import Region
+
+    try:
+        return Region.parse(text)
+    except Problem as problem:
+        raise typer.BadParameter(problem.detail, param_hint="--region") from problem
 
 
 def _given(values: dict[str, Any]) -> dict[str, Any]:

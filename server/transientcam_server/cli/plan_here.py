@@ -1,6 +1,7 @@
 """The verb ``plan`` in this process: a look through a camera, and the search."""
 
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, Final
 
 from rich.status import Status
@@ -12,6 +13,7 @@ from transientcam_driver.clock import RealClock, VirtualClock
 from transientcam_server.camera import sensor_of
 from transientcam_server.errors import Problem
 from transientcam_server.planning import (
+    MAP_FORMATS,
     Goal,
     Planner,
     Progress,
@@ -52,8 +54,15 @@ class View:
     ambient_dn_per_s: float | None
 
 
-def by_camera(view: View, goal: Goal | None, console: Terminal) -> dict[str, Any]:
-    """Plan for a goal, or, without one, find all that no other beats; return it as JSON.
+def by_camera(
+    view: View, goal: Goal, console: Terminal, map_file: Path | None = None, *, front: bool = False
+) -> tuple[dict[str, Any], bytes]:
+    """Plan for a goal, or find the ``front`` of all that no other beats; as JSON, and the map.
+
+    Parameters
+    ----------
+    map_file
+        Whose format a map is to have; None for none.
 
     Raises
     ------
@@ -63,7 +72,7 @@ def by_camera(view: View, goal: Goal | None, console: Terminal) -> dict[str, Any
     CameraError
         As the camera does.
     """
-    if goal is not None:
+    if not front:
         goal.require_sensible()
     virtual = view.camera.startswith("sim:") and not view.real_time
     clock = VirtualClock() if virtual else RealClock()
@@ -78,12 +87,17 @@ def by_camera(view: View, goal: Goal | None, console: Terminal) -> dict[str, Any
             problem.extensions["takes"] = [asdict(each) for each in predicted]
             raise
         planner = Planner(camera.capabilities, sensor, ReconstructionSettings())
-        scene = _scene(planner, camera, view, goal or Goal(), console)
+        scene = _scene(planner, camera, view, goal, console)
     with tm.kernels.only_note(), console.status("predicting") as status:
         progress = Progress(_shown(status))
-        if goal is None:
-            return planner.tradeoff_document(Goal(), scene, progress)
-        return planner.plan_document(goal, scene, progress)
+        if front:
+            return planner.tradeoff_document(goal, scene, progress), b""
+        found = planner.plan(goal, scene, progress)
+        if map_file is None:
+            return found.to_document(), b""
+        best = found.recommended
+        error_m = planner.map_m(scene, best.estimator, best.applied.sequence, progress)
+        return found.to_document(), MAP_FORMATS[map_file.suffix[1:]](error_m, goal.range_error_m)
 
 
 def _scene(

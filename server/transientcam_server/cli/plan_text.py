@@ -8,7 +8,8 @@ from transientcam.cli.terminal import echo
 
 MOVING: Final = 0.02
 """Share of moving pixels from which on it is said."""
-_COLUMNS: Final = ("time ms", "error mm", "90 %", "noise mm", "bias mm", "outliers", "sequence")
+_COLUMNS: Final = ("time ms", "error mm", "interval", "p90 mm", "noise mm", "bias mm", "sequence")
+_ITEMS: Final = ("light", "readout", "settling", "transport", "computing", "sum")
 
 
 def print_plan(document: Mapping[str, Any], *, computing: bool) -> None:
@@ -25,12 +26,15 @@ def print_plan(document: Mapping[str, Any], *, computing: bool) -> None:
             f"{document['computing_share']:.1%} of the time"
         )
     echo(
-        f"range to {error['median'] * 1e3:.2f} mm ({error['low'] * 1e3:.2f} to "
-        f"{error['high'] * 1e3:.2f}): noise {std['median'] * 1e3:.2f} mm, "
-        f"bias {_bias_mm(predicted, '.2f')} mm; "
-        f"{predicted['outlier_share']:.1%} of the ranges are outliers"
+        f"error {error['median'] * 1e3:.2f} mm in the median pixel ({error['low'] * 1e3:.2f} to "
+        f"{error['high'] * 1e3:.2f}), {error['p90'] * 1e3:.2f} mm at 90 %: "
+        f"noise {std['median'] * 1e3:.2f} mm, bias {_bias_mm(predicted, '.2f')} mm"
     )
+    if predicted["within"] is not None:
+        _print_within(predicted["within"], document["region"])
     echo(document["summary"])
+    _print_price(document["price"], document["computing_s"])
+    echo(document["price_summary"])
     _print_scene(document["scene"])
     if predicted["beyond_scene"]:
         echo("at best: this resolves more of the scene than the capture it is predicted from")
@@ -69,11 +73,38 @@ def _row(choice: Mapping[str, Any]) -> tuple[str, ...]:
         f"{choice['capture_s'] * 1e3:.4g}",
         f"{error['median'] * 1e3:.3g}",
         f"{error['low'] * 1e3:.3g} to {error['high'] * 1e3:.3g}",
+        f"{error['p90'] * 1e3:.3g}",
         f"{predicted['range_std_m']['median'] * 1e3:.3g}",
         _bias_mm(predicted, ".3g"),
-        f"{predicted['outlier_share']:.1%}",
         in_words(Sequence.from_document(choice["sequence"]), choice["estimator"]),
     )
+
+
+def _print_within(within: Mapping[str, Any], region: object) -> None:
+    where = "the lit pixels" if region is None else "the region's lit pixels"
+    target_m = within["target_m"]
+    met = "" if target_m is None else f"; {within['target_share']:.0%} within {target_m * 1e3:g} mm"
+    echo(
+        f"a capture has {within['share']:.0%} of {where} within {within['error_m'] * 1e3:.2f} mm "
+        f"({within['low'] * 1e3:.2f} to {within['high'] * 1e3:.2f}){met}"
+    )
+
+
+def _print_price(price: Mapping[str, Any], computing_s: Mapping[str, float | None]) -> None:
+    """Print what a capture takes, item by item, and what else it costs."""
+    times_s = [price[f"{name}_s"] for name in _ITEMS]
+    cells = ["?" if each is None else f"{each * 1e3:.1f}" for each in times_s]
+    if None in times_s:
+        cells[-1] = f">={cells[-1]}"
+    widths = [max(map(len, pair)) for pair in zip(_ITEMS, cells, strict=True)]
+    for row in (_ITEMS, cells):
+        padded = (cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+        echo("  ".join((*padded, "ms" if row is cells else "")).rstrip())
+    known = [f"{name} {each * 1e3:.1f} ms" for name, each in computing_s.items() if each]
+    if known:
+        echo(f"computing by estimator: {', '.join(known)}")
+    megabytes = price["data_bytes"] / 1e6
+    echo(f"{megabytes:.2f} MB a capture; the light is on for {price['light_share']:.0%} of it")
 
 
 def _bias_mm(predicted: Mapping[str, Any], digits: str) -> str:

@@ -1,28 +1,33 @@
 """Which sequence and estimator to take: for a target accuracy, or for a budget of time.
 
-A look at the scene (`Planner.look`) gives `SceneStatistics`, from which a `Planner` predicts noise,
-bias and outliers of any sequence, recommends the best for a `Goal` (`Plan`), or returns all that no
-other beats.
+A look at the scene (`Planner.look`) gives `SceneStatistics`, from which a `Planner` predicts noise
+and bias of any sequence, and how many pixels are within a target; recommends the best for a `Goal`
+(`Plan`), or returns all that no other beats.
 """
 
-from transientcam_server.planning._front import FrontCache
+from transientcam_server.planning._front import About, FrontCache
 from transientcam_server.planning._looks import Looks
+from transientcam_server.planning._map import MAP_FORMATS
 from transientcam_server.planning._planner import Planner
 from transientcam_server.planning._prediction.takes import predict_takes, takes_of
 from transientcam_server.planning._process.process import PlanningProcess
 from transientcam_server.planning._process.progress import Progress, Report
 from transientcam_server.planning._process.queue import PlanningQueue
 from transientcam_server.planning._scene.estimation import ESTIMATORS
+from transientcam_server.planning._scene.region import Region
 from transientcam_server.planning._scene.scene import SceneStatistics, uniform_scene
 from transientcam_server.planning._search import families
 from transientcam_server.planning._search.choice import in_words
 from transientcam_server.planning._search.families import require_plannable
-from transientcam_server.planning._search.goal import Goal
+from transientcam_server.planning._search.goal import SHARE, Goal
 from transientcam_server.planning._search.pareto import flat_from, front
 from transientcam_server.planning._search.plan import Plan
 
 __all__ = [
     "ESTIMATORS",
+    "MAP_FORMATS",
+    "SHARE",
+    "About",
     "FrontCache",
     "Goal",
     "Looks",
@@ -31,6 +36,7 @@ __all__ = [
     "PlanningProcess",
     "PlanningQueue",
     "Progress",
+    "Region",
     "Report",
     "SceneStatistics",
     "families",

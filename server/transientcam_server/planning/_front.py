@@ -12,9 +12,30 @@ from transientcam_server.planning._looks import CACHED_S, Looks
 from transientcam_server.planning._planner import Planner, range_error
 from transientcam_server.planning._process.progress import Progress
 from transientcam_server.planning._process.queue import PlanningQueue
+from transientcam_server.planning._scene.region import Region
 from transientcam_server.planning._search.goal import Goal
 
 _WIDE: Final = 1e9  # a target that every sequence reaches: it only requests the prediction
+
+
+_KEPT: Final = 8
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What a front is wanted for.
+
+    Attributes
+    ----------
+    by
+        The target that capture time is held against.
+    share, region
+        As a `Goal` has them.
+    """
+
+    by: str
+    share: float | None = None
+    region: Region | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,30 +65,32 @@ class FrontCache:
         self._looks = looks
         self._simulated = simulated
         self._clock = clock
-        self._cached: dict[str, _CachedFront] = {}
+        self._cached: dict[About, _CachedFront] = {}
         self._predicting = asyncio.Lock()
 
     async def of(
-        self, frame: Frame, by: str, looking: Progress, predicting: Progress
+        self, frame: Frame, about: About, looking: Progress, predicting: Progress
     ) -> dict[str, Any]:
-        """Return the front compared by target ``by``, and the frame's own place, as JSON.
+        """Return the front that is wanted, and the frame's own place, as JSON.
 
         ``predicting`` shows the same document with the front so far; what either progress raises
         ends the work, unless it is done.
         """
         around = {
-            "compared_by": by,
+            "compared_by": about.by,
             "scene_of_frame": frame.number,
             "current": await self._current(frame),
         }
         shown = predicting.part(0.0, 1.0, show=lambda part: predicting.show(around | part))
         async with self._predicting:
-            cached = self._cached.get(by)
+            cached = self._cached.get(about)
             made_with = frame.raw.epoch, frame.recipe.settings_version
             if cached is None or cached.made_with != made_with or self._clock() > cached.until_s:
-                document = await self._predicted(frame, by, looking, shown)
+                document = await self._predicted(frame, about, looking, shown)
                 cached = _CachedFront(made_with, frame.number, self._clock() + CACHED_S, document)
-                self._cached[by] = cached
+                if len(self._cached) >= _KEPT:
+                    self._cached.clear()
+                self._cached[about] = cached
         return around | {"scene_of_frame": cached.frame} | cached.document
 
     def forget(self) -> None:
@@ -76,7 +99,7 @@ class FrontCache:
         self._looks.forget()
 
     async def _predicted(
-        self, frame: Frame, by: str, looking: Progress, predicting: Progress
+        self, frame: Frame, about: About, looking: Progress, predicting: Progress
     ) -> dict[str, Any]:
         base = frame.recipe.applied.sequence
         if self._looks.needs_frame:
@@ -87,8 +110,10 @@ class FrontCache:
             scene = await self._looks.of_twin(base, None, looking)
         goal = Goal(
             base=base,
-            range_std_m=_WIDE if by == "range_std_m" else None,
-            bound_width=_WIDE if by == "bound_width" else None,
+            range_std_m=_WIDE if about.by == "range_std_m" else None,
+            bound_width=_WIDE if about.by == "bound_width" else None,
+            share=about.share,
+            region=about.region,
         )
         return await self._queue.run(
             self._planner.tradeoff_document, goal, scene, progress=predicting

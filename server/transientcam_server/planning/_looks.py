@@ -6,12 +6,12 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Final, Protocol
 
-from transientcam_driver import Sequence
+from transientcam_driver import Camera, Sequence
 from transientcam_server.imaging import Frame, Workers
 from transientcam_server.planning._planner import Planner
 from transientcam_server.planning._process.progress import Progress
 from transientcam_server.planning._process.queue import PlanningQueue
-from transientcam_server.planning._scene.look import FrameSource, look_of_frame
+from transientcam_server.planning._scene.look import look_of_frame
 from transientcam_server.planning._scene.scene import SceneStatistics
 
 CACHED_S: Final = 10.0
@@ -20,7 +20,7 @@ CACHED_S: Final = 10.0
 class CameraTwin(Protocol):
     """A simulated camera before the same scene, in virtual time; it is pickled."""
 
-    def open(self) -> AbstractContextManager[FrameSource]:
+    def open(self) -> AbstractContextManager[Camera]:
         """Open it."""
         ...
 

@@ -5,13 +5,15 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_driver import Capabilities, Sequence, Truth
+from transientcam_driver import Camera, Capabilities, Sequence, Truth
+from transientcam_server.planning._map import error_map
 from transientcam_server.planning._prediction.prediction import Predictor
 from transientcam_server.planning._prediction.timing import timer_of
 from transientcam_server.planning._process.progress import Progress
-from transientcam_server.planning._scene.look import STEPS, FrameSource, look_at
+from transientcam_server.planning._scene.look import STEPS, look_at
 from transientcam_server.planning._scene.scene import SceneStatistics
 from transientcam_server.planning._search.candidates import ComputingTime, curves
 from transientcam_server.planning._search.choice import Choice
@@ -51,7 +53,7 @@ class Planner:
 
     def look(
         self,
-        camera: FrameSource,
+        camera: Camera,
         base: Sequence,
         *,
         ambient_dn_per_s: float | None = None,
@@ -79,7 +81,7 @@ class Planner:
     def plan(self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None) -> Plan:
         """Recommend a sequence; see `planning.plan`. What is raised by ``progress`` ends it."""
         progress = progress or Progress()
-        predictor = self._predictor(scene, progress)
+        predictor = self._predictor(goal, scene, progress)
         timed = self._computing_time(goal, progress)
         return plan(goal, predictor, self._capabilities, timed=timed, progress=progress)
 
@@ -89,9 +91,32 @@ class Planner:
         """Return `plan` as JSON."""
         return self.plan(goal, scene, progress).to_document()
 
+    def map_m(
+        self,
+        scene: SceneStatistics,
+        estimator: str,
+        sequence: Sequence,
+        progress: Progress | None = None,
+    ) -> NDArray[np.float32]:
+        """Predict the error of each pixel (H, W) in m, noise and bias together; NaN if not lit.
+
+        Raises
+        ------
+        Problem
+            ``invalid-request`` for a scene that is given, which has no pixels.
+        """
+        progress = progress or Progress()
+        progress.at(0.0, "error of each pixel")
+        every = scene.within(None, every=True)
+        predictor = Predictor(every, self._sensor, self._settings, go_on=progress, closely=True)
+        found = *predictor.of_each(estimator, sequence), predictor.relative_noise(sequence)
+        planes = np.full((len(found), *every.shape), np.nan)
+        planes.reshape((len(found), -1))[:, every.pixels] = found
+        return error_map(*planes)
+
     def families(self, goal: Goal, scene: SceneStatistics) -> list[Family]:
         """Return all that is searched for a goal; see `planning.families`."""
-        return families(goal, self._predictor(scene), self._capabilities)
+        return families(goal, self._predictor(goal, scene), self._capabilities)
 
     def tradeoff_document(
         self, goal: Goal, scene: SceneStatistics, progress: Progress | None = None
@@ -102,7 +127,8 @@ class Planner:
         raises ends the work.
         """
         progress = progress or Progress()
-        predictor = self._predictor(scene, progress)
+        predictor = self._predictor(goal, scene, progress)
+        scene = predictor.scene
         found = families(goal, predictor, self._capabilities)
         candidates = curves(found, goal, predictor, self._computing_time(goal, progress))
         choices: list[Choice] = []
@@ -112,9 +138,10 @@ class Planner:
         return tradeoff_document(choices, lines(candidates, choices), scene)
 
     def _predictor(
-        self, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
+        self, goal: Goal, scene: SceneStatistics, go_on: Callable[[], None] = lambda: None
     ) -> Predictor:
-        return Predictor(scene, self._sensor, self._settings, go_on=go_on)
+        seen = scene.within(goal.region)
+        return Predictor(seen, self._sensor, self._settings, go_on=go_on, share=goal.share)
 
     def _computing_time(self, goal: Goal, progress: Progress) -> ComputingTime:
         """Return what times frames; a budget of computing time needs kernels that are compiled."""

@@ -1,10 +1,14 @@
 """The verb `transientcam plan` with a running daemon, and the front of all sequences."""
 
 import json
+import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
 
+import httpx
 import pytest
 from rich.status import Status
 
@@ -145,6 +149,35 @@ def test_an_interrupt_cancels_the_job_of_the_daemon(
         last = max(jobs_of(daemon), key=lambda job: float(job["created_at"]))
         assert last["kind"] == what
         assert camera.wait_for(last["id"])["state"] == "cancelled"
+
+
+@pytest.mark.usefixtures("kept")
+def test_a_command_that_is_ended_cancels_the_job_and_the_next_is_not_held_up(
+    daemon: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    work = Endless()
+    monkeypatch.setattr(daemon.service.planning, "_process", Here())
+    monkeypatch.setattr(daemon.service.planner, "look", lambda *_, **__: None)
+    main = "from transientcam.cli import main; main()"
+    command = [sys.executable, "-c", main, "plan", "--daemon", daemon.url]
+
+    with monkeypatch.context() as patched:
+        patched.setattr(daemon.service.planner, "plan_document", work)
+        with subprocess.Popen([*command, "--capture-s", "0.05"]) as ended:
+            try:
+                assert work.began.wait(60)
+                ended.send_signal(signal.SIGTERM)
+                assert work.ended.wait(60)
+                assert ended.wait(60) == 128 + signal.SIGTERM
+            finally:
+                work.ended.set()
+                ended.kill()
+    goal = {"budget": {"capture_s": 0.05}, "scene": {"brightness_dn_per_s": 8e5}}
+    goal |= {"fixed": {"harmonics": 1, "base_frequency_hz": 23e6}}
+    next_plan = httpx.post(f"{daemon.url}/api/v1/plan", json=goal, timeout=60)
+    assert next_plan.json()["capture_s"] <= 0.05
+    last = max(jobs_of(daemon), key=lambda job: float(job["created_at"]))
+    assert (last["kind"], last["state"]) == ("plan", "cancelled")
 
 
 def test_what_a_daemon_refuses_is_printed_with_what_limits(

@@ -20,14 +20,18 @@ MARGIN = 1.05
 class ClosedForm:
     """A predictor whose answers are formulas: noise by the light, bias by frequency and m."""
 
-    def __init__(self, *, far_m: float = 2.0) -> None:
+    def __init__(self, *, far_m: float = 2.0, light: float = 1.0) -> None:
         self.scene = uniform_scene(1e6, [(far_m, 1.0)])
+        self.light = light
+
+    def brighter(self, times: float) -> "ClosedForm":
+        return ClosedForm(light=times * self.light)
 
     def longest_exposure_s(self) -> float:
-        return 0.004
+        return 0.004 / self.light
 
     def noise_scale(self, sequence: Sequence) -> float:
-        return float(np.sqrt(1e-3 / (sequence.exposure_s * sequence.takes)))
+        return float(np.sqrt(1e-3 / (self.light * sequence.exposure_s * sequence.takes)))
 
     def least_noise_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
         m = 1 if estimator == "single-frequency" else sequence.harmonics
@@ -49,7 +53,7 @@ class ClosedForm:
             Figure(value, value / SPREAD, value * SPREAD, 2 * value, value * MARGIN)
             for value in (each[0], each[2])
         )
-        return Prediction(std, error, each[1], 0.0, each[1], bias_known=True)
+        return Prediction(std, error, each[1], each[1], bias_known=True)
 
     def beyond_scene(self, sequence: Sequence) -> bool:
         return False

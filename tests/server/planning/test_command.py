@@ -1,6 +1,7 @@
 """The command that plans."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -34,10 +35,23 @@ def test_the_command_prints_a_plan_in_words(capsys: pytest.CaptureFixture[str]) 
     first, *words = capsys.readouterr().out.splitlines()
     assert Sequence.from_document(json.loads(first)).harmonics == 3
     assert any(line.startswith("captures in") for line in words)
-    assert any("bias" in line and "outliers" in line for line in words)
+    assert any("bias" in line and "at 90 %" in line for line in words)
+    assert any(line.startswith("a capture has 90% of the lit pixels within") for line in words)
+    items = next(place for place, line in enumerate(words) if line.split()[:1] == ["light"])
+    light_ms, readout_ms, settling_ms = map(float, words[items + 1].split()[:3])
+    capture_ms = float(next(line for line in words if line.startswith("captures in")).split()[2])
+    assert light_ms + readout_ms + settling_ms == pytest.approx(capture_ms, abs=0.2)
+    assert any("twice the light gives" in line for line in words)
     assert any("both returns" in line for line in words)
     assert any("mean density" in line for line in words)
     assert any(line.startswith("half the time") for line in words)
+
+
+def test_a_given_scene_has_no_region(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(typer.Exit):
+        plan_verb.plan(**NEARBY, capture_s=0.1, region="0,0,9,9", as_json=True)
+
+    assert json.loads(capsys.readouterr().out)["field"] == "region"
 
 
 def test_the_command_fails_with_the_best_where_a_target_is_out_of_reach(
@@ -57,6 +71,8 @@ def test_the_command_fails_with_the_best_where_a_target_is_out_of_reach(
         {"returns": ["near"]},
         {"returns": ["1:-2"]},
         {"estimator": "guess"},
+        {"region": "1,2,3"},
+        {"map_file": Path("map.tiff")},
     ],
 )
 def test_the_command_refuses_what_it_cannot_read(mistake: dict[str, Any]) -> None:

@@ -1,6 +1,6 @@
 import { computed, signal } from "@preact/signals";
 
-import type { ChoiceDocument, JobDocument, PlanRequest, TradeoffDocument } from "../stream/documents";
+import type { ChoiceDocument, JobDocument, PlanDocument, PlanRequest, TradeoffDocument } from "../stream/documents";
 import type { Problem } from "../stream/protocol";
 import { type Api, refusalIn } from "./api";
 import { followed } from "./jobs";
@@ -11,6 +11,8 @@ export class Accuracy {
   readonly tradeoff = signal<TradeoffDocument | null>(null);
   /** A point of the front or a plan that is looked at, and not set. */
   readonly looked = signal<ChoiceDocument | null>(null);
+  /** A plan that was made, and a picture of the error that it predicts of each pixel: an address; null while there is none. */
+  readonly mapped = signal<{ readonly plan: PlanDocument; readonly url: string } | null>(null);
   /** What the service computes for this page. */
   readonly job = signal<JobDocument | null>(null);
   /** Why the last question had no answer. */
@@ -40,12 +42,22 @@ export class Accuracy {
   /** Looks for a sequence for a goal. */
   async plan(goal: PlanRequest): Promise<void> {
     this.looked.value = null; // it would seem to answer this question
+    const before = this.mapped.peek();
+    if (before !== null) URL.revokeObjectURL(before.url);
+    this.mapped.value = null;
+    let made: string | null = null;
     await this.#ask(
-      () => this.api.ask("POST /plan/jobs", { body: goal }),
-      ({ result }) => {
-        if (result !== null) this.looked.value = result as unknown as ChoiceDocument;
+      () => this.api.ask("POST /plan/jobs", { body: { ...goal, map: true } }),
+      ({ id, result, state }) => {
+        if (result !== null) this.looked.value = result as unknown as PlanDocument;
+        if (state === "done") made = id;
       },
     );
+    const plan = this.looked.peek() as PlanDocument | null;
+    if (made === null || plan === null) return;
+    const path = `/jobs/${encodeURIComponent(made)}/map.png`;
+    const file = await this.#answer(() => this.api.file(path));
+    if (file !== null) this.mapped.value = { plan, url: URL.createObjectURL(file) };
   }
 
   async cancel(): Promise<void> {

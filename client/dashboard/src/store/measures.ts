@@ -2,6 +2,7 @@
 import type { Signal } from "@preact/signals";
 import { statistics } from "../physics/statistics";
 
+import type { PlanRequest } from "../stream/documents";
 import { type Pixel, pixelOf, pixelText } from "./pixel";
 import type { Settings } from "./settings";
 
@@ -99,6 +100,13 @@ export class Measures {
 /** The region between two corners, in whatever order. */
 export function regionOf(a: Pixel, b: Pixel): Region {
   return { x0: Math.min(a.x, b.x), y0: Math.min(a.y, b.y), x1: Math.max(a.x, b.x), y1: Math.max(a.y, b.y) };
+}
+
+/** A region as the service is asked for it: a box, or the corners of a polygon; null for the whole picture. */
+export function askedRegion(region: Region | null): NonNullable<PlanRequest["region"]> | null {
+  if (region === null) return null;
+  const { x0, y0, x1, y1, corners } = region;
+  return corners === undefined || corners.length < 3 ? [x0, y0, x1 - x0 + 1, y1 - y0 + 1] : corners.map(({ x, y }) => [x, y] as const);
 }
 
 /** The region within a polygon; null without corners. */

@@ -21,11 +21,12 @@ const front = (...times_s: number[]): JobDocument["result"] => ({ front: times_s
 
 let answers: (JobDocument | RequestError)[];
 let cancelled: string[];
+let files: string[];
 let refusal: RequestError | null;
 let accuracy: Accuracy;
 beforeEach(() => {
   vi.useFakeTimers();
-  [answers, cancelled, refusal] = [[], [], null];
+  [answers, cancelled, files, refusal] = [[], [], [], null];
   const start = () => (refusal === null ? Promise.resolve(job("queued")) : Promise.reject(refusal));
   const api = answering({
     "POST /tradeoff/jobs": start,
@@ -37,6 +38,11 @@ beforeEach(() => {
     "POST /jobs/{job}/cancel": ({ of }) => {
       cancelled.push(of);
       return Promise.resolve(job("running"));
+    },
+  }, {
+    file: (path: string) => {
+      files.push(path);
+      return Promise.resolve(new File(["picture"], "map.png"));
     },
   });
   accuracy = new Accuracy(api);
@@ -89,10 +95,12 @@ test("a plan is what is looked at then; why there is none is kept", async () => 
   answers.push(job("done", { kind: "plan", result: { capture_s: 5 } }));
   await vi.advanceTimersByTimeAsync(500);
   expect(accuracy.looked.value).toEqual({ capture_s: 5 });
+  expect(files).toEqual(["/jobs/j/map.png"]);
+  expect(accuracy.mapped.value).toEqual({ plan: accuracy.looked.value, url: expect.stringMatching(/^blob:/) });
   void accuracy.plan({ target: { range_error_m: 1e-9 }, budget: {} });
   answers.push(job("failed", { kind: "plan", problem: { title: "Out of reach" } }));
   await vi.advanceTimersByTimeAsync(500);
-  expect(accuracy.looked.value).toBeNull();
+  expect([accuracy.looked.value, accuracy.mapped.value, files.length]).toEqual([null, null, 1]);
   expect(accuracy.problem.value).toEqual({ title: "Out of reach" });
   refusal = new RequestError({ title: "Eight plans wait." });
   await accuracy.predict();

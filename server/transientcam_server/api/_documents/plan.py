@@ -1,7 +1,8 @@
 """The JSON documents of planning."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
+from annotated_types import Len
 from pydantic import ConfigDict, Field
 
 from transientcam_server.api._documents.document import Document, RequestDocument
@@ -17,7 +18,7 @@ class TargetDocument(_StrictDocument):
     """What has to be reached; all that is given."""
 
     range_error_m: float | None = Field(default=None, gt=0)
-    """Noise and bias of the range together, of the median lit pixel, at most."""
+    """How far the range is off, noise and bias together, at most; in `share` of the pixels."""
     range_std_m: float | None = Field(default=None, gt=0)
     """Standard deviation of the range of a typical pixel, at most."""
     separation_m: float | None = Field(default=None, gt=0)
@@ -59,6 +60,14 @@ class SceneDocument(_StrictDocument):
     )
 
 
+Share = Annotated[float | None, Field(gt=0, lt=1)]
+"""Of the pixels of a capture."""
+Corner = Annotated[list[int], Len(2, 2)]
+"""Column and row of a pixel."""
+RegionOfPixels = Annotated[list[int], Len(4, 4)] | list[Corner]
+"""Column and row of the first pixel, width and height of a box; or the corners of a polygon."""
+
+
 class PlanRequest(_StrictDocument):
     """What a sequence is wanted for."""
 
@@ -67,6 +76,7 @@ class PlanRequest(_StrictDocument):
         json_schema_extra={
             "examples": [
                 {"target": {"range_error_m": 0.005}},
+                {"target": {"range_error_m": 0.02}, "share": 0.95, "region": [40, 30, 60, 40]},
                 {"budget": {"frame_rate_hz": 15.0}, "fixed": {"zeroth": "low-frequency"}},
             ]
         },
@@ -74,6 +84,13 @@ class PlanRequest(_StrictDocument):
 
     target: TargetDocument = TargetDocument()
     budget: BudgetDocument = BudgetDocument()
+    share: Share = 0.9
+    """Of the pixels of a capture that are to be within the target. Null plans for the error of the
+    median pixel over many captures, which two of three pixels of a capture are within."""
+    region: RegionOfPixels | None = None
+    """Whose lit pixels count; null for the whole picture. What is outside may saturate."""
+    map: bool = False
+    """Whether a job is to predict the error of each pixel, too."""
     fixed: dict[str, Any] = Field(default_factory=dict)
     """Fields of the sequence that must stay as given here."""
     estimator: Literal["single-frequency", "maximum-entropy", "likelihood", "pisarenko"] | None = (
@@ -97,8 +114,67 @@ class FigureDocument(Document):
     high: float
     """And below this."""
     p90: float
-    """90 % of the pixels are predicted to be better; fewer are where much light comes back close
+    """Of 90 % of the pixels; fewer are better where much light comes back close
     behind the direct one, as near the edge of a corner, and no frequency resolves it."""
+
+
+class WithinDocument(Document):
+    """How many pixels of a capture are how close, noise and bias together."""
+
+    share: float
+    """Of the pixels, as the goal has it."""
+    error_m: float
+    """So many are within this."""
+    low: float
+    """What is measured of `error_m` lies above this with 95 %."""
+    high: float
+    """And below this."""
+    target_m: float | None = None
+    """The largest error that the goal allows."""
+    target_share: float | None = None
+    """So many are within that."""
+
+
+class BeyondDocument(Document):
+    """How many pixels of a capture are further off."""
+
+    error_m: float
+    share: float
+
+
+class PriceDocument(Document):
+    """What a capture takes until its ranges are there, item by item, and what else it costs."""
+
+    light_s: float
+    """Exposure, with the light on."""
+    readout_s: float
+    settling_s: float
+    """After changes of the modulation frequency."""
+    transport_s: float | None = None
+    """From the end of the capture to the arrival of the last image, by the newest frame; the least
+    that a link ever took is not in it. Null where no frame tells."""
+    computing_s: float | None = None
+    """From images to ranges on one core; null as long as kernels are not compiled."""
+    sum_s: float
+    """Of all that is known."""
+    light_share: float
+    """Share of the capture with the light on: dose and heat go with it."""
+    data_bytes: int
+    """Raw images of one capture."""
+
+
+class ChangeDocument(Document):
+    """What a better camera would give with the same frequencies and estimator."""
+
+    what: Literal["readout", "light"]
+    """Read-out twice as fast, or twice as much light."""
+    capture_s: float
+    error: float
+    """Of `compared_by`."""
+    time_factor: float
+    """How many times less time it takes."""
+    error_factor: float
+    """How many times less its error is."""
 
 
 class PredictedDocument(Document):
@@ -118,9 +194,10 @@ class PredictedDocument(Document):
     alike put the range elsewhere, nor where its two estimators disagree about the direct range,
     nor where many pixels may be lit by other surfaces alone: then `range_bias_m` holds only for
     the simplest light, and `summary` says why."""
-    outlier_share: float
-    """Share of the ranges that are off by more than five times `range_error_m`; pixels whose bias
-    none of the frequencies looked at shows are not in it."""
+    within: WithinDocument | None = None
+    """What the share of the goal is within; null where the goal is of the median pixel."""
+    beyond: list[BeyondDocument] = Field(default_factory=list)
+    """Shares of the pixels of a capture that are further off than some errors."""
     beyond_scene: bool
     """Whether it sees more of the scene than the look that the scene was judged by, so that the
     prediction is a bound on how good it can be."""
@@ -144,6 +221,7 @@ class ChoiceDocument(Document):
     not compiled. With a budget `computing_share` they are, before the answer."""
     computing_share: float | None
     """That over the time between two frames: what a core is busy with."""
+    price: PriceDocument
     predicted: PredictedDocument
 
 
@@ -194,6 +272,14 @@ class PlanDocument(ChoiceDocument):
     summary: str
     """Noise and bias in a sentence, what half the error costs, and why a bias is not known."""
     scene: SeenDocument
+    region: list[Corner] | None = None
+    """Corners of the region whose pixels count."""
+    computing_s: dict[str, float | None]
+    """Computing time of a frame of the sequence, by estimator; null as in `price`."""
+    changes: list[ChangeDocument]
+    """What better cameras would give, the best first: each is predicted, too."""
+    price_summary: str
+    """What the time goes into, and what would buy most, in a sentence."""
     half_time: PlanNeighbourDocument | None = None
     """What half the time gives; null where nothing is that quick."""
     twice_accuracy: PlanNeighbourDocument | None = None
@@ -227,6 +313,7 @@ class PointDocument(Document):
     range_std_m: float
     range_bias_m: float
     range_error_m: float
+    """With a share what that is within, and of the median pixel without."""
 
 
 class LineDocument(Document):
@@ -251,6 +338,10 @@ class TradeoffRequest(_StrictDocument):
 
     by: AccuracyName = "range_error_m"
     """The accuracy that capture time is held against."""
+    share: Share = None
+    """Of the pixels of a capture, whose error counts; null for that of the median pixel."""
+    region: RegionOfPixels | None = None
+    """Whose pixels count; null for the whole picture."""
 
 
 class TradeoffDocument(Document):

@@ -1,8 +1,8 @@
 """Jobs: long work that other requests started, and its progress."""
 
-from typing import Annotated, Final
+from typing import Annotated, Final, Literal
 
-from fastapi import APIRouter, Path, Query, Request
+from fastapi import APIRouter, Path, Query, Request, Response
 
 from transientcam_server.api._auth import Role
 from transientcam_server.api._auth.permissions import TO_CHANGE, needs, require
@@ -10,10 +10,11 @@ from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._documents.job import JobDocument, JobsDocument
 from transientcam_server.api._job_answers import job_document
 from transientcam_server.api._problems import documented
-from transientcam_server.errors import kinds
+from transientcam_server.errors import Problem, kinds
 
 router = APIRouter(tags=["jobs"])
 MAX_WAIT_S: Final = 30.0
+_MAP_TYPES: Final = {"npy": "application/octet-stream", "png": "image/png"}
 _Job = Annotated[
     str,
     Path(description="its id, as the list has it", max_length=200, examples=["5a0c1f6be2d4"]),
@@ -42,6 +43,30 @@ async def read_job(
     found = service.jobs.get(job)
     await service.jobs.end_of(found, wait_s=wait_s)
     return job_document(found)
+
+
+@router.get(
+    "/jobs/{job}/map.{form}",
+    summary="The predicted error of each pixel",
+    response_class=Response,
+    responses=documented(kinds.UNKNOWN_JOB, kinds.NOT_FOUND, kinds.INVALID_REQUEST)
+    | {200: {"description": "the map", "content": {each: {} for each in _MAP_TYPES.values()}}},
+)
+async def read_map(
+    service: ServiceOf,
+    job: _Job,
+    form: Annotated[Literal["npy", "png"], Path(description="values in m, or colours for eyes")],
+) -> Response:
+    """Return noise and bias together of each pixel (H, W), as the planned sequence would have them.
+
+    A plan's job with `map` makes it; the last few are kept. It is NaN, or grey, where no light is.
+    Colours go from dark at 0 over their middle at the target to the brightest at twice that.
+    """
+    found = service.jobs.get(job)
+    if form not in found.files:
+        detail = f"The job {found.id} has no map: it made none, it has not ended, or it is too old."
+        raise Problem(kinds.NOT_FOUND, detail, field="job", value=found.id)
+    return Response(found.files[form], media_type=_MAP_TYPES[form])
 
 
 @router.post(

@@ -1,7 +1,7 @@
 """Accuracy and time: which sequence for a target or a budget."""
 
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 from fastapi import APIRouter, Request, Response, status
 
@@ -15,7 +15,15 @@ from transientcam_server.api._documents.plan import PlanDocument, PlanRequest
 from transientcam_server.api._job_answers import ACCEPTED
 from transientcam_server.api._problems import documented
 from transientcam_server.errors import kinds
-from transientcam_server.planning import Goal, Progress, SceneStatistics, uniform_scene
+from transientcam_server.imaging import Frame
+from transientcam_server.planning import (
+    MAP_FORMATS,
+    Goal,
+    Progress,
+    Region,
+    SceneStatistics,
+    uniform_scene,
+)
 from transientcam_server.service import Service
 
 router = APIRouter(tags=["accuracy"])
@@ -57,25 +65,35 @@ async def start_plan(
     """Begin to make the plan that `POST /plan` answers with, which is the `result` of the job.
 
     What that would be refused with is the `problem` of the job. It goes on when the client leaves;
-    `POST /jobs/{job}/cancel` ends it.
+    `POST /jobs/{job}/cancel` ends it. With `map` the error of each pixel is predicted, too:
+    `GET /jobs/{job}/map`.
     """
-    return planned.as_job(service, KIND, await _work(service, request, http), response)
+    files: dict[str, bytes] = {}
+    work = await _work(service, request, http, files)
+    return planned.as_job(service, KIND, work, response, files)
 
 
 async def _work(
-    service: Service, request: PlanRequest, http: Request
+    service: Service, request: PlanRequest, http: Request, files: dict[str, bytes] | None = None
 ) -> planned.Work[PlanDocument]:
     """Return what makes the plan; a goal that cannot be meant or planned is refused at once."""
     await planned.require_plannable(service, planned.address_of(http))
     if request.scene is None:
         planned.require_scene(service)
-    return partial(_made, service, request, _goal(service, request), planned.address_of(http))
+    goal, address = _goal(service, request), planned.address_of(http)
+    return partial(_made, service, request, goal, address, files)
 
 
 def _goal(service: Service, request: PlanRequest) -> Goal:
     document = {"base_frequency_hz": service.applied.sequence.base_frequency_hz, **request.fixed}
+    region = Region.of(request.region)
+    if region is not None:
+        capabilities = service.camera.capabilities
+        region.mask(capabilities.height, capabilities.width)
     goal = Goal(
         **request.target.model_dump(),
+        share=request.share,
+        region=region,
         **request.budget.model_dump(),
         base=Sequence.from_document(document),
         fixed=frozenset(request.fixed),
@@ -86,18 +104,46 @@ def _goal(service: Service, request: PlanRequest) -> Goal:
 
 
 async def _made(
-    service: Service, request: PlanRequest, goal: Goal, address: str, progress: Progress
+    service: Service,
+    request: PlanRequest,
+    goal: Goal,
+    address: str,
+    files: dict[str, bytes] | None,
+    progress: Progress,
 ) -> PlanDocument:
-    """Plan once there is a place for the address."""
+    """Plan once there is a place for the address, and put the map into the files of a job."""
+    mapped = request.map and files is not None
+    searched = 0.8 if mapped else 1.0
     async with service.planning.place_of(address):
         scene = await _scene(service, request, goal.base, progress.part(0.0, planned.LOOKED))
         made = await service.planning.run(
             service.planner.plan_document,
             goal,
             scene,
-            progress=progress.part(planned.LOOKED, 1.0),
+            progress=progress.part(planned.LOOKED, searched),
         )
+        if mapped:
+            assert files is not None  # noqa: S101 - it is mapped
+            error_m = await service.planning.run(
+                service.planner.map_m,
+                scene,
+                made["estimator"],
+                Sequence.from_document(made["sequence"]),
+                progress=progress.part(searched, 1.0),
+            )
+            files |= {name: form(error_m, goal.range_error_m) for name, form in MAP_FORMATS.items()}
+        _add_transport(made["price"], service.hub.latest)
         return PlanDocument.model_validate(made)
+
+
+def _add_transport(price: dict[str, Any], frame: Frame | None) -> None:
+    """State what transport takes, by the newest frame."""
+    begun_s = None if frame is None else frame.meta()["captured_unix_s"]
+    if frame is None or begun_s is None:
+        return
+    transport_s = max(0.0, frame.raw.host_time_s - begun_s - frame.raw.capture_s)
+    price["transport_s"] = transport_s
+    price["sum_s"] += transport_s
 
 
 async def _scene(

@@ -1,4 +1,4 @@
-"""Noise, bias and outliers of ranges: one definition for what is predicted and what is measured."""
+"""Noise and bias of ranges: one definition for what is predicted and what is measured."""
 
 from dataclasses import dataclass
 from typing import Any, Final
@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from transientcam_server.imaging import typical_deviation
 
 _Array = NDArray[Any]
-OUTLIER_DEVIATIONS: Final = 5.0
-"""A range further off than so many times the error of the median pixel is an outlier."""
-_LEAST_ERROR_M: Final = 1e-6
+TOLERANCES_M: Final = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
+"""How far off ranges may be in the shares that are stated of any prediction."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,20 +27,28 @@ class PixelErrors:
         part of it: with 30 captures and no bias it is 0.15 of the deviation.
     centre_m
         (P) median of the captures; 0 where there are no two.
-    outlier_share
-        Share of the ranges that are off by more than `OUTLIER_DEVIATIONS` times the error of the
-        median pixel, by noise or for good.
+    apart_m
+        (D, P) range less truth of each capture; infinite where it has none.
+    signed_m
+        (P) that of the median of the captures.
     """
 
     std_m: _Array
     bias_m: _Array
     centre_m: _Array
-    outlier_share: float
+    apart_m: _Array
+    signed_m: _Array
 
     @property
     def error_m(self) -> _Array:
         """(P) root sum of squares of deviation and bias."""
         return np.hypot(self.std_m, self.bias_m)
+
+    def off_m(self, bias_m: _Array) -> _Array:
+        """Return how far each range (P, D) is off, without sign, were the bias (P) this one."""
+        noise_m = np.where(self.signed_m < 0, -1.0, 1.0) * (self.apart_m - self.signed_m)
+        known = np.isfinite(noise_m) & np.isfinite(bias_m)
+        return np.where(known, np.abs(np.where(known, noise_m + bias_m, 0.0)), np.inf).T
 
     def farthest_m(self, earliest_m: _Array, latest_m: _Array) -> _Array:
         """Return the bias (P) if the truth is the one of two ranges (P) that is farther away."""
@@ -72,6 +79,5 @@ def pixel_errors(
     bias_m = np.hypot(centre_m - true_m, uncertainty_m)
     std_m = np.where(enough, std_m, np.inf)
     bias_m = np.where(enough, bias_m, np.inf)
-    limit_m = OUTLIER_DEVIATIONS * max(float(np.median(np.hypot(std_m, bias_m))), _LEAST_ERROR_M)
-    near = np.abs(range_m - true_m) <= limit_m  # a range that is missing is an outlier, too
-    return PixelErrors(std_m, bias_m, centre_m, 1.0 - float(near.mean()))
+    apart_m = np.where(enough & np.isfinite(range_m), range_m - true_m, np.inf)
+    return PixelErrors(std_m, bias_m, centre_m, apart_m, np.where(enough, centre_m - true_m, 0.0))

@@ -1,15 +1,15 @@
 """What accuracy a sequence will have on a scene, before it is captured.
 
 Noisy moments are drawn around those of the scene and go through the estimator itself, so that
-noise, bias and outliers come from one computation, whatever the estimator. What is drawn depends on
+noise, bias and shares come from one computation, whatever the estimator. What is drawn depends on
 a sequence by its frequencies and by how noisy it is: a few steps of noise serve every exposure and
 number of takes.
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, lru_cache, partial
 from statistics import NormalDist
 from typing import Any, Final
 
@@ -41,6 +41,10 @@ DRAWS: Final = 6
 """Noisy captures of each pixel for a first prediction."""
 FINE_DRAWS: Final = 30
 """And for the one that is stated."""
+MAP_DRAWS: Final = 8
+"""And for each pixel of a map."""
+_AT_ONCE: Final = 2048
+"""Pixels of a map whose draws are in memory together."""
 FEW: Final = slice(None, None, 2)
 """The pixels that first predictions are made of: every other one of each kind."""
 STEP: Final = 4.0
@@ -52,6 +56,12 @@ OUTVOTED: Final = 3
 FOUR_PHASES: Final = np.array([1, 1j, -1, -1j])
 NOMINAL: Final = Sequence(exposure_s=1e-3, zeroth="estimated")
 """The steps are multiples of its noise."""
+_SHARES: Final = np.linspace(0.0, 1.0, 201)
+"""For which it is stated how far ranges are off."""
+_FEW_DRAWS: Final = 3
+"""Every third draw tells the intervals of shares."""
+_OF_MEDIAN: Final = math.pi / 2
+"""Variance of the median of draws, which is in their bias, over that of one, times their number."""
 _HARDLY: Final = 0.8
 _NORMAL: Final = np.array([NormalDist().inv_cdf(0.5 + (k + 0.5) / 64) for k in range(32)])
 """Absolute values of a standard normal variable, each as likely."""
@@ -67,22 +77,29 @@ class Prediction:
         Noise, and the root sum of squares of noise and bias, pixel by pixel.
     range_bias_m
         Systematic error of the median pixel.
-    outlier_share
-        Share of the ranges beyond five standard deviations.
     most_bias_m
         Bias of the median pixel if the light begins where the moments only just allow it.
     bias_known
         Whether the moments tell the bias: not where shapes of light that explain them alike put
         the range elsewhere, nor where estimators disagree about the direct range at all
         frequencies, nor where many pixels may be lit by other surfaces alone.
+    off_m
+        How far the ranges of a capture are off, without sign, in equal shares by rising value.
+    within
+        What the share of a goal of them is within; None where a goal is of the median pixel.
     """
 
     range_std: Figure
     range_error: Figure
     range_bias_m: float
-    outlier_share: float
     most_bias_m: float
     bias_known: bool
+    off_m: tuple[float, ...] = ()
+    within: Figure | None = None
+
+    def share_within(self, tolerance_m: float) -> float:
+        """Return the share of a capture's ranges that are off by no more than that."""
+        return float(np.interp(tolerance_m, self.off_m, _SHARES, left=0.0))
 
 
 class Predictor:
@@ -102,6 +119,9 @@ class Predictor:
         Called several times a second while this computes; whatever it raises ends that.
     closely
         Predict with all pixels of the scene, and not with few of them.
+    share
+        Of the ranges of a capture whose largest error is predicted; None for noise and bias
+        together of the median pixel.
     """
 
     def __init__(
@@ -113,7 +133,9 @@ class Predictor:
         seed: int = 0,
         go_on: Callable[[], None] = lambda: None,
         closely: bool = False,
+        share: float | None = None,
     ) -> None:
+        self._share = share
         self._go_on = go_on
         self._whole = scene
         self.scene = scene if closely else scene.few()
@@ -136,7 +158,7 @@ class Predictor:
         return float(np.median(self.relative_noise(sequence) / self._nominal))
 
     def quick(self, estimator: str, sequence: Sequence, scale: float) -> tuple[float, float, float]:
-        """Return deviation, bias and error in m of the median pixel at a scale of noise.
+        """Return deviation and bias in m of the median pixel, and the error, at a scale of noise.
 
         Between the steps that were drawn the logarithms of each pixel's errors are interpolated.
         """
@@ -150,28 +172,42 @@ class Predictor:
             for one, other in ((low[0], high[0]), (low[1], high[1]))
         )
         bias = np.hypot(bias, self._drift_m)
-        return float(_typical(std)), float(np.median(bias)), float(np.median(np.hypot(std, bias)))
+        if self._share is None:
+            error_m = np.median(np.hypot(std, bias))
+        else:
+            both = np.concatenate([_NORMAL, -_NORMAL])
+            own = np.sqrt(np.maximum(bias**2 - _OF_MEDIAN / DRAWS * std**2, 0.0))
+            error_m = np.quantile(np.abs(own + both[:, None] * std), self._share)
+        return float(_typical(std)), float(np.median(bias)), float(error_m)
 
     def least_noise_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
         """Return a bound in m on the noise of the median pixel: that of Cramer and Rao.
 
-        Of one return with all the light, whose phase all frequencies tell together.
+        Of one return with all the light, whose phase all frequencies tell together. Half of the
+        pixels are noisier than the median one: the share s of all ranges that is off by least
+        reaches at least as far as the share 2 s - 1 of the median pixel's.
         """
         m = self._harmonics(estimator, sequence)
         noise = float(np.median(self._nominal)) * scale
         contrast = self.scene.contrast_at(m, sequence.base_frequency_hz)
         std_rad = noise / float(np.linalg.norm(np.arange(m + 1) * contrast))
+        if self._share is not None:
+            std_rad *= NormalDist().inv_cdf(max(self._share, 0.5))
         return float(tm.range_m(std_rad, sequence.base_frequency_hz))
 
     def least_bias_m(self, estimator: str, sequence: Sequence) -> float:
-        """Return what the bias of the median pixel hardly falls below: that without noise."""
+        """Return what the bias hardly lets the error fall below: that without noise.
+
+        Of the median pixel, or of a share s of the ranges: of a pixel that is off at least half of
+        the ranges are further off, so that it is that of the share 2 s - 1 of the pixels.
+        """
         m = self._harmonics(estimator, sequence)
         return self._exact(estimator, m, sequence.base_frequency_hz)
 
     def _bias_without_noise(
         self, estimator: str, harmonics: int, base_frequency_hz: float
     ) -> float:
-        """Bias in m of the median pixel that no exposure and no takes reduce."""
+        """Bias in m that no exposure and no takes reduce."""
         self._go_on()
         scene = self.scene
         b = scene.relative_moments(harmonics, base_frequency_hz)[:, FEW]
@@ -180,7 +216,9 @@ class Predictor:
         range_m = ranges_m(b, variance, estimator, base_frequency_hz, self.settings)
         bias_m = np.hypot(range_m - scene.direct_m[FEW], scene.uncertainty_m[FEW])
         # noise of the look itself is in this, and in the direct range
-        return _HARDLY * float(np.median(np.nan_to_num(bias_m, nan=math.inf)))
+        share = 0.5 if self._share is None else max(0.0, 2 * self._share - 1)
+        known = np.sort(np.nan_to_num(bias_m, nan=math.inf))
+        return _HARDLY * float(known[int(share * (known.size - 1))])
 
     def predict(
         self,
@@ -222,19 +260,57 @@ class Predictor:
             and _median(np.hypot(errors.std_m, farthest_m)) <= DOUBTFUL * _median(errors.error_m)
         )
         picks = resampled(noise.size, RESAMPLED, self._seed)
+        most_m = None if known else farthest_m
+        drifted_m = np.hypot(errors.bias_m, self._drift_m)
+        within = None
+        if self._share is not None:
+            within = _within(self._share, errors, most_m, picks, self._drift_m)
         return Prediction(
             figure(errors.std_m, _typical, picks),
-            _error(errors, None if known else farthest_m, picks, self._drift_m),
-            float(_median(np.hypot(errors.bias_m, self._drift_m))),
-            errors.outlier_share,
+            _error(
+                lambda bias_m: np.hypot(errors.std_m, bias_m),
+                _median,
+                errors,
+                most_m,
+                picks,
+                self._drift_m,
+            ),
+            float(_median(drifted_m)),
             float(_median(farthest_m)),
-            bias_known=known,
+            known,
+            tuple(_ordered(errors.off_m(drifted_m))),
+            within,
         )
 
     @property
     def _drift_m(self) -> float:
         """What is expected of a drift that is known only to be no larger than so much."""
         return self.scene.drift_m / 2
+
+    def of_each(self, estimator: str, sequence: Sequence) -> tuple[_Array, _Array]:
+        """Predict noise over `relative_noise`, and bias in m, of each pixel of the scene (P)."""
+        harmonics, noise = self._harmonics(estimator, sequence), self.relative_noise(sequence)
+        arguments = estimator, harmonics, sequence.base_frequency_hz, noise, MAP_DRAWS
+        parts = [
+            self._errors(*arguments, sequence.zeroth, slice(first, first + _AT_ONCE))
+            for first in range(0, noise.size, _AT_ONCE)
+        ]
+        std_m, bias_m = (
+            np.concatenate([getattr(each, name) for each in parts]) for name in ("std_m", "bias_m")
+        )
+        return std_m / noise, np.hypot(bias_m, self._drift_m)
+
+    def brighter(self, times: float) -> "Predictor":
+        """Return the predictor of the same scene with so many times the camera's own light."""
+        scene = self._whole
+        ambient = float(np.median(scene.ambient_dn_per_s))
+        lit = replace(
+            scene,
+            brightness_dn_per_s=times * scene.brightness_dn_per_s,
+            brightest_dn_per_s=times * max(scene.brightest_dn_per_s - ambient, 0.0) + ambient,
+        )
+        arguments = lit, self.sensor, self.settings
+        return Predictor(*arguments, seed=self._seed, go_on=self._go_on, share=self._share)
 
     def beyond_scene(self, sequence: Sequence) -> bool:
         """Whether a sequence sees more of the scene than the look that describes it."""
@@ -277,7 +353,9 @@ class Predictor:
     @cached_property
     def _closer(self) -> "Predictor":
         arguments = self._whole, self.sensor, self.settings
-        return Predictor(*arguments, seed=self._seed, go_on=self._go_on, closely=True)
+        return Predictor(
+            *arguments, seed=self._seed, go_on=self._go_on, closely=True, share=self._share
+        )
 
     def _harmonics(self, estimator: str, sequence: Sequence) -> int:
         """How many harmonics the estimator looks at."""
@@ -346,11 +424,24 @@ def _out_of_step(b: _Array, share: float, takes: int, random: np.random.Generato
     return out
 
 
-def _error(errors: PixelErrors, farthest_m: _Array | None, picks: _Array, drift_m: float) -> Figure:
-    """Return the figure of the error.
+def _error(
+    of_bias: Callable[[_Array], _Array],
+    value: Callable[[_Array], _Array],
+    errors: PixelErrors,
+    farthest_m: _Array | None,
+    picks: _Array,
+    drift_m: float,
+) -> Figure:
+    """Return the figure of an error; ``farthest_m`` (P) is the most bias, where none is known.
 
-    ``farthest_m`` (P) is the most bias, where none is known; ``drift_m`` the expected drift, which
-    may be none, and twice as much.
+    Parameters
+    ----------
+    of_bias
+        Returns the errors of pixels (P, ...) were their bias (P) the one given.
+    value
+        Of errors (..., P, ...), the figure (...).
+    drift_m
+        Expected; there may be none, and twice as much.
     """
     reach = KNOWN if farthest_m is None else UNKNOWN
     least_m, most_m = reach.least_bias * errors.bias_m, reach.most_bias * errors.bias_m
@@ -358,10 +449,38 @@ def _error(errors: PixelErrors, farthest_m: _Array | None, picks: _Array, drift_
         most_m = np.maximum(most_m, farthest_m)
     most_m = np.hypot(most_m, 2 * drift_m)
     least, most = (
-        figure(np.hypot(errors.std_m, bias_m), _median, picks, reach.spread)
-        for bias_m in (least_m, most_m)
+        figure(of_bias(bias_m), value, picks, reach.spread) for bias_m in (least_m, most_m)
     )
-    return between(figure(np.hypot(errors.error_m, drift_m), _median, picks), least, most)
+    expected = of_bias(np.hypot(errors.bias_m, drift_m))
+    return between(figure(expected, value, picks), least, most)
+
+
+def _within(
+    share: float,
+    errors: PixelErrors,
+    farthest_m: _Array | None,
+    picks: _Array,
+    drift_m: float,
+) -> Figure:
+    """Return the figure of what a share of the ranges is within; few draws tell its interval."""
+    few = replace(errors, apart_m=errors.apart_m[::_FEW_DRAWS])
+    found = _error(few.off_m, partial(_quantile, share), few, farthest_m, picks, drift_m)
+    whole = float(_quantile(share, errors.off_m(np.hypot(errors.bias_m, drift_m))))
+    scale = whole / found.median if 0 < found.median < math.inf else 1.0
+    return Figure(*(scale * getattr(found, each.name) for each in fields(Figure)))
+
+
+def _quantile(share: float, off_m: _Array) -> _Array:
+    """Return what a share of the ranges (..., P, D) is within (...)."""
+    flat = off_m.reshape((*off_m.shape[:-2], -1))
+    place = min(int(share * flat.shape[-1]), flat.shape[-1] - 1)
+    return np.asarray(np.partition(flat, place, axis=-1)[..., place])
+
+
+def _ordered(off_m: _Array) -> _Array:
+    """Return how far equal shares of all ranges (P, D) are off, by rising value."""
+    flat = np.sort(off_m, axis=None)
+    return np.asarray(flat[np.rint(_SHARES * (flat.size - 1)).astype(int)])
 
 
 def _typical(deviations: _Array) -> _Array:

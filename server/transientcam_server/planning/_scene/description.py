@@ -1,7 +1,8 @@
 """From the moments of a look to the statistics of a scene."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -34,6 +35,8 @@ DIM: Final = 0.2
 """What a surface gets from a lit one beside it, over what that one gets, is hardly more."""
 BRIGHT_SHARE: Final = 0.95
 """All but the brightest pixels, which may be a mirror's."""
+BRIGHTEST_SHARE: Final = 0.999
+"""Share of the pixels that nothing planned may saturate."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,8 +61,8 @@ class FrameAverages:
         (m + 1, H, W) moments that are not smoothed, averaged over the frames.
     mean_dn
         (H, W) mean of all four-bucket images above the dark level.
-    brightest_dn
-        What the brightest pixels hold above the dark level.
+    highest_dn
+        (H, W) the most that an image holds above the dark level.
     usable
         (H, W) which pixels are not saturated.
     """
@@ -74,8 +77,13 @@ class FrameAverages:
     temperature_c: float | None
     single: _Array
     mean_dn: _Array
-    brightest_dn: float
+    highest_dn: _Array
     usable: _Array
+
+    def brightest_dn(self, within: _Array | None = None) -> float:
+        """Return what the brightest pixels, of those within (H, W), hold above the dark level."""
+        chosen = self.highest_dn if within is None else self.highest_dn[within]
+        return float(np.quantile(chosen, BRIGHTEST_SHARE))
 
     @property
     def exposure_s(self) -> float:
@@ -162,13 +170,45 @@ def describe(
     if coarse is not None:
         lit &= lit_pixels(coarse)
         moving |= moving_pixels(coarse)
+        coarse = _kept(coarse)
+    swings = _swings_m_per_s(quick) if quick else None
+    arguments = settings, coarse, ambient_dn_per_s, gain_noise, swings, lit, moving
+    seen = partial(_described, _kept(averages), *arguments)
+    scene = seen()
+    return None if scene is None else replace(scene, seen=seen, shape=lit.shape)
+
+
+def _kept(averages: FrameAverages) -> FrameAverages:
+    """Return what other pixels of the same frames are described by."""
+    nothing = averages.first[:0]
+    recipe = replace(averages.recipe)  # without what it keeps, which no process can be sent
+    return replace(
+        averages, recipe=recipe, first=nothing, last=nothing, scatter=nothing, single=nothing
+    )
+
+
+def _described(
+    averages: FrameAverages,
+    settings: ReconstructionSettings,
+    coarse: FrameAverages | None,
+    ambient_dn_per_s: float | None,
+    gain_noise: float,
+    swings_m_per_s: _Array | None,
+    lit: _Array,
+    moving: _Array,
+    within: _Array | None = None,
+    *,
+    every: bool = False,
+) -> SceneStatistics | None:
+    """Describe typical lit pixels, or every one of them, of those within (H, W)."""
+    lit = lit if within is None else lit & within
     if not lit.any():
         return None
     moving_share = float(moving[lit].mean())
     # what moves is another thing at each frequency, and beyond any range between two of them
     still = moving_share <= 1 - LEAST_STILL
-    there = np.flatnonzero(lit & ~moving if still else lit)
-    pixels = there[typical_pixels(averages.at(there)[0], PIXELS)]
+    there = np.flatnonzero(lit & ~moving if still and not every else lit)
+    pixels = there if every else there[typical_pixels(averages.at(there)[0], PIXELS)]
     b, mean_dn = averages.at(pixels)
     base_hz = averages.recipe.base_frequency_hz
     variance = averages.variance(mean_dn) * (1 / averages.frames + gain_noise)
@@ -182,7 +222,9 @@ def describe(
     told = 1 + int(np.flatnonzero(contrast >= LEAST_CONTRAST)[-1])
     b, variance = b[:told], variance[:told]
     direct_m, uncertainty_m = direct_range(b, variance, base_hz, settings)
-    earliest_m, latest_m = _plausible_by_kind(b, variance, base_hz, direct_m, uncertainty_m)
+    earliest_m, latest_m = direct_m, direct_m
+    if not every:  # of maps nobody asks for it
+        earliest_m, latest_m = _plausible_by_kind(b, variance, base_hz, direct_m, uncertainty_m)
     checked = coarse is not None
     if coarse is not None:
         wrapped_m, direct_m = direct_m, _unwrapped(direct_m, b, coarse, pixels, base_hz)
@@ -200,7 +242,7 @@ def describe(
     return SceneStatistics(
         brightness_dn_per_s=light_dn / averages.exposure_s,
         ambient_dn_per_s=ambient,
-        brightest_dn_per_s=averages.brightest_dn / averages.exposure_s,
+        brightest_dn_per_s=averages.brightest_dn(within) / averages.exposure_s,
         direct_m=direct_m,
         uncertainty_m=uncertainty_m,
         earliest_m=earliest_m,
@@ -210,14 +252,17 @@ def describe(
         base_frequency_hz=base_hz,
         measured=relative,
         relative_noise=np.sqrt(variance[1]) / light_dn,
-        lit_share=float(lit.mean()),
+        lit_share=float((lit if within is None else lit[within]).mean()),
         dim_share=dim_share(light_dn, direct_m),
         moving_share=moving_share,
         ambiguity_checked=checked,
         contrast=tuple(contrast.tolist()),
         uncalibrated_m=averages.uncalibrated_m,
         calibrated=coarse is not None or averages.recipe.gains is not None,
-        swing_m_per_s=_swing_m_per_s(quick, lit) if quick else None,
+        swing_m_per_s=(
+            None if swings_m_per_s is None else _typical_swings(swings_m_per_s[:, lit], pixels.size)
+        ),
+        pixels=pixels,
     )
 
 
@@ -314,7 +359,7 @@ def contrast_of_picture(b: _Array, variance: _Array) -> _Array:
     size = np.sqrt(np.maximum(np.abs(b) ** 2 - 2 * variance, 0.0))
     bright = np.abs(b[1]) >= np.median(np.abs(b[1]))
     kept = np.quantile((size / np.maximum(size[1], 1e-9))[:, bright], 0.75, axis=1)
-    return np.clip(np.concatenate([[1.0], kept[1:]]), 0.01, 1.0)
+    return np.asarray(np.clip(np.concatenate([[1.0], kept[1:]]), 0.01, 1.0))
 
 
 def _of_one_return(b: _Array, coarse: FrameAverages, pixels: _Array, base_hz: float) -> _Array:
@@ -326,21 +371,23 @@ def _of_one_return(b: _Array, coarse: FrameAverages, pixels: _Array, base_hz: fl
     return np.asarray(np.abs(coarse_b[1]) * np.exp(1j * j * phase), b.dtype)
 
 
-def _swing_m_per_s(quick: Sequence[FrameAverages], lit: _Array) -> _Array:
-    """Return how fast ranges change, in `PIXELS` that stand for the lit ones (H, W), by chance.
-
-    Between two frames, beyond what noise does, and when more of them do. Twice as many as there
-    are: captures in succession see edges elsewhere.
-    """
+def _swings_m_per_s(quick: Sequence[FrameAverages]) -> _Array:
+    """Return how fast ranges change between two frames (K, H, W), beyond what noise does."""
     swings_m_per_s = []
     for two in quick:
         size = np.maximum(np.abs(two.moments[1]), 1e-9)
         noise = MOVED_DEVIATIONS * np.sqrt(2 * two.variance(two.mean_dn)[1]) / size
         turned = np.angle(two.last[1] * np.conj(two.first[1]))
-        beyond = np.nan_to_num(np.sqrt(np.maximum(turned**2 - noise**2, 0.0)))[lit]
-        applied = two.recipe.applied
+        beyond = np.nan_to_num(np.sqrt(np.maximum(turned**2 - noise**2, 0.0)))
         swing_m = np.asarray(tm.range_m(beyond, two.recipe.base_frequency_hz))
-        swings_m_per_s.append(swing_m * applied.frame_rate_hz)
-    place = 1 - (np.arange(PIXELS) + 0.5) / (2 * PIXELS)
-    typical = np.quantile(np.concatenate(swings_m_per_s), place)
-    return np.random.default_rng(0).permutation(typical)
+        swings_m_per_s.append(swing_m * two.recipe.applied.frame_rate_hz)
+    return np.stack(swings_m_per_s)
+
+
+def _typical_swings(swings_m_per_s: _Array, count: int) -> _Array:
+    """Return how fast so many pixels change that stand for those given (K, N), by chance.
+
+    When more of them do. Twice as many as there are: captures in succession see edges elsewhere.
+    """
+    place = 1 - (np.arange(count) + 0.5) / (2 * count)
+    return np.random.default_rng(0).permutation(np.quantile(swings_m_per_s, place))

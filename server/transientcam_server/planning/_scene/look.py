@@ -2,20 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
-from transientcam_driver import (
-    AppliedSequence,
-    Capabilities,
-    RawFrame,
-    Sequence,
-    Simulation,
-    capture_calibration,
-)
+from transientcam_driver import Camera, RawFrame, Sequence, capture_calibration
 from transientcam_driver.calibration import TemperatureDrift
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging import Gains, Recipe, evaluate
@@ -52,45 +45,8 @@ LONGEST_EXPOSURE_S: Final = 0.02
 FILLED: Final = 0.6
 """How full the brightest pixels of the look are."""
 MOST_HARMONICS: Final = 16
-BRIGHT_SHARE: Final = 0.999
-"""Share of the pixels that nothing planned may saturate."""
 _SPARE_S: Final = 10.0
 _DARKER: Final = 8.0
-
-
-class FrameSource(Protocol):
-    """A camera, as far as a look needs it."""
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """Limits and size of the device."""
-        ...
-
-    @property
-    def applied(self) -> AppliedSequence:
-        """What is really set."""
-        ...
-
-    @property
-    def simulation(self) -> Simulation | None:
-        """What a simulated camera alone offers; None of a real one."""
-        ...
-
-    def configure(self, sequence: Sequence) -> AppliedSequence:
-        """Set a sequence."""
-        ...
-
-    def start(self) -> None:
-        """Capture frames back to back."""
-        ...
-
-    def stop(self) -> None:
-        """Capture nothing more."""
-        ...
-
-    def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
-        """Wait for the next frame."""
-        ...
 
 
 class _FrameSums:
@@ -160,13 +116,13 @@ class _FrameSums:
             temperature_c=self._temperature_c,
             single=self._single / self._frames,
             mean_dn=self._sum_dn / self._images - sensor.dark_dn,
-            brightest_dn=float(np.quantile(self._highest_dn, BRIGHT_SHARE)) - sensor.dark_dn,
+            highest_dn=self._highest_dn - sensor.dark_dn,
             usable=self._highest_dn < sensor.highest_dn,
         )
 
 
 def look_at(
-    camera: FrameSource,
+    camera: Camera,
     sensor: tm.noise.Sensor,
     settings: ReconstructionSettings,
     *,
@@ -243,7 +199,7 @@ def look_at(
         exposure_s = max(FIRST_EXPOSURE_S, capabilities.min_exposure_s)
         while True:
             first = captured(replace(sequence, exposure_s=exposure_s), 1, "exposure")
-            brightest_dn = first.averages().brightest_dn
+            brightest_dn = first.averages().brightest_dn()
             if brightest_dn < sensor.brightest:
                 break
             if exposure_s <= capabilities.min_exposure_s:

@@ -1,6 +1,6 @@
 """The scene as predictions see it: light, returns and true range of typical pixels."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from typing import Any, Final
 
@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD
+from transientcam_server.errors import Problem, kinds
+from transientcam_server.planning._scene.region import Region
 from transientcam_server.planning._scene.sampling import STRATUM, one_of_each
 
 _Array = NDArray[Any]
@@ -76,6 +78,13 @@ class SceneStatistics:
         (P) how fast the ranges of lit pixels change, these or others; None where nothing moves.
     of_one_frame
         Whether no look was taken, but one frame of another purpose.
+    pixels
+        (P) places of the pixels in the picture, row by row; None of a scene that is given.
+    shape
+        Height and width of the picture.
+    seen
+        Describes pixels within a mask (H, W), None for all: typical ones or, with ``every``, each
+        lit one; None of a scene that is given, or if none is lit.
     """
 
     brightness_dn_per_s: _Array
@@ -101,6 +110,9 @@ class SceneStatistics:
     drift_m: float = 0.0
     swing_m_per_s: _Array | None = None
     of_one_frame: bool = False
+    pixels: _Array | None = None
+    shape: tuple[int, int] = (0, 0)
+    seen: "Callable[..., SceneStatistics | None] | None" = None
 
     def few(self) -> "SceneStatistics":
         """Return what fewer pixels show, `FEW_PIXELS` of them."""
@@ -115,6 +127,33 @@ class SceneStatistics:
             if isinstance(value, np.ndarray)
         }
         return replace(self, **of_pixels)
+
+    def within(self, region: Region | None, *, every: bool = False) -> "SceneStatistics":
+        """Return what is seen in a region, by typical pixels or by ``every`` lit one.
+
+        Raises
+        ------
+        Problem
+            ``invalid-request`` where the picture does not hold the region, or no picture was seen;
+            ``target-unreachable`` where nothing is lit in it.
+        """
+        if region is None and not every:
+            return self
+        if self.seen is None:
+            detail = "A scene that is given has no picture, and so no region of it."
+            raise Problem(kinds.INVALID_REQUEST, detail, field="region", value=None, limit=None)
+        mask = None if region is None else region.mask(*self.shape)
+        scene = self.seen(mask, every=every)
+        if scene is None:
+            raise Problem(
+                kinds.TARGET_UNREACHABLE,
+                "No pixel of the region has light that stands clear of the noise.",
+                field="region",
+                value=None if region is None else region.to_document(),
+                best=None,
+            )
+        kept = ("seen", "shape", "drift_m", "lost_share", "of_one_frame")
+        return replace(scene, **{name: getattr(self, name) for name in kept})
 
     def to_document(self) -> dict[str, Any]:
         """Return what was seen, as JSON."""

@@ -103,6 +103,9 @@ class Candidate:
             self.reconstruct_s,
             self.predictor.bound_width(sequence) if bounded else None,
             None if distance_m is None else self.predictor.separation(sequence, distance_m),
+            self.family.capabilities.settle_s * sequence.frequency_changes,
+            self.goal.share,
+            self.goal.range_error_m,
         )
 
 

@@ -6,7 +6,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from transientcam_driver import AppliedSequence, Sequence
+from transientcam_server.planning._prediction.intervals import Figure
+from transientcam_server.planning._prediction.measures import TOLERANCES_M
 from transientcam_server.planning._prediction.prediction import Prediction
+from transientcam_server.planning._search.price import price
 
 
 def in_words(sequence: Sequence, estimator: str) -> str:
@@ -38,6 +41,10 @@ class Choice:
         not compiled yet.
     bound_width, separation_share
         Predicted where the goal has them.
+    settling_s
+        Part of the capture in which the modulation settles.
+    share, target_m
+        Of the pixels, and the error that so many are to be within; None where the goal has none.
     """
 
     applied: AppliedSequence
@@ -47,6 +54,14 @@ class Choice:
     timed: Callable[[], float | None] = field(compare=False)
     bound_width: float | None = None
     separation_share: float | None = None
+    settling_s: float = 0.0
+    share: float | None = None
+    target_m: float | None = None
+
+    @property
+    def range_error(self) -> Figure:
+        """The error that a target limits: of the share of the goal, or of the median pixel."""
+        return self.predicted.within or self.predicted.range_error
 
     @property
     def computing_share(self) -> float | None:
@@ -60,13 +75,13 @@ class Choice:
             return math.inf if self.bound_width is None else self.bound_width
         if target == "separation_m":
             return 1.0 if self.separation_share is None else 1.0 - self.separation_share
-        figure = self.predicted.range_std if target == "range_std_m" else self.predicted.range_error
+        figure = self.predicted.range_std if target == "range_std_m" else self.range_error
         return figure.median
 
     def error_with_margin(self, target: str) -> float:
         """Return what most of the captures stay below."""
         if target == "range_error_m":
-            return self.predicted.range_error.with_margin
+            return self.range_error.with_margin
         if target == "range_std_m":
             return self.predicted.range_std.with_margin
         return self.error(target)
@@ -96,17 +111,36 @@ class Choice:
             "frame_rate_hz": self.applied.frame_rate_hz,
             "reconstruct_s": self.timed(),
             "computing_share": self.computing_share,
+            "price": price(self.applied, self.settling_s, self.timed()),
             "predicted": {
                 "range_error_m": self.predicted.range_error.to_document(),
                 "range_std_m": self.predicted.range_std.to_document(),
                 "range_bias_m": self.predicted.range_bias_m,
                 "range_bias_most_m": self.predicted.most_bias_m,
                 "bias_known": self.predicted.bias_known,
-                "outlier_share": self.predicted.outlier_share,
+                "within": self._within(),
+                "beyond": [
+                    {"error_m": each, "share": 1 - self.predicted.share_within(each)}
+                    for each in TOLERANCES_M
+                    if self.predicted.off_m
+                ],
                 "beyond_scene": self.beyond_scene,
                 "bound_width": self.bound_width,
                 "separation_share": self.separation_share,
             },
+        }
+
+    def _within(self) -> dict[str, Any] | None:
+        figure, target_m = self.predicted.within, self.target_m
+        if figure is None:
+            return None
+        return {
+            "share": self.share,
+            "error_m": figure.median,
+            "low": figure.low,
+            "high": figure.high,
+            "target_m": target_m,
+            "target_share": None if target_m is None else self.predicted.share_within(target_m),
         }
 
     def in_words(self) -> str:

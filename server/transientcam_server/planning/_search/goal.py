@@ -7,9 +7,13 @@ from typing import Final
 
 from transientcam_driver import Sequence
 from transientcam_server.errors import Problem, kinds
+from transientcam_server.planning._scene.region import Region
 
 TARGETS: Final = ("range_error_m", "range_std_m", "separation_m", "bound_width")
 """Accuracies that a goal may limit; choices are compared by the first by default."""
+SHARE: Final = 0.9
+"""Of the pixels that are to be within a target; a capture has two of three within the error of the
+median pixel."""
 BUDGETS: Final = ("capture_s", "frame_rate_hz", "computing_share")
 
 
@@ -20,7 +24,12 @@ class Goal:
     Attributes
     ----------
     range_error_m
-        Noise and bias of the range together, of the median lit pixel, at most.
+        How far the range is off, noise and bias together, at most.
+    share
+        Of the pixels of a capture whose ranges are to be within it; None for the error of the
+        median pixel, over many captures.
+    region
+        Whose lit pixels count; None for all of the picture.
     range_std_m
         Standard deviation of the range of a typical pixel, at most.
     separation_m
@@ -43,6 +52,8 @@ class Goal:
     """
 
     range_error_m: float | None = None
+    share: float | None = SHARE
+    region: Region | None = None
     range_std_m: float | None = None
     separation_m: float | None = None
     separation_share: float = 0.9
@@ -118,7 +129,8 @@ class Goal:
                 limit=f"at least one of {', '.join((*TARGETS, *BUDGETS))}",
             )
         positive = [(name, math.inf, "a number above 0") for name in (*TARGETS, *BUDGETS)]
-        for name, most, limit in [*positive, ("separation_share", 1.0, "between 0 and 1")]:
+        shares = [(name, 1.0, "between 0 and 1") for name in ("share", "separation_share")]
+        for name, most, limit in [*positive, *shares]:
             value = getattr(self, name)
             if value is not None and not 0 < value < most:
                 detail = f"{name} = {value!r} must be {limit}."

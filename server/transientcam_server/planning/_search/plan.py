@@ -5,7 +5,7 @@ candidates, which are predicted as far as the search asks; what it recommends be
 what falls short of the goal a refusal.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from transientcam.notebook import table_html
@@ -14,6 +14,7 @@ from transientcam_server.planning._prediction.prediction import Predictor
 from transientcam_server.planning._process.progress import Progress
 from transientcam_server.planning._scene.scene import SceneStatistics
 from transientcam_server.planning._search.candidates import ComputingTime, curves
+from transientcam_server.planning._search.changes import Change, changes, computing_s, in_words
 from transientcam_server.planning._search.choice import Choice
 from transientcam_server.planning._search.families import families
 from transientcam_server.planning._search.finest import shortened
@@ -41,6 +42,12 @@ class Plan:
         known.
     scene
         What it was planned for.
+    goal
+        What it was planned for, too.
+    changes
+        What better cameras would give, best first.
+    computing_s
+        Computing time of a frame by estimator; None where it is not known yet.
     """
 
     recommended: Choice
@@ -49,11 +56,20 @@ class Plan:
     leading: str
     summary: str
     scene: SceneStatistics
+    goal: Goal
+    changes: list[Change]
+    computing_s: dict[str, float | None]
 
     def to_document(self) -> dict[str, Any]:
         """Return the plan as JSON has it."""
+        recommended = self.recommended.to_document()
+        region = self.goal.region
         return {
-            **self.recommended.to_document(),
+            **recommended,
+            "region": None if region is None else region.to_document(),
+            "computing_s": self.computing_s,
+            "changes": [asdict(each) for each in self.changes],
+            "price_summary": in_words(recommended["price"], self.changes, self.goal),
             "compared_by": self.leading,
             "summary": self.summary,
             "scene": self.scene.to_document(),
@@ -133,15 +149,17 @@ def plan(
     progress.at(0.8, "twice the accuracy")
     twice = quickest(unlimited, {leading: best.error(leading) / 2}, contenders=1)
     scene = predictor.scene
-    words = summary(best, twice, scene) + scene.conditions
-    return Plan(best, half_time, twice, leading, words, scene)
+    progress.at(0.9, "what would buy most")
+    better = changes(best, goal, predictor, capabilities)
+    words, times_s = summary(best, twice, scene) + scene.conditions, computing_s(best, timed)
+    return Plan(best, half_time, twice, leading, words, scene, goal, better, times_s)
 
 
 def _in_words(choice: Choice) -> str:
     predicted = choice.predicted
     return (
         f"{choice.in_words()}: captures in {choice.applied.capture_s * 1e3:.1f} ms, "
-        f"range to {predicted.range_error.median * 1e3:.2f} mm "
+        f"range to {choice.range_error.median * 1e3:.2f} mm "
         f"({predicted.range_std.median * 1e3:.2f} noise, "
         f"{predicted.range_bias_m * 1e3:.2f} bias)"
     )

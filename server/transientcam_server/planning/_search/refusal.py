@@ -21,16 +21,18 @@ def refusal(goal: Goal, shortfall: Shortfall, *, of_one_frame: bool = False) -> 
     limit, achieved = getattr(goal, field), _achieved(best, field)
     limited_by, words = _limits(shortfall)
     named = "share of captures that find both" if field == "separation_m" else field
-    margin = ""
+    margin, of_share = "", ""
+    if field == "range_error_m" and goal.share is not None:
+        of_share = f" in {goal.share:.0%} of the pixels"
     if field.startswith("range") and achieved <= limit:
         margin = ", which leaves no margin"
     decided = not (of_one_frame and field.startswith("range"))
     verdict = (
-        f"This cannot be reached on this scene: {field} = {limit:g}. "
+        f"This cannot be reached on this scene: {field} = {limit:g}{of_share}. "
         f"The best {named} is {achieved:.4g}{margin}."
         if decided
-        else f"Whether this can be reached one frame does not tell: {field} = {limit:g}. By it the "
-        f"best {named} is {achieved:.4g}; a look at all frequencies may find less."
+        else f"Whether this can be reached one frame does not tell: {field} = {limit:g}{of_share}. "
+        f"By it the best {named} is {achieved:.4g}; a look at all frequencies may find less."
     )
     return Problem(
         kinds.TARGET_UNREACHABLE,

@@ -99,7 +99,7 @@ def _expected(possible: list[_Place], targets: Targets, within_s: float) -> list
 
 def _first_affordable(curve: Curve, limits: Targets, first: int, last: int) -> int | None:
     """Return the first place that few draws find within limits, up to one that is affordable."""
-    place = _first_within(curve, limits, first, last)
+    place = first_within(curve, limits, first, last)
     if place is None:
         return None
     return next(each for each in range(place, last + 1) if curve[each].affordable)
@@ -127,7 +127,7 @@ def _confirmed(expected: _Place, targets: Targets, within_s: float) -> Choice | 
         # where even the error is too large, the margin of few pixels says nothing
         wrong = max(error if error > 1 else with_margin, _LEAST_CORRECTION)
         corrected = {name: candidate.error(name) / wrong for name in targets}
-        further = _first_within(curve, corrected, failed + 1, last)
+        further = first_within(curve, corrected, failed + 1, last)
         if further is None and best is None and failed < last:
             # few draws are not wrong about all by the same factor: the best by them is left
             further = last = _finest(curve, failed + 1, last)
@@ -137,7 +137,7 @@ def _confirmed(expected: _Place, targets: Targets, within_s: float) -> Choice | 
     return best
 
 
-def _first_within(curve: Curve, limits: Targets, first: int, last: int) -> int | None:
+def first_within(curve: Curve, limits: Targets, first: int, last: int) -> int | None:
     """Return the first place from ``first`` to ``last`` that few draws find within limits."""
 
     def within(candidate: Candidate) -> bool:

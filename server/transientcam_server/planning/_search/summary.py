@@ -19,7 +19,7 @@ def summary(best: Choice, twice: Choice | None, scene: SceneStatistics) -> str:
             + doubt
         )
     factor = twice.applied.capture_s / best.applied.capture_s
-    error_m = twice.predicted.range_error.median
+    error_m = twice.range_error.median
     return (
         f"{first}: {twice.in_words()} takes {factor:.2g} x as long for {error_m * 1e3:.3g} mm."
         + doubt
@@ -32,7 +32,7 @@ def summary_of_front(front: list[Choice], scene: SceneStatistics) -> str:
         return "Nothing reaches any accuracy on this scene."
     finest = front[-1]
     best = (
-        f"the best is {finest.predicted.range_error.median * 1e3:.3g} mm in "
+        f"the best is {finest.range_error.median * 1e3:.3g} mm in "
         f"{_time_in_words(finest.applied.capture_s)} ({finest.in_words()})"
     )
     doubt = _doubt(finest, scene)
@@ -41,7 +41,7 @@ def summary_of_front(front: list[Choice], scene: SceneStatistics) -> str:
             (
                 each.predicted.range_std.median,
                 each.predicted.range_bias_m,
-                each.predicted.range_error.median,
+                each.range_error.median,
             )
             for each in front
         ]

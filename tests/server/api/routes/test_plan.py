@@ -1,5 +1,6 @@
 """Planning over REST: recommendations, refusals, and the front of the scene that is seen."""
 
+import io
 import json
 from collections.abc import Iterator
 from http.client import HTTPConnection
@@ -8,6 +9,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import httpx
+import numpy as np
 import pytest
 
 from tests.server.contract import client_of
@@ -46,7 +48,18 @@ def test_a_plan_for_the_scene_before_the_camera_is_a_sequence_it_takes(noisy: ht
     assert predicted["range_error_m"]["median"] <= 0.02
     assert predicted["range_std_m"]["median"] > 0
     assert predicted["range_bias_m"] < predicted["range_error_m"]["p90"]
-    assert 0 <= predicted["outlier_share"] < 0.2
+    within = predicted["within"]
+    assert (within["share"], within["target_m"]) == (0.9, 0.02)
+    assert within["error_m"] <= 0.02
+    assert 0.9 <= within["target_share"] <= 1
+    beyond = [each["share"] for each in predicted["beyond"]]
+    assert beyond == sorted(beyond, reverse=True)
+    items = answer["price"]
+    spent_s = sum(items[f"{name}_s"] for name in ("light", "readout", "settling"))
+    assert spent_s == pytest.approx(answer["capture_s"])
+    waited_s = items["transport_s"] + (items["computing_s"] or 0.0)
+    assert items["sum_s"] == pytest.approx(spent_s + waited_s)
+    assert {each["what"] for each in answer["changes"]} == {"readout", "light"}
     assert "mm noise, " in answer["summary"]
     assert answer["scene"]["ambiguity_checked"] is True
     assert answer["scene"]["lit_share"] > 0.9
@@ -98,6 +111,9 @@ def test_an_impossible_target_is_refused_with_the_best_achievable(noisy: httpx.C
         ({"budget": {"frame_rate_hz": "fast"}}, "budget.frame_rate_hz"),
         ({"fixed": {"harmonics": 99}, "budget": {"capture_s": 1}}, "harmonics"),
         ({"scene": {"brightness_dn_per_s": 0}, "budget": {"capture_s": 1}}, None),
+        ({"share": 1.0, "budget": {"capture_s": 1}}, "share"),
+        ({"region": [150, 0, 20, 20], "budget": {"capture_s": 1}}, "region"),
+        ({"region": [[0, 0], [9, 9]], "budget": {"capture_s": 1}}, "region"),
     ],
 )
 def test_a_request_that_cannot_be_meant_is_refused_by_name(
@@ -203,6 +219,29 @@ def test_a_job_makes_the_plan_that_a_request_waits_for(noisy: httpx.Client) -> N
     assert (job["kind"], job["state"], job["progress"]) == ("plan", "done", 1.0)
     for name in ("sequence", "predicted", "summary", "scene"):
         assert job["result"][name] == expected[name]
+
+
+def test_a_job_maps_the_error_of_each_pixel_and_says_who_is_within_a_region(
+    noisy: httpx.Client, noisy_daemon: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(noisy_daemon.service.planning, "_process", Here())
+    goal = {"target": {"range_error_m": 0.5}, "estimator": "single-frequency", "map": True}
+    fixed = {"base_frequency_hz": 23e6, "harmonics": 1, "exposure_s": 5e-4, "takes": 1}
+
+    region = [40, 30, 60, 50]
+    job = end_of(noisy, start(noisy, **goal, fixed=fixed, scene=None, region=region))
+
+    assert job["state"] == "done", job["problem"]
+    assert job["result"]["region"] == [[40, 30], [99, 30], [99, 79], [40, 79]]
+    path = f"/api/v1/jobs/{job['id']}/map"
+    error_m = np.load(io.BytesIO(noisy.get(f"{path}.npy").content))
+    assert error_m.shape == (120, 163)
+    stated = job["result"]["predicted"]["range_error_m"]
+    inside = error_m[30:80, 40:100]
+    assert np.nanmedian(inside) == pytest.approx(stated["median"], rel=0.15)
+    assert noisy.get(f"{path}.png").content.startswith(b"\x89PNG")
+    without = noisy.get(f"/api/v1/jobs/{end_of(noisy, start(noisy, **goal))['id']}/map.npy")
+    assert (without.status_code, without.json()["type"]) == (404, "/problems/not-found")
 
 
 def test_a_job_fails_with_what_the_request_is_refused_with(noisy: httpx.Client) -> None:

@@ -10,9 +10,11 @@ import transientcam_moments as tm
 from benchmarks.accuracy.capturing import measured
 from tests.server.planning.looks import SETTINGS, looked
 from transientcam_driver import Sequence
-from transientcam_server.planning import Goal, Planner, SceneStatistics, uniform_scene
+from transientcam_server.errors import Problem
+from transientcam_server.planning import Goal, Planner, Region, SceneStatistics, uniform_scene
 from transientcam_server.planning._prediction.prediction import SWING, Prediction, Predictor
 from transientcam_server.planning._scene.sampling import one_of_each
+from transientcam_server.planning._search.search import TOLERANCE
 
 FREQUENCY_HZ = 23e6
 
@@ -120,7 +122,7 @@ def test_the_bias_of_a_second_return_is_that_of_the_phase_of_the_sum() -> None:
     assert predicted.range_error.median == pytest.approx(mixed - 1.5, rel=0.01)
 
 
-@pytest.mark.parametrize("goal", [Goal(range_error_m=0.005), Goal(capture_s=0.05)])
+@pytest.mark.parametrize("goal", [Goal(range_error_m=0.005, share=None), Goal(capture_s=0.05)])
 def test_the_recommended_sequence_measures_as_predicted(
     goal: Goal, wall: tuple[Planner, SceneStatistics]
 ) -> None:
@@ -135,6 +137,41 @@ def test_the_recommended_sequence_measures_as_predicted(
     assert saturated == 0.0
     if goal.range_error_m is not None:
         assert values["error"] <= goal.range_error_m
+
+
+def test_a_share_of_the_pixels_of_a_wall_is_within_what_its_noise_gives() -> None:
+    scene = uniform_scene(4e5, [(2.0, 1.0)])
+    sequence = Sequence(harmonics=1, exposure_s=0.001, takes=2, zeroth="estimated")
+    of_median = Predictor(scene, tm.noise.Sensor(), SETTINGS)
+    std_m = of_median.least_noise_m("single-frequency", sequence, of_median.noise_scale(sequence))
+
+    for share, deviations in ((0.6827, 1.0), (0.9, 1.6449), (0.9545, 2.0)):
+        predictor = Predictor(scene, tm.noise.Sensor(), SETTINGS, share=share)
+        predicted = predictor.predict("single-frequency", sequence)
+        assert predicted.within is not None
+        # the median of 30 draws takes a little of the noise for bias, which is back in the sum
+        assert predicted.within.median == pytest.approx(deviations * std_m, rel=0.04)
+        assert predicted.within.low < predicted.within.median < predicted.within.with_margin
+        assert predicted.share_within(deviations * std_m) == pytest.approx(share, abs=0.02)
+        scale = predictor.noise_scale(sequence)
+        assert predictor.least_noise_m("single-frequency", sequence, scale) < deviations * std_m
+        few_m = predictor.quick("single-frequency", sequence, scale)[2]
+        assert 1 < few_m / (deviations * std_m) < TOLERANCE  # else a search overlooks it
+    assert of_median.predict("single-frequency", sequence).within is None
+
+
+def test_a_region_is_predicted_by_its_own_pixels(wall: tuple[Planner, SceneStatistics]) -> None:
+    _, scene = wall
+    region = Region.of([20, 30, 40, 50])
+
+    part = scene.within(region)
+
+    assert part.pixels is not None
+    row, column = np.divmod(part.pixels, scene.shape[1])
+    assert (row.min() >= 30, row.max() < 80, column.min() >= 20, column.max() < 60) == (True,) * 4
+    assert part.lit_share == 1.0
+    with pytest.raises(Problem, match="within 163 x 120 pixels"):
+        scene.within(Region.of([150, 0, 20, 20]))
 
 
 @pytest.mark.parametrize(("apart_m", "known"), [(0.0, True), (0.0005, True), (0.02, False)])

@@ -3,6 +3,8 @@
 import dataclasses
 import math
 
+import numpy as np
+
 from transientcam_driver import Capabilities, Sequence
 from transientcam_server.planning._prediction.intervals import Figure
 from transientcam_server.planning._prediction.prediction import Prediction
@@ -25,6 +27,7 @@ def choice(
     reconstruct_s: float | None = 0.01,
     bound_width: float | None = None,
     separation_share: float | None = None,
+    within_m: float | None = None,
 ) -> Choice:
     """A choice of these errors; its capture takes what the camera needs, or what is stated."""
     sequence = Sequence(base_frequency_hz=20e6, harmonics=harmonics, exposure_s=1e-3, takes=takes)
@@ -36,9 +39,10 @@ def choice(
         range_std=figure(std_m),
         range_error=figure(error_m),
         range_bias_m=bias_m,
-        outlier_share=0.125,
         most_bias_m=2 * bias_m,
         bias_known=bias_known,
+        off_m=tuple(np.linspace(0.0, 0.1, 201)),
+        within=None if within_m is None else figure(within_m),
     )
     return Choice(
         applied,
@@ -48,4 +52,7 @@ def choice(
         timed=lambda: reconstruct_s,
         bound_width=bound_width,
         separation_share=separation_share,
+        settling_s=0.5e-3,
+        share=None if within_m is None else 0.75,
+        target_m=0.08,
     )

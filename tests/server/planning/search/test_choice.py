@@ -68,4 +68,24 @@ def test_the_document_has_all_of_it(capabilities: Capabilities) -> None:
     assert (predicted["range_bias_m"], predicted["range_bias_most_m"]) == (4e-3, 8e-3)
     assert (predicted["bias_known"], predicted["beyond_scene"]) == (True, False)
     assert (predicted["bound_width"], predicted["separation_share"]) == (None, 0.5)
-    assert predicted["outlier_share"] == 0.125
+    assert predicted["within"] is None
+    beyond = {each["error_m"]: each["share"] for each in predicted["beyond"]}
+    assert (beyond[0.02], beyond[0.05], beyond[0.2]) == pytest.approx((0.8, 0.5, 0.0))
+
+
+def test_a_share_of_the_pixels_is_what_a_target_is_held_against(capabilities: Capabilities) -> None:
+    one = choice(capabilities, std_m=3e-3, bias_m=4e-3, within_m=9e-3)
+
+    assert one.error("range_error_m") == 9e-3
+    assert one.error_with_margin("range_error_m") == pytest.approx(1.25 * 9e-3)
+    assert one.error("range_std_m") == 3e-3
+    assert one.to_document()["predicted"]["within"] == pytest.approx(
+        {
+            "share": 0.75,
+            "error_m": 9e-3,
+            "low": 4.5e-3,
+            "high": 18e-3,
+            "target_m": 0.08,
+            "target_share": 0.8,
+        }
+    )

@@ -27,8 +27,9 @@ def test_noise_and_bias_are_named_by_which_is_larger(capabilities: Capabilities)
 
     found = refused(goal, "range_error_m", biased)
     assert found.detail == (
-        "This cannot be reached on this scene: range_error_m = 0.001. The best range_error_m is "
-        "0.005. What limits it: more time does not help here: bias 4 mm at m = 3."
+        "This cannot be reached on this scene: range_error_m = 0.001 in 90% of the pixels. The "
+        "best range_error_m is 0.005. What limits it: more time does not help here: bias 4 mm at "
+        "m = 3."
     )
     assert (found.extensions["field"], found.extensions["value"]) == ("range_error_m", 1e-3)
     assert found.extensions["limit"] == pytest.approx(5e-3)

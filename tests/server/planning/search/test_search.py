@@ -92,7 +92,7 @@ class Hasty(ClosedForm):
     def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
         exact = super().quick(estimator, sequence, self.noise_scale(sequence))
         std, error = (Figure(each, each, each, each, each) for each in (exact[0], exact[2]))
-        return Prediction(std, error, exact[1], 0.0, exact[1], bias_known=True)
+        return Prediction(std, error, exact[1], exact[1], bias_known=True)
 
 
 class Splitting(ClosedForm):

@@ -9,6 +9,8 @@ import { Finding } from "./Finding";
 import { FrontPlot } from "./FrontPlot";
 import { FrontSlider } from "./FrontSlider";
 import { GoalForm } from "./GoalForm";
+import { PlannedMap } from "./PlannedMap";
+import { PriceBar } from "./PriceBar";
 import { sameSequence, standingOf } from "./place";
 import { Summary } from "./Summary";
 import { errorWords } from "./words";
@@ -61,6 +63,8 @@ export function AccuracySection({ applied }: { applied: AppliedDocument }) {
       </div>
       <div class="accuracy-facts fades">
         {looked === null ? <Summary applied={applied} /> : <ChoiceFacts choice={looked} />}
+        {looked !== null && <PriceBar choice={looked} />}
+        <PlannedMap />
         <details class="accuracy-goal">
           <summary>Plan for a target</summary>
           <GoalForm disabled={busy} onGoal={(goal) => void accuracy.plan(goal)} />

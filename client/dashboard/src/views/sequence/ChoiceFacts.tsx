@@ -1,7 +1,21 @@
 import { engineering, fixed } from "../../scales/format";
-import type { ChoiceDocument } from "../../stream/documents";
+import type { ChoiceDocument, FigureDocument, WithinDocument } from "../../stream/documents";
 import { Fact } from "./Figures";
 import { measuredOf, ZEROTH_NAMES } from "./words";
+
+/** The error of the median pixel, and of the worst but a tenth. */
+function bothWords({ median, p90 }: FigureDocument): string {
+  return `${engineering(median, "m", 2)}, ${engineering(p90, "m", 2)}`;
+}
+
+/** How many pixels of a capture are within the target, or within what those of the goal are. */
+function withinWords({ share, error_m, target_m, target_share }: WithinDocument): { readonly name: string; readonly value: string } {
+  const met = target_m != null && target_share != null;
+  return {
+    name: `Pixels within ${engineering(met ? target_m : error_m, "m", 2)}`,
+    value: fixed(100 * (met ? target_share : share), 0, "%"),
+  };
+}
 
 /** A sequence that is looked at, and what is predicted of it. */
 export function ChoiceFacts({ choice }: { choice: ChoiceDocument }) {
@@ -24,7 +38,8 @@ export function ChoiceFacts({ choice }: { choice: ChoiceDocument }) {
       />
       <Fact name="of that noise" value={engineering(predicted.range_std_m.median, "m")} field="choice_range_std_m" />
       <Fact name="of that bias" value={bias + doubt} field="choice_range_bias_m" />
-      <Fact name="Outliers" value={fixed(100 * predicted.outlier_share, 1, "%")} field="choice_outlier_share" />
+      <Fact name="Error in 50, 90 % of pixels" value={bothWords(predicted.range_error_m)} field="choice_range_error_p90_m" />
+      {predicted.within != null && <Fact {...withinWords(predicted.within)} field="choice_within" />}
     </dl>
   );
 }
