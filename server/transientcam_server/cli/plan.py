@@ -168,7 +168,12 @@ def plan(
             [_return(text) for text in returns or ["2"]],
             ambient_dn_per_s,
         )
-        asked = {**target, **budget, "separation_share": separation_share, "estimator": estimator}
+        asked: dict[str, Any] = {
+            **target,
+            **budget,
+            "separation_share": separation_share,
+            "estimator": estimator,
+        }
         asked |= {"share": share if front or share is not None else SHARE, "region": of_pixels}
         goal = _goal(asked, stays)
         document, made = _by_camera(view, goal, console, map_file, front=front, as_json=as_json)

@@ -1,7 +1,7 @@
 """Looks: light, ambiguity and motion of a scene."""
 
 import dataclasses
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -106,7 +106,7 @@ def test_only_what_stands_still_is_looked_at_for_long(
         planner = Planner(camera.capabilities, sensor_of(camera, SensorSettings()), SETTINGS)
         carried = Carried(camera, pixels)
         scene = planner.look(
-            carried,
+            cast(Camera, carried),
             Sequence(),
             progress=Progress(lambda share, step: steps.append(step)),
         )
