@@ -28,23 +28,26 @@ beforeEach(() => {
   vi.useFakeTimers();
   [answers, cancelled, files, refusal] = [[], [], [], null];
   const start = () => (refusal === null ? Promise.resolve(job("queued")) : Promise.reject(refusal));
-  const api = answering({
-    "POST /tradeoff/jobs": start,
-    "POST /plan/jobs": start,
-    "GET /jobs/{job}": () => {
-      const answer = answers.shift() ?? job("running");
-      return answer instanceof RequestError ? Promise.reject(answer) : Promise.resolve(answer);
+  const api = answering(
+    {
+      "POST /tradeoff/jobs": start,
+      "POST /plan/jobs": start,
+      "GET /jobs/{job}": () => {
+        const answer = answers.shift() ?? job("running");
+        return answer instanceof RequestError ? Promise.reject(answer) : Promise.resolve(answer);
+      },
+      "POST /jobs/{job}/cancel": ({ of }) => {
+        cancelled.push(of);
+        return Promise.resolve(job("running"));
+      },
     },
-    "POST /jobs/{job}/cancel": ({ of }) => {
-      cancelled.push(of);
-      return Promise.resolve(job("running"));
+    {
+      file: (path: string) => {
+        files.push(path);
+        return Promise.resolve(new File(["picture"], "map.png"));
+      },
     },
-  }, {
-    file: (path: string) => {
-      files.push(path);
-      return Promise.resolve(new File(["picture"], "map.png"));
-    },
-  });
+  );
   accuracy = new Accuracy(api);
 });
 afterEach(() => vi.useRealTimers());
