@@ -178,13 +178,13 @@ def _changed(
         block = np.s_[..., start : start + _BLOCK_PIXELS]
         parts = [each[block] for each in flat], [each[block] for each in pixels]
         changed[block], doubtful[block] = _judged(*parts, order[:, None], numbers, sums[block])
-    sums = np.concatenate([sums, sums != 0])  # of deviations, and how many
-    changed, doubtful, sums = (each.reshape((-1, *shape)) for each in (changed, doubtful, sums))
+    found, near = changed.reshape(shape), doubtful.reshape(shape)
+    both = np.concatenate([sums, sums != 0]).reshape((-1, *shape))  # of deviations; how many
     for step in (1, 3):  # 3 x 3 pixels, then 3 x 3 of these; what has changed is not among them
-        sums = _summed(np.where(changed, 0, sums), step)
-        changed = changed | (sums[:4] ** 2 > DRIFTED**2 * np.maximum(sums[4:], 1)).any(axis=0)
-    found = changed[0] & among
-    found |= doubtful[0] & (_summed(found.astype(np.int8), 1) >= BESIDE)
+        both = _summed(np.where(found, 0, both), step)
+        found |= (both[:4] ** 2 > DRIFTED**2 * np.maximum(both[4:], 1)).any(axis=0)
+    found &= among
+    found |= near & (_summed(found.astype(np.int8), 1) >= BESIDE)
     return found | (_summed(found.astype(np.int8), 1) >= AMIDST)
 
 
