@@ -1,7 +1,6 @@
 """Averaging moments over frames where nothing changes: a recursive mean, begun anew by a test."""
 
 import math
-from collections.abc import Sequence
 from functools import lru_cache
 from statistics import NormalDist
 from typing import Final, NamedTuple
@@ -26,7 +25,6 @@ AMIDST: Final = 5
 RECENT: Final = 16
 LIT: Final = 20.0
 """Least size of the mean over its noise, from which on its brightness is tested by itself."""
-_BLOCK_PIXELS: Final = 2048  # whose planes stay in the caches
 _Planes = NDArray[np.floating]
 
 
@@ -168,53 +166,22 @@ def _changed(
     new: _Planes, before: Still, weight: _Planes, order: NDArray[np.int_], among: Array
 ) -> Array:
     """Return which pixels differ from their means by more than noise, or have drifted."""
-    shape, planes = among.shape, len(order)
-    flat = [each.reshape((2, planes, -1)) for each in (new, before.mean, before.recent)]
-    pixels = weight.reshape((planes, -1)), before.seen.reshape(-1), among.reshape(-1)
+    mean, seen, j = before.mean, np.maximum(before.seen, 1), order.astype(new.dtype)[:, None, None]
     numbers = int(((weight.max(axis=(1, 2)) > 0) * np.where(order > 0, 2, 1)).sum())
-    changed, doubtful = np.zeros((2, among.size), dtype=bool)
-    sums = np.zeros((4, among.size), new.dtype)
-    for start in range(0, among.size, _BLOCK_PIXELS):
-        block = np.s_[..., start : start + _BLOCK_PIXELS]
-        parts = [each[block] for each in flat], [each[block] for each in pixels]
-        changed[block], doubtful[block] = _judged(*parts, order[:, None], numbers, sums[block])
-    sums = np.concatenate([sums, sums != 0])  # of deviations, and how many
-    changed, doubtful, sums = (each.reshape((-1, *shape)) for each in (changed, doubtful, sums))
-    for step in (1, 3):  # 3 x 3 pixels, then 3 x 3 of these; what has changed is not among them
-        sums = _summed(np.where(changed, 0, sums), step)
-        changed = changed | (sums[:4] ** 2 > DRIFTED**2 * np.maximum(sums[4:], 1)).any(axis=0)
-    found = changed[0] & among
-    found |= doubtful[0] & (_summed(found.astype(np.int8), 1) >= BESIDE)
-    return found | (_summed(found.astype(np.int8), 1) >= AMIDST)
-
-
-def _judged(
-    moments: Sequence[_Planes],
-    pixels: Sequence[Array],
-    order: NDArray[np.int_],
-    numbers: int,
-    shifts: _Planes,
-) -> tuple[Array, Array]:
-    """Return which of some pixels have changed by themselves, and which may have.
-
-    Writes what they are later and brighter by, in deviations: the frame and the last ones.
-    """
-    new, mean, recent = moments
-    weight, seen, among = pixels
-    seen, j = np.maximum(seen, 1), order.astype(new.dtype)
+    shifts = np.zeros((4, *among.shape), new.dtype)  # later and brighter: the frame, the last ones
     size = weight * (mean[0] * mean[0] + mean[1] * mean[1])
     brightness, depth = size.sum(axis=0), (j * j * size).sum(axis=0)
     lit = among & (brightness * seen > LIT**2)
     drifting = among & (seen > RECENT)
     # one over the variance of a difference, over that of a frame
     of_recent = np.where(drifting, RECENT * seen / np.maximum(seen - RECENT, 1), 0)
-    changed, doubtful = np.zeros((2, *among.shape), dtype=bool)
+    found, near = np.zeros((2, *among.shape), dtype=bool)
     differences = [(new, seen / (seen + 1), CHANGED)]
     if drifting.any():
-        differences.append((recent, of_recent, DRIFTED))
+        differences.append((before.recent, of_recent, DRIFTED))
     for at, (other, known, limit) in enumerate(differences):
         off = other - mean
-        off[1] *= order > 0
+        off[1, order == 0] = 0
         scaled = weight * off
         misfit = known * (scaled * off).sum(axis=(0, 1))
         later = (j * (scaled[1] * mean[0] - scaled[0] * mean[1])).sum(axis=0)
@@ -225,9 +192,15 @@ def _judged(
         both = shifts[2 * at : 2 * at + 2]
         both[0], both[1] = np.where(among, later, 0), np.where(lit, more, 0)
         most = abs(both).max(axis=0)
-        changed |= ~((misfit <= _quantile(numbers, limit)) & (most <= limit))
-        doubtful |= (misfit > _quantile(numbers, DOUBTFUL)) | (most > DOUBTFUL)
-    return changed, doubtful
+        found |= ~((misfit <= _quantile(numbers, limit)) & (most <= limit))
+        near |= (misfit > _quantile(numbers, DOUBTFUL)) | (most > DOUBTFUL)
+    both = np.concatenate([shifts, shifts != 0])  # of deviations; how many
+    for step in (1, 3):  # 3 x 3 pixels, then 3 x 3 of these; what has changed is not among them
+        both = _summed(np.where(found, 0, both), step)
+        found |= (both[:4] ** 2 > DRIFTED**2 * np.maximum(both[4:], 1)).any(axis=0)
+    found &= among
+    found |= near & (_summed(found.astype(np.int8), 1) >= BESIDE)
+    return found | (_summed(found.astype(np.int8), 1) >= AMIDST)
 
 
 @lru_cache(maxsize=64)

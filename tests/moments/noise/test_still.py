@@ -15,10 +15,11 @@ NOISE = tm.noise.MomentNoise(VARIANCE)
 Complexes = NDArray[np.complex128]
 
 
-def light(later: NDArray[np.float64] | float = 0.0, brighter: float = 1.0) -> Complexes:
+def light(later: float = 0.0) -> Complexes:
     """Return moments of one return, of other range and brightness in each column."""
     phase = np.linspace(0.5, 3.0, SHAPE[1]) * np.ones(SHAPE) + later
-    return 40.0 * brighter * np.exp(1j * ORDERS * phase)
+    found: Complexes = 40.0 * np.exp(1j * ORDERS * phase)
+    return found
 
 
 def noisy(moments: Complexes, random: np.random.Generator) -> Complexes:
@@ -33,10 +34,10 @@ def deviation_of_shift() -> float:
     return float(1 / np.sqrt((ORDERS**2 * 40.0**2 / VARIANCE).sum()))
 
 
-def streamed(frames: list[Complexes], **how: int) -> tm.Still:
+def streamed(frames: list[Complexes]) -> tm.Still:
     still = None
     for frame in frames:
-        still = tm.average_frames(frame, NOISE, still, **how)
+        still = tm.average_frames(frame, NOISE, still)
     assert still is not None
     return still
 
@@ -61,7 +62,7 @@ def test_what_stands_still_is_the_mean_of_all_frames() -> None:
 
 def test_beyond_the_most_frames_the_variance_stays() -> None:
     frames, random = still_frames(1)
-    still = streamed(frames, most_frames=4)
+    still = streamed(frames)
     seen = []
     for _ in range(40):
         still = tm.average_frames(noisy(light(), random), NOISE, still, most_frames=4)

@@ -8,6 +8,7 @@ import pytest
 import transientcam_moments as tm
 from tests.moments.reconstruction.test_detection import captured, halves
 from tests.moments.reconstruction.test_neighbours import GAINS, SETTINGS
+from transientcam_moments.reconstruction import NEIGHBOURS
 
 COUNT = 9
 
@@ -27,7 +28,7 @@ def spread_m(found: tm.Reconstruction) -> float:
     return float(np.median(abs(range_m - np.median(range_m))))
 
 
-@pytest.mark.parametrize("neighbours", tm.reconstruction.NEIGHBOURS)
+@pytest.mark.parametrize("neighbours", NEIGHBOURS)
 def test_the_deviation_falls_with_the_frames_as_stated(neighbours: str) -> None:
     settings = replace(SETTINGS, neighbours=neighbours, still_frames=16)
 

@@ -180,6 +180,16 @@ def test_what_needs_images_is_refused_with_the_origins_address(
     assert refused.value.document["origin"] == origin.url
 
 
+def test_averaging_over_frames_is_refused_where_no_one_states_the_noise(
+    at_relay: transientcam.Camera, relay: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(relay.service, "sensor", None)
+    with pytest.raises(transientcam.ProblemError, match="still_frames") as refused:
+        at_relay.reconstruction = {"still_frames": 16}
+    assert refused.value.type == "/problems/only-moments"
+    assert at_relay.reconstruction["still_frames"] == 1
+
+
 def test_there_are_no_images_and_the_reason_is_stated(
     at_relay: transientcam.Camera, relay: Served
 ) -> None:
