@@ -25,8 +25,8 @@ def print_plan(document: Mapping[str, Any], *, computing: bool) -> None:
             f"{document['computing_share']:.1%} of the time"
         )
     echo(
-        f"range to {error['median'] * 1e3:.2f} mm ({error['low'] * 1e3:.2f} to "
-        f"{error['high'] * 1e3:.2f}): noise {std['median'] * 1e3:.2f} mm, "
+        f"range to {error['median'] * 1e3:.2f} mm ({_interval_mm(error, '.2f')}): "
+        f"noise {std['median'] * 1e3:.2f} mm, "
         f"bias {_bias_mm(predicted, '.2f')} mm; "
         f"{predicted['outlier_share']:.1%} of the ranges are outliers"
     )
@@ -68,12 +68,19 @@ def _row(choice: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         f"{choice['capture_s'] * 1e3:.4g}",
         f"{error['median'] * 1e3:.3g}",
-        f"{error['low'] * 1e3:.3g} to {error['high'] * 1e3:.3g}",
+        _interval_mm(error, ".3g"),
         f"{predicted['range_std_m']['median'] * 1e3:.3g}",
         _bias_mm(predicted, ".3g"),
         f"{predicted['outlier_share']:.1%}",
         in_words(Sequence.from_document(choice["sequence"]), choice["estimator"]),
     )
+
+
+def _interval_mm(figure: Mapping[str, Any], digits: str) -> str:
+    low, high = figure["low"], figure["high"]
+    if high is None:
+        return f"at least {low * 1e3:{digits}}"
+    return f"{low * 1e3:{digits}} to {high * 1e3:{digits}}"
 
 
 def _bias_mm(predicted: Mapping[str, Any], digits: str) -> str:

@@ -397,8 +397,9 @@ export interface FigureDocument {
   readonly median: number;
   /** What is measured lies above this with 95 %. */
   readonly low: number;
-  /** And below this. */
-  readonly high: number;
+  /** And below this; null where the bias is not known, and how much more it is the look cannot
+   * tell. */
+  readonly high: number | null;
   /** 90 % of the pixels are predicted to be better; fewer are where much light comes back close
    * behind the direct one, as near the edge of a corner, and no frequency resolves it. */
   readonly p90: number;
@@ -1215,11 +1216,22 @@ export interface SeenDocument {
   readonly lit_share: number;
   /** Share of those that are so dim, at their range, that other surfaces may light them alone. */
   readonly dim_share: number;
-  /** Share of the lit pixels that changed while the scene was looked at: what moves is not
-   * predicted. */
+  /** Share of the lit pixels that changed while the scene was looked at. Plans are for the others,
+   * with the error that the speed of what moves adds during a capture. */
   readonly moving_share: number;
   /** Whether a second base frequency showed that no range is short by a period. */
   readonly ambiguity_checked: boolean;
+  /** Whether what was seen is known to be the scene's; of one frame by nominal gains it is not. */
+  readonly calibrated: boolean;
+  /** How far nominal gains put the range of the median pixel off. Plans are for a camera that is
+   * calibrated with their sequence. */
+  readonly uncalibrated_m: number;
+  /** Share of the images that lose their synchronisation. */
+  readonly lost_share: number;
+  /** By how much ranges may have drifted since the calibration in use, by the temperature. */
+  readonly drift_m: number;
+  /** Whether the current frame had to do in the place of a look. */
+  readonly of_one_frame: boolean;
 }
 
 /** The sensor, which predictions of noise rest on. */

@@ -94,8 +94,9 @@ class FigureDocument(Document):
     """Of the median lit pixel."""
     low: float
     """What is measured lies above this with 95 %."""
-    high: float
-    """And below this."""
+    high: float | None
+    """And below this; null where the bias is not known, and how much more it is the look cannot
+    tell."""
     p90: float
     """90 % of the pixels are predicted to be better; fewer are where much light comes back close
     behind the direct one, as near the edge of a corner, and no frequency resolves it."""

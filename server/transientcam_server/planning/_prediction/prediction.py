@@ -352,16 +352,17 @@ def _error(errors: PixelErrors, farthest_m: _Array | None, picks: _Array, drift_
     ``farthest_m`` (P) is the most bias, where none is known; ``drift_m`` the expected drift, which
     may be none, and twice as much.
     """
+    expected = figure(np.hypot(errors.error_m, drift_m), _median, picks)
     reach = KNOWN if farthest_m is None else UNKNOWN
-    least_m, most_m = reach.least_bias * errors.bias_m, reach.most_bias * errors.bias_m
-    if farthest_m is not None:
-        most_m = np.maximum(most_m, farthest_m)
-    most_m = np.hypot(most_m, 2 * drift_m)
+    least_m = reach.least_bias * errors.bias_m
+    most_m = np.hypot(reach.most_bias * errors.bias_m, 2 * drift_m)
     least, most = (
         figure(np.hypot(errors.std_m, bias_m), _median, picks, reach.spread)
         for bias_m in (least_m, most_m)
     )
-    return between(figure(np.hypot(errors.error_m, drift_m), _median, picks), least, most)
+    found = between(expected, least, most)
+    # how much more than the least this look cannot tell
+    return found if farthest_m is None else replace(found, high=math.inf)
 
 
 def _typical(deviations: _Array) -> _Array:
