@@ -26,8 +26,8 @@ def print_plan(document: Mapping[str, Any], *, computing: bool) -> None:
             f"{document['computing_share']:.1%} of the time"
         )
     echo(
-        f"error {error['median'] * 1e3:.2f} mm in the median pixel ({error['low'] * 1e3:.2f} to "
-        f"{error['high'] * 1e3:.2f}), {error['p90'] * 1e3:.2f} mm at 90 %: "
+        f"error {error['median'] * 1e3:.2f} mm in the median pixel ({_interval_mm(error, '.2f')}), "
+        f"{error['p90'] * 1e3:.2f} mm at 90 %: "
         f"noise {std['median'] * 1e3:.2f} mm, bias {_bias_mm(predicted, '.2f')} mm"
     )
     if predicted["within"] is not None:
@@ -72,7 +72,7 @@ def _row(choice: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         f"{choice['capture_s'] * 1e3:.4g}",
         f"{error['median'] * 1e3:.3g}",
-        f"{error['low'] * 1e3:.3g} to {error['high'] * 1e3:.3g}",
+        _interval_mm(error, ".3g"),
         f"{error['p90'] * 1e3:.3g}",
         f"{predicted['range_std_m']['median'] * 1e3:.3g}",
         _bias_mm(predicted, ".3g"),
@@ -86,7 +86,7 @@ def _print_within(within: Mapping[str, Any], region: object) -> None:
     met = "" if target_m is None else f"; {within['target_share']:.0%} within {target_m * 1e3:g} mm"
     echo(
         f"a capture has {within['share']:.0%} of {where} within {within['error_m'] * 1e3:.2f} mm "
-        f"({within['low'] * 1e3:.2f} to {within['high'] * 1e3:.2f}){met}"
+        f"({_interval_mm(within, '.2f')}){met}"
     )
 
 
@@ -105,6 +105,13 @@ def _print_price(price: Mapping[str, Any], computing_s: Mapping[str, float | Non
         echo(f"computing by estimator: {', '.join(known)}")
     megabytes = price["data_bytes"] / 1e6
     echo(f"{megabytes:.2f} MB a capture; the light is on for {price['light_share']:.0%} of it")
+
+
+def _interval_mm(figure: Mapping[str, Any], digits: str) -> str:
+    low, high = figure["low"], figure["high"]
+    if high is None:
+        return f"at least {low * 1e3:{digits}}"
+    return f"{low * 1e3:{digits}} to {high * 1e3:{digits}}"
 
 
 def _bias_mm(predicted: Mapping[str, Any], digits: str) -> str:

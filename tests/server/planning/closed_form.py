@@ -47,7 +47,14 @@ class ClosedForm:
         bias_m = self.least_bias_m(estimator, sequence)
         return std_m, bias_m, math.hypot(std_m, bias_m)
 
-    def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
+    def predict(
+        self,
+        estimator: str,
+        sequence: Sequence,
+        *,
+        closely: bool = False,
+        capture_s: float = 0.0,
+    ) -> Prediction:
         each = self.quick(estimator, sequence, self.noise_scale(sequence))
         std, error = (
             Figure(value, value / SPREAD, value * SPREAD, 2 * value, value * MARGIN)

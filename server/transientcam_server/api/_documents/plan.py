@@ -111,8 +111,9 @@ class FigureDocument(Document):
     """Of the median lit pixel."""
     low: float
     """What is measured lies above this with 95 %."""
-    high: float
-    """And below this."""
+    high: float | None
+    """And below this; null where the bias is not known, and how much more it is the look cannot
+    tell."""
     p90: float
     """Of 90 % of the pixels; fewer are better where much light comes back close
     behind the direct one, as near the edge of a corner, and no frequency resolves it."""
@@ -127,8 +128,9 @@ class WithinDocument(Document):
     """So many are within this."""
     low: float
     """What is measured of `error_m` lies above this with 95 %."""
-    high: float
-    """And below this."""
+    high: float | None
+    """And below this; null where the bias is not known, and how much more it is the look cannot
+    tell."""
     target_m: float | None = None
     """The largest error that the goal allows."""
     target_share: float | None = None

@@ -68,7 +68,7 @@ class Figure:
     median
         Of the median lit pixel.
     low, high
-        `COVERAGE` of the captures measure a value between them.
+        `COVERAGE` of the captures measure a value between them. An infinite end is not known.
     p90
         90 % of the pixels are predicted to be better.
     with_margin
@@ -81,9 +81,10 @@ class Figure:
     p90: float
     with_margin: float
 
-    def to_document(self) -> dict[str, float]:
-        """Return it as JSON."""
-        return {"median": self.median, "low": self.low, "high": self.high, "p90": self.p90}
+    def to_document(self) -> dict[str, float | None]:
+        """Return it as JSON, where an open end is null."""
+        high = self.high if math.isfinite(self.high) else None
+        return {"median": self.median, "low": self.low, "high": high, "p90": self.p90}
 
 
 def figure(

@@ -443,16 +443,16 @@ def _error(
     drift_m
         Expected; there may be none, and twice as much.
     """
+    expected = figure(of_bias(np.hypot(errors.bias_m, drift_m)), value, picks)
     reach = KNOWN if farthest_m is None else UNKNOWN
-    least_m, most_m = reach.least_bias * errors.bias_m, reach.most_bias * errors.bias_m
-    if farthest_m is not None:
-        most_m = np.maximum(most_m, farthest_m)
-    most_m = np.hypot(most_m, 2 * drift_m)
+    least_m = reach.least_bias * errors.bias_m
+    most_m = np.hypot(reach.most_bias * errors.bias_m, 2 * drift_m)
     least, most = (
         figure(of_bias(bias_m), value, picks, reach.spread) for bias_m in (least_m, most_m)
     )
-    expected = of_bias(np.hypot(errors.bias_m, drift_m))
-    return between(figure(expected, value, picks), least, most)
+    found = between(expected, least, most)
+    # how much more than the least this look cannot tell
+    return found if farthest_m is None else replace(found, high=math.inf)
 
 
 def _within(

@@ -137,8 +137,7 @@ class Choice:
         return {
             "share": self.share,
             "error_m": figure.median,
-            "low": figure.low,
-            "high": figure.high,
+            **{name: figure.to_document()[name] for name in ("low", "high")},
             "target_m": target_m,
             "target_share": None if target_m is None else self.predicted.share_within(target_m),
         }

@@ -142,7 +142,7 @@ def test_what_a_device_does_is_not_taken_for_the_scene() -> None:
 
     # of its profile: amplitudes at 11.5, 46 and 92 MHz; the delays of its pixels are 1.2 ns
     assert np.array(scene.contrast)[[1, 4, 8]] == pytest.approx([1.0, 0.951, 0.553], abs=0.02)
-    assert scene.lost_share == pytest.approx(0.07, abs=0.02)
+    assert 0.03 < scene.lost_share < 0.08  # of 7 %, those that differ by more than noise
     assert 0.03 < scene.uncalibrated_m < 0.18
     assert scene.disagreement_m < 1e-3
     assert np.median(scene.direct_m) == pytest.approx(np.median(true_m), abs=0.01)

@@ -127,7 +127,8 @@ def test_few_pixels_may_lie_beyond_the_unambiguous_range(
     share[0] = 1.0
     direct_m[:far] = 5.0
     delays_s[1, 50 : 50 + late], share[1, 50 : 50 + late] = delay_s(5.0) * (1 + 1e-9), 0.9
-    scene = dataclasses.replace(measured(100), direct_m=direct_m, delay_s=delays_s, share=share)
+    still = dataclasses.replace(measured(100), moving_share=0.0)
+    scene = dataclasses.replace(still, direct_m=direct_m, delay_s=delays_s, share=share)
 
     assert scene.ambiguous(5.0) == ambiguous
     assert not scene.ambiguous(5.001)

@@ -22,7 +22,14 @@ class Doubtful(ClosedForm):
         apart = np.full_like(self.scene.direct_m, apart_m)
         self.scene = dataclasses.replace(self.scene, dim_share=dim_share, uncertainty_m=apart)
 
-    def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
+    def predict(
+        self,
+        estimator: str,
+        sequence: Sequence,
+        *,
+        closely: bool = False,
+        capture_s: float = 0.0,
+    ) -> Prediction:
         found = super().predict(estimator, sequence)
         return dataclasses.replace(found, most_bias_m=0.04, bias_known=False)
 

@@ -89,7 +89,14 @@ class Hasty(ClosedForm):
         part = 1 / 3 if estimator == "maximum-entropy" else 1.0
         return std_m, bias_m, part * error_m
 
-    def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
+    def predict(
+        self,
+        estimator: str,
+        sequence: Sequence,
+        *,
+        closely: bool = False,
+        capture_s: float = 0.0,
+    ) -> Prediction:
         exact = super().quick(estimator, sequence, self.noise_scale(sequence))
         std, error = (Figure(each, each, each, each, each) for each in (exact[0], exact[2]))
         return Prediction(std, error, exact[1], exact[1], bias_known=True)
@@ -133,7 +140,14 @@ def test_an_error_that_rises_again_with_time_hides_no_quicker_sequence(
 class Sampled(ClosedForm):
     """Few pixels leave an error uncertain by a third; all that there are do not."""
 
-    def predict(self, estimator: str, sequence: Sequence, *, closely: bool = False) -> Prediction:
+    def predict(
+        self,
+        estimator: str,
+        sequence: Sequence,
+        *,
+        closely: bool = False,
+        capture_s: float = 0.0,
+    ) -> Prediction:
         found = super().predict(estimator, sequence)
         if closely:
             return found

@@ -33,7 +33,7 @@ export function ChoiceFacts({ choice }: { choice: ChoiceDocument }) {
       <Fact name="Range by" value={choice.estimator.replaceAll("-", " ")} field="choice_estimator" />
       <Fact
         name="Error, 90 % within"
-        value={`${engineering(low, "m", 2)} to ${engineering(high, "m", 2)}`}
+        value={high === null ? `at least ${engineering(low, "m", 2)}` : `${engineering(low, "m", 2)} to ${engineering(high, "m", 2)}`}
         field="choice_range_error_interval_m"
       />
       <Fact name="of that noise" value={engineering(predicted.range_std_m.median, "m")} field="choice_range_std_m" />

@@ -114,7 +114,7 @@ export function FrontPlot({ tradeoff, now, chosen, onChoose }: FrontPlotProps) {
                 }}
               >
                 <title>{words}</title>
-                <path d={`M${point.x} ${at(choice.capture_s, low).y}V${at(choice.capture_s, high).y}`} />
+                <path d={`M${point.x} ${at(choice.capture_s, low).y}V${high === null ? MARGIN.top : at(choice.capture_s, high).y}`} />
                 <circle class="front-reach" cx={point.x} cy={point.y} r="9" />
                 <circle cx={point.x} cy={point.y} r="4" />
               </g>

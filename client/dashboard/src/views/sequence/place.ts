@@ -22,7 +22,7 @@ export function endsOf({ front, current }: TradeoffDocument): Ends {
   const times = [current.capture_s, ...front.map(({ capture_s }) => capture_s)];
   const errors = front.flatMap(({ predicted }) => [
     predicted.range_error_m.low,
-    predicted.range_error_m.high,
+    predicted.range_error_m.high ?? predicted.range_error_m.low,
     predicted.range_error_m.median,
   ]);
   const then = plannedError_m(current.meta.accuracy);
