@@ -11,7 +11,6 @@ from transientcam_simulation.effects._conditions import (
     WORST_ABOVE,
     Call,
     Conditions,
-    over_noise,
 )
 from transientcam_simulation.effects._dark_current import DarkCurrentElectrons
 from transientcam_simulation.effects._distortion import Distortion
@@ -114,6 +113,5 @@ __all__ = [
     "Values",
     "draw_few",
     "measured_harmonics",
-    "over_noise",
     "read_offsets_rad",
 ]
