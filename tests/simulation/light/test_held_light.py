@@ -76,12 +76,13 @@ def world(interreflection: str, sequence: Sequence) -> World:
     return built
 
 
-def solved_in_full(time_s: float) -> Interreflection:
-    """Light over several surfaces, as if the scene stood still."""
+def solved_in_full(time_s: float) -> tuple[Interreflection, NDArray[np.intp]]:
+    """Light over several surfaces as if the scene stood still, and which one (H, W) pixels see."""
     now = scene().at(time_s)
     assert now.camera is not None
     lit = light_rays(now, camera_rays(now.camera, width=WIDTH, height=HEIGHT))
-    return Interreflection(now, lit, width=WIDTH, height=HEIGHT)
+    light = Interreflection(now, lit, width=WIDTH, height=HEIGHT)
+    return light, lit.surface.reshape(HEIGHT, WIDTH)
 
 
 @pytest.mark.parametrize(
@@ -95,6 +96,7 @@ def test_what_steps_leave_out_is_below_the_noise(
     factor_e = 0.5 * conditions.scale_e * conditions.sub_phase_gain(1)
     period_s = sequence.exposure_s + READOUT_S
     errors_e: dict[int, NDArray[np.complex128]] = {}
+    seen: list[NDArray[np.intp]] = []
     for label in (
         each for each in sequence.labels if each.take in takes and each.harmonic in harmonics
     ):
@@ -103,7 +105,8 @@ def test_what_steps_leave_out_is_below_the_noise(
             of.mean_image_e(label, number=0, device_time_s=time_s).astype(np.float64)
             for of in (lit, dark)
         )
-        light = solved_in_full(time_s)
+        light, surface = solved_in_full(time_s)
+        seen.append(surface)
         turned = light.moments(label.frequency_hz) * np.exp(-1j * label.phase_rad)
         expected_e = (factor_e * turned + 0.5 * conditions.scale_e * light.moments(0.0)).real
         error_e = (found_e - direct_e - expected_e) * np.exp(1j * label.phase_rad) / len(takes)
@@ -114,6 +117,10 @@ def test_what_steps_leave_out_is_below_the_noise(
 
     assert set(errors_e) == set(harmonics)
     over = np.max([np.abs(each) for each in errors_e.values()], axis=0) / deviation_e
+    # a ray that just grazes a silhouette may fall on either side of it
+    ways = [np.roll(each, by, axis) for each in seen for by in (-1, 0, 1) for axis in (0, 1)]
+    over = over[np.ptp(ways, axis=0) == 0]
+    assert over.size > 0.6 * WIDTH * HEIGHT
     assert np.mean(over > 0.5) < 0.01
     assert np.sqrt(np.mean(over**2)) < 0.2
 
