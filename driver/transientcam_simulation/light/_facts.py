@@ -79,6 +79,7 @@ class SceneFacts:
         self._found: Recent[tuple[str, tuple[float, ...], float], tuple[Values, ...]]
         self._found = Recent(_KEPT)
         self._left_out: dict[str, list[list[_SampledView]]] = {}
+        self._rough = min(_ROUGH_PATCHES, scene.transport.patches)
         self._errors: dict[int, Values] = {}  # by patches a side; 0: the light itself
 
     @cached_property
@@ -257,9 +258,8 @@ class SceneFacts:
         return len(light.patches) ** 2 * of_pair_s + width * height * float(of_pixel_s)
 
     def patches_a_side(self, noise: Noise) -> int:
-        """Return how finely what stands still must be cut where something moves.
+        """Return how finely surfaces must be cut for few pixels to be off where some move.
 
-        Such that errors are above a quarter of the noise in a hundredth of the pixels at most.
         Coarser patches have longer steps of time (`FurtherLight`), whose errors count, too.
         """
         light, most = self._further_light, self._scene.transport.patches
@@ -306,10 +306,6 @@ class SceneFacts:
         if flat or not scattering or transport.diffuse_bounces == 0:
             return ()
         return tuple(_ROUGH_ERROR * self._further(each, self._rough) for each in self._seen)
-
-    @property
-    def _rough(self) -> int:
-        return min(_ROUGH_PATCHES, self._scene.transport.patches)
 
 
 def _some(frequencies_hz: tuple[float, ...]) -> tuple[float, ...]:

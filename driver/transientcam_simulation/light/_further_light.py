@@ -24,16 +24,10 @@ _EXCHANGES, _SOLVED = 3, 128  # kept
 
 
 class FurtherLight:
-    """Light over several surfaces, on patches, at any time.
+    """Light over several surfaces, on patches, at any time, but for what is below a tolerance.
 
-    Parameters
-    ----------
-    scene
-        With surfaces that move.
-    per_side
-        Patches along the longest side of what stands still; others are cut as the scene says.
-    tolerance
-        Brightness that light may lack, where the scene does not say how far it is followed.
+    ``per_side``: patches along the longest side of what stands still; the rest is cut as the scene
+    says.
     """
 
     def __init__(self, scene: Scene, *, per_side: int, tolerance: float = 1e-4) -> None:

@@ -90,8 +90,6 @@ class MovingResponses:
     ----------
     uncovered
         Shares (H, W) of pixels that show what stands still.
-    held
-        Light over several surfaces; None if there is none.
 
     Attributes
     ----------

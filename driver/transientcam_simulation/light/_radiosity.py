@@ -25,19 +25,9 @@ _HISTOGRAM_PATCHES = 12  # a side, for the impulse response of a pixel
 
 
 class Gathering:
-    """Light of patches where rays of the camera end, between the patches' centres.
+    """Light of patches, at any places, where rays end on the same surfaces, between their centres.
 
-    Parameters
-    ----------
-    scene, lit
-        The surfaces at their places, and rays that end on them.
-    patches
-        Of the same surfaces, at any places.
-
-    Attributes
-    ----------
-    places
-        Patches around the end of each ray, and weights of the interpolation.
+    ``places``: patches around the end of each ray, and weights of the interpolation.
     """
 
     def __init__(self, scene: Scene, patches: Patches, lit: Lit) -> None:

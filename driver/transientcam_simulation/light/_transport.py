@@ -262,12 +262,8 @@ class SurfaceScenery:
             patches = self.facts.patches_a_side(wanted.noise)
             held = held_light(FurtherLight(scene, per_side=patches, tolerance=tolerance), still)
 
-        steps = Steps(
-            scene,
-            lambda time_s: moving.at(time_s, held(time_s)),
-            pixel_rad=still.pixel_rad,
-            every_s=wanted.image_period_s,
-        )
+        far = {"pixel_rad": still.pixel_rad, "every_s": wanted.image_period_s}
+        steps = Steps(scene, lambda time_s: moving.at(time_s, held(time_s)), **far)
 
         @lru_cache(maxsize=1)
         def background(held: HeldLight | None) -> View:
