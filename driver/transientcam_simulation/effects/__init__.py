@@ -11,7 +11,6 @@ from transientcam_simulation.effects._conditions import (
     WORST_ABOVE,
     Call,
     Conditions,
-    over_noise,
 )
 from transientcam_simulation.effects._dark_current import DarkCurrentElectrons
 from transientcam_simulation.effects._distortion import Distortion
@@ -128,6 +127,5 @@ __all__ = [
     "draw_few",
     "measured_harmonics",
     "missing_calls",
-    "over_noise",
     "read_offsets_rad",
 ]

@@ -156,12 +156,6 @@ class Call:
     worst: float = 0.0
 
 
-def over_noise(noise: Noise, glimpse: Glimpse, change: Values) -> Values:
-    """Return changes of moments of some pixels over the noise of each."""
-    over: Values = change / noise.deviation(glimpse.brightness, glimpse.reflectance)
-    return over
-
-
 def weigh(
     conditions: Conditions, changes: tuple[Values, ...], reason: str, cost_s: float = 0.0
 ) -> Call:
@@ -170,17 +164,18 @@ def weigh(
     ``{share}`` in the reason becomes the share of the lit pixels that change so far, at the time
     when most do.
     """
-    noise = replace(conditions.noise, white_e=conditions.white_e)
     size = relative = worst = share = 0.0
     for glimpse, change in zip(conditions.glimpses, changes, strict=True):
         counted = glimpse.lit | (change > 0)
         if not counted.any():
             continue
-        moved, over = change[counted], over_noise(noise, glimpse, change)[counted]
+        moved = change[counted]
+        noise = replace(conditions.noise, white_e=conditions.white_e)
+        deviation = noise.deviation(glimpse.brightness[counted], glimpse.reflectance[counted])
         size = max(size, math.sqrt(np.mean(moved**2)))
-        relative = max(relative, math.sqrt(np.mean(over**2)))
-        worst = max(worst, float(over.max()))
-        share = max(share, float(np.mean(over > WORST_ABOVE)))
+        relative = max(relative, math.sqrt(np.mean((moved / deviation) ** 2)))
+        worst = max(worst, float((moved / deviation).max()))
+        share = max(share, float(np.mean(moved > WORST_ABOVE * deviation)))
     called = relative > CALLED_ABOVE or worst > WORST_ABOVE
     size_dn = size * conditions.scale_e / conditions.sensor.gain_e_per_dn
     words = f"{share:.1%}" if share >= 1e-3 or not share else "less than 0.1%"

@@ -90,10 +90,7 @@ class Facts(Protocol):
         ...
 
     def further_cost_s(self, noise: Noise, *, moments: int, image_period_s: float) -> float:
-        """Return what light over several surfaces costs in each image where they move.
-
-        Of a sequence that asks for moments at so many frequencies.
-        """
+        """Return what light over several surfaces costs an image, of so many moments in all."""
         ...
 
     def missing(

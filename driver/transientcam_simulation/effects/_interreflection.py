@@ -7,10 +7,7 @@ from transientcam_simulation.effects._effect import LightEffect
 
 
 class DiffuseInterreflection(LightEffect):
-    """A continuous tail of late light, by radiosity with times of flight.
-
-    Solved once where nothing moves; else at steps of time, which cost something in every image.
-    """
+    """A continuous tail of late light, by radiosity with times of flight."""
 
     name = "interreflection"
     what = "light that surfaces give each other"

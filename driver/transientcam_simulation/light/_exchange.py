@@ -45,12 +45,9 @@ class Exchange:
         return cls.between(scene, Patches.of(scene, per_side))
 
     @classmethod
-    def between(
-        cls, scene: Scene, patches: Patches, factors: NDArray[np.float64] | None = None
-    ) -> "Exchange":
-        """Compute form factors, if need be, distances between patches, and direct light on each."""
-        if factors is None:
-            factors = form_factors(scene, patches, patches.centre, patches.normal)
+    def between(cls, scene: Scene, patches: Patches) -> "Exchange":
+        """Compute form factors and distances between patches, and the direct light on each."""
+        factors = form_factors(scene, patches, patches.centre, patches.normal)
         squared = np.maximum(
             np.sum(patches.centre**2, 1)[:, None]
             + np.sum(patches.centre**2, 1)

@@ -9,16 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.base import PINHOLE
-from transientcam_simulation.effects import (
-    BLUR,
-    WORST_ABOVE,
-    Glimpse,
-    Noise,
-    Values,
-    over_noise,
-)
+from transientcam_simulation.effects import BLUR, WORST_ABOVE, Glimpse, Noise, Values
 from transientcam_simulation.light._exchange import Exchange
-from transientcam_simulation.light._further_light import HELD_STEPS, FurtherLight, Work
+from transientcam_simulation.light._further_light import HELD_STEPS, FurtherLight
 from transientcam_simulation.light._missing import SampledWays, sampled_glimpses
 from transientcam_simulation.light._paths import Lit, light_rays
 from transientcam_simulation.light._radiosity import Gathering, Interreflection
@@ -38,6 +31,8 @@ _ROUNDING = 1e-9
 _KEPT = 32  # changes by effects, for the last few sequences
 _PATCHES = (6, 9, 13, 18)  # a side, where something moves, if they are fine enough
 _BEYOND = 0.01  # of the pixels, which coarser patches may put off by more
+PAIR_S, TURNED_S = 3e-7, 3e-8  # processor time: of two patches, and of a moment between them, ...
+STILL_S, MOVING_S = 1.5e-7, 3e-8  # and of a moment on a pixel of what stands still, and moves
 _ROUGH_PATCHES = 6  # a side, to estimate interreflection
 _ROUGH_ERROR = 1.5  # by which that may be too low
 
@@ -85,16 +80,12 @@ class SceneFacts:
         self._found: Recent[tuple[str, tuple[float, ...], float], tuple[Values, ...]]
         self._found = Recent(_KEPT)
         self._left_out: dict[str, list[list[_SampledView]]] = {}
-        self._full: Values | None = None
-        self._coarse: dict[int, tuple[Values, ...]] = {}
-
-    @property
-    def glimpses(self) -> tuple[Glimpse, ...]:
-        """Direct light and mirrors on the pixels judged."""
-        return self._glimpses
+        self._rough = min(_ROUGH_PATCHES, scene.transport.patches)
+        self._errors: dict[int, Values] = {}  # by patches a side; 0: the light itself
 
     @cached_property
-    def _glimpses(self) -> tuple[Glimpse, ...]:
+    def glimpses(self) -> tuple[Glimpse, ...]:
+        """Direct light and mirrors on the pixels judged."""
         cosine = cosine_to_axis(self._camera, self._rays(self._camera))
         return tuple(
             Glimpse(each.lits[0].weight.sum(axis=0), each.lits[0].reflectance, cosine, self._shape)
@@ -280,63 +271,50 @@ class SceneFacts:
                     np.maximum(apart[k], change, out=apart[k])
         return apart
 
-    def further_work(self, noise: Noise, *, moments: int, image_period_s: float) -> Work:
-        """Return what light over several surfaces takes an image where they move."""
-        moves = np.array([bool(each.motions) for each in self._scene.surfaces] + [False])
-        width, height = self._size
-        return Work.of(
-            FurtherLight(self._scene, per_side=self.patches_a_side(noise)),
-            moments=moments,
-            every_s=image_period_s,
-            pixels=width * height,
-            moving=width * height * np.mean([moves[k.lits[0].surface].mean() for k in self._seen]),
-        )
-
     def further_cost_s(self, noise: Noise, *, moments: int, image_period_s: float) -> float:
         """Return what light over several surfaces costs in each image where they move."""
         if not self._scene.moves:
             return 0.0
-        return self.further_work(noise, moments=moments, image_period_s=image_period_s).cost_s
+        light = FurtherLight(self._scene, per_side=self.patches_a_side(noise))
+        solved = min(2.0, image_period_s / light.step_s)
+        moves = np.array([bool(each.motions) for each in self._scene.surfaces] + [False])
+        shown = np.mean([moves[each.lits[0].surface].mean() for each in self._seen])
+        of_pixel_s = min(1.0, solved / HELD_STEPS) * moments * STILL_S + 2 * shown * MOVING_S
+        of_pair_s = solved * (PAIR_S + moments * TURNED_S)
+        width, height = self._size
+        return len(light.patches) ** 2 * of_pair_s + width * height * float(of_pixel_s)
 
     def patches_a_side(self, noise: Noise) -> int:
-        """Return how finely surfaces must be cut where some move: up to errors below the noise.
+        """Return how finely surfaces must be cut for few pixels to be off where some move.
 
-        Up to more than a quarter of it in a hundredth of the pixels. Coarser patches have longer
-        steps of time (`FurtherLight`), whose errors count, too.
+        Coarser patches have longer steps of time (`FurtherLight`), whose errors count, too.
         """
-        most = self._scene.transport.patches
-
-        def negligible(changes: tuple[Values, ...]) -> bool:
-            pairs = zip(self._glimpses, changes, strict=True)
-            over = np.array([over_noise(noise, *each) for each in pairs])
-            return bool(np.quantile(over, 1 - _BEYOND, axis=1).max() < WORST_ABOVE)
-
-        light = self._further_light
-        if not light or negligible(light):
+        light, most = self._further_light, self._scene.transport.patches
+        if not light:
+            return most
+        when = int(np.argmax([each.sum() for each in light]))
+        glimpse = self.glimpses[when]
+        limit = WORST_ABOVE * noise.deviation(glimpse.brightness, glimpse.reflectance)
+        if np.mean(light[when] > limit) < _BEYOND:  # whatever its error
             return min(_PATCHES[0], most)
-        fine = (each for each in _PATCHES if each >= most or negligible(self._coarser(each)))
-        return min(next(fine, most), most)
+        for per_side in (each for each in _PATCHES if each < most):
+            if np.mean(self._error(per_side, when) > limit) < _BEYOND:
+                return per_side
+        return most
 
-    def _coarser(self, per_side: int) -> tuple[Values, ...]:
-        """Return the error of the brightness by coarser patches, in the middle of a step, by time.
-
-        At the time with most of that light; at others it counts as none. It bounds moments.
-        """
-        if per_side not in self._coarse:
-            when = int(np.argmax([each.sum() for each in self._further_light]))
-            seen = self._seen[when]
-            light = FurtherLight(self._scene, per_side=per_side)
-            ends = Gathering(seen.scene, light.patches, seen.lits[0])
+    def _error(self, per_side: int, when: int) -> Values:
+        """Return how far coarser patches put off the brightness, in the middle of a step."""
+        if per_side not in self._errors:
+            seen, light = self._seen[when], FurtherLight(self._scene, per_side=per_side)
             around_s = (self._times_s[when] + by * light.step_s for by in (-0.5, 0.5))
             one, other = (light.solution(time_s, 0.0) for time_s in around_s)
             late = HELD_STEPS / 4  # of a step, that light which stands is off, on average
+            ends = Gathering(seen.scene, light.patches, seen.lits[0])
             coarse = ends.moments((0.5 - late) * one + (0.5 + late) * other, 0.0)
-            if self._full is None:
-                self._full = self._further(seen, self._scene.transport.patches)
-            errors = [np.zeros(len(self._rows)) for _ in self._seen]
-            errors[when] = np.abs(coarse - self._full)
-            self._coarse[per_side] = tuple(errors)
-        return self._coarse[per_side]
+            if 0 not in self._errors:
+                self._errors[0] = self._further(seen, self._scene.transport.patches)
+            self._errors[per_side] = np.abs(coarse - self._errors[0])
+        return self._errors[per_side]
 
     def _further(self, seen: _SampledView, per_side: int) -> Values:
         """Return the brightness of light over several surfaces."""
@@ -355,10 +333,6 @@ class SceneFacts:
         if flat or not scattering or transport.diffuse_bounces == 0:
             return ()
         return tuple(_ROUGH_ERROR * self._further(each, self._rough) for each in self._seen)
-
-    @property
-    def _rough(self) -> int:
-        return min(_ROUGH_PATCHES, self._scene.transport.patches)
 
 
 def _some(frequencies_hz: tuple[float, ...]) -> tuple[float, ...]:

@@ -1,13 +1,10 @@
-"""Light that surfaces give each other while some of them move, between times at which it is solved.
+"""Light that surfaces give each other where some move, as a function of the time alone.
 
-It follows from the time alone. Patches' light is solved at multiples of a step, in which nothing
-moves by more than part of a patch, and interpolated between them in the patches' own places: what
-moves takes its light with it. What it gives the pixels stands for a half a step. How fine
-patches are, and with them how long steps, is chosen by the noise (`SceneFacts.patches_a_side`).
+It is solved at steps of time, and interpolated in the patches' own places: what moves takes its
+light with it. `SceneFacts.patches_a_side` says how fine patches, and with them steps, must be.
 """
 
 import math
-from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -15,41 +12,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.light._exchange import Exchange
-from transientcam_simulation.light._patches import Patches, form_factors
-from transientcam_simulation.light._paths import blocked
+from transientcam_simulation.light._patches import Patches
 from transientcam_simulation.light._recent import Recent
 from transientcam_simulation.scene import Points, Scene, patch_edges_m
 
-STEP_PATCHES: Final = 0.5
-"""Of the largest patches' edges, that anything moves in a step at most."""
 HELD_STEPS: Final = 0.5
 """Of a step, for which what patches give the pixels stands (`HeldLight`)."""
+_STEP_PATCHES = 0.5  # of the largest patches' edges, that anything moves in a step at most
 _LONGEST_S = 3600.0  # of a step
-_COSTS_S = 3e-7, 3e-8, 1e-7, 1e-7  # of each kind of `Work`
 _EXCHANGES, _SOLVED = 3, 128  # kept
 
 
-_Alike = tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]
-"""Surfaces (S) that move otherwise, and receivers, givers and form factors of patches."""
-
-
 class FurtherLight:
-    """Light over several surfaces, on patches, at any time.
+    """Light over several surfaces, on patches, at any time, but for what is below a tolerance.
 
-    Parameters
-    ----------
-    scene
-        With surfaces that move.
-    per_side
-        Patches along the longest side of a surface that stands still; those of others are as fine
-        as the scene says.
-    tolerance
-        Brightness that light may lack, where the scene does not say how far it is followed.
+    ``per_side``: patches along the longest side of what stands still; the rest is cut as the scene
+    says.
     """
 
     def __init__(self, scene: Scene, *, per_side: int, tolerance: float = 1e-4) -> None:
         self._scene, self._per_side, self._tolerance = scene, per_side, tolerance
-        self._reach_m = STEP_PATCHES * max(patch_edges_m(scene, per_side).values())
+        self._reach_m = _STEP_PATCHES * max(patch_edges_m(scene, per_side).values())
         self._exchanges: Recent[float, tuple[Exchange, int]] = Recent(_EXCHANGES)
         self._solved: Recent[tuple[float, float], NDArray[np.complex128]] = Recent(_SOLVED)
 
@@ -75,36 +58,6 @@ class FurtherLight:
         one, other = (self.solution(at_s, frequency_hz) for at_s in (first_s, last_s))
         return (1 - later) * one + later * other
 
-    @cached_property
-    def _groups(self) -> NDArray[np.intp]:
-        """By surface (S): which of them move alike."""
-        kinds = [tuple(map(id, each.motions)) for each in self._scene.surfaces]
-        return np.array([kinds.index(kind) for kind in kinds])
-
-    @cached_property
-    def _alike(self) -> list[_Alike]:
-        """Form factors between patches that move alike, but for what comes between them."""
-        found, patches, groups = [], self.patches, self._groups
-        for group in np.unique(groups[patches.surface]):
-            mine = np.flatnonzero(groups[patches.surface] == group)
-            ends = patches.centre[mine], patches.normal[mine]
-            wanted = np.broadcast_to(groups[patches.surface] == group, (len(mine), len(patches)))
-            near = _some(self._scene, groups == group)
-            factors = form_factors(near, patches, *ends, wanted)
-            p, n = np.nonzero(factors)
-            found.append((groups != group, mine[p], n, factors[p, n]))
-        return found
-
-    def _factors(self, now: Scene, patches: Patches) -> NDArray[np.float64]:
-        """Form factors of patches at their places, of which those that move alike are kept."""
-        group = self._groups[patches.surface]
-        apart = group[:, None] != group
-        factors = form_factors(now, patches, patches.centre, patches.normal, apart)
-        for others, p, n, kept in self._alike:
-            hidden = blocked(_some(now, others), patches.centre[p], patches.centre[n])
-            factors[p, n] = np.where(hidden, 0.0, kept)
-        return factors
-
     def _offsets(self, time_s: float) -> Points:
         """How far each surface is from its place, (S, 3)."""
         return np.array([each.offset_m(time_s) for each in self._scene.surfaces])
@@ -114,7 +67,7 @@ class FurtherLight:
 
         def exchange() -> tuple[Exchange, int]:
             now, patches = self._scene.at(time_s), self.patches.moved(self._offsets(time_s))
-            between = Exchange.between(now, patches, self._factors(now, patches))
+            between = Exchange.between(now, patches)
             return between, between.bounces(self._tolerance)
 
         def solve() -> NDArray[np.complex128]:
@@ -122,61 +75,3 @@ class FurtherLight:
             return between.irradiance(frequency_hz, bounces)
 
         return self._solved.get((time_s, frequency_hz), solve)
-
-
-def _some(scene: Scene, wanted: NDArray[np.bool_]) -> Scene:
-    """Return a scene with only some of its surfaces."""
-    pairs = zip(scene.surfaces, wanted, strict=True)
-    return replace(scene, surfaces=tuple(each for each, is_wanted in pairs if is_wanted))
-
-
-@dataclass(frozen=True, slots=True)
-class Work:
-    """What that light takes an image, on average.
-
-    Attributes
-    ----------
-    pairs
-        Of patches, whose form factors are computed.
-    turned
-        Of patches, between which a moment goes.
-    still, moving
-        Moments on pixels of what stands still, and of what moves.
-    """
-
-    pairs: float
-    turned: float
-    still: float
-    moving: float
-
-    @classmethod
-    def of(
-        cls, light: FurtherLight, *, moments: int, every_s: float, pixels: int, moving: float
-    ) -> "Work":
-        """Count it, for images so far apart that ask for moments at so many frequencies in all.
-
-        ``moving``: pixels that show what moves.
-        """
-        count = len(light.patches) ** 2
-        solutions = min(2.0, every_s / light.step_s)
-        parts = min(1.0, every_s / light.step_s / HELD_STEPS)
-        return cls(
-            solutions * count,
-            solutions * count * _asked(moments, solutions),
-            parts * pixels * _asked(moments, parts),
-            2 * moving,
-        )
-
-    @property
-    def cost_s(self) -> float:
-        """Processor time."""
-        costs_s = zip(_COSTS_S, (self.pairs, self.turned, self.still, self.moving), strict=True)
-        return sum(each_s * count for each_s, count in costs_s)
-
-
-def _asked(moments: int, an_image: float) -> float:
-    """Return the moments that are asked of what is computed so many times an image.
-
-    Each image asks for two: at 0 Hz, and at its own frequency.
-    """
-    return min(moments, max(2.0, 2.0 / an_image))

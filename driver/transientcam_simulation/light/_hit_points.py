@@ -4,7 +4,6 @@ The same as ``paths.light_on_ends``, for the many points that are lit anew for e
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +75,7 @@ class Way:
     weight: NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Ends:
     """Points on surfaces that rays of the camera end on.
 
@@ -229,15 +228,10 @@ class Ends:
                 axes, segment.apex, np.array(indices, np.int32), *points, segment.boxes, clear
             )
 
-    @cached_property
-    def spans(self) -> NDArray[np.int64]:
-        """First and last point (N, 2), exclusive, of each surface's."""
-        starts = np.append(0, np.flatnonzero(self.index[1:] != self.index[:-1]) + 1)
-        return np.stack([starts, np.append(starts[1:], len(self.index))], axis=1)
-
     def _normals(self) -> tuple[Plane, Plane, Plane]:
-        spans = self.spans
-        shapes = [self.surfaces[self.index[start]].shape for start in spans[:, 0]]
+        starts = np.append(0, np.flatnonzero(self.index[1:] != self.index[:-1]) + 1)
+        spans = np.stack([starts, np.append(starts[1:], len(self.index))], axis=1)
+        shapes = [self.surfaces[self.index[start]].shape for start in starts]
         balls = [(*each.centre, *each.radii**2) for each in shapes if isinstance(each, Ellipsoid)]
         is_round = [isinstance(each, Ellipsoid) for each in shapes]
         normals = compiled_light.upright(

@@ -15,7 +15,7 @@ from transientcam_simulation.light import (
 )
 from transientcam_simulation.light._bundle import Region, inside, numbers
 from transientcam_simulation.light._coverage import Plane
-from transientcam_simulation.light._held_light import HeldLight, SeenPatches
+from transientcam_simulation.light._held_light import HeldLight
 from transientcam_simulation.light._hit_points import LitEnds
 from transientcam_simulation.light._paths import Lit, scatter_of, sparse_image
 from transientcam_simulation.light._still import StillLight
@@ -90,8 +90,6 @@ class MovingResponses:
     ----------
     uncovered
         Shares (H, W) of pixels that show what stands still.
-    held
-        Light over several surfaces; None if there is none.
 
     Attributes
     ----------
@@ -116,7 +114,6 @@ class MovingResponses:
         self._found: dict[float, Moments] = {}
         self._shape = still.height, still.width
         self._layers = layers
-        self._seen: SeenPatches | None = None
         self._uncovered = uncovered
         self._dimmed = _Dimmed.by(shadows, uncovered)
 
@@ -154,6 +151,8 @@ class MovingResponses:
         if self._layers is None:
             return moments
         of_rays, places = self._of_layers(self._layers, frequency_hz), self._layers.places
+        if self.held is not None:
+            of_rays = of_rays + self.held.on(self._layers.lit, self._layers.parts, frequency_hz)
         top, left = (of.start for of in self.region)
         numbers_of = of_rays.view(np.float32).reshape(len(of_rays), -1)
         planes = moments.view(np.float32)
@@ -172,14 +171,6 @@ class MovingResponses:
 
     def _of_layers(self, layers: Layers, frequency_hz: float) -> Moments:
         """Moments of the points of layers, in single precision."""
-        direct = self._direct_of_layers(layers, frequency_hz)
-        if self.held is None:
-            return direct
-        if self._seen is None:
-            self._seen = self.held.seen(layers.lit)
-        return direct + self.held.on(self._seen, frequency_hz)
-
-    def _direct_of_layers(self, layers: Layers, frequency_hz: float) -> Moments:
         if not frequency_hz:
             brightness = np.zeros(layers.places.shape[1], dtype=np.float32)
             for _chain, way in layers.lit.ways:

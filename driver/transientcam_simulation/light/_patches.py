@@ -66,16 +66,8 @@ class Patches:
         return replace(self, centre=self.centre + by_m, corners=corners)
 
 
-def form_factors(
-    scene: Scene,
-    patches: Patches,
-    at: Points,
-    normal: Points,
-    wanted: NDArray[np.bool_] | None = None,
-) -> NDArray[np.float64]:
+def form_factors(scene: Scene, patches: Patches, at: Points, normal: Points) -> NDArray[np.float64]:
     """Irradiance (P, N) at points by each patch of radiosity 1: Lambert's contour integral.
-
-    Of the pairs that are ``wanted`` (P, N), by default all; 0 of others.
 
     Patches that face away, stand behind the point's surface, or are hidden, give nothing. A patch
     that the point's horizon cuts counts by its centre.
@@ -89,8 +81,7 @@ def form_factors(
         way = patches.centre[None, :, :] - at[block, None, :]
         towards = np.einsum("pnc,pc->pn", way, normal[block]) > 1e-9
         back = np.einsum("pnc,nc->pn", way, patches.normal) < -1e-9
-        seen = towards & back
-        p, n = np.nonzero(seen if wanted is None else seen & wanted[block])
+        p, n = np.nonzero(towards & back)
         if hides:
             clear = ~_blocked(scene, patches, at[block][p], n)
             p, n = p[clear], n[clear]

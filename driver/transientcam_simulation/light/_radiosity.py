@@ -25,19 +25,9 @@ _HISTOGRAM_PATCHES = 12  # a side, for the impulse response of a pixel
 
 
 class Gathering:
-    """Light of patches where rays of the camera end, between the patches' centres.
+    """Light of patches, at any places, where rays end on the same surfaces, between their centres.
 
-    Parameters
-    ----------
-    scene, lit
-        The surfaces at their places, and rays that end on them.
-    patches
-        Of the same surfaces, at any places.
-
-    Attributes
-    ----------
-    places
-        Patches around the end of each ray, and weights of the interpolation.
+    ``places``: patches around the end of each ray, and weights of the interpolation.
     """
 
     def __init__(self, scene: Scene, patches: Patches, lit: Lit) -> None:
@@ -53,23 +43,16 @@ class Gathering:
                 index[mine] += patches.first[surface]
         self.places: Bilinear = index, weights
 
-    def to_camera(self, frequency_hz: float) -> NDArray[np.complex128]:
-        """Return the factor of each ray's moment from its end to the camera."""
-        way = np.exp(2j * np.pi * frequency_hz / SPEED_OF_LIGHT_M_S * self._lit.distance_m)
-        factor: NDArray[np.complex128] = self._lit.reflectance * way
-        return factor if self._scatter is None else factor * self._scatter.transfer(frequency_hz)
-
-    def on_ends(self, irradiance: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
-        """Return the moments on the rays' ends, given those of the patches."""
-        index, weights = self.places
-        moments: NDArray[np.complexfloating] = np.einsum("pk,pk->p", weights, irradiance[index])
-        return moments
-
     def moments(
-        self, irradiance: NDArray[np.complex128], frequency_hz: float
-    ) -> NDArray[np.complexfloating]:
-        """Return the moments that the camera sees."""
-        return self.on_ends(irradiance) * self.to_camera(frequency_hz)
+        self, irradiance: NDArray[np.complexfloating], frequency_hz: float
+    ) -> NDArray[np.complex128]:
+        """Return the moments that the camera sees, given those on the patches."""
+        on_pixel = np.einsum("pk,pk->p", self.places[1], irradiance[self.places[0]])
+        way = np.exp(2j * np.pi * frequency_hz / SPEED_OF_LIGHT_M_S * self._lit.distance_m)
+        moments: NDArray[np.complex128] = self._lit.reflectance * on_pixel * way
+        if self._scatter is not None:
+            moments *= self._scatter.transfer(frequency_hz)
+        return moments
 
 
 class Interreflection:
@@ -107,11 +90,6 @@ class Interreflection:
         patches = self._exchange.patches
         self._ends = Gathering(scene, patches, lit)
         self._ends_of_fine = [Gathering(scene, patches, each.rays) for each in fine]
-
-    @property
-    def patches(self) -> int:
-        """Number of patches of the scene."""
-        return len(self._exchange.patches)
 
     def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
         """``int g(tau) exp(2 pi i f tau) dtau`` of this light, (H, W)."""

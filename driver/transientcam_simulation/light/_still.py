@@ -24,7 +24,6 @@ from transientcam_simulation.light._rays import (
     RAYS,
     RAYS_AT_EDGES,
     RAYS_AT_THIN,
-    rays_within,
 )
 from transientcam_simulation.light._subpixel import PIXELS, crossed, may_be_thin
 from transientcam_simulation.scene import Points, Scene
@@ -94,10 +93,6 @@ class StillLight:
         """Angle of a pixel in the middle of the image."""
         middle = self.height // 2 * self.width + self.width // 2
         return float(np.arccos(np.clip(self.rays[middle] @ self.rays[middle - 1], -1, 1)))
-
-    def rays_in(self, pixel: NDArray[np.intp], *count: int) -> Points:
-        """Return rays, so many each, in some pixels; see `rays_within`."""
-        return rays_within(self._camera, pixel, *count, width=self.width, height=self.height)
 
     @cached_property
     def reflectance(self) -> NDArray[np.float32]:

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Final, Generic, Protocol, TypeVar
+from functools import cached_property, lru_cache
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,9 @@ from transientcam_simulation.effects import (
 from transientcam_simulation.light._bundle import Region
 from transientcam_simulation.light._compiler import load_compiled
 from transientcam_simulation.light._facts import SceneFacts, cosine_to_axis
-from transientcam_simulation.light._followed import FollowedRays, Within
+from transientcam_simulation.light._followed import FollowedRays
 from transientcam_simulation.light._further_light import FurtherLight
-from transientcam_simulation.light._paths import Lit, light_rays
+from transientcam_simulation.light._paths import light_rays
 from transientcam_simulation.light._radiosity import Interreflection, WithInterreflection
 from transientcam_simulation.light._rays import camera_rays
 from transientcam_simulation.light._recent import Recent
@@ -42,7 +42,6 @@ from transientcam_simulation.light._variants import (
 from transientcam_simulation.scene import Scene
 
 Values = NDArray[np.float64]
-_Seen = TypeVar("_Seen")
 KEPT_PIXELS: Final = 40_000
 """Of sensors for which more is kept of a scene than what is shown: 1 KiB a pixel and view."""
 _STILL_VIEWS: Final = 3  # for sequences that alternate
@@ -100,20 +99,6 @@ class Views:
     surface: Callable[[float], SurfaceSeen] | None = None
 
 
-class Latest(Generic[_Seen]):
-    """A function of time that remembers its last value."""
-
-    def __init__(self, of: Callable[[float], _Seen]) -> None:
-        self._of = of
-        self._last: tuple[float, _Seen] | None = None
-
-    def __call__(self, time_s: float) -> _Seen:
-        """Return the value at a time."""
-        if self._last is None or self._last[0] != time_s:
-            self._last = time_s, self._of(time_s)
-        return self._last[1]
-
-
 class Scenery(Protocol):
     """Something in front of the camera."""
 
@@ -158,13 +143,9 @@ class GivenScenery:
         self._responses = responses
         self._view = View(responses.moments, lambda: np.float32(1))
 
-    @property
+    @cached_property
     def glimpses(self) -> tuple[Glimpse, ...]:
         """All pixels, once."""
-        return self._glimpses
-
-    @cached_property
-    def _glimpses(self) -> tuple[Glimpse]:
         brightness = self._responses.moments(0.0).real
         ones = np.ones(brightness.size)
         shape = brightness.shape[0], brightness.shape[1]
@@ -208,22 +189,14 @@ class SurfaceScenery:
         """Pixels, over the scene's life."""
         return self.facts.glimpses
 
-    @property
+    @cached_property
     def facts(self) -> SceneFacts:
         """How effects change the scene, over its life."""
-        return self._facts
-
-    @cached_property
-    def _facts(self) -> SceneFacts:
         return SceneFacts(self._scene, **self._size)
 
-    @property
+    @cached_property
     def cosine(self) -> Values:
         """Of the pixels' rays to the lens's axis."""
-        return self._cosine
-
-    @cached_property
-    def _cosine(self) -> Values:
         shape = self._size["height"], self._size["width"]
         return cosine_to_axis(self._camera, camera_rays(self._camera, **self._size)).reshape(shape)
 
@@ -257,12 +230,21 @@ class SurfaceScenery:
         )
         tolerance = CALLED_ABOVE * float(wanted.noise.deviation(0.0, 0.0))
         further = DiffuseInterreflection.name in effects
+        reflectance = still.reflectance.reshape(still.height, still.width)
         if not self.moves:
             responses: Responses = still.responses()
             if further:
-                light = self._further(still.scene, still.lit, tolerance, still.fine, followed)
+                light = Interreflection(
+                    still.scene,
+                    still.lit,
+                    width=still.width,
+                    height=still.height,
+                    fine=still.fine,
+                    tolerance=tolerance,
+                    exchange=followed.exchange,
+                )
                 responses = WithInterreflection(responses, light)
-            view = View(responses.moments, lambda: still.reflectance.reshape(self._shape))
+            view = View(responses.moments, lambda: reflectance)
 
             def seen(_time_s: float) -> SurfaceSeen:
                 brightness = responses.moments(0.0).real
@@ -270,7 +252,7 @@ class SurfaceScenery:
 
             return Views(lambda _time_s: view, lambda _time_s: responses, seen)
         load_compiled()
-        from transientcam_simulation.light._held_light import HeldLight, HeldLights
+        from transientcam_simulation.light._held_light import HeldLight, held_light
         from transientcam_simulation.light._moving import MovingLight
         from transientcam_simulation.light._time_interpolation import Steps
 
@@ -278,58 +260,37 @@ class SurfaceScenery:
         held: Callable[[float], HeldLight | None] = lambda _time_s: None  # noqa: E731
         if further:
             patches = self.facts.patches_a_side(wanted.noise)
-            held = HeldLights(FurtherLight(scene, per_side=patches, tolerance=tolerance), still).at
-        steps = Steps(
-            scene,
-            lambda time_s: moving.at(time_s, held(time_s)),
-            pixel_rad=still.pixel_rad,
-            every_s=wanted.image_period_s,
-        )
-        backgrounds: Recent[HeldLight | None, View] = Recent(1)
+            held = held_light(FurtherLight(scene, per_side=patches, tolerance=tolerance), still)
 
+        far = {"pixel_rad": still.pixel_rad, "every_s": wanted.image_period_s}
+        steps = Steps(scene, lambda time_s: moving.at(time_s, held(time_s)), **far)
+
+        @lru_cache(maxsize=1)
+        def background(held: HeldLight | None) -> View:
+            return View((held or still).moments, lambda: reflectance)
+
+        @lru_cache(maxsize=1)
         def at(time_s: float) -> View:
             now = steps.at(time_s)
-            background = backgrounds.get(
-                now.held,
-                lambda: View(
-                    (now.held or still).moments, lambda: still.reflectance.reshape(self._shape)
-                ),
-            )
-            return View(
-                now.moments, lambda: now.reflectance, now.region, now.moments_in, background
-            )
+            planes = now.moments, lambda: now.reflectance
+            return View(*planes, now.region, now.moments_in, background(now.held))
 
-        def responses_at(time_s: float) -> Responses:
+        @lru_cache(maxsize=1)
+        def exact(time_s: float) -> Responses:
             now = moving.at(time_s)
             if not further:
                 return now
-            return WithInterreflection(now, self._further(now.scene, now.lit, tolerance))
-
-        exact = Latest(responses_at)
+            width, height = still.width, still.height
+            light = Interreflection(
+                now.scene, now.lit, width=width, height=height, tolerance=tolerance
+            )
+            return WithInterreflection(now, light)
 
         def seen_then(time_s: float) -> SurfaceSeen:
             now, brightness = scene.at(time_s), exact(time_s).moments(0.0).real
             return surface_seen(now, still.rays, light_rays(now, still.rays), (), brightness)
 
-        return Views(Latest(at), exact, seen_then)
-
-    @property
-    def _shape(self) -> tuple[int, int]:
-        return self._size["height"], self._size["width"]
-
-    def _further(
-        self,
-        scene: Scene,
-        lit: Lit,
-        tolerance: float,
-        fine: tuple[Within, ...] = (),
-        followed: FollowedRays | None = None,
-    ) -> Interreflection:
-        """Light over several surfaces of a scene at a time, up to a tolerance."""
-        exchange = None if followed is None else followed.exchange
-        return Interreflection(
-            scene, lit, **self._size, fine=fine, tolerance=tolerance, exchange=exchange
-        )
+        return Views(at, exact, seen_then)
 
     def _with(self, wanted: LightRequirements) -> Scene:
         """Return the scene with the effects of light that are wanted, and no others."""

@@ -48,13 +48,8 @@ def patch_edges_m(scene: Scene, per_side: int, *, moving: int = 0) -> dict[int, 
         if each.scatters
     }
     longest_m = max(sides_m.values(), default=0.0)
-    return {
-        index: min(
-            longest_m / max(per_side, moving if scene.surfaces[index].motions else 0),
-            side_m / _LEAST_PER_SIDE,
-        )
-        for index, side_m in sides_m.items()
-    }
+    counts = {k: max(per_side, moving if scene.surfaces[k].motions else 0) for k in sides_m}
+    return {k: min(longest_m / counts[k], m / _LEAST_PER_SIDE) for k, m in sides_m.items()}
 
 
 def patches_of(scene: Scene, per_side: int) -> int:

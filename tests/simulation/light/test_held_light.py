@@ -1,5 +1,6 @@
 """Light that moving surfaces give each other, against its full solution for every image."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,15 +11,21 @@ from transientcam_driver.sequence import Sequence
 from transientcam_simulation.effects import Noise
 from transientcam_simulation.emulated import world_of
 from transientcam_simulation.imaging import World
-from transientcam_simulation.light import LightRequirements
 from transientcam_simulation.light._exchange import Exchange
-from transientcam_simulation.light._facts import SceneFacts
-from transientcam_simulation.light._held_light import FurtherLight, HeldLights
+from transientcam_simulation.light._facts import (
+    MOVING_S,
+    PAIR_S,
+    STILL_S,
+    TURNED_S,
+    SceneFacts,
+)
+from transientcam_simulation.light._further_light import FurtherLight
+from transientcam_simulation.light._held_light import HeldLight, held_light
+from transientcam_simulation.light._patches import Patches
 from transientcam_simulation.light._paths import light_rays
-from transientcam_simulation.light._radiosity import Interreflection
+from transientcam_simulation.light._radiosity import Gathering, Interreflection
 from transientcam_simulation.light._rays import camera_rays
 from transientcam_simulation.light._still import StillLight
-from transientcam_simulation.light._transport import SurfaceScenery
 from transientcam_simulation.light._variants import still_scene
 from transientcam_simulation.scene import (
     Ellipsoid,
@@ -69,74 +76,84 @@ def world(interreflection: str, sequence: Sequence) -> World:
     return built
 
 
-def solved_in_full(time_s: float, frequency_hz: float) -> NDArray[np.complex128]:
-    """Moments (H, W) of light over several surfaces, as if the scene stood still."""
+def solved_in_full(time_s: float) -> tuple[Interreflection, NDArray[np.intp]]:
+    """Light over several surfaces as if the scene stood still, and which one (H, W) pixels see."""
     now = scene().at(time_s)
     assert now.camera is not None
     lit = light_rays(now, camera_rays(now.camera, width=WIDTH, height=HEIGHT))
-    return Interreflection(now, lit, width=WIDTH, height=HEIGHT).moments(frequency_hz)
+    light = Interreflection(now, lit, width=WIDTH, height=HEIGHT)
+    return light, lit.surface.reshape(HEIGHT, WIDTH)
 
 
-@pytest.mark.parametrize(("sequence", "takes"), [(VIDEO, (0,)), (LONG, (3, 16))])
+@pytest.mark.parametrize(
+    ("sequence", "takes", "harmonics"), [(VIDEO, (0,), (1, 3)), (LONG, (3, 16), (4,))]
+)
 def test_what_steps_leave_out_is_below_the_noise(
-    sequence: Sequence, takes: tuple[int, ...]
+    sequence: Sequence, takes: tuple[int, ...], harmonics: tuple[int, ...]
 ) -> None:
     lit, dark = (world(choice, sequence) for choice in ("auto", "off"))
     conditions = lit.conditions(sequence)
     factor_e = 0.5 * conditions.scale_e * conditions.sub_phase_gain(1)
     period_s = sequence.exposure_s + READOUT_S
     errors_e: dict[int, NDArray[np.complex128]] = {}
-    for label in (each for each in sequence.labels if each.take in takes and each.harmonic > 0):
+    seen: list[NDArray[np.intp]] = []
+    for label in (
+        each for each in sequence.labels if each.take in takes and each.harmonic in harmonics
+    ):
         time_s = 1.3 + label.index * period_s
         found_e, direct_e = (
             of.mean_image_e(label, number=0, device_time_s=time_s).astype(np.float64)
             for of in (lit, dark)
         )
-        turned = solved_in_full(time_s, label.frequency_hz) * np.exp(-1j * label.phase_rad)
-        expected_e = (factor_e * turned).real + 0.5 * conditions.scale_e * solved_in_full(
-            time_s, 0.0
-        ).real
+        light, surface = solved_in_full(time_s)
+        seen.append(surface)
+        turned = light.moments(label.frequency_hz) * np.exp(-1j * label.phase_rad)
+        expected_e = (factor_e * turned + 0.5 * conditions.scale_e * light.moments(0.0)).real
         error_e = (found_e - direct_e - expected_e) * np.exp(1j * label.phase_rad) / len(takes)
         errors_e[label.harmonic] = errors_e.get(label.harmonic, 0) + error_e
     brightness = lit.truth(device_time_s=1.3).brightness
     gain = sequence.exposure_s * 3e7 / lit.sensor.gain_e_per_dn
     deviation_e = conditions.noise.deviation(brightness / gain, 1.0) * conditions.scale_e
 
-    assert len(errors_e) == sequence.harmonics
+    assert set(errors_e) == set(harmonics)
     over = np.max([np.abs(each) for each in errors_e.values()], axis=0) / deviation_e
+    # a ray that just grazes a silhouette may fall on either side of it
+    ways = [np.roll(each, by, axis) for each in seen for by in (-1, 0, 1) for axis in (0, 1)]
+    over = over[np.ptp(ways, axis=0) == 0]
+    assert over.size > 0.6 * WIDTH * HEIGHT
     assert np.mean(over > 0.5) < 0.01
     assert np.sqrt(np.mean(over**2)) < 0.2
 
 
-def held(of: Scene, *, per_side: int = 6) -> HeldLights:
+def held(of: Scene, *, per_side: int = 6) -> Callable[[float], HeldLight]:
     still = StillLight(still_scene(of), width=WIDTH, height=HEIGHT)
-    return HeldLights(FurtherLight(of, per_side=per_side), still)
+    return held_light(FurtherLight(of, per_side=per_side), still)
 
 
 def test_light_follows_from_the_time_whatever_was_asked_before() -> None:
     first, second = held(scene()), held(scene())
     for time_s in (55.0, 0.2, 7.7, 3.9, 8.1):
-        second.at(time_s).moments(69e6)
+        second(time_s).moments(69e6)
 
-    assert first.at(7.7).moments(69e6).tobytes() == second.at(7.7).moments(69e6).tobytes()
-    assert first.at(7.7).moments(69e6).tobytes() != first.at(8.7).moments(69e6).tobytes()
+    assert first(7.7).moments(69e6).tobytes() == second(7.7).moments(69e6).tobytes()
+    assert first(7.7).moments(69e6).tobytes() != first(8.7).moments(69e6).tobytes()
 
 
 def test_at_its_steps_light_is_solved_exactly() -> None:
-    light = FurtherLight(scene(), per_side=8)
+    light = FurtherLight(scene(), per_side=24)
 
     found = light.irradiance(5 * light.step_s, 46e6)
 
-    exchange = Exchange.of(scene().at(5 * light.step_s), 8)
+    exchange = Exchange.of(scene().at(5 * light.step_s), 24)
     expected = exchange.irradiance(46e6, exchange.bounces(1e-4))
     assert found == pytest.approx(expected, rel=1e-6, abs=1e-12)
 
 
 def test_where_a_path_starts_again_light_jumps_with_it() -> None:
-    light = FurtherLight(scene("restart"), per_side=8)
+    light = FurtherLight(scene("restart"), per_side=24)
 
     for time_s in (4.0 - 1e-6, 4.0 + 1e-6):
-        exchange = Exchange.of(scene("restart").at(time_s), 8)
+        exchange = Exchange.of(scene("restart").at(time_s), 24)
         expected = exchange.irradiance(0.0, exchange.bounces(1e-4))
         assert light.irradiance(time_s, 0.0) == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
@@ -157,27 +174,40 @@ def test_patches_are_as_fine_as_the_noise_calls_for() -> None:
     assert sides[0] < sides[1] <= sides[2] == scene().transport.patches
 
 
-@pytest.mark.parametrize("takes", [1, 1_000_000])
-def test_the_work_that_is_stated_is_what_is_done(
-    takes: int, monkeypatch: pytest.MonkeyPatch
+def test_the_cost_that_is_stated_is_that_of_the_work_that_is_done(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    pairs = 0
-    solve = Exchange.of
+    pairs = solved = gathered = 0
+    between, irradiance, moments = Exchange.between, Exchange.irradiance, Gathering.moments
 
-    def counted(of: Scene, per_side: int) -> Exchange:
+    def counted(of: Scene, patches: Patches) -> Exchange:
         nonlocal pairs
-        found = solve(of, per_side)
-        pairs += len(found.patches) ** 2
-        return found
+        pairs += len(patches) ** 2
+        return between(of, patches)
 
-    scenery = SurfaceScenery(scene(), width=WIDTH, height=HEIGHT)
-    noise = Noise(3e4, 0.0, 900.0, takes)
-    stated = scenery.facts.further_work(noise, moments=4, image_period_s=0.005)
-    views = scenery.view(LightRequirements(frozenset({"interreflection"}), noise))
-    monkeypatch.setattr(Exchange, "of", counted)
-    images = 400
+    def turned(self: Exchange, frequency_hz: float, bounces: int) -> NDArray[np.complex128]:
+        nonlocal solved
+        solved += len(self.patches) ** 2
+        return irradiance(self, frequency_hz, bounces)
+
+    def on_still(
+        self: Gathering, light: NDArray[np.complexfloating], frequency_hz: float
+    ) -> NDArray[np.complex128]:
+        nonlocal gathered
+        gathered += len(self.places[0])
+        return moments(self, light, frequency_hz)
+
+    built = world("auto", VIDEO)
+    call = built.calls(VIDEO)["interreflection"]
+    built.prepare()
+    monkeypatch.setattr(Exchange, "between", counted)
+    monkeypatch.setattr(Exchange, "irradiance", turned)
+    monkeypatch.setattr(Gathering, "moments", on_still)
+    images = 40 * len(VIDEO.labels)
     for k in range(images):
-        view = views.at(3.0 + 0.005 * k)
-        view.moments(0.0, view.region)
+        label = VIDEO.labels[k % len(VIDEO.labels)]
+        built.mean_image_e(label, number=k, device_time_s=k * (VIDEO.exposure_s + READOUT_S))
 
-    assert images * stated.pairs / 2 < pairs < images * stated.pairs * 2
+    work_s = pairs * PAIR_S + solved * TURNED_S + gathered * STILL_S
+    moving_s = 0.1 * 2 * WIDTH * HEIGHT * MOVING_S  # the ball covers about a tenth of the image
+    assert images * call.cost_s / 2 < work_s + images * moving_s < images * call.cost_s * 2

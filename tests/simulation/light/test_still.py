@@ -12,7 +12,7 @@ from transientcam_simulation.emulated import find_scene, world_of
 from transientcam_simulation.light import _still as module
 from transientcam_simulation.light._followed import FollowedRays
 from transientcam_simulation.light._paths import Lit, light_rays
-from transientcam_simulation.light._rays import RAYS, RAYS_AT_EDGES
+from transientcam_simulation.light._rays import RAYS, RAYS_AT_EDGES, rays_within
 from transientcam_simulation.light._still import StillLight
 from transientcam_simulation.scene import (
     Ellipsoid,
@@ -38,6 +38,11 @@ def board(x: float, y: float, width: float, albedo: float) -> Surface:
     return Surface("board", "diffuse", shape, albedo)
 
 
+def rays_in(of: Scene, pixel: NDArray[np.intp], *count: int) -> NDArray[np.float64]:
+    assert of.camera is not None
+    return rays_within(of.camera, pixel, *count, width=WIDTH, height=HEIGHT)
+
+
 def scene(*surfaces: Surface) -> Scene:
     return Scene(
         name="test",
@@ -61,7 +66,7 @@ SCENES = {
 def test_pixels_that_an_edge_crosses_are_the_mean_over_their_area(name: str) -> None:
     of = SCENES[name]
     still = StillLight(of, width=WIDTH, height=HEIGHT, noise=NOISE, highest_hz=69e6)
-    every = light_rays(of, still.rays_in(np.arange(WIDTH * HEIGHT), 512))
+    every = light_rays(of, rays_in(of, np.arange(WIDTH * HEIGHT), 512))
 
     assert 0 < still.mixed.size < 0.35 * WIDTH * HEIGHT
     for frequency_hz in (0.0, 69e6):
@@ -100,9 +105,7 @@ def test_large_images_take_fewer_rays_in_each_pixel(monkeypatch: pytest.MonkeyPa
 
 
 def test_edges_along_a_pixel_are_resolved_as_finely_as_it_has_rays() -> None:
-    still = StillLight(scene(WALL), width=WIDTH, height=HEIGHT)
-
-    rays = still.rays_in(np.array([HEIGHT // 2 * WIDTH + WIDTH // 2]))
+    rays = rays_in(scene(WALL), np.array([HEIGHT // 2 * WIDTH + WIDTH // 2]))
 
     count = len(rays)
     wide = 2 * np.tan(np.radians(20)) / WIDTH  # of a pixel, on a plane 1 m away
@@ -142,7 +145,7 @@ def test_rays_followed_for_other_pixels_before_change_nothing() -> None:
     for pixel in (third, still.mixed[1::2], still.mixed, third):
         shared_light = shared.within(pixel).rays
 
-        alone = light_rays(of, still.rays_in(pixel))
+        alone = light_rays(of, rays_in(of, pixel))
         for name in Lit.__slots__:
             np.testing.assert_array_equal(getattr(shared_light, name), getattr(alone, name))
 
@@ -178,7 +181,7 @@ THIN = {
 def test_what_is_thinner_than_a_pixel_takes_its_share_of_those_it_crosses(name: str) -> None:
     of = THIN[name]
     still = StillLight(of, width=WIDTH, height=HEIGHT, noise=NOISE, highest_hz=69e6)
-    every = light_rays(of, still.rays_in(np.arange(WIDTH * HEIGHT), 1024))
+    every = light_rays(of, rays_in(of, np.arange(WIDTH * HEIGHT), 1024))
     expected = every.moments(0.0, None).real.reshape(-1, WIDTH * HEIGHT).mean(axis=0)
     bare = light_rays(replace(of, surfaces=of.surfaces[:-1]), still.rays)
     crossed = np.abs(bare.moments(0.0, None).real - expected)
