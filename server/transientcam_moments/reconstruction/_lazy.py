@@ -487,8 +487,10 @@ class Reconstruction:
         if self.settings.technique == "unwrapped-phase":
             return self._lone(self.unwrapped.separate())
         sharp = self._sharp
-        known = isinstance(sharp, Likelihood)
-        found = sharp.separate(threshold) if known else separate(sharp, threshold)
+        if isinstance(sharp, Likelihood):
+            found = sharp.separate(threshold)
+        else:
+            found = separate(sharp, threshold)
         return self._first(found, sharp.phase_rad, sharp.weight)
 
     def _first(self, found: Separation, phase: Array, weight: Array) -> Separation:
@@ -548,8 +550,8 @@ class Reconstruction:
 
     @cached_property
     def _turned(self) -> tuple[Separation, Array] | None:
-        """What `turned` returns; None where no low frequency tells."""
-        if self._low is None:
+        """What `turned` returns; None where no low frequency tells, and without a range at all."""
+        if self._low is None or len(self.smoothed) <= self.settings.least_harmonics:
             return None
         settings, found, technique = self.settings, self._in_turn, self.settings.technique
         peaky = technique == "maximum-entropy"

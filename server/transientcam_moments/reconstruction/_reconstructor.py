@@ -214,7 +214,7 @@ class Reconstructor:
     ) -> Reconstruction:
         """Go on from calibrated moments, with what else `Reconstruction` is given."""
         given |= {"calibration": self._calibration, "spread": spread}
-        lazily = {"saturated_pixels": saturated_pixels, "bad_pixels": self._bad}
+        lazily: dict[str, Any] = {"saturated_pixels": saturated_pixels, "bad_pixels": self._bad}
         if not self.settings.consecutive:
             return GappedReconstruction(moments, self.settings, **lazily, **given)
         one_pass = self._pass_of_moments(moments)
