@@ -476,21 +476,18 @@ class Reconstruction:
     @cached_property
     def _separation(self) -> Separation:
         """Direct and indirect light of the turn from the least range on."""
-        threshold, technique = self.settings.threshold, self._technique
+        at, technique = self.settings.threshold, self._technique
         if technique is not None:
             xp = namespace(self.smoothed)
             b = np.asarray(self.smoothed)
             check_order(b.shape[0] - 1, least=technique.least_harmonics, name=technique.name)
             # as measured: none of them needs biased moments
-            parts = technique.estimate(b).separate(threshold)
+            parts = technique.estimate(b).separate(at)
             return self._lone(Separation(*(xp.asarray(part) for part in parts)))
         if self.settings.technique == "unwrapped-phase":
             return self._lone(self.unwrapped.separate())
         sharp = self._sharp
-        if isinstance(sharp, Likelihood):
-            found = sharp.separate(threshold)
-        else:
-            found = separate(sharp, threshold)
+        found = sharp.separate(at) if isinstance(sharp, Likelihood) else separate(sharp, at)
         return self._first(found, sharp.phase_rad, sharp.weight)
 
     def _first(self, found: Separation, phase: Array, weight: Array) -> Separation:

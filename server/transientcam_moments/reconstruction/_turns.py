@@ -29,8 +29,8 @@ def low_phase_rad(settings: Settings, calibration: Array) -> float | None:
     """
     if not (settings.zeroth == "low-frequency" and settings.consecutive and settings.low_ratio):
         return None
-    gain, step_rad = np.asarray(calibration), _TURN * (settings.base_frequency_hz or 0.0)
-    step_rad *= settings.delay_s
+    gain = np.asarray(calibration)
+    step_rad = _TURN * (settings.base_frequency_hz or 0.0) * settings.delay_s
     if len(gain) < 3:
         own = gain[1] * np.exp(-1j * step_rad)
         known = gain.ndim == 1 and abs(own.real * own.imag) <= 1e-9 * abs(own) ** 2
