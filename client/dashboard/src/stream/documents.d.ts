@@ -1010,9 +1010,8 @@ export interface ReconstructionDocument {
   readonly bias: number;
   /** Weight from which a return counts as the first, over the pixel's strongest return. */
   readonly return_threshold: number;
-  /** The sensor's, from which ranges count: what is nearer is taken for what is one unambiguous
-   * range farther. For 0 strong light in the last 64th of that range is below 0, so that noise puts
-   * nothing that is at 0 m to the far end. */
+  /** The sensor's: what is nearer is taken for what is one unambiguous range farther. For 0 strong
+   * light in the last 64th of that is below 0: noise puts nothing at 0 m to the far end. */
   readonly least_range_m: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
    * least over the scenes of docs/likelihood.md together; each frame names its `estimator`. The
@@ -1063,9 +1062,8 @@ export interface ReconstructionRequest {
   readonly bias?: number;
   /** Weight from which a return counts as the first, over the pixel's strongest return. */
   readonly return_threshold?: number;
-  /** The sensor's, from which ranges count: what is nearer is taken for what is one unambiguous
-   * range farther. For 0 strong light in the last 64th of that range is below 0, so that noise puts
-   * nothing that is at 0 m to the far end. */
+  /** The sensor's: what is nearer is taken for what is one unambiguous range farther. For 0 strong
+   * light in the last 64th of that is below 0: noise puts nothing at 0 m to the far end. */
   readonly least_range_m?: number;
   /** What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
    * least over the scenes of docs/likelihood.md together; each frame names its `estimator`. The
