@@ -19,7 +19,6 @@ from transientcam_server.imaging import Recipe
 from transientcam_server.imaging._errors_of_range.accuracy import SPARSE_PX, range_accuracy
 from transientcam_server.settings import SensorSettings
 
-_Array = NDArray[Any]
 EXPOSURES_S: Final = (0.0002, 0.0005, 0.001, 0.00192, 0.004)
 ZEROTHS: Final = get_args(Zeroth)
 ESTIMATORS: Final = ("likelihood", "pisarenko", "maximum-entropy", "single-frequency")
@@ -29,7 +28,7 @@ ambient = {{ electrons_per_s = {3} }}
 light = {{ position_m = [0.0, 0.0, 0.0], aim_at_m = [0.0, 2.0, 0.0], electrons_per_s = 5e7 }}
 surface = [
 {{ kind = "diffuse", normal = [0, -1, 0], centre_m = [-4, {1}, 0], size_m = [8, 9], albedo = {0} }},
-{{ kind = "diffuse", normal = [0, -1, 0], centre_m = [50, {2}, 0], size_m = [99, 99], albedo = 1 }}
+{{ kind = "diffuse", normal = [0, -1, 0], centre_m = [9, {2}, 0], size_m = [18, 9], albedo = 0.8 }}
 ]
 """
 SCENES: Final = {
@@ -39,7 +38,7 @@ SCENES: Final = {
     "far": (0.0, 1.0, 7.4, 0.0),
 }
 """Albedo and distance of a wall in the left half of the picture, distance of one in the right half
-whose albedo is 1, in m, and other light in electrons a second."""
+whose albedo is 0.8, in m, and other light in electrons a second."""
 
 
 def table(folder: Path, exposures_s: tuple[float, ...] = EXPOSURES_S) -> Table:
@@ -61,14 +60,13 @@ def table(folder: Path, exposures_s: tuple[float, ...] = EXPOSURES_S) -> Table:
     kept = ~(unlit < 0.99) & ~(lost > 0.01) & ~(held < 2 / 3)
     worst = np.fmin.reduce(unlit, 1), np.fmax.reduce(lost, 1), np.fmin.reduce(held, 1)
     for row, at in np.ndindex(*worst[0].shape):
-        known = (float(each[row, at]) for each in worst)
-        figures = (figure if np.isfinite(figure) else None for figure in known)
+        figures = (float(of[row, at]) if np.isfinite(of[row, at]) else None for of in worst)
         found.rows.append((", ".join(cases[row]), ESTIMATORS[at], *figures))
     found.notes.append(f"{kept.sum()} of {kept.size} captures are within all bars.")
     return found
 
 
-def _shares(folder: Path, scene: str, zeroth: Zeroth, exposure_s: float) -> _Array:
+def _shares(folder: Path, scene: str, zeroth: Zeroth, exposure_s: float) -> NDArray[Any]:
     """Return the three shares (estimators, 3) of one capture, NaN of no pixels."""
     path = folder / f"{scene}.toml"
     path.write_text(_SCENE.format(*SCENES[scene]))

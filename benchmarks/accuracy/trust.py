@@ -66,8 +66,7 @@ def tables(
         for path in (*paths, *names):
             found.append(judged(path))
             table.rows.append((Path(path).stem, *_figures(found[-1])))
-        if exposures_s:
-            yield halves.table(Path(folder), exposures_s)
+        yield halves.table(Path(folder), exposures_s)
     if not found:
         return
     together = Judged(*(np.concatenate(parts) for parts in zip(*found, strict=True)))

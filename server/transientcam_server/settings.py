@@ -99,9 +99,8 @@ class ReconstructionSettings(_Group):
     return_threshold: _Finite = Field(default=_DEFAULTS.threshold, ge=0.0, le=1.0)
     """Weight from which a return counts as the first, over the pixel's strongest return."""
     least_range_m: _Finite = Field(default=_DEFAULTS.least_range_m, ge=-1000.0, le=1000.0)
-    """The sensor's, from which ranges count: what is nearer is taken for what is one unambiguous
-    range farther. For 0 strong light in the last 64th of that range is below 0, so that noise puts
-    nothing that is at 0 m to the far end."""
+    """The sensor's: what is nearer is taken for what is one unambiguous range farther. For 0 strong
+    light in the last 64th of that is below 0: noise puts nothing at 0 m to the far end."""
     estimator: Estimator = "automatic"
     """What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
     least over the scenes of docs/likelihood.md together; each frame names its `estimator`. The

@@ -484,19 +484,18 @@ class Reconstruction:
     @cached_property
     def _separation(self) -> Separation:
         """Direct and indirect light of the turn from the least range on."""
-        threshold, technique = self.settings.threshold, self._technique
+        at, technique = self.settings.threshold, self._technique
         if technique is not None:
             xp = namespace(self.smoothed)
             b = np.asarray(self.smoothed)
             check_order(b.shape[0] - 1, least=technique.least_harmonics, name=technique.name)
             # as measured: none of them needs biased moments
-            parts = technique.estimate(b).separate(threshold)
+            parts = technique.estimate(b).separate(at)
             return self._lone(Separation(*(xp.asarray(part) for part in parts)))
         if self.settings.technique == "unwrapped-phase":
             return self._lone(self.unwrapped.separate())
         sharp = self._sharp
-        known = isinstance(sharp, Likelihood)
-        found = sharp.separate(threshold) if known else separate(sharp, threshold)
+        found = sharp.separate(at) if isinstance(sharp, Likelihood) else separate(sharp, at)
         return self._first(found, sharp.phase_rad, sharp.weight)
 
     def _first(self, found: Separation, phase: Array, weight: Array) -> Separation:
@@ -556,8 +555,8 @@ class Reconstruction:
 
     @cached_property
     def _turned(self) -> tuple[Separation, Array] | None:
-        """What `turned` returns; None where no low frequency tells."""
-        if self._low is None:
+        """What `turned` returns; None where no low frequency tells, and without a range at all."""
+        if self._low is None or len(self.smoothed) <= self.settings.least_harmonics:
             return None
         settings, found, technique = self.settings, self._in_turn, self.settings.technique
         peaky = technique == "maximum-entropy"

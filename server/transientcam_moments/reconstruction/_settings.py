@@ -69,6 +69,8 @@ class Settings:
         not measured are "estimated".
     low_frequency_hz : float, optional
         Where b_0 was measured so: of raw images ranges are unambiguous to half its wavelength.
+    delay_s : float
+        Of light within the camera, as its data sheet has it: which turn that is.
     takes : int, optional
         Captures in the images, averaged without outliers. Raw images need it.
     multiples : tuple of int, optional
@@ -132,6 +134,7 @@ class Settings:
     spoilt_images: str = "repair"
     sensor: Sensor | None = None
     low_frequency_hz: float | None = None
+    delay_s: float = 0.0
     still_frames: int = 1
     least_range_m: float = 0.0
 

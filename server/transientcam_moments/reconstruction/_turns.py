@@ -23,18 +23,22 @@ _BEFORE: Final = 1 / 16
 def low_phase_rad(settings: Settings, calibration: Array) -> float | None:
     """Return the phase of the gain at the low frequency; None where it does not follow.
 
-    By b_1 and b_2, for sub-phases as at all frequencies and a delay of less than half a period.
-    With m = 1 a gain for all pixels of phase 0, or a quarter turn as of arccos, has no delay.
+    By b_1 and b_2, for sub-phases as at all frequencies and a delay up to half a period from that
+    of the settings. With m = 1 a gain of all pixels is known by that one, if the sub-phases' phase
+    is 0, or a quarter turn as of arccos.
     """
     if not (settings.zeroth == "low-frequency" and settings.consecutive and settings.low_ratio):
         return None
     gain = np.asarray(calibration)
+    step_rad = _TURN * (settings.base_frequency_hz or 0.0) * settings.delay_s
     if len(gain) < 3:
-        known = gain.ndim == 1 and abs(gain[1].real * gain[1].imag) <= 1e-9 * abs(gain[1]) ** 2
-        return float(np.angle(gain[1])) if known else None
+        own = gain[1] * np.exp(-1j * step_rad)
+        known = gain.ndim == 1 and abs(own.real * own.imag) <= 1e-9 * abs(own) ** 2
+        return float(np.angle(own)) + step_rad * settings.low_ratio if known else None
     with np.errstate(all="ignore"):
         first, second = (np.nansum(each / abs(each)) for each in gain[1:3])
-    return float(np.angle(first) - np.angle(second * np.conj(first)) * (1 - settings.low_ratio))
+    step_rad += np.angle(second * np.conj(first) * np.exp(-1j * step_rad))
+    return float(np.angle(first) - step_rad * (1 - settings.low_ratio))
 
 
 def begun(phase: Array, start_rad: float, turn_rad: float = _TURN) -> Array:

@@ -25,7 +25,7 @@ def captured(
     delay_s: float = 0.0,
     sub_phases_rad: tuple[float, ...] = (0.0,),
     seed: int = 1,
-) -> tuple[_Array, dict[str, _Array]]:
+) -> tuple[_Array, dict[str, Any]]:
     """Return noisy images of light at a range, and what they show; b_0 is measured at LOW_HZ."""
     random, images, labels = np.random.default_rng(seed), [], []
     for j in range(m + 1):

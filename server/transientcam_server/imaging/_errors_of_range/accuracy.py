@@ -123,7 +123,7 @@ def range_accuracy(
     )
     turn_m = float(tm.range_m(2 * np.pi, recipe.base_frequency_hz))
 
-    def shift_m(other_m: _Array) -> _Array:  # whatever turn a range is in
+    def shift_m(other_m: _Array) -> Any:  # whatever turn a range is in
         return np.remainder(other_m - range_m[seen] + turn_m / 2, turn_m) - turn_m / 2
 
     drawn_m = shift_m(frame.drawn_m())

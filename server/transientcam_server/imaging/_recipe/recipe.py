@@ -269,6 +269,7 @@ class Recipe:
             base_frequency_hz=sequence.base_frequency_hz,
             zeroth=sequence.zeroth,
             low_frequency_hz=self.applied.low_frequency_hz or None,
+            delay_s=self.applied.delay_s,
             takes=sequence.takes,
             multiples=sequence.multiples,
             phases_rad=sequence.sampling.phases_rad,
