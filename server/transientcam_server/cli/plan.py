@@ -250,7 +250,7 @@ def _region(text: str | None) -> "Region | None":
     from transientcam_server.planning import Region
 
     try:
-        return Region.parse(text)
+        return Region.of(text)
     except Problem as problem:
         raise typer.BadParameter(problem.detail, param_hint="--region") from problem
 

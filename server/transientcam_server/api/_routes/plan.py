@@ -17,11 +17,11 @@ from transientcam_server.api._problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.imaging import Frame
 from transientcam_server.planning import (
-    MAP_FORMATS,
     Goal,
     Progress,
     Region,
     SceneStatistics,
+    map_files,
     uniform_scene,
 )
 from transientcam_server.service import Service
@@ -142,7 +142,7 @@ async def _made(
                 Sequence.from_document(made["sequence"]),
                 progress=progress.part(searched, 1.0),
             )
-            files |= {name: form(error_m, goal.range_error_m) for name, form in MAP_FORMATS.items()}
+            files |= map_files(error_m, goal.range_error_m)
         _add_transport(made["price"], service.hub.latest)
         return PlanDocument.model_validate(made)
 

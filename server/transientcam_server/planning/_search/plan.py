@@ -12,9 +12,10 @@ from transientcam.notebook import table_html
 from transientcam_driver import Capabilities
 from transientcam_server.planning._prediction.prediction import Predictor
 from transientcam_server.planning._process.progress import Progress
+from transientcam_server.planning._scene.estimation import SEARCHED
 from transientcam_server.planning._scene.scene import SceneStatistics
 from transientcam_server.planning._search.candidates import ComputingTime, curves
-from transientcam_server.planning._search.changes import Change, changes, computing_s, in_words
+from transientcam_server.planning._search.changes import Change, changes, in_words
 from transientcam_server.planning._search.choice import Choice
 from transientcam_server.planning._search.families import families
 from transientcam_server.planning._search.finest import shortened
@@ -62,14 +63,13 @@ class Plan:
 
     def to_document(self) -> dict[str, Any]:
         """Return the plan as JSON has it."""
-        recommended = self.recommended.to_document()
         region = self.goal.region
         return {
-            **recommended,
+            **self.recommended.to_document(),
             "region": None if region is None else region.to_document(),
             "computing_s": self.computing_s,
             "changes": [asdict(each) for each in self.changes],
-            "price_summary": in_words(recommended["price"], self.changes, self.goal),
+            "price_summary": in_words(self.recommended, self.changes, self.goal),
             "compared_by": self.leading,
             "summary": self.summary,
             "scene": self.scene.to_document(),
@@ -151,7 +151,8 @@ def plan(
     scene = predictor.scene
     progress.at(0.9, "what would buy most")
     better = changes(best, goal, predictor, capabilities)
-    words, times_s = summary(best, twice, scene), computing_s(best, timed)
+    words, sequence = summary(best, twice, scene), best.applied.sequence
+    times_s = {name: timed(sequence, name) for name in dict.fromkeys((best.estimator, *SEARCHED))}
     return Plan(best, half_time, twice, leading, words, scene, goal, better, times_s)
 
 

@@ -42,6 +42,20 @@ def test_computing_takes_its_share_of_the_time_between_frames(capabilities: Capa
     assert choice(capabilities, reconstruct_s=None).computing_share is None
 
 
+def test_the_items_of_a_capture_add_up_to_it(capabilities: Capabilities) -> None:
+    one = choice(capabilities, takes=5, reconstruct_s=0.25)
+    applied, items = one.applied, one.price
+
+    assert items["light_s"] == pytest.approx(applied.images * 1e-3)
+    assert items["readout_s"] == pytest.approx(
+        applied.images * capabilities.streaming_readout_s - one.settling_s
+    )
+    assert items["sum_s"] == applied.capture_s + 0.25
+    assert items["light_share"] == pytest.approx(applied.images * 1e-3 / applied.capture_s)
+    assert items["data_bytes"] == applied.images * (capabilities.image_bytes + 64)
+    assert choice(capabilities, reconstruct_s=None).price["computing_s"] is None
+
+
 def test_a_choice_is_stated_in_words() -> None:
     one = Sequence(base_frequency_hz=11.5e6, harmonics=3, exposure_s=1.2345e-3)
 
