@@ -171,12 +171,6 @@ export interface AppliedDocument {
   readonly data_rate_bytes_s: number;
 }
 
-/** How many pixels of a capture are further off. */
-export interface BeyondDocument {
-  readonly error_m: number;
-  readonly share: number;
-}
-
 /** What a request sends, where that has a name. */
 export interface Bodies {
   readonly "POST /lease": LeaseRequest;
@@ -303,19 +297,6 @@ export interface CameraDocument {
   readonly counters: Readonly<Record<string, number>>;
 }
 
-/** What a better camera would give with the same frequencies and estimator. */
-export interface ChangeDocument {
-  /** Read-out twice as fast, or twice as much light. */
-  readonly what: "readout" | "light";
-  readonly capture_s: number;
-  /** Of `compared_by`. */
-  readonly error: number;
-  /** How many times less time it takes. */
-  readonly time_factor: number;
-  /** How many times less its error is. */
-  readonly error_factor: number;
-}
-
 /** A sequence and what is predicted of it. */
 export interface ChoiceDocument {
   /** The body for `PUT /sequence`. */
@@ -331,7 +312,11 @@ export interface ChoiceDocument {
   readonly reconstruct_s: number | null;
   /** That over the time between two frames: what a core is busy with. */
   readonly computing_share: number | null;
-  readonly price: PriceDocument;
+  /** Times of a capture: `light_s` of exposure, `readout_s`, `settling_s` after changes of frequency;
+   * `transport_s` until the last image arrives beyond the least that the link took, by the newest
+   * frame, and `computing_s` on one core, null where not known; their `sum_s`. And `light_share`, the
+   * part of the capture with the light on, that dose and heat go with, and `data_bytes` of images. */
+  readonly price: Readonly<Record<string, number | null>>;
   readonly predicted: PredictedDocument;
 }
 
@@ -823,7 +808,11 @@ export interface PlanDocument {
   readonly reconstruct_s: number | null;
   /** That over the time between two frames: what a core is busy with. */
   readonly computing_share: number | null;
-  readonly price: PriceDocument;
+  /** Times of a capture: `light_s` of exposure, `readout_s`, `settling_s` after changes of frequency;
+   * `transport_s` until the last image arrives beyond the least that the link took, by the newest
+   * frame, and `computing_s` on one core, null where not known; their `sum_s`. And `light_share`, the
+   * part of the capture with the light on, that dose and heat go with, and `data_bytes` of images. */
+  readonly price: Readonly<Record<string, number | null>>;
   readonly predicted: PredictedDocument;
   /** The target that neighbours are compared by. */
   readonly compared_by: string;
@@ -834,8 +823,9 @@ export interface PlanDocument {
   readonly region: readonly (readonly [number, number])[] | null;
   /** Computing time of a frame of the sequence, by estimator; null as in `price`. */
   readonly computing_s: Readonly<Record<string, number | null>>;
-  /** What better cameras would give, the best first: each is predicted, too. */
-  readonly changes: readonly ChangeDocument[];
+  /** What would be, the best first, with the same frequencies and `what`, twice the `light` or a
+   * `readout` twice as fast: `capture_s` and `error`, and how many times less they are. */
+  readonly changes: readonly Readonly<Record<string, number | string>>[];
   /** What the time goes into, and what would buy most, in a sentence. */
   readonly price_summary: string;
   /** What half the time gives; null where nothing is that quick. */
@@ -859,7 +849,11 @@ export interface PlanNeighbourDocument {
   readonly reconstruct_s: number | null;
   /** That over the time between two frames: what a core is busy with. */
   readonly computing_share: number | null;
-  readonly price: PriceDocument;
+  /** Times of a capture: `light_s` of exposure, `readout_s`, `settling_s` after changes of frequency;
+   * `transport_s` until the last image arrives beyond the least that the link took, by the newest
+   * frame, and `computing_s` on one core, null where not known; their `sum_s`. And `light_share`, the
+   * part of the capture with the light on, that dose and heat go with, and `data_bytes` of images. */
+  readonly price: Readonly<Record<string, number | null>>;
   readonly predicted: PredictedDocument;
   /** Its capture time over the recommended one's. */
   readonly time_factor: number;
@@ -916,8 +910,8 @@ export interface PredictedDocument {
   readonly bias_known: boolean;
   /** What the share of the goal is within; null where the goal is of the median pixel. */
   readonly within: WithinDocument | null;
-  /** Shares of the pixels of a capture that are further off than some errors. */
-  readonly beyond: readonly BeyondDocument[];
+  /** Shares of the pixels of a capture that are further off than errors in m. */
+  readonly beyond: Readonly<Record<string, number>>;
   /** Whether it sees more of the scene than the look that the scene was judged by, so that the
    * prediction is a bound on how good it can be. */
   readonly beyond_scene: boolean;
@@ -934,26 +928,6 @@ export interface PredictedStdDocument {
   readonly p90: number;
   /** Share of the pixels where the noise model holds; that of the others is a rough figure. */
   readonly first_order_share: number;
-}
-
-/** What a capture takes until its ranges are there, item by item, and what else it costs. */
-export interface PriceDocument {
-  /** Exposure, with the light on. */
-  readonly light_s: number;
-  readonly readout_s: number;
-  /** After changes of the modulation frequency. */
-  readonly settling_s: number;
-  /** From the end of the capture to the arrival of the last image, by the newest frame; the least
-   * that a link ever took is not in it. Null where no frame tells. */
-  readonly transport_s: number | null;
-  /** From images to ranges on one core; null as long as kernels are not compiled. */
-  readonly computing_s: number | null;
-  /** Of all that is known. */
-  readonly sum_s: number;
-  /** Share of the capture with the light on: dose and heat go with it. */
-  readonly light_share: number;
-  /** Raw images of one capture. */
-  readonly data_bytes: number;
 }
 
 /** A problem as RFC 9457 describes it. */
@@ -1486,13 +1460,11 @@ export interface WithinDocument {
   readonly share: number;
   /** So many are within this. */
   readonly error_m: number;
-  /** What is measured of `error_m` lies above this with 95 %. */
   readonly low: number;
-  /** And below this. */
+  /** It is measured between them with 90 %. */
   readonly high: number;
-  /** The largest error that the goal allows. */
   readonly target_m: number | null;
-  /** So many are within that. */
+  /** So many are within the target. */
   readonly target_share: number | null;
 }
 

@@ -150,11 +150,10 @@ async def _made(
 def _add_transport(price: dict[str, Any], frame: Frame | None) -> None:
     """State what transport takes, by the newest frame."""
     begun_s = None if frame is None else frame.meta()["captured_unix_s"]
-    if frame is None or begun_s is None:
-        return
-    transport_s = max(0.0, frame.raw.host_time_s - begun_s - frame.raw.capture_s)
-    price["transport_s"] = transport_s
-    price["sum_s"] += transport_s
+    if frame is not None and begun_s is not None:
+        taken_s = frame.raw.host_time_s - begun_s - frame.raw.capture_s
+        price["transport_s"] = max(0.0, taken_s)
+        price["sum_s"] += price["transport_s"]
 
 
 async def _scene(

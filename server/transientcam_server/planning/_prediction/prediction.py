@@ -9,7 +9,7 @@ number of takes.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from statistics import NormalDist
 from typing import Any, Final
 
@@ -177,9 +177,8 @@ class Predictor:
     def least_noise_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
         """Return a bound in m on the noise of the median pixel: that of Cramer and Rao.
 
-        Of one return with all the light; the sum of squares of 1 to m is in it. Half of the pixels
-        are noisier than the median one: the share s of all ranges that is off by least reaches at
-        least as far as the share 2 s - 1 of the median pixel's.
+        Of one return with all the light; the sum of squares of 1 to m is in it. As half of the
+        pixels are noisier, a share s of all ranges reaches as far as 2 s - 1 of that pixel's.
         """
         m = self._harmonics(estimator, sequence)
         noise = float(np.median(self._nominal)) * scale
@@ -191,8 +190,8 @@ class Predictor:
     def least_bias_m(self, estimator: str, sequence: Sequence) -> float:
         """Return what the bias hardly lets the error fall below: that without noise.
 
-        Of the median pixel, or of a share s of the ranges: of a pixel that is off at least half of
-        the ranges are further off, so that it is that of the share 2 s - 1 of the pixels.
+        As half of a pixel's ranges are further off than it is, that is for a share s of them the
+        bias of the share 2 s - 1 of the pixels.
         """
         m = self._harmonics(estimator, sequence)
         return self._exact(estimator, m, sequence.base_frequency_hz)
@@ -233,17 +232,14 @@ class Predictor:
         )
         picks = resampled(noise.size, RESAMPLED, self._seed)
         most_m = None if known else farthest_m
-        within = None
-        if self._share is not None:
-            within = _within(self._share, errors, most_m, picks)
         return Prediction(
             figure(errors.std_m, _typical, picks),
             _error(lambda bias_m: np.hypot(errors.std_m, bias_m), _median, errors, most_m, picks),
             float(_median(errors.bias_m)),
             float(_median(farthest_m)),
             known,
-            tuple(_ordered(errors.off_m(errors.bias_m))),
-            within,
+            tuple(_quantiles(_SHARES, errors.off_m(errors.bias_m)).tolist()),
+            None if self._share is None else _within(self._share, errors, most_m, picks),
         )
 
     def of_each(self, estimator: str, sequence: Sequence) -> tuple[_Array, _Array]:
@@ -261,15 +257,14 @@ class Predictor:
 
     def brighter(self, times: float) -> "Predictor":
         """Return the predictor of the same scene with so many times the camera's own light."""
-        scene = self._whole
-        ambient = float(np.median(scene.ambient_dn_per_s))
-        lit = replace(
-            scene,
-            brightness_dn_per_s=times * scene.brightness_dn_per_s,
-            brightest_dn_per_s=times * max(scene.brightest_dn_per_s - ambient, 0.0) + ambient,
+        ambient = float(np.median(self._whole.ambient_dn_per_s))
+        return self._with(
+            replace(
+                self._whole,
+                brightness_dn_per_s=times * self._whole.brightness_dn_per_s,
+                brightest_dn_per_s=times * (self._whole.brightest_dn_per_s - ambient) + ambient,
+            )
         )
-        arguments = lit, self.sensor, self.settings
-        return Predictor(*arguments, seed=self._seed, go_on=self._go_on, share=self._share)
 
     def beyond_scene(self, sequence: Sequence) -> bool:
         """Whether a sequence sees more of the scene than the look that describes it."""
@@ -306,10 +301,11 @@ class Predictor:
 
     @cached_property
     def _closer(self) -> "Predictor":
-        arguments = self._whole, self.sensor, self.settings
-        return Predictor(
-            *arguments, seed=self._seed, go_on=self._go_on, closely=True, share=self._share
-        )
+        return self._with(self._whole, closely=True)
+
+    def _with(self, scene: SceneStatistics, *, closely: bool = False) -> "Predictor":
+        same = {"seed": self._seed, "go_on": self._go_on, "share": self._share}
+        return Predictor(scene, self.sensor, self.settings, closely=closely, **same)
 
     def _harmonics(self, estimator: str, sequence: Sequence) -> int:
         """How many harmonics the estimator looks at."""
@@ -386,24 +382,20 @@ def _error(
 
 def _within(share: float, errors: PixelErrors, farthest_m: _Array | None, picks: _Array) -> Figure:
     """Return the figure of what a share of the ranges is within; few draws tell its interval."""
+
+    def value(off_m: _Array) -> _Array:
+        return _quantiles(share, off_m)
+
     few = replace(errors, apart_m=errors.apart_m[::_FEW_DRAWS])
-    found = _error(few.off_m, partial(_quantile, share), few, farthest_m, picks)
-    whole = float(_quantile(share, errors.off_m(errors.bias_m)))
-    scale = whole / found.median if 0 < found.median < math.inf else 1.0
+    found = _error(few.off_m, value, few, farthest_m, picks)
+    scale = float(value(errors.off_m(errors.bias_m))) / found.median
     return Figure(*(scale * getattr(found, each.name) for each in fields(Figure)))
 
 
-def _quantile(share: float, off_m: _Array) -> _Array:
-    """Return what a share of the ranges (..., P, D) is within (...)."""
+def _quantiles(shares: _Array | float, off_m: _Array) -> _Array:
+    """Return how far shares (S) of the ranges (..., P, D) are off at most: (S, ...)."""
     flat = off_m.reshape((*off_m.shape[:-2], -1))
-    place = min(int(share * flat.shape[-1]), flat.shape[-1] - 1)
-    return np.asarray(np.partition(flat, place, axis=-1)[..., place])
-
-
-def _ordered(off_m: _Array) -> _Array:
-    """Return how far equal shares of all ranges (P, D) are off, by rising value."""
-    flat = np.sort(off_m, axis=None)
-    return np.asarray(flat[np.rint(_SHARES * (flat.size - 1)).astype(int)])
+    return np.asarray(np.quantile(flat, shares, axis=-1, method="higher"))
 
 
 def _typical(deviations: _Array) -> _Array:

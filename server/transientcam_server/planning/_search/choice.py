@@ -143,11 +143,11 @@ class Choice:
                     "target_m": target_m,
                     "target_share": target_m and self.predicted.share_within(target_m),
                 },
-                "beyond": [
-                    {"error_m": each, "share": 1 - self.predicted.share_within(each)}
+                "beyond": {
+                    f"{each:g}": 1 - self.predicted.share_within(each)
                     for each in TOLERANCES_M
                     if self.predicted.off_m
-                ],
+                },
                 "beyond_scene": self.beyond_scene,
                 "bound_width": self.bound_width,
                 "separation_share": self.separation_share,

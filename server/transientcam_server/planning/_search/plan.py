@@ -8,7 +8,6 @@ what falls short of the goal a refusal.
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from transientcam.notebook import table_html
 from transientcam_driver import Capabilities
 from transientcam_server.planning._prediction.prediction import Predictor
 from transientcam_server.planning._process.progress import Progress
@@ -80,19 +79,6 @@ class Plan:
     def __repr__(self) -> str:
         """State the recommended sequence, and what it takes and gives."""
         return f"<Plan {_in_words(self.recommended)}>"
-
-    def _repr_html_(self) -> str:
-        """Return the recommendation and its neighbours as a table, for notebooks."""
-        rows = {
-            "recommended": self.recommended,
-            "half the time": self.half_time,
-            "twice the accuracy": self.twice_accuracy,
-        }
-        words = {
-            name: "no sequence does" if each is None else _in_words(each)
-            for name, each in rows.items()
-        }
-        return table_html(f"Plan, compared by {self.leading}", words)
 
     def _neighbour(self, choice: Choice | None) -> dict[str, Any] | None:
         if choice is None:
