@@ -312,10 +312,10 @@ export interface ChoiceDocument {
   readonly reconstruct_s: number | null;
   /** That over the time between two frames: what a core is busy with. */
   readonly computing_share: number | null;
-  /** Times of a capture: `light_s` of exposure, `readout_s`, `settling_s` after changes of frequency;
+  /** Times of a capture: `light_s` of exposure, `readout_s`, and `settling_s` of the modulation;
    * `transport_s` until the last image arrives beyond the least that the link took, by the newest
-   * frame, and `computing_s` on one core, null where not known; their `sum_s`. And `light_share`, the
-   * part of the capture with the light on, that dose and heat go with, and `data_bytes` of images. */
+   * frame, and `computing_s` on one core, null where not known; their `sum_s`. And `light_share`,
+   * the part with the light on, which dose and heat go with, and `data_bytes` of images. */
   readonly price: Readonly<Record<string, number | null>>;
   readonly predicted: PredictedDocument;
 }
@@ -808,10 +808,10 @@ export interface PlanDocument {
   readonly reconstruct_s: number | null;
   /** That over the time between two frames: what a core is busy with. */
   readonly computing_share: number | null;
-  /** Times of a capture: `light_s` of exposure, `readout_s`, `settling_s` after changes of frequency;
+  /** Times of a capture: `light_s` of exposure, `readout_s`, and `settling_s` of the modulation;
    * `transport_s` until the last image arrives beyond the least that the link took, by the newest
-   * frame, and `computing_s` on one core, null where not known; their `sum_s`. And `light_share`, the
-   * part of the capture with the light on, that dose and heat go with, and `data_bytes` of images. */
+   * frame, and `computing_s` on one core, null where not known; their `sum_s`. And `light_share`,
+   * the part with the light on, which dose and heat go with, and `data_bytes` of images. */
   readonly price: Readonly<Record<string, number | null>>;
   readonly predicted: PredictedDocument;
   /** The target that neighbours are compared by. */
@@ -849,10 +849,10 @@ export interface PlanNeighbourDocument {
   readonly reconstruct_s: number | null;
   /** That over the time between two frames: what a core is busy with. */
   readonly computing_share: number | null;
-  /** Times of a capture: `light_s` of exposure, `readout_s`, `settling_s` after changes of frequency;
+  /** Times of a capture: `light_s` of exposure, `readout_s`, and `settling_s` of the modulation;
    * `transport_s` until the last image arrives beyond the least that the link took, by the newest
-   * frame, and `computing_s` on one core, null where not known; their `sum_s`. And `light_share`, the
-   * part of the capture with the light on, that dose and heat go with, and `data_bytes` of images. */
+   * frame, and `computing_s` on one core, null where not known; their `sum_s`. And `light_share`,
+   * the part with the light on, which dose and heat go with, and `data_bytes` of images. */
   readonly price: Readonly<Record<string, number | null>>;
   readonly predicted: PredictedDocument;
   /** Its capture time over the recommended one's. */

@@ -178,10 +178,10 @@ class ChoiceDocument(Document):
     computing_share: float | None
     """That over the time between two frames: what a core is busy with."""
     price: dict[str, float | None]
-    """Times of a capture: `light_s` of exposure, `readout_s`, `settling_s` after another frequency;
+    """Times of a capture: `light_s` of exposure, `readout_s`, and `settling_s` of the modulation;
     `transport_s` until the last image arrives beyond the least that the link took, by the newest
-    frame, and `computing_s` on one core, null where not known; their `sum_s`. And `light_share`, the
-    part of the capture with the light on, that dose and heat go with, and `data_bytes` of images."""
+    frame, and `computing_s` on one core, null where not known; their `sum_s`. And `light_share`,
+    the part with the light on, which dose and heat go with, and `data_bytes` of images."""
     predicted: PredictedDocument
 
 
