@@ -75,8 +75,7 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         budget: Mapping[str, float] | None = None,
         fixed: Mapping[str, Any] | None = None,
         estimator: str | None = None,
-        share: float | None = None,
-        region: Sequence[Any] | None = None,
+        **more: Any,
     ) -> _Document:
         """Return the sequence and estimator for a target, or the best within a budget.
 
@@ -97,11 +96,9 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
             Fields of the sequence that must stay as given here.
         estimator
             The only one to plan with.
-        share
-            Of the pixels of a capture that are to be within ``range_error_m``; None for 0.9.
-        region
-            Whose pixels count: ``[x, y, width, height]``, or corners ``[[x, y], ...]`` of a
-            polygon; None for all.
+        more
+            ``share`` of the pixels of a capture that are to be within ``range_error_m``, 0.9 if
+            left out; ``region`` whose pixels count, ``[x, y, width, height]`` or corners.
 
         Raises
         ------
@@ -109,14 +106,7 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
             ``target-unreachable`` where nothing reaches the target; it says what limits.
         """
         return self._ask(
-            planning.plan(
-                target=target,
-                budget=budget,
-                fixed=fixed,
-                estimator=estimator,
-                share=share,
-                region=region,
-            )
+            planning.plan(target=target, budget=budget, fixed=fixed, estimator=estimator, **more)
         )
 
     def start_plan(
@@ -126,9 +116,7 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         budget: Mapping[str, float] | None = None,
         fixed: Mapping[str, Any] | None = None,
         estimator: str | None = None,
-        share: float | None = None,
-        region: Sequence[Any] | None = None,
-        map: bool = False,  # noqa: A002 - as the document has it
+        **more: Any,
     ) -> _Document:
         """Begin what `plan` returns as a job, and return that; arguments as in `plan`.
 
@@ -141,13 +129,7 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         """
         return self._ask(
             planning.start_plan(
-                target=target,
-                budget=budget,
-                fixed=fixed,
-                estimator=estimator,
-                share=share,
-                region=region,
-                map=map or None,
+                target=target, budget=budget, fixed=fixed, estimator=estimator, **more
             )
         )
 
@@ -158,29 +140,13 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         """
         return self._ask(planning.plan_map(job_id, form))
 
-    def tradeoff(
-        self,
-        by: str = "range_error_m",
-        *,
-        share: float | None = None,
-        region: Sequence[Any] | None = None,
-    ) -> _Document:
-        """Return what accuracy costs in time: the sequences that no other beats, in ``front``.
+    def tradeoff(self, by: str = "range_error_m") -> _Document:
+        """Return what accuracy costs in time: the sequences that no other beats, in ``front``."""
+        return self._ask(planning.tradeoff(by))
 
-        Errors are of the median pixel, or of a ``share`` of the pixels of a ``region``, as in
-        `plan`.
-        """
-        return self._ask(planning.tradeoff(by, share=share, region=region))
-
-    def start_tradeoff(
-        self,
-        by: str = "range_error_m",
-        *,
-        share: float | None = None,
-        region: Sequence[Any] | None = None,
-    ) -> _Document:
-        """Begin what `tradeoff` returns as a job, and return that; see `start_plan`."""
-        return self._ask(planning.start_tradeoff(by=by, share=share, region=region))
+    def start_tradeoff(self, by: str = "range_error_m", **more: Any) -> _Document:
+        """Begin what `tradeoff` returns as a job, for a ``share`` and a ``region``, too."""
+        return self._ask(planning.start_tradeoff(by=by, **more))
 
     @property
     def calibrations(self) -> Calibrations[_Document, _Bytes]:

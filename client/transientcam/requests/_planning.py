@@ -1,6 +1,6 @@
 """Requests about accuracy and time: a sequence for a goal, and what accuracy costs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final
 from urllib.parse import quote
 
@@ -28,15 +28,9 @@ def plan_map(job_id: str, form: str) -> Request[bytes]:
     )
 
 
-def tradeoff(by: str, share: float | None, region: Sequence[Any] | None) -> Request[dict[str, Any]]:
+def tradeoff(by: str) -> Request[dict[str, Any]]:
     """Build the request for all sequences that no other beats."""
-    params: list[tuple[str, Any]] = [("by", by)]
-    if share is not None:
-        params.append(("share", share))
-    if region is not None:
-        each = region if isinstance(region[0], Sequence) else [region]
-        params.append(("region", "/".join(",".join(map(str, numbers)) for numbers in each)))
-    return document("tradeoff", params=params, extra_timeout_s=_PLANNED_S)
+    return document("tradeoff", params=[("by", by)], extra_timeout_s=_PLANNED_S)
 
 
 def start_tradeoff(**parts: Any) -> Request[dict[str, Any]]:

@@ -4,7 +4,8 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,7 +16,6 @@ from transientcam.cli.terminal import Terminal, echo
 from transientcam_server.cli.plan_text import print_front, print_plan, print_takes
 
 if TYPE_CHECKING:
-    from transientcam_server.cli.plan_here import View
     from transientcam_server.planning import Goal, Region
 
 
@@ -150,15 +150,17 @@ def plan(
         here |= {"return": returns or None}
         here |= {"brightness_dn_per_s": brightness_dn_per_s, "ambient_dn_per_s": ambient_dn_per_s}
         _refuse(_options(here), "is the daemon's")
-        parts: dict[str, Any] = {"target": _given(target), "budget": _given(budget)}
-        parts["target"] |= {"separation_share": separation_share} if separation_m else {}
-        wanted = {"share": share, "region": None if of_pixels is None else of_pixels.to_document()}
+        wanted: dict[str, Any] = {"share": share}
+        wanted["region"] = None if of_pixels is None else of_pixels.to_document()
         if not front:
-            parts |= {"fixed": stays, "estimator": estimator, "map": map_file is not None}
-            wanted |= parts
-        document, made = _by_daemon(daemon, token, wanted, console, map_file, as_json=as_json)
+            target |= {"separation_share": separation_share} if separation_m else {}
+            wanted |= {"target": _given(target), "budget": _given(budget), "fixed": stays}
+            wanted |= {"estimator": estimator, "map": map_file is not None}
+        from transientcam_server.cli.plan_daemon import by_daemon
+
+        make = partial(by_daemon, daemon, token, wanted, console, map_file)
     else:
-        from transientcam_server.cli.plan_here import View
+        from transientcam_server.cli.plan_here import View, by_camera
         from transientcam_server.planning import SHARE
 
         view = View(
@@ -175,8 +177,8 @@ def plan(
             "estimator": estimator,
         }
         asked |= {"share": share if front or share is not None else SHARE, "region": of_pixels}
-        goal = _goal(asked, stays)
-        document, made = _by_camera(view, goal, console, map_file, front=front, as_json=as_json)
+        make = partial(by_camera, view, _goal(asked, stays), console, map_file, front=front)
+    document, made = _planned(make, console, as_json=as_json)
     if map_file is not None:
         map_file.write_bytes(made)
     if as_json:
@@ -198,55 +200,24 @@ def _goal(asked: dict[str, Any], fixed: dict[str, Any]) -> "Goal":
     return Goal(**asked, base=Sequence.from_document(fixed), fixed=frozenset(fixed))
 
 
-def _by_camera(
-    view: "View",
-    goal: "Goal",
-    console: Terminal,
-    map_file: Path | None,
-    *,
-    front: bool,
-    as_json: bool,
+def _planned(
+    made: Callable[[], tuple[dict[str, Any], bytes]], console: Terminal, *, as_json: bool
 ) -> tuple[dict[str, Any], bytes]:
-    """Plan here; where that is refused print what limits, and end with exit code 1."""
-    from transientcam_server.cli.plan_here import by_camera
+    """Plan; where that is refused print what limits, and end with exit code 1."""
+    from transientcam.errors import ProblemError
     from transientcam_server.errors import Problem
 
     try:
-        return by_camera(view, goal, console, map_file, front=front)
-    except Problem as problem:
-        document = {"detail": problem.detail, **problem.extensions}
-        raise _refused(problem.detail, document, console, as_json=as_json) from problem
-
-
-def _by_daemon(
-    url: str,
-    token: str | None,
-    wanted: dict[str, Any],
-    console: Terminal,
-    map_file: Path | None,
-    *,
-    as_json: bool,
-) -> tuple[dict[str, Any], bytes]:
-    """Let a daemon plan; where it refuses that do the same."""
-    from transientcam.errors import ProblemError
-    from transientcam_server.cli.plan_daemon import by_daemon
-
-    try:
-        return by_daemon(url, token, wanted, console, map_file)
-    except ProblemError as problem:
-        raise _refused(problem.detail, problem.document, console, as_json=as_json) from problem
-
-
-def _refused(
-    detail: str, document: Mapping[str, Any], console: Terminal, *, as_json: bool
-) -> typer.Exit:
-    """Print why nothing was planned, and return what ends the command."""
-    if as_json:
-        echo(json.dumps(document))
-    else:
-        console.print(detail, style="red", soft_wrap=True)
-        print_takes(document.get("takes", []))
-    return typer.Exit(1 if document.get("decided", True) else 3)
+        return made()
+    except (Problem, ProblemError) as problem:
+        document: dict[str, Any] = {"detail": problem.detail}
+        document |= problem.extensions if isinstance(problem, Problem) else problem.document
+        if as_json:
+            echo(json.dumps(document))
+        else:
+            console.print(problem.detail, style="red", soft_wrap=True)
+            print_takes(document.get("takes", []))
+        raise typer.Exit(1 if document.get("decided", True) else 3) from problem
 
 
 def _region(text: str | None) -> "Region | None":
@@ -256,7 +227,7 @@ def _region(text: str | None) -> "Region | None":
     from transientcam_server.planning import Region
 
     try:
-        return Region.parse(text)
+        return Region.of(text)
     except Problem as problem:
         raise typer.BadParameter(problem.detail, param_hint="--region") from problem
 

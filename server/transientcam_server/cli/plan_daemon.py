@@ -1,15 +1,17 @@
 """The verb ``plan`` of a running daemon: a job there, followed to its end."""
 
 import signal
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import typer
 
 from transientcam import Camera
 from transientcam.cli.terminal import Terminal
+
+_ENDING: Final = (signal.SIGTERM, signal.SIGHUP)
 
 
 def by_daemon(
@@ -41,56 +43,24 @@ def by_daemon(
             status.update(f"{job['progress']:.0%}: {job['step']}")
 
         start = camera.start_plan if "target" in wanted else camera.start_tradeoff
-        with _ends_by_signals() as told:
+        for number in _ENDING:
+            signal.signal(number, lambda number, _: sys.exit(128 + number))
+        signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)  # until there is a job to cancel
+        job: dict[str, Any] = {}
+        try:
             job = start(**wanted)
-            try:
-                told.go_on()
-                show(job)
-                job = camera.wait_for(job["id"], on_progress=show)
-            except (KeyboardInterrupt, SystemExit):
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
+            show(job)
+            job = camera.wait_for(job["id"], on_progress=show)
+        except (KeyboardInterrupt, SystemExit):
+            if job:
                 camera.jobs.cancel(job["id"])
-                raise
+            raise
+        finally:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
         if job["state"] == "cancelled":
             console.print("The job was cancelled.", style="red")
             raise typer.Exit(1)
         result: dict[str, Any] = job["result"]
-        if map_file is None:
-            return result, b""
-        return result, camera.plan_map(job["id"], map_file.suffix[1:])
-
-
-class _Told:
-    """Which signal came; it ends nothing before there is a job to cancel."""
-
-    def __init__(self) -> None:
-        self._number: int | None = None
-        self._held = True
-
-    def take(self, number: int, _: object) -> None:
-        """Handle a signal."""
-        self._number = number
-        if not self._held:
-            raise SystemExit(128 + number)
-
-    def go_on(self) -> None:
-        """Let signals end the command from now on, also one that came before."""
-        self._held = False
-        if self._number is not None:
-            raise SystemExit(128 + self._number)
-
-
-@contextmanager
-def _ends_by_signals() -> Iterator[_Told]:
-    """Raise SystemExit where a signal would end the process at once."""
-    told = _Told()
-    numbers = [getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")]
-    before = {
-        number: signal.signal(number, told.take)
-        for number in numbers
-        if number is not None and signal.getsignal(number) is signal.SIG_DFL
-    }
-    try:
-        yield told
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        made = b"" if map_file is None else camera.plan_map(job["id"], map_file.suffix[1:])
+        return result, made

@@ -13,12 +13,12 @@ from transientcam_driver.clock import RealClock, VirtualClock
 from transientcam_server.camera import sensor_of
 from transientcam_server.errors import Problem
 from transientcam_server.planning import (
-    MAP_FORMATS,
     Goal,
     Planner,
     Progress,
     Report,
     SceneStatistics,
+    map_files,
     predict_takes,
     require_plannable,
     uniform_scene,
@@ -97,7 +97,7 @@ def by_camera(
             return found.to_document(), b""
         best = found.recommended
         error_m = planner.map_m(scene, best.estimator, best.applied.sequence, progress)
-        return found.to_document(), MAP_FORMATS[map_file.suffix[1:]](error_m, goal.range_error_m)
+        return found.to_document(), map_files(error_m, goal.range_error_m)[map_file.suffix[1:]]
 
 
 def _scene(

@@ -5,9 +5,9 @@ and bias of any sequence, and how many pixels are within a target; recommends th
 (`Plan`), or returns all that no other beats.
 """
 
-from transientcam_server.planning._front import About, FrontCache
+from transientcam_server.planning._front import FrontCache, front_goal
 from transientcam_server.planning._looks import Looks
-from transientcam_server.planning._map import MAP_FORMATS
+from transientcam_server.planning._map import map_files
 from transientcam_server.planning._planner import Planner
 from transientcam_server.planning._prediction.takes import predict_takes, takes_of
 from transientcam_server.planning._process.process import PlanningProcess
@@ -25,9 +25,7 @@ from transientcam_server.planning._search.plan import Plan
 
 __all__ = [
     "ESTIMATORS",
-    "MAP_FORMATS",
     "SHARE",
-    "About",
     "FrontCache",
     "Goal",
     "Looks",
@@ -42,7 +40,9 @@ __all__ = [
     "families",
     "flat_from",
     "front",
+    "front_goal",
     "in_words",
+    "map_files",
     "predict_takes",
     "require_plannable",
     "takes_of",

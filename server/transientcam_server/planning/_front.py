@@ -3,7 +3,7 @@
 import asyncio
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from transientcam_driver import AppliedSequence, Sequence
@@ -21,21 +21,10 @@ _WIDE: Final = 1e9  # a target that every sequence reaches: it only requests the
 _KEPT: Final = 8
 
 
-@dataclass(frozen=True, slots=True)
-class About:
-    """What a front is wanted for.
-
-    Attributes
-    ----------
-    by
-        The target that capture time is held against.
-    share, region
-        As a `Goal` has them.
-    """
-
-    by: str
-    share: float | None = None
-    region: Region | None = None
+def front_goal(by: str, share: float | None = None, region: Region | None = None) -> Goal:
+    """Return the goal that a front is compared by: all sequences reach it."""
+    target = {} if by == "range_error_m" else {by: _WIDE}
+    return Goal(share=share, region=region, **target)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,11 +54,11 @@ class FrontCache:
         self._looks = looks
         self._simulated = simulated
         self._clock = clock
-        self._cached: dict[About, _CachedFront] = {}
+        self._cached: dict[Goal, _CachedFront] = {}
         self._predicting = asyncio.Lock()
 
     async def of(
-        self, frame: Frame, about: About, looking: Progress, predicting: Progress
+        self, frame: Frame, goal: Goal, looking: Progress, predicting: Progress
     ) -> dict[str, Any]:
         """Return the front that is wanted, and the frame's own place, as JSON.
 
@@ -77,20 +66,20 @@ class FrontCache:
         ends the work, unless it is done.
         """
         around = {
-            "compared_by": about.by,
+            "compared_by": goal.leading,
             "scene_of_frame": frame.number,
             "current": await self._current(frame),
         }
         shown = predicting.part(0.0, 1.0, show=lambda part: predicting.show(around | part))
         async with self._predicting:
-            cached = self._cached.get(about)
+            cached = self._cached.get(goal)
             made_with = frame.raw.epoch, frame.recipe.settings_version
             if cached is None or cached.made_with != made_with or self._clock() > cached.until_s:
-                document = await self._predicted(frame, about, looking, shown)
+                document = await self._predicted(frame, goal, looking, shown)
                 cached = _CachedFront(made_with, frame.number, self._clock() + CACHED_S, document)
                 if len(self._cached) >= _KEPT:
                     self._cached.clear()
-                self._cached[about] = cached
+                self._cached[goal] = cached
         return around | {"scene_of_frame": cached.frame} | cached.document
 
     def forget(self) -> None:
@@ -99,7 +88,7 @@ class FrontCache:
         self._looks.forget()
 
     async def _predicted(
-        self, frame: Frame, about: About, looking: Progress, predicting: Progress
+        self, frame: Frame, goal: Goal, looking: Progress, predicting: Progress
     ) -> dict[str, Any]:
         base = frame.recipe.applied.sequence
         if self._looks.needs_frame:
@@ -108,13 +97,7 @@ class FrontCache:
             frequency_hz = base.base_frequency_hz
             base = Sequence(base_frequency_hz=frequency_hz, sub_phases=base.sub_phases)
             scene = await self._looks.of_twin(base, None, looking)
-        goal = Goal(
-            base=base,
-            range_std_m=_WIDE if about.by == "range_std_m" else None,
-            bound_width=_WIDE if about.by == "bound_width" else None,
-            share=about.share,
-            region=about.region,
-        )
+        goal = replace(goal, base=base)
         return await self._queue.run(
             self._planner.tradeoff_document, goal, scene, progress=predicting
         )

@@ -10,13 +10,13 @@ import numpy as np
 from transientcam_driver import Capabilities, Sequence, SubPhases
 from transientcam_server.imaging import Frame, Workers
 from transientcam_server.planning import (
-    About,
     FrontCache,
     Goal,
     Looks,
     Planner,
     PlanningQueue,
     Progress,
+    front_goal,
 )
 
 BASE = Sequence(harmonics=3, takes=2, sub_phases=SubPhases("none"))
@@ -71,7 +71,7 @@ class Bench:
         return await self.looks.of_twin(base, ambient, Progress())
 
     async def front(self, frame: Frame, by: str = "range_error_m") -> dict[str, Any]:
-        return await self.fronts.of(frame, About(by), Progress(), Progress())
+        return await self.fronts.of(frame, front_goal(by), Progress(), Progress())
 
     @property
     def goals(self) -> list[tuple[Goal, Any]]:

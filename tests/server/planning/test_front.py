@@ -8,7 +8,7 @@ import pytest
 
 from tests.server.planning.present import BASE, Bench, frame
 from transientcam_driver import Capabilities, Sequence
-from transientcam_server.planning import About, Progress
+from transientcam_server.planning import Progress, front_goal
 
 
 @pytest.mark.parametrize(("later_s", "again"), [(0.0, 5), (10.0, 5), (10.001, 9)])
@@ -75,7 +75,10 @@ def test_who_waits_for_a_front_sees_its_parts(capabilities: Capabilities) -> Non
         bench = Bench()
         shown: list[dict[str, Any]] = []
         await bench.fronts.of(
-            frame(3, capabilities), About("range_error_m"), Progress(), Progress(show=shown.append)
+            frame(3, capabilities),
+            front_goal("range_error_m"),
+            Progress(),
+            Progress(show=shown.append),
         )
         assert [(each["part"], each["scene_of_frame"]) for each in shown] == [(2, 3)]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from transientcam_server.planning import MAP_FORMATS
+from transientcam_server.planning import map_files
 from transientcam_server.planning._map import error_map
 
 
@@ -33,11 +33,11 @@ def test_noise_is_shared_by_neighbours_and_light_and_bias_are_each_pixels_own() 
 def test_files_hold_the_values_or_their_colours() -> None:
     error_m = np.array([[0.0, 0.02, 0.5], [np.nan, 0.01, 0.04]], np.float32)
 
-    np.testing.assert_array_equal(np.load(io.BytesIO(MAP_FORMATS["npy"](error_m, 0.02))), error_m)
-    picture = Image.open(io.BytesIO(MAP_FORMATS["png"](error_m, 0.02)))
+    np.testing.assert_array_equal(np.load(io.BytesIO(map_files(error_m, 0.02)["npy"])), error_m)
+    picture = Image.open(io.BytesIO(map_files(error_m, 0.02)["png"]))
     assert np.asarray(picture).tolist() == [[1, 128, 255], [0, 64, 255]]
     # without a target the worst of twenty is brightest
-    free = np.asarray(Image.open(io.BytesIO(MAP_FORMATS["png"](error_m, None))))
+    free = np.asarray(Image.open(io.BytesIO(map_files(error_m, None)["png"])))
     assert (free[0, 2], free[1, 0]) == (255, 0)
     dark = np.full((2, 2), np.nan, np.float32)
-    assert not np.asarray(Image.open(io.BytesIO(MAP_FORMATS["png"](dark, None)))).any()
+    assert not np.asarray(Image.open(io.BytesIO(map_files(dark, None)["png"]))).any()

@@ -127,56 +127,12 @@ class WithinDocument(Document):
     error_m: float
     """So many are within this."""
     low: float
-    """What is measured of `error_m` lies above this with 95 %."""
     high: float | None
-    """And below this; null where the bias is not known, and how much more it is the look cannot
-    tell."""
+    """It is measured between them with 90 %; null where the bias is not known, and how much more
+    it is the look cannot tell."""
     target_m: float | None = None
-    """The largest error that the goal allows."""
     target_share: float | None = None
-    """So many are within that."""
-
-
-class BeyondDocument(Document):
-    """How many pixels of a capture are further off."""
-
-    error_m: float
-    share: float
-
-
-class PriceDocument(Document):
-    """What a capture takes until its ranges are there, item by item, and what else it costs."""
-
-    light_s: float
-    """Exposure, with the light on."""
-    readout_s: float
-    settling_s: float
-    """After changes of the modulation frequency."""
-    transport_s: float | None = None
-    """From the end of the capture to the arrival of the last image, by the newest frame; the least
-    that a link ever took is not in it. Null where no frame tells."""
-    computing_s: float | None = None
-    """From images to ranges on one core; null as long as kernels are not compiled."""
-    sum_s: float
-    """Of all that is known."""
-    light_share: float
-    """Share of the capture with the light on: dose and heat go with it."""
-    data_bytes: int
-    """Raw images of one capture."""
-
-
-class ChangeDocument(Document):
-    """What a better camera would give with the same frequencies and estimator."""
-
-    what: Literal["readout", "light"]
-    """Read-out twice as fast, or twice as much light."""
-    capture_s: float
-    error: float
-    """Of `compared_by`."""
-    time_factor: float
-    """How many times less time it takes."""
-    error_factor: float
-    """How many times less its error is."""
+    """So many are within the target."""
 
 
 class PredictedDocument(Document):
@@ -198,8 +154,8 @@ class PredictedDocument(Document):
     the simplest light, and `summary` says why."""
     within: WithinDocument | None = None
     """What the share of the goal is within; null where the goal is of the median pixel."""
-    beyond: list[BeyondDocument] = Field(default_factory=list)
-    """Shares of the pixels of a capture that are further off than some errors."""
+    beyond: dict[str, float] = Field(default_factory=dict)
+    """Shares of the pixels of a capture that are further off than errors in m."""
     beyond_scene: bool
     """Whether it sees more of the scene than the look that the scene was judged by, so that the
     prediction is a bound on how good it can be."""
@@ -223,7 +179,11 @@ class ChoiceDocument(Document):
     not compiled. With a budget `computing_share` they are, before the answer."""
     computing_share: float | None
     """That over the time between two frames: what a core is busy with."""
-    price: PriceDocument
+    price: dict[str, float | None]
+    """Times of a capture: `light_s` of exposure, `readout_s`, and `settling_s` of the modulation;
+    `transport_s` until the last image arrives beyond the least that the link took, by the newest
+    frame, and `computing_s` on one core, null where not known; their `sum_s`. And `light_share`,
+    the part with the light on, which dose and heat go with, and `data_bytes` of images."""
     predicted: PredictedDocument
 
 
@@ -278,8 +238,9 @@ class PlanDocument(ChoiceDocument):
     """Corners of the region whose pixels count."""
     computing_s: dict[str, float | None]
     """Computing time of a frame of the sequence, by estimator; null as in `price`."""
-    changes: list[ChangeDocument]
-    """What better cameras would give, the best first: each is predicted, too."""
+    changes: list[dict[str, float | str]]
+    """What would be, the best first, with the same frequencies and `what`, twice the `light` or a
+    `readout` twice as fast: `capture_s` and `error`, and how many times less they are."""
     price_summary: str
     """What the time goes into, and what would buy most, in a sentence."""
     half_time: PlanNeighbourDocument | None = None

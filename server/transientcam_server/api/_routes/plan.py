@@ -17,11 +17,11 @@ from transientcam_server.api._problems import documented
 from transientcam_server.errors import kinds
 from transientcam_server.imaging import Frame
 from transientcam_server.planning import (
-    MAP_FORMATS,
     Goal,
     Progress,
     Region,
     SceneStatistics,
+    map_files,
     uniform_scene,
 )
 from transientcam_server.service import Service
@@ -131,7 +131,7 @@ async def _made(
                 Sequence.from_document(made["sequence"]),
                 progress=progress.part(searched, 1.0),
             )
-            files |= {name: form(error_m, goal.range_error_m) for name, form in MAP_FORMATS.items()}
+            files |= map_files(error_m, goal.range_error_m)
         _add_transport(made["price"], service.hub.latest)
         return PlanDocument.model_validate(made)
 
@@ -139,11 +139,10 @@ async def _made(
 def _add_transport(price: dict[str, Any], frame: Frame | None) -> None:
     """State what transport takes, by the newest frame."""
     begun_s = None if frame is None else frame.meta()["captured_unix_s"]
-    if frame is None or begun_s is None:
-        return
-    transport_s = max(0.0, frame.raw.host_time_s - begun_s - frame.raw.capture_s)
-    price["transport_s"] = transport_s
-    price["sum_s"] += transport_s
+    if frame is not None and begun_s is not None:
+        taken_s = frame.raw.host_time_s - begun_s - frame.raw.capture_s
+        price["transport_s"] = max(0.0, taken_s)
+        price["sum_s"] += price["transport_s"]
 
 
 async def _scene(

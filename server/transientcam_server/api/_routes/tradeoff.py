@@ -18,7 +18,7 @@ from transientcam_server.api._documents.plan import (
 from transientcam_server.api._job_answers import ACCEPTED
 from transientcam_server.api._problems import documented
 from transientcam_server.errors import kinds
-from transientcam_server.planning import About, Progress, Region
+from transientcam_server.planning import Goal, Progress, Region, front_goal
 from transientcam_server.service import Service
 
 router = APIRouter(tags=["accuracy"])
@@ -51,8 +51,8 @@ async def read_tradeoff(
     frequencies is refused; `takes` of the problem says what more of them give. A client that leaves
     ends the work; `POST /tradeoff/jobs` reports its progress.
     """
-    about = About(by, share, Region.parse(region))
-    return await planned.for_request(http, await _work(service, about, http))
+    goal = front_goal(by, share, Region.of(region))
+    return await planned.for_request(http, await _work(service, goal, http))
 
 
 @router.post(
@@ -71,21 +71,19 @@ async def start_tradeoff(
     lines. What that would be refused with is the `problem` of the job. It goes on when the client
     leaves; `POST /jobs/{job}/cancel` ends it.
     """
-    about = About(request.by, request.share, Region.of(request.region))
-    return planned.as_job(service, KIND, await _work(service, about, http), response)
+    goal = front_goal(request.by, request.share, Region.of(request.region))
+    return planned.as_job(service, KIND, await _work(service, goal, http), response)
 
 
-async def _work(service: Service, about: About, http: Request) -> planned.Work[TradeoffDocument]:
+async def _work(service: Service, goal: Goal, http: Request) -> planned.Work[TradeoffDocument]:
     await planned.require_plannable(service, planned.address_of(http))
     planned.require_scene(service)
-    return partial(_made, service, about, planned.address_of(http))
+    return partial(_made, service, goal, planned.address_of(http))
 
 
-async def _made(
-    service: Service, about: About, address: str, progress: Progress
-) -> TradeoffDocument:
+async def _made(service: Service, goal: Goal, address: str, progress: Progress) -> TradeoffDocument:
     """Compute the front once there is a place for the address."""
     async with service.planning.place_of(address):
         frame = await service.hub.newest(after=0, wait_s=planned.FRAME_WITHIN_S)
         looked = progress.part(0.0, planned.LOOKED), progress.part(planned.LOOKED, 1.0)
-        return TradeoffDocument.model_validate(await service.fronts.of(frame, about, *looked))
+        return TradeoffDocument.model_validate(await service.fronts.of(frame, goal, *looked))

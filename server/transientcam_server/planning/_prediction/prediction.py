@@ -9,7 +9,7 @@ number of takes.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from statistics import NormalDist
 from typing import Any, Final
 
@@ -183,9 +183,8 @@ class Predictor:
     def least_noise_m(self, estimator: str, sequence: Sequence, scale: float) -> float:
         """Return a bound in m on the noise of the median pixel: that of Cramer and Rao.
 
-        Of one return with all the light, whose phase all frequencies tell together. Half of the
-        pixels are noisier than the median one: the share s of all ranges that is off by least
-        reaches at least as far as the share 2 s - 1 of the median pixel's.
+        Of one return with all the light, whose phase all frequencies tell together. As half of the
+        pixels are noisier, a share s of all ranges reaches as far as 2 s - 1 of that pixel's.
         """
         m = self._harmonics(estimator, sequence)
         noise = float(np.median(self._nominal)) * scale
@@ -198,8 +197,8 @@ class Predictor:
     def least_bias_m(self, estimator: str, sequence: Sequence) -> float:
         """Return what the bias hardly lets the error fall below: that without noise.
 
-        Of the median pixel, or of a share s of the ranges: of a pixel that is off at least half of
-        the ranges are further off, so that it is that of the share 2 s - 1 of the pixels.
+        As half of a pixel's ranges are further off than it is, that is for a share s of them the
+        bias of the share 2 s - 1 of the pixels.
         """
         m = self._harmonics(estimator, sequence)
         return self._exact(estimator, m, sequence.base_frequency_hz)
@@ -278,7 +277,7 @@ class Predictor:
             float(_median(drifted_m)),
             float(_median(farthest_m)),
             known,
-            tuple(_ordered(errors.off_m(drifted_m))),
+            tuple(_quantiles(_SHARES, errors.off_m(drifted_m)).tolist()),
             within,
         )
 
@@ -302,15 +301,14 @@ class Predictor:
 
     def brighter(self, times: float) -> "Predictor":
         """Return the predictor of the same scene with so many times the camera's own light."""
-        scene = self._whole
-        ambient = float(np.median(scene.ambient_dn_per_s))
-        lit = replace(
-            scene,
-            brightness_dn_per_s=times * scene.brightness_dn_per_s,
-            brightest_dn_per_s=times * max(scene.brightest_dn_per_s - ambient, 0.0) + ambient,
+        ambient = float(np.median(self._whole.ambient_dn_per_s))
+        return self._with(
+            replace(
+                self._whole,
+                brightness_dn_per_s=times * self._whole.brightness_dn_per_s,
+                brightest_dn_per_s=times * (self._whole.brightest_dn_per_s - ambient) + ambient,
+            )
         )
-        arguments = lit, self.sensor, self.settings
-        return Predictor(*arguments, seed=self._seed, go_on=self._go_on, share=self._share)
 
     def beyond_scene(self, sequence: Sequence) -> bool:
         """Whether a sequence sees more of the scene than the look that describes it."""
@@ -352,10 +350,11 @@ class Predictor:
 
     @cached_property
     def _closer(self) -> "Predictor":
-        arguments = self._whole, self.sensor, self.settings
-        return Predictor(
-            *arguments, seed=self._seed, go_on=self._go_on, closely=True, share=self._share
-        )
+        return self._with(self._whole, closely=True)
+
+    def _with(self, scene: SceneStatistics, *, closely: bool = False) -> "Predictor":
+        same = {"seed": self._seed, "go_on": self._go_on, "share": self._share}
+        return Predictor(scene, self.sensor, self.settings, closely=closely, **same)
 
     def _harmonics(self, estimator: str, sequence: Sequence) -> int:
         """How many harmonics the estimator looks at."""
@@ -463,24 +462,21 @@ def _within(
     drift_m: float,
 ) -> Figure:
     """Return the figure of what a share of the ranges is within; few draws tell its interval."""
+
+    def value(off_m: _Array) -> _Array:
+        return _quantiles(share, off_m)
+
     few = replace(errors, apart_m=errors.apart_m[::_FEW_DRAWS])
-    found = _error(few.off_m, partial(_quantile, share), few, farthest_m, picks, drift_m)
-    whole = float(_quantile(share, errors.off_m(np.hypot(errors.bias_m, drift_m))))
+    found = _error(few.off_m, value, few, farthest_m, picks, drift_m)
+    whole = float(value(errors.off_m(np.hypot(errors.bias_m, drift_m))))
     scale = whole / found.median if 0 < found.median < math.inf else 1.0
     return Figure(*(scale * getattr(found, each.name) for each in fields(Figure)))
 
 
-def _quantile(share: float, off_m: _Array) -> _Array:
-    """Return what a share of the ranges (..., P, D) is within (...)."""
+def _quantiles(shares: _Array | float, off_m: _Array) -> _Array:
+    """Return how far shares (S) of the ranges (..., P, D) are off at most: (S, ...)."""
     flat = off_m.reshape((*off_m.shape[:-2], -1))
-    place = min(int(share * flat.shape[-1]), flat.shape[-1] - 1)
-    return np.asarray(np.partition(flat, place, axis=-1)[..., place])
-
-
-def _ordered(off_m: _Array) -> _Array:
-    """Return how far equal shares of all ranges (P, D) are off, by rising value."""
-    flat = np.sort(off_m, axis=None)
-    return np.asarray(flat[np.rint(_SHARES * (flat.size - 1)).astype(int)])
+    return np.asarray(np.quantile(flat, shares, axis=-1, method="higher"))
 
 
 def _typical(deviations: _Array) -> _Array:

@@ -2,104 +2,64 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw
 
 from transientcam_server.errors import Problem, kinds
 
-MOST_CORNERS: Final = 64
-_WORDS: Final = (
-    f"a box [x, y, width, height], or from 3 to {MOST_CORNERS} corners [x, y] of a polygon, "
-    "in whole pixels"
-)
+_WORDS = "x, y, width, height of a box, or 3 to 64 corners x, y of a polygon, in whole pixels"
 
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """The pixels whose centres a polygon holds, those on its edges too.
-
-    Attributes
-    ----------
-    corners
-        Column and row of pixels, in their order.
-    """
+    """The pixels that a polygon of columns and rows holds, those on its edges too."""
 
     corners: tuple[tuple[int, int], ...]
 
     @classmethod
-    def of(cls, value: Sequence[Any] | None) -> "Region | None":
-        """Return the region of a box or of corners; None for None.
+    def of(cls, value: str | Sequence[Any] | None) -> "Region | None":
+        """Return a region of four numbers or of corners; as text ``x,y,w,h`` or ``x,y/x,y/x,y``.
 
-        Raises
-        ------
-        Problem
-            ``invalid-request`` for anything else.
+        Problem ``invalid-request`` for anything else; None for None.
         """
         if value is None:
             return None
-        if len(value) == 4 and all(map(_whole, value)) and min(value) >= 0 < min(value[2:]):
-            x, y, width, height = value
-            right, bottom = x + width - 1, y + height - 1
-            return cls(((x, y), (right, y), (right, bottom), (x, bottom)))
-        corners = tuple(tuple(each) if isinstance(each, list | tuple) else () for each in value)
-        if 3 <= len(corners) <= MOST_CORNERS and all(map(_pixel, corners)):
-            return cls(corners)
-        raise _refused(list(value))
-
-    @classmethod
-    def parse(cls, text: str | None) -> "Region | None":
-        """Return the region that a text has: ``x,y,width,height`` or corners ``x,y/x,y/x,y``.
-
-        Raises
-        ------
-        Problem
-            ``invalid-request`` for anything else.
-        """
-        if text is None:
-            return None
         try:
-            numbers = [[int(each) for each in part.split(",")] for part in text.split("/")]
-        except ValueError:
-            raise _refused([text]) from None
-        return cls.of(numbers[0] if len(numbers) == 1 else numbers)
+            if isinstance(value, str):
+                parts = [part.split(",") for part in value.split("/")]
+                numbers = [[int(each) for each in part] for part in parts]
+            else:
+                numbers = [list(each) for each in ([value] if np.ndim(value) == 1 else value)]
+            if len(numbers) == 1:
+                x, y, width, height = numbers[0]
+                if width < 1 or height < 1:
+                    raise _refused(value)
+                numbers = [[x, y], [x + width - 1, y], [x + width - 1, y + height - 1]]
+                numbers.append([x, y + height - 1])
+            corners = tuple((column, row) for column, row in numbers)
+        except (TypeError, ValueError):
+            raise _refused(value) from None
+        whole = all(isinstance(each, int) and each >= 0 for corner in corners for each in corner)
+        if not whole or not 3 <= len(corners) <= 64:
+            raise _refused(value)
+        return cls(corners)
 
     def mask(self, height: int, width: int) -> NDArray[np.bool_]:
-        """Return which pixels (H, W) are within.
-
-        Raises
-        ------
-        Problem
-            ``invalid-request`` if a corner is not in the picture.
-        """
-        x, y = np.array(self.corners).T
-        if x.max() >= width or y.max() >= height:
-            raise _refused([*map(list, self.corners)], f" within {width} x {height} pixels")
-        row, column = np.mgrid[:height, :width]
-        odd = np.zeros((height, width), dtype=bool)
-        on_edge = np.zeros_like(odd)
-        for ax, ay, bx, by in zip(x, y, np.roll(x, -1), np.roll(y, -1), strict=True):
-            side = (bx - ax) * (row - ay) - (by - ay) * (column - ax)
-            between = (column >= min(ax, bx)) & (column <= max(ax, bx))
-            between &= (row >= min(ay, by)) & (row <= max(ay, by))
-            on_edge |= (side == 0) & between
-            odd ^= ((ay > row) != (by > row)) & ((side > 0) == (by > ay))
-        return np.asarray(odd | on_edge)
+        """Return which pixels (H, W) are within; ``invalid-request`` if a corner is outside."""
+        if any(x >= width or y >= height for x, y in self.corners):
+            raise _refused(self.to_document(), f", within {width} x {height} pixels")
+        image = Image.new("1", (width, height))
+        ImageDraw.Draw(image).polygon(self.corners, fill=1, outline=1)
+        return np.array(image)
 
     def to_document(self) -> list[list[int]]:
         """Return the corners as JSON."""
         return [list(corner) for corner in self.corners]
 
 
-def _whole(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
-
-
-def _pixel(corner: tuple[Any, ...]) -> bool:
-    return len(corner) == 2 and all(map(_whole, corner)) and min(corner) >= 0
-
-
-def _refused(value: list[Any], where: str = "") -> Problem:
+def _refused(value: Any, where: str = "") -> Problem:
     detail = f"region must be {_WORDS}{where}."
     return Problem(kinds.INVALID_REQUEST, detail, field="region", value=value, limit=_WORDS + where)

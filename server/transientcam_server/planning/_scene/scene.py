@@ -131,11 +131,8 @@ class SceneStatistics:
     def within(self, region: Region | None, *, every: bool = False) -> "SceneStatistics":
         """Return what is seen in a region, by typical pixels or by ``every`` lit one.
 
-        Raises
-        ------
-        Problem
-            ``invalid-request`` where the picture does not hold the region, or no picture was seen;
-            ``target-unreachable`` where nothing is lit in it.
+        Problem ``invalid-request`` where the picture does not hold it, or none was seen, and
+        ``target-unreachable`` where nothing is lit in it.
         """
         if region is None and not every:
             return self

@@ -9,7 +9,6 @@ from transientcam_driver import AppliedSequence, Sequence
 from transientcam_server.planning._prediction.intervals import Figure
 from transientcam_server.planning._prediction.measures import TOLERANCES_M
 from transientcam_server.planning._prediction.prediction import Prediction
-from transientcam_server.planning._search.price import price
 
 
 def in_words(sequence: Sequence, estimator: str) -> str:
@@ -69,6 +68,22 @@ class Choice:
         reconstruct_s = self.timed()
         return None if reconstruct_s is None else reconstruct_s * self.applied.frame_rate_hz
 
+    @property
+    def price(self) -> dict[str, float | None]:
+        """What a capture takes and leaves, item by item, as JSON; transport is told by frames."""
+        applied, computing_s = self.applied, self.timed()
+        light_s = applied.images * applied.sequence.exposure_s
+        return {
+            "light_s": light_s,
+            "readout_s": applied.capture_s - light_s - self.settling_s,
+            "settling_s": self.settling_s,
+            "transport_s": None,
+            "computing_s": computing_s,
+            "sum_s": applied.capture_s + (computing_s or 0.0),
+            "light_share": light_s / applied.capture_s,
+            "data_bytes": round(applied.data_rate_bytes_s * applied.capture_s),
+        }
+
     def error(self, target: str) -> float:
         """Return the error that a target limits, as it is expected."""
         if target == "bound_width":
@@ -103,6 +118,7 @@ class Choice:
         """Return the choice as JSON; ``sequence`` is the body of a PUT."""
         document = self.applied.to_document()
         del document["sequence_id"]
+        figure, target_m = self.predicted.within, self.target_m
         return {
             "sequence": self.applied.sequence.to_document(),
             "estimator": self.estimator,
@@ -111,35 +127,30 @@ class Choice:
             "frame_rate_hz": self.applied.frame_rate_hz,
             "reconstruct_s": self.timed(),
             "computing_share": self.computing_share,
-            "price": price(self.applied, self.settling_s, self.timed()),
+            "price": self.price,
             "predicted": {
                 "range_error_m": self.predicted.range_error.to_document(),
                 "range_std_m": self.predicted.range_std.to_document(),
                 "range_bias_m": self.predicted.range_bias_m,
                 "range_bias_most_m": self.predicted.most_bias_m,
                 "bias_known": self.predicted.bias_known,
-                "within": self._within(),
-                "beyond": [
-                    {"error_m": each, "share": 1 - self.predicted.share_within(each)}
+                "within": figure
+                and {
+                    "share": self.share,
+                    "error_m": figure.median,
+                    **{end: figure.to_document()[end] for end in ("low", "high")},
+                    "target_m": target_m,
+                    "target_share": target_m and self.predicted.share_within(target_m),
+                },
+                "beyond": {
+                    f"{each:g}": 1 - self.predicted.share_within(each)
                     for each in TOLERANCES_M
                     if self.predicted.off_m
-                ],
+                },
                 "beyond_scene": self.beyond_scene,
                 "bound_width": self.bound_width,
                 "separation_share": self.separation_share,
             },
-        }
-
-    def _within(self) -> dict[str, Any] | None:
-        figure, target_m = self.predicted.within, self.target_m
-        if figure is None:
-            return None
-        return {
-            "share": self.share,
-            "error_m": figure.median,
-            **{name: figure.to_document()[name] for name in ("low", "high")},
-            "target_m": target_m,
-            "target_share": None if target_m is None else self.predicted.share_within(target_m),
         }
 
     def in_words(self) -> str:

@@ -8,13 +8,13 @@ what falls short of the goal a refusal.
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from transientcam.notebook import table_html
 from transientcam_driver import Capabilities
 from transientcam_server.planning._prediction.prediction import Predictor
 from transientcam_server.planning._process.progress import Progress
+from transientcam_server.planning._scene.estimation import SEARCHED
 from transientcam_server.planning._scene.scene import SceneStatistics
 from transientcam_server.planning._search.candidates import ComputingTime, curves
-from transientcam_server.planning._search.changes import Change, changes, computing_s, in_words
+from transientcam_server.planning._search.changes import Change, changes, in_words
 from transientcam_server.planning._search.choice import Choice
 from transientcam_server.planning._search.families import families
 from transientcam_server.planning._search.finest import shortened
@@ -62,14 +62,13 @@ class Plan:
 
     def to_document(self) -> dict[str, Any]:
         """Return the plan as JSON has it."""
-        recommended = self.recommended.to_document()
         region = self.goal.region
         return {
-            **recommended,
+            **self.recommended.to_document(),
             "region": None if region is None else region.to_document(),
             "computing_s": self.computing_s,
             "changes": [asdict(each) for each in self.changes],
-            "price_summary": in_words(recommended["price"], self.changes, self.goal),
+            "price_summary": in_words(self.recommended, self.changes, self.goal),
             "compared_by": self.leading,
             "summary": self.summary,
             "scene": self.scene.to_document(),
@@ -80,19 +79,6 @@ class Plan:
     def __repr__(self) -> str:
         """State the recommended sequence, and what it takes and gives."""
         return f"<Plan {_in_words(self.recommended)}>"
-
-    def _repr_html_(self) -> str:
-        """Return the recommendation and its neighbours as a table, for notebooks."""
-        rows = {
-            "recommended": self.recommended,
-            "half the time": self.half_time,
-            "twice the accuracy": self.twice_accuracy,
-        }
-        words = {
-            name: "no sequence does" if each is None else _in_words(each)
-            for name, each in rows.items()
-        }
-        return table_html(f"Plan, compared by {self.leading}", words)
 
     def _neighbour(self, choice: Choice | None) -> dict[str, Any] | None:
         if choice is None:
@@ -151,7 +137,8 @@ def plan(
     scene = predictor.scene
     progress.at(0.9, "what would buy most")
     better = changes(best, goal, predictor, capabilities)
-    words, times_s = summary(best, twice, scene) + scene.conditions, computing_s(best, timed)
+    words, sequence = summary(best, twice, scene) + scene.conditions, best.applied.sequence
+    times_s = {name: timed(sequence, name) for name in dict.fromkeys((best.estimator, *SEARCHED))}
     return Plan(best, half_time, twice, leading, words, scene, goal, better, times_s)
 
 

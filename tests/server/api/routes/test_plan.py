@@ -52,7 +52,7 @@ def test_a_plan_for_the_scene_before_the_camera_is_a_sequence_it_takes(noisy: ht
     assert (within["share"], within["target_m"]) == (0.9, 0.02)
     assert within["error_m"] <= 0.02
     assert 0.9 <= within["target_share"] <= 1
-    beyond = [each["share"] for each in predicted["beyond"]]
+    beyond = list(predicted["beyond"].values())
     assert beyond == sorted(beyond, reverse=True)
     items = answer["price"]
     spent_s = sum(items[f"{name}_s"] for name in ("light", "readout", "settling"))

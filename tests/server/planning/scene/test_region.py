@@ -10,7 +10,7 @@ from transientcam_server.planning import Region
 
 
 def drawn(text: str) -> list[str]:
-    region = Region.parse(text)
+    region = Region.of(text)
     assert region is not None
     return ["".join(".#"[inside] for inside in row) for row in region.mask(5, 6).tolist()]
 
@@ -56,6 +56,6 @@ def test_a_region_has_to_be_in_the_picture() -> None:
     with pytest.raises(Problem, match="within 6 x 5 pixels"):
         region.mask(5, 6)
     with pytest.raises(Problem):
-        Region.parse("a,b,c,d")
-    assert Region.of(None) is Region.parse(None) is None
+        Region.of("a,b,c,d")
+    assert Region.of(None) is Region.of(None) is None
     np.testing.assert_array_equal(region.mask(9, 9), Region(region.corners[::-1]).mask(9, 9))

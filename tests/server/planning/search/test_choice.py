@@ -42,6 +42,20 @@ def test_computing_takes_its_share_of_the_time_between_frames(capabilities: Capa
     assert choice(capabilities, reconstruct_s=None).computing_share is None
 
 
+def test_the_items_of_a_capture_add_up_to_it(capabilities: Capabilities) -> None:
+    one = choice(capabilities, takes=5, reconstruct_s=0.25)
+    applied, items = one.applied, one.price
+
+    assert items["light_s"] == pytest.approx(applied.images * 1e-3)
+    assert items["readout_s"] == pytest.approx(
+        applied.images * capabilities.streaming_readout_s - one.settling_s
+    )
+    assert items["sum_s"] == applied.capture_s + 0.25
+    assert items["light_share"] == pytest.approx(applied.images * 1e-3 / applied.capture_s)
+    assert items["data_bytes"] == applied.images * (capabilities.image_bytes + 64)
+    assert choice(capabilities, reconstruct_s=None).price["computing_s"] is None
+
+
 def test_a_choice_is_stated_in_words() -> None:
     one = Sequence(base_frequency_hz=11.5e6, harmonics=3, exposure_s=1.2345e-3)
 
@@ -69,8 +83,8 @@ def test_the_document_has_all_of_it(capabilities: Capabilities) -> None:
     assert (predicted["bias_known"], predicted["beyond_scene"]) == (True, False)
     assert (predicted["bound_width"], predicted["separation_share"]) == (None, 0.5)
     assert predicted["within"] is None
-    beyond = {each["error_m"]: each["share"] for each in predicted["beyond"]}
-    assert (beyond[0.02], beyond[0.05], beyond[0.2]) == pytest.approx((0.8, 0.5, 0.0))
+    shares = [predicted["beyond"][each] for each in ("0.02", "0.05", "0.2")]
+    assert shares == pytest.approx([0.8, 0.5, 0.0])
 
 
 def test_a_share_of_the_pixels_is_what_a_target_is_held_against(capabilities: Capabilities) -> None:

@@ -53,7 +53,7 @@ export function GoalForm({ disabled, onGoal }: GoalFormProps) {
       <NumberField label="Frames at least" unit="Hz" name="frame_rate_hz" value={rate_hz.value} onType={(text) => (rate_hz.value = text)} />
       <Check
         checked={inRegion.value && measures.region.value !== null}
-        title="Of the region that is drawn in a map, or in the picture of predicted errors"
+        title="Of the region that is drawn in a map"
         onChange={(checked) => (inRegion.value = checked)}
       >
         {measures.region.value === null ? "no region is marked" : "in the region"}
