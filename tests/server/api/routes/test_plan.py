@@ -225,7 +225,7 @@ def test_a_job_maps_the_error_of_each_pixel_and_says_who_is_within_a_region(
     noisy: httpx.Client, noisy_daemon: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(noisy_daemon.service.planning, "_process", Here())
-    goal = {"target": {"range_error_m": 0.5}, "estimator": "single-frequency", "map": True}
+    goal = {"budget": {"capture_s": 0.2}, "estimator": "single-frequency", "map": True}
     fixed = {"base_frequency_hz": 23e6, "harmonics": 1, "exposure_s": 5e-4, "takes": 1}
 
     region = [40, 30, 60, 50]
