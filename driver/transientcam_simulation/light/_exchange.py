@@ -1,6 +1,6 @@
 """Light that patches of surfaces give each other, with its times of flight."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import BIN_S, Scatter, ask
-from transientcam_simulation.light._over_mirrors import OverMirrors
+from transientcam_simulation.light._over_mirrors import NOTHING, OverMirrors
 from transientcam_simulation.light._patches import Patches, form_factors
 from transientcam_simulation.light._paths import image_lights, light_on, normals_at, scatter_of
 from transientcam_simulation.scene import Points, Scene
@@ -30,6 +30,8 @@ class Exchange:
     delay_s, radiosity
         (K, N, S) direct light on S samples of each patch by each chain of mirrors, and what it
         gives on.
+    over_mirrors
+        What mirrors show patches of each other.
     """
 
     scene: Scene
@@ -38,11 +40,18 @@ class Exchange:
     distance_m: NDArray[np.float32]
     delay_s: NDArray[np.float64]
     radiosity: NDArray[np.float64]
+    over_mirrors: OverMirrors = NOTHING
 
     @classmethod
     def of(cls, scene: Scene, per_side: int) -> "Exchange":
-        """Compute form factors and distances between patches, and the direct light on each."""
+        """Cut surfaces into patches, and find the light between them, straight and over mirrors."""
         patches = Patches.of(scene, per_side)
+        over_mirrors = OverMirrors.of(scene, patches)
+        return replace(cls.between(scene, patches), over_mirrors=over_mirrors)
+
+    @classmethod
+    def between(cls, scene: Scene, patches: Patches) -> "Exchange":
+        """Compute form factors and distances between patches, and the direct light on each."""
         factors = form_factors(scene, patches, patches.centre, patches.normal)
         squared = np.maximum(
             np.sum(patches.centre**2, 1)[:, None]
@@ -104,18 +113,15 @@ class Exchange:
         return total
 
     @cached_property
-    def over_mirrors(self) -> OverMirrors:
-        """What mirrors show patches of each other."""
-        return OverMirrors.of(self.scene, self.patches)
-
-    @cached_property
     def history(self) -> tuple[float, NDArray[np.float64]]:
         """Irradiance (N, T) over time in bins of ``BIN_S``, and the time of the first bin's start.
 
         Of the first bounces only; the caller scales it to the light of all. Light is moved by
         whole bins, so that each bounce is off by half a bin at most.
         """
-        shift = np.rint(self.distance_m / (SPEED_OF_LIGHT_M_S * BIN_S)).astype(np.intp)
+        bin_m, over = SPEED_OF_LIGHT_M_S * BIN_S, self.over_mirrors
+        shift = np.rint(self.distance_m / bin_m).astype(np.intp)
+        later = np.rint(over.distance_m / bin_m).astype(np.intp)
         scatter = scatter_of(self.scene, self.patches.surface)
         first_s = float(self.delay_s[self.radiosity > 0].min(initial=1.0))
         placed = np.rint((self.delay_s - first_s) / BIN_S).astype(np.intp)
@@ -127,7 +133,8 @@ class Exchange:
         tail = 0
         if scatter is not None:
             tail = int((8 * scatter.width_s.max() + 12 * scatter.decay_s.max()) / BIN_S) + 1
-        count = int(placed.max()) + bounces * (int(shift.max()) + tail) + 1
+        longest = max(int(shift.max()), int(later.max(initial=0)))
+        count = int(placed.max()) + bounces * (longest + tail) + 1
         patches = len(self.patches)
         light = np.zeros((patches, count))
         index = np.broadcast_to(np.arange(patches)[None, :, None], placed.shape)
@@ -145,6 +152,10 @@ class Exchange:
                 for p in np.flatnonzero(self.factors[:, q]):
                     at = shift[p, q]
                     got[p, at : at + len(given)] += (self.factors[p, q] * given)[: count - at]
+                for k in np.flatnonzero(over.by == q):
+                    at = later[k]
+                    part = (over.factors[k] * given)[: count - at]
+                    got[over.to[k], at : at + len(given)] += part
             total += got
             light = self.patches.albedo[:, None] * got
         return first_s - BIN_S / 2, total

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.base import PINHOLE
-from transientcam_simulation.effects import BLUR, Glimpse, Values
+from transientcam_simulation.effects import BLUR, COARSE_PATCHES, Glimpse, Values
 from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._missing import SampledWays, sampled_glimpses
 from transientcam_simulation.light._paths import Lit, light_rays
@@ -106,6 +106,8 @@ class SceneFacts:
             over_s = max(during_s, min(pixel_s, self._period_s / _TIMES))
             changes = self.changes("motion", frequencies_hz, during_s=over_s)
             return self.glimpses, tuple(during_s / over_s / 2 * each for each in changes)
+        if kind == COARSE_PATCHES.name and self._scene.moves:
+            return (), ()
         ways, glimpses = self._sampled
         some = _some(frequencies_hz)
         return glimpses, self._found.get(
@@ -119,7 +121,8 @@ class SceneFacts:
             tuple(
                 (seen.scene, rays, glimpse)
                 for seen, glimpse in zip(self._seen, self.glimpses, strict=True)
-            )
+            ),
+            moves=self._scene.moves,
         )
 
     def further_bounces(self, tolerance: float) -> int:
@@ -270,6 +273,7 @@ class SceneFacts:
         transport = self._scene.transport
         scattering = [each for each in self._scene.surfaces if each.scatters]
         flat = len(scattering) == 1 and isinstance(scattering[0].shape, Rectangle)
+        flat = flat and not any(each.kind == "mirror" for each in self._scene.surfaces)
         if flat or not scattering or transport.diffuse_bounces == 0:
             return ()
         height, width = self._shape

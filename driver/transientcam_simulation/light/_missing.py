@@ -71,8 +71,13 @@ class SampledWays:
     kind: NDArray[np.intp]
 
     @classmethod
-    def of(cls, scene: Scene, rays: Points, *, paths: int = _PATHS) -> "SampledWays":
-        """Follow so many random paths from where each ray of the camera ends, twice."""
+    def of(
+        cls, scene: Scene, rays: Points, *, paths: int = _PATHS, moves: bool = False
+    ) -> "SampledWays":
+        """Follow so many random paths from where each ray of the camera ends, twice.
+
+        ``moves``: of a scene that moves radiosity follows no light over mirrors.
+        """
         assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
         pixels, random = len(rays), np.random.default_rng(0)
         ends = first_scattering(scene, scene.camera.position_m, rays)
@@ -98,7 +103,8 @@ class SampledWays:
             normal = normals_at(scene, ends.point, ends.surface)
             albedo = ends.throughput * _of(scene, "reflectivity")[ends.surface]
             cut = _BOUNCES if most is not None and further > most else min(further - 1, _FOLLOWED)
-            kind = np.where(glossy, _GLOSS, np.where(over, _MIRRORS, cut))
+            kind = np.where(over, _MIRRORS if moves else max(cut, _FOLLOWED), cut)
+            kind = np.where(glossy, _GLOSS, kind)
             for light in lights:
                 far_m, irradiance = light_on(scene, light, ends.point, normal)
                 gloss = highlight(scene, light, ends, normal)
@@ -137,7 +143,7 @@ class SampledWays:
 
     def _by_patches(self, frequency_hz: float) -> Values:
         """Difference (P) of radiosity from paths, by the first bounce; 0 where they cannot tell."""
-        if self.scene.moves or not (self.kind == _FIRST).any():
+        if not (self.kind == _FIRST).any():
             return np.zeros(len(self.rays))
         scene = without_scattering(self.scene)
         lit = light_rays(scene, self.rays)
@@ -166,14 +172,14 @@ class SampledWays:
 
 
 def sampled_glimpses(
-    seen: tuple[tuple[Scene, Points, Glimpse], ...],
+    seen: tuple[tuple[Scene, Points, Glimpse], ...], *, moves: bool
 ) -> tuple[tuple[SampledWays, ...], tuple[Glimpse, ...]]:
     """Sample scenes at some times: of the pixels judged then, by their rays, a few drawn once."""
     ways, glimpses = [], []
     for scene, rays, glimpse in seen:
         count = min(len(rays), PIXELS // len(seen))
         some = np.sort(np.random.default_rng(1).choice(len(rays), count, replace=False))
-        ways.append(SampledWays.of(scene, rays[some]))
+        ways.append(SampledWays.of(scene, rays[some], moves=moves))
         bright = glimpse.brightness[some] + ways[-1].followed
         part = Glimpse(bright, glimpse.reflectance[some], glimpse.cosine[some], (1, count))
         glimpses.append(part)

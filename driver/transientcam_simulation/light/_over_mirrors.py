@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,19 +37,19 @@ class _Images:
 class OverMirrors:
     """Form factors and distances of pairs of patches over chains of mirrors, receivers first."""
 
-    to: NDArray[np.intp]
-    by: NDArray[np.intp]
-    factors: NDArray[np.float64]
-    distance_m: NDArray[np.float64]
+    to: NDArray[np.int32]
+    by: NDArray[np.int32]
+    factors: NDArray[np.float32]
+    distance_m: NDArray[np.float32]
 
     @classmethod
     def of(cls, scene: Scene, patches: Patches) -> "OverMirrors":
         """Find what mirrors show to the middles of patches."""
-        found = [each for images in _images(scene, patches) for each in _seen(scene, patches, images)]
-        to, by, factors, distance_m = (
-            np.concatenate(each) for each in zip(*found, strict=True)
-        ) if found else (np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0), np.zeros(0))
-        return cls(to, by, factors, distance_m)
+        chains = _images(scene, patches)
+        found = [pairs for images in chains for pairs in _seen(scene, patches, images)]
+        if not found:
+            return NOTHING
+        return cls(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
     def irradiance(
         self, given: NDArray[np.complexfloating], frequency_hz: float
@@ -60,6 +61,10 @@ class OverMirrors:
             self.to, got.real, count
         ) + 1j * np.bincount(self.to, got.imag, count)
         return irradiance
+
+
+NOTHING = OverMirrors(*(np.zeros(0, kind) for kind in ("i4", "i4", "f4", "f4")))
+"""Where there are no mirrors."""
 
 
 def _images(scene: Scene, patches: Patches) -> Iterator[_Images]:
@@ -84,9 +89,7 @@ def _images(scene: Scene, patches: Patches) -> Iterator[_Images]:
         yield from (chain for chain in chains if chain.there.any())
 
 
-def _seen(
-    scene: Scene, patches: Patches, images: _Images
-) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]]:
+def _seen(scene: Scene, patches: Patches, images: _Images) -> Iterator[tuple[NDArray[Any], ...]]:
     """Yield pairs, receivers first, with form factors and distances, of a chain of mirrors."""
     those = np.flatnonzero(images.there)
     these = np.flatnonzero(images.mirrors[0].in_front(patches.centre))
@@ -103,13 +106,13 @@ def _seen(
         to, by = to[clear], by[clear]
         from_m = patches.centre[to]
         factors = contour(images.corners[by] - from_m[:, None], patches.normal[to])
+        factors *= images.reflectivity
         far_m = np.linalg.norm(images.centres[0][by] - from_m, axis=-1)
-        yield to, by, images.reflectivity * factors, far_m
+        pairs = (each.astype(np.int32) for each in (to, by))
+        yield *pairs, *(each.astype(np.float32) for each in (factors, far_m))
 
 
-def _clear(
-    scene: Scene, images: _Images, at: Points, patch: NDArray[np.intp]
-) -> NDArray[np.intp]:
+def _clear(scene: Scene, images: _Images, at: Points, patch: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the pairs, by index, whose way over the mirrors is free."""
     left, stops = np.arange(len(at)), [at]
     for mirror, centre in zip(images.mirrors, images.centres, strict=False):

@@ -61,7 +61,7 @@ def sampled(scene: Scene) -> SampledWays:
     assert scene.camera is not None
     rows, columns = np.divmod(PIXEL, SIZE[0])
     rays = rays_through(scene.camera, columns, rows, width=SIZE[0], height=SIZE[1])
-    return SampledWays.of(scene, rays, paths=2048)
+    return SampledWays.of(scene, rays, paths=2048, moves=True)
 
 
 def traced(scene: Scene, bounces: int) -> NDArray[np.complex128]:
@@ -118,6 +118,7 @@ def test_what_is_missing_is_called_for_by_its_size_over_the_noise() -> None:
         explained = world.explain("", Sequence(takes=16))
         return {each.effect: each.relative for each in explained.not_made if each.called_for}
 
-    dull = room('kind = "mirror"\nreflectivity = 0.001')
-    assert missing(room(MIRROR))[MIRRORS_BETWEEN.name] > 0.1
-    assert MIRRORS_BETWEEN.name not in missing(dull)
+    dull = room(GLOSSY.replace("0.4", "0.0001"))
+    assert missing(room(GLOSSY))[GLOSS_OF_SURROUNDINGS.name] > 0.1
+    assert GLOSS_OF_SURROUNDINGS.name not in missing(dull)
+    assert not missing(room(MIRROR))  # radiosity follows it
