@@ -1,6 +1,6 @@
 """Light that patches of surfaces give each other, with its times of flight."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import BIN_S, Scatter, ask
-from transientcam_simulation.light._over_mirrors import NOTHING, OverMirrors
 from transientcam_simulation.light._patches import Patches, form_factors
 from transientcam_simulation.light._paths import image_lights, light_on, normals_at, scatter_of
 from transientcam_simulation.scene import Points, Scene
@@ -30,8 +29,6 @@ class Exchange:
     delay_s, radiosity
         (K, N, S) direct light on S samples of each patch by each chain of mirrors, and what it
         gives on.
-    over_mirrors
-        What mirrors show patches of each other.
     """
 
     scene: Scene
@@ -40,18 +37,11 @@ class Exchange:
     distance_m: NDArray[np.float32]
     delay_s: NDArray[np.float64]
     radiosity: NDArray[np.float64]
-    over_mirrors: OverMirrors = NOTHING
 
     @classmethod
     def of(cls, scene: Scene, per_side: int) -> "Exchange":
-        """Cut surfaces into patches, and find the light between them, straight and over mirrors."""
-        patches = Patches.of(scene, per_side)
-        over_mirrors = OverMirrors.of(scene, patches)
-        return replace(cls.between(scene, patches), over_mirrors=over_mirrors)
-
-    @classmethod
-    def between(cls, scene: Scene, patches: Patches) -> "Exchange":
         """Compute form factors and distances between patches, and the direct light on each."""
+        patches = Patches.of(scene, per_side)
         factors = form_factors(scene, patches, patches.centre, patches.normal)
         squared = np.maximum(
             np.sum(patches.centre**2, 1)[:, None]
@@ -59,7 +49,7 @@ class Exchange:
             - 2 * patches.centre @ patches.centre.T,
             0,
         )
-        delay_s, radiosity = direct_light(scene, patches)
+        delay_s, radiosity = _direct(scene, patches)
         return cls(
             scene,
             patches,
@@ -82,8 +72,7 @@ class Exchange:
         highest = [float(light.max(initial=0.0))]
         for bounce in range(_MOST_BOUNCES):
             ask()
-            got = self.factors @ light + self.over_mirrors.irradiance(light, 0.0).real
-            light = self.patches.albedo * got
+            light = self.patches.albedo * (self.factors @ light)
             highest.append(float(light.max(initial=0.0)))
             share = min(highest[-1] / highest[-2], 0.999) if highest[-2] else 0.0
             if highest[-1] / (1 - share) <= tolerance:
@@ -107,7 +96,6 @@ class Exchange:
             got = (in_phase @ of_real - quadrature @ of_imag) + 1j * (
                 in_phase @ of_imag + quadrature @ of_real
             )
-            got = got + self.over_mirrors.irradiance(given, frequency_hz)
             total += got
             light = self.patches.albedo * got
         return total
@@ -119,9 +107,7 @@ class Exchange:
         Of the first bounces only; the caller scales it to the light of all. Light is moved by
         whole bins, so that each bounce is off by half a bin at most.
         """
-        bin_m, over = SPEED_OF_LIGHT_M_S * BIN_S, self.over_mirrors
-        shift = np.rint(self.distance_m / bin_m).astype(np.intp)
-        later = np.rint(over.distance_m / bin_m).astype(np.intp)
+        shift = np.rint(self.distance_m / (SPEED_OF_LIGHT_M_S * BIN_S)).astype(np.intp)
         scatter = scatter_of(self.scene, self.patches.surface)
         first_s = float(self.delay_s[self.radiosity > 0].min(initial=1.0))
         placed = np.rint((self.delay_s - first_s) / BIN_S).astype(np.intp)
@@ -133,8 +119,7 @@ class Exchange:
         tail = 0
         if scatter is not None:
             tail = int((8 * scatter.width_s.max() + 12 * scatter.decay_s.max()) / BIN_S) + 1
-        longest = max(int(shift.max()), int(later.max(initial=0)))
-        count = int(placed.max()) + bounces * (longest + tail) + 1
+        count = int(placed.max()) + bounces * (int(shift.max()) + tail) + 1
         patches = len(self.patches)
         light = np.zeros((patches, count))
         index = np.broadcast_to(np.arange(patches)[None, :, None], placed.shape)
@@ -152,10 +137,6 @@ class Exchange:
                 for p in np.flatnonzero(self.factors[:, q]):
                     at = shift[p, q]
                     got[p, at : at + len(given)] += (self.factors[p, q] * given)[: count - at]
-                for k in np.flatnonzero(over.by == q):
-                    at = later[k]
-                    part = (over.factors[k] * given)[: count - at]
-                    got[over.to[k], at : at + len(given)] += part
             total += got
             light = self.patches.albedo[:, None] * got
         return first_s - BIN_S / 2, total
@@ -170,7 +151,7 @@ def _spread(
     return np.convolve(given, np.diff(Scatter(width_s, decay_s).cumulated(edges_s)))
 
 
-def direct_light(scene: Scene, patches: Patches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _direct(scene: Scene, patches: Patches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Direct light on samples of each patch, as the share of the patch's radiosity it makes."""
     middles = (2 * np.arange(_SAMPLES) + 1) / (2 * _SAMPLES)
     u, w = (grid.ravel() for grid in np.meshgrid(middles, middles))

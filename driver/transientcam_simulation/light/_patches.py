@@ -79,7 +79,7 @@ def form_factors(scene: Scene, patches: Patches, at: Points, normal: Points) -> 
         if hides:
             clear = ~_blocked(scene, patches, at[block][p], n)
             p, n = p[clear], n[clear]
-        factors[block][p, n] = contour(
+        factors[block][p, n] = _contour(
             patches.corners[n] - at[block][p][:, None, :], normal[block][p]
         )
     return factors
@@ -99,7 +99,7 @@ def _convex(scene: Scene) -> bool:
     return all(hasattr(surface.shape, "right") for surface in scene.surfaces)
 
 
-def contour(corners: Points, normal: Points) -> NDArray[np.float64]:
+def _contour(corners: Points, normal: Points) -> NDArray[np.float64]:
     """Form factor of polygons (P, 4, 3), relative to points with normals (P, 3)."""
     unit = corners / np.linalg.norm(corners, axis=-1, keepdims=True)
     following = np.roll(unit, -1, axis=1)

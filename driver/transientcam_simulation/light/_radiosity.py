@@ -6,7 +6,6 @@ flight. Moments are therefore sums over all paths between patches, at exactly th
 requested; nothing is binned.
 """
 
-from dataclasses import replace
 from functools import cached_property
 from typing import Literal
 
@@ -81,21 +80,6 @@ class Interreflection:
             of_rays = self._gathered(irradiance, frequency_hz, each.rays, places)
             moments[each.pixel] = each.of_pixels(of_rays).mean(axis=0)
         return moments.reshape(self._shape)
-
-    def error(self, frequency_hz: float) -> float:
-        """Estimate the error of the moments by their change when patches are twice as large.
-
-        Relative, root mean square over the pixels. The rule is of second order: of the change by
-        a factor of two, a third is left.
-        """
-        fine = self.moments(frequency_hz)
-        transport = self._scene.transport
-        halved = replace(transport, patches=max(2, transport.patches // 2))
-        height, width = self._shape
-        scene = replace(self._scene, transport=halved)
-        coarse = Interreflection(scene, self._lit, width=width, height=height)
-        change = np.sqrt(np.mean(np.abs(fine - coarse.moments(frequency_hz)) ** 2))
-        return float(change / np.sqrt(np.mean(np.abs(fine) ** 2)) / 3)
 
     @cached_property
     def returns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

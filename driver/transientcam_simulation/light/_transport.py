@@ -24,10 +24,8 @@ from transientcam_simulation.effects import (
 )
 from transientcam_simulation.light._bundle import Region
 from transientcam_simulation.light._compiler import load_compiled
-from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._facts import SceneFacts, cosine_to_axis
 from transientcam_simulation.light._followed import FollowedRays
-from transientcam_simulation.light._patches import Patches
 from transientcam_simulation.light._paths import light_rays
 from transientcam_simulation.light._radiosity import Interreflection, WithInterreflection
 from transientcam_simulation.light._rays import camera_rays
@@ -295,16 +293,7 @@ class SurfaceScenery:
     def _lit_view(self, now: "MovingResponses", tolerance: float) -> View:
         """View of a moving scene with light over several surfaces, computed anew."""
         width, height = self._size["width"], self._size["height"]
-        # light over mirrors between surfaces would cost too much at every step
-        patches = Patches.of(now.scene, now.scene.transport.patches)
-        light = Interreflection(
-            now.scene,
-            now.lit,
-            width=width,
-            height=height,
-            tolerance=tolerance,
-            exchange=Exchange.between(now.scene, patches),
-        )
+        light = Interreflection(now.scene, now.lit, width=width, height=height, tolerance=tolerance)
         return View(WithInterreflection(now, light), lambda: now.reflectance)
 
     def _still_view(

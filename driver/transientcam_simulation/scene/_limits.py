@@ -3,7 +3,6 @@
 It is counted as the light is built, by the same functions (`patch_edges_m`, `Shape.grid`).
 """
 
-import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,10 +15,7 @@ MOST_SURFACES: Final = 32
 MOST_MIRROR_PATHS: Final = 64
 """Chains of mirrors that light may take, each of which is followed."""
 MOST_PATCHES: Final = 4096
-"""Between scattering surfaces: their matrices take 128 MiB, and 0.5 GiB while they are made.
-
-Fewer where mirrors show them to each other.
-"""
+"""Between scattering surfaces: their matrices take 128 MiB, and 0.5 GiB while they are made."""
 _LEAST_PER_SIDE: Final = 4
 """Patches along the longest side of a surface, however small it is beside others."""
 
@@ -91,13 +87,10 @@ def require_modest(scene: Scene) -> None:
     if cost.mirror_paths > MOST_MIRROR_PATHS:
         limit = f"fewer: {cost.mirror_paths} chains of mirrors are more than {MOST_MIRROR_PATHS}"
         raise SceneError("the scene", "transport.mirror_bounces", transport.mirror_bounces, limit)
-    # over each chain of mirrors patches may see each other as they do straight
-    limit_of = int(MOST_PATCHES / math.sqrt(1 + cost.mirror_paths))
-    if cost.patches > limit_of:
-        fewer = (n for n in range(2, transport.patches) if patches_of(scene, n) <= limit_of)
-        most = max(fewer, default=0)
+    if cost.patches > MOST_PATCHES:
+        most = max(n for n in range(2, transport.patches) if patches_of(scene, n) <= MOST_PATCHES)
         limit = (
-            f"{f'at most {most} with these surfaces, or ' if most else ''}diffuse_bounces = 0: "
-            f"{cost.patches} patches are more than {limit_of}"
+            f"at most {most} with these surfaces, or diffuse_bounces = 0: {cost.patches} patches "
+            f"are more than {MOST_PATCHES}"
         )
         raise SceneError("the scene", "transport.patches", transport.patches, limit)

@@ -188,20 +188,6 @@ def test_a_second_bounce_adds_less_than_the_first_and_later() -> None:
     assert (both_s > first_s).all()
 
 
-def test_the_error_estimate_falls_with_refinement_and_covers_the_error() -> None:
-    errors, estimates = [], []
-    best = further(right_angle(patches=32)).moments(69e6)
-    for patches in (6, 12):
-        coarse = further(right_angle(patches=patches))
-        change = coarse.moments(69e6) - best
-        errors.append(math.sqrt(np.mean(np.abs(change) ** 2) / np.mean(np.abs(best) ** 2)))
-        estimates.append(coarse.error(69e6))
-
-    assert errors[1] < 0.6 * errors[0]
-    assert estimates[1] < estimates[0]
-    assert errors[1] < 3 * estimates[1]
-
-
 def test_the_histogram_of_a_pixel_has_the_moments_of_the_pixel() -> None:
     light = further(right_angle(bounces=3))
     weight = light.moments(0.0).real
