@@ -123,16 +123,15 @@ def described(explanation: Explanation) -> str:
     always = [each for each in explanation.effects if each.built and each.effect in _ALWAYS]
     there = [each for each in explanation.effects if each.built or each.size_dn]
     there = [each for each in [*there, *explanation.not_made] if each not in always]
-    made = [each for each in there if each.choice != "never"]
+    called = [each for each in there if each.called_for]
     parts = (
-        ("Called for:", [each for each in made if each.called_for]),
+        ("Called for:", [each for each in called if each.choice != "never"]),
         ("Not called for:", [each for each in there if not each.called_for]),
-        ("Called for, and cannot be made:", [each for each in there if each not in made]),
+        ("Called for, and cannot be made:", [each for each in called if each.choice == "never"]),
     )
     for title, effects in parts:
-        listed = [each for each in effects if each.called_for or "Not" in title]
-        lines += ["", title] if listed else []
-        for each in listed:
+        lines += ["", title] if effects else []
+        for each in effects:
             lines += _lines(each)
     absent = [each.effect for each in explanation.effects if not each.built and not each.size_dn]
     sizes = (f"{each.effect} ({_figure(each.relative)} x the noise)" for each in always)
@@ -162,16 +161,13 @@ def scenes_table(explanations: list[Explanation]) -> str:
         if any(explanation.effects[k].size_dn for explanation in explanations)
     ]
     rows = [
-        "| scene | " + " | ".join(there) + " | cannot be made |",
+        f"| scene | {' | '.join([*there, 'cannot be made'])} |",
         "|---" * (2 + len(there)) + "|",
     ]
     for explanation in explanations:
         cells = [_cell(each) for each in explanation.effects if each.effect in there]
-        cells.append(
-            ", ".join(
-                f"{each.effect} {_cell(each)}" for each in explanation.not_made if each.called_for
-            )
-        )
+        lacks = (each for each in explanation.not_made if each.called_for)
+        cells.append(", ".join(f"{each.effect} {_cell(each)}" for each in lacks))
         rows.append(f"| {explanation.scene} | " + " | ".join(cells) + " |")
     return "\n".join(rows)
 

@@ -31,14 +31,7 @@ from transientcam_simulation.effects._gloss import Gloss
 from transientcam_simulation.effects._interreflection import DiffuseInterreflection
 from transientcam_simulation.effects._lens_scatter import LensScatter
 from transientcam_simulation.effects._mirror_paths import MirrorPaths
-from transientcam_simulation.effects._missing import (
-    BLUR,
-    COARSE_PATCHES,
-    FURTHER_BOUNCES,
-    GLOSS_OF_SURROUNDINGS,
-    MIRRORS_BETWEEN,
-    missing_calls,
-)
+from transientcam_simulation.effects._missing import Missing, missing_calls
 from transientcam_simulation.effects._mixed_pixels import MixedPixels
 from transientcam_simulation.effects._modulation_harmonics import (
     ModulationHarmonics,
@@ -85,15 +78,10 @@ EFFECTS: tuple[type[Effect], ...] = (
 """In the order in which they happen."""
 
 __all__ = [
-    "BLUR",
     "CALLED_ABOVE",
     "CHOICES",
-    "COARSE_PATCHES",
     "EFFECTS",
     "FEW_E",
-    "FURTHER_BOUNCES",
-    "GLOSS_OF_SURROUNDINGS",
-    "MIRRORS_BETWEEN",
     "NOISE",
     "WORST_ABOVE",
     "Call",
@@ -109,6 +97,7 @@ __all__ = [
     "LightEffect",
     "LightPlanes",
     "MirrorPaths",
+    "Missing",
     "MixedPixels",
     "ModulationHarmonics",
     "MotionDuringSequence",

@@ -96,10 +96,7 @@ class Facts(Protocol):
     def missing(
         self, kind: str, frequencies_hz: tuple[float, ...], *, during_s: float
     ) -> tuple[tuple[Glimpse, ...], tuple[Values, ...]]:
-        """Return pixels, and how far their moments lack light of a kind of ``MISSING``, by time.
-
-        ``during_s`` is the time that an image is exposed.
-        """
+        """Return pixels, and how far moments lack light of a kind in an exposure, by time."""
         ...
 
     def further_bounces(self, tolerance: float) -> int:

@@ -22,6 +22,7 @@ from transientcam_simulation.effects import (
     ImageEffect,
     LightEffect,
     LightPlanes,
+    Missing,
     ModulationHarmonics,
     MotionDuringSequence,
     PlaneEffect,
@@ -217,36 +218,14 @@ class World:
         if sequence is None:
             sequence = self._configured().sequence
         conditions = self.conditions(sequence)
-        effects = []
+        made = []
         for effect, call in zip(EFFECTS, self.calls(sequence).values(), strict=True):
             choice = self.choice(effect)
-            explained = ExplainedEffect(
-                effect=effect.name,
-                what=effect.what,
-                choice=choice if effect.optional else "always",
-                called_for=bool(call.called),
-                built=choice == "on" or (choice == "auto" and bool(call.called)),
-                reason=call.reason,
-                size_dn=float(call.size_dn),
-                relative=float(call.relative),
-                worst=float(call.worst),
-                cost_s=call.cost_s * sequence.images,
-            )
-            effects.append(explained)
+            built = choice == "on" or (choice == "auto" and bool(call.called))
+            shown = choice if effect.optional else "always"
+            made.append(_explained(effect, call, shown, built, call.cost_s * sequence.images))
         not_made = (
-            ExplainedEffect(
-                effect=kind.name,
-                what=kind.what,
-                choice="never",
-                called_for=bool(call.called),
-                built=False,
-                reason=call.reason,
-                size_dn=float(call.size_dn),
-                relative=float(call.relative),
-                worst=float(call.worst),
-                cost_s=0.0,
-            )
-            for kind, call in missing_calls(conditions)
+            _explained(kind, call, "never", False, 0.0) for kind, call in missing_calls(conditions)
         )
         forced = conditions
         for effect in EFFECTS:
@@ -256,7 +235,7 @@ class World:
             forced.device.described(forced.lens),
             sequence,
             conditions.floor_dn,
-            tuple(effects),
+            tuple(made),
             tuple(not_made),
             CALLED_ABOVE,
             WORST_ABOVE,
@@ -347,3 +326,20 @@ class World:
     def _configured(self) -> _Plan:
         assert self._plan is not None, "no sequence committed"  # noqa: S101  (the firmware configures first)
         return self._plan
+
+
+def _explained(
+    kind: type[Effect] | Missing, call: Call, choice: str, built: bool, cost_s: float
+) -> ExplainedEffect:
+    return ExplainedEffect(
+        effect=kind.name,
+        what=kind.what,
+        choice=choice,
+        called_for=bool(call.called),
+        built=built,
+        reason=call.reason,
+        size_dn=float(call.size_dn),
+        relative=float(call.relative),
+        worst=float(call.worst),
+        cost_s=cost_s,
+    )

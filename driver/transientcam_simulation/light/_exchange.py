@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import BIN_S, Scatter, ask
-from transientcam_simulation.light._over_mirrors import OverMirrors
 from transientcam_simulation.light._patches import Patches, form_factors
 from transientcam_simulation.light._paths import image_lights, light_on, normals_at, scatter_of
 from transientcam_simulation.scene import Points, Scene
@@ -54,7 +53,7 @@ class Exchange:
             - 2 * patches.centre @ patches.centre.T,
             0,
         )
-        delay_s, radiosity = direct_light(scene, patches)
+        delay_s, radiosity = _direct(scene, patches)
         return cls(
             scene,
             patches,
@@ -77,8 +76,7 @@ class Exchange:
         highest = [float(light.max(initial=0.0))]
         for bounce in range(_MOST_BOUNCES):
             ask()
-            got = self.factors @ light + self.over_mirrors.irradiance(light, 0.0).real
-            light = self.patches.albedo * got
+            light = self.patches.albedo * (self.factors @ light)
             highest.append(float(light.max(initial=0.0)))
             share = min(highest[-1] / highest[-2], 0.999) if highest[-2] else 0.0
             if highest[-1] / (1 - share) <= tolerance:
@@ -102,15 +100,9 @@ class Exchange:
             got = (in_phase @ of_real - quadrature @ of_imag) + 1j * (
                 in_phase @ of_imag + quadrature @ of_real
             )
-            got = got + self.over_mirrors.irradiance(given, frequency_hz)
             total += got
             light = self.patches.albedo * got
         return total
-
-    @cached_property
-    def over_mirrors(self) -> OverMirrors:
-        """What mirrors show patches of each other."""
-        return OverMirrors.of(self.scene, self.patches)
 
     @cached_property
     def history(self) -> tuple[float, NDArray[np.float64]]:
@@ -163,7 +155,7 @@ def _spread(
     return np.convolve(given, np.diff(Scatter(width_s, decay_s).cumulated(edges_s)))
 
 
-def direct_light(scene: Scene, patches: Patches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _direct(scene: Scene, patches: Patches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Direct light on samples of each patch, as the share of the patch's radiosity it makes."""
     middles = (2 * np.arange(_SAMPLES) + 1) / (2 * _SAMPLES)
     u, w = (grid.ravel() for grid in np.meshgrid(middles, middles))

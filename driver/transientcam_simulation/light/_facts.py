@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.base import PINHOLE
-from transientcam_simulation.effects import BLUR, WORST_ABOVE, Glimpse, Noise, Values
+from transientcam_simulation.effects import WORST_ABOVE, Glimpse, Noise, Values
 from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._further_light import HELD_STEPS, FurtherLight
 from transientcam_simulation.light._missing import SampledWays, sampled_glimpses
@@ -105,12 +105,14 @@ class SceneFacts:
         self, kind: str, frequencies_hz: tuple[float, ...], *, during_s: float
     ) -> tuple[tuple[Glimpse, ...], tuple[Values, ...]]:
         """Return some pixels, and how far their moments lack light of a kind, at most, by time."""
-        if kind == BLUR.name:
+        if kind == "blur":
             # an image is an instant of its exposure; edges pass pixels by shares, not at once
             pixel_s = 1 / max(self._fastest_pixels_per_s, 1e-9)
             over_s = max(during_s, min(pixel_s, self._period_s / _TIMES))
             changes = self.changes("motion", frequencies_hz, during_s=over_s)
             return self.glimpses, tuple(during_s / over_s / 2 * each for each in changes)
+        if kind == "coarse-patches" and self._scene.moves:
+            return (), ()
         ways, glimpses = self._sampled
         some = _some(frequencies_hz)
         return glimpses, self._found.get(
@@ -119,13 +121,8 @@ class SceneFacts:
 
     @cached_property
     def _sampled(self) -> tuple[tuple[SampledWays, ...], tuple[Glimpse, ...]]:
-        rays = self._rays(self._camera)
-        return sampled_glimpses(
-            tuple(
-                (seen.scene, rays, glimpse)
-                for seen, glimpse in zip(self._seen, self.glimpses, strict=True)
-            )
-        )
+        scenes = tuple(each.scene for each in self._seen)
+        return sampled_glimpses(scenes, self._rays(self._camera), self.glimpses)
 
     def further_bounces(self, tolerance: float) -> int:
         """Return how often light goes from surface to surface until less than this is left."""

@@ -6,23 +6,14 @@ for the kind of way it took: over a mirror between two scattering surfaces, by g
 but the lamp, over more surfaces than the scene's file allows, or as radiosity follows it.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import ask
-from transientcam_simulation.effects import (
-    COARSE_PATCHES,
-    FURTHER_BOUNCES,
-    GLOSS_OF_SURROUNDINGS,
-    MIRRORS_BETWEEN,
-    Glimpse,
-    Values,
-)
-from transientcam_simulation.light._exchange import direct_light
-from transientcam_simulation.light._patches import Patches, form_factors
+from transientcam_simulation.effects import Glimpse, Values
 from transientcam_simulation.light._paths import (
     RayEnds,
     first_scattering,
@@ -32,6 +23,7 @@ from transientcam_simulation.light._paths import (
     light_rays,
     normals_at,
 )
+from transientcam_simulation.light._radiosity import Interreflection
 from transientcam_simulation.light._variants import without_scattering
 from transientcam_simulation.scene import Points, Scene
 
@@ -42,25 +34,15 @@ _FURTHER = 3  # surfaces behind the one that is seen
 _PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])  # even places in two dimensions
 _SURE = 3.0  # standard errors by which patches must differ from paths
 _FIRST, _FOLLOWED, _MIRRORS, _GLOSS, _BOUNCES = range(5)  # ``_FIRST`` by radiosity, too
-_KINDS = {
-    MIRRORS_BETWEEN.name: _MIRRORS,
-    GLOSS_OF_SURROUNDINGS.name: _GLOSS,
-    FURTHER_BOUNCES.name: _BOUNCES,
-}
+_KINDS = {"mirrors-between": _MIRRORS, "gloss-of-surroundings": _GLOSS, "further-bounces": _BOUNCES}
 
 
 @dataclass(frozen=True)
 class SampledWays:
     """Light that paths bring to some pixels: by pixel and half of the paths, and by kind.
 
-    Attributes
-    ----------
-    scene, rays
-        What is seen, and the rays (P, 3) through the pixels' centres.
-    slot
-        (N) index of the pixel, and P more in the second half of the paths.
-    length_m, weight, kind
-        (N) whole way from the lamp to the camera, brightness, and by what way.
+    ``rays`` (P, 3) go through the pixels' centres; ``slot`` (N) is the pixel's index, and P more in
+    the second half of the paths, ``length_m`` the whole way, and ``weight`` the brightness.
     """
 
     scene: Scene
@@ -119,7 +101,7 @@ class SampledWays:
 
     def change(self, kind: str, frequencies_hz: tuple[float, ...]) -> Values:
         """Size (P) of the moments that are missing, at most."""
-        if kind == COARSE_PATCHES.name:
+        if kind == "coarse-patches":
             return self._by_patches(max(frequencies_hz))
         sizes = [self._moments(_KINDS[kind], each) for each in frequencies_hz]
         return np.sqrt(np.max([_power(one, other) for one, other in sizes], axis=0).clip(0))
@@ -137,27 +119,13 @@ class SampledWays:
 
     def _by_patches(self, frequency_hz: float) -> Values:
         """Difference (P) of radiosity from paths, by the first bounce; 0 where they cannot tell."""
-        if self.scene.moves or not (self.kind == _FIRST).any():
+        if not (self.kind == _FIRST).any():
             return np.zeros(len(self.rays))
-        scene = without_scattering(self.scene)
+        once = replace(self.scene.transport, diffuse_bounces=1)
+        scene = without_scattering(replace(self.scene, transport=once))
         lit = light_rays(scene, self.rays)
-        patches = Patches.of(scene, scene.transport.patches)
-        near, weights = np.zeros((len(self.rays), 4), dtype=np.intp), np.zeros((len(self.rays), 4))
-        for k, cells in patches.cells.items():
-            mine, shape = lit.surface == k, scene.surfaces[k].shape
-            near[mine], weights[mine] = shape.between_cells(
-                lit.point[mine], cells.rows, cells.columns
-            )
-            near[mine] += patches.first[k]
-        at, where = np.unique(near, return_inverse=True)
-        factors = form_factors(scene, patches, patches.centre[at], patches.normal[at])
-        delay_s, radiosity = direct_light(scene, patches)
-        turn = 2j * np.pi * frequency_hz
-        given = np.einsum("kns,kns->n", radiosity, np.exp(turn * delay_s))
-        far_m = np.linalg.norm(patches.centre[at][:, None] - patches.centre, axis=-1)
-        got = (factors * np.exp(turn / SPEED_OF_LIGHT_M_S * far_m)) @ given
-        seen = np.einsum("pk,pk->p", weights, got[where.reshape(near.shape)])
-        seen *= lit.reflectance * np.exp(turn / SPEED_OF_LIGHT_M_S * lit.distance_m)
+        patches = Interreflection(scene, lit, width=len(self.rays), height=1)
+        seen = patches.moments(frequency_hz)[0]
         one, other = self._moments(_FIRST, frequency_hz)
         power = _power(one - seen, other - seen)
         error = np.abs(one - other) ** 2 / 4
@@ -166,18 +134,18 @@ class SampledWays:
 
 
 def sampled_glimpses(
-    seen: tuple[tuple[Scene, Points, Glimpse], ...],
+    scenes: tuple[Scene, ...], rays: Points, seen: tuple[Glimpse, ...]
 ) -> tuple[tuple[SampledWays, ...], tuple[Glimpse, ...]]:
     """Sample scenes at some times: of the pixels judged then, by their rays, a few drawn once."""
-    ways, glimpses = [], []
-    for scene, rays, glimpse in seen:
-        count = min(len(rays), PIXELS // len(seen))
-        some = np.sort(np.random.default_rng(1).choice(len(rays), count, replace=False))
-        ways.append(SampledWays.of(scene, rays[some]))
-        bright = glimpse.brightness[some] + ways[-1].followed
-        part = Glimpse(bright, glimpse.reflectance[some], glimpse.cosine[some], (1, count))
-        glimpses.append(part)
-    return tuple(ways), tuple(glimpses)
+    count = min(len(rays), PIXELS // len(seen))
+    some = np.sort(np.random.default_rng(1).choice(len(rays), count, replace=False))
+    ways = tuple(SampledWays.of(scene, rays[some]) for scene in scenes)
+    parts = zip((each.brightness[some] for each in seen), ways, strict=True)
+    bright = [direct + each.followed for direct, each in parts]
+    return ways, tuple(
+        Glimpse(light, each.reflectance[some], each.cosine[some], (1, count))
+        for light, each in zip(bright, seen, strict=True)
+    )
 
 
 def _power(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> Values:

@@ -85,7 +85,7 @@ def form_factors(scene: Scene, patches: Patches, at: Points, normal: Points) -> 
         if hides:
             clear = ~_blocked(scene, patches, at[block][p], n)
             p, n = p[clear], n[clear]
-        factors[block][p, n] = contour(
+        factors[block][p, n] = _contour(
             patches.corners[n] - at[block][p][:, None, :], normal[block][p]
         )
     return factors
@@ -105,7 +105,7 @@ def _convex(scene: Scene) -> bool:
     return all(hasattr(surface.shape, "right") for surface in scene.surfaces)
 
 
-def contour(corners: Points, normal: Points) -> NDArray[np.float64]:
+def _contour(corners: Points, normal: Points) -> NDArray[np.float64]:
     """Form factor of polygons (P, 4, 3), relative to points with normals (P, 3)."""
     unit = np.ascontiguousarray(corners.transpose(1, 2, 0))  # long rows, along the polygons
     unit /= np.sqrt(np.einsum("kcp,kcp->kp", unit, unit))[:, None]

@@ -14,7 +14,7 @@ F_HZ = 69e6
 Values = NDArray[np.float64]
 
 
-def moments(surfaces: str, *, paths: int = 256, **changed: str) -> NDArray[np.complex128]:
+def moments(surfaces: str, paths: int = 256, /, **changed: str) -> NDArray[np.complex128]:
     """Moments (repetition, f) at 0 and 69 MHz of the one pixel of a camera with a narrow view."""
     given = {
         "eye": "[0, 0, 0]",
@@ -106,7 +106,7 @@ def test_a_far_lamps_light_over_a_plate_is_its_form_factor() -> None:
     above = plate("[0, 0, 1]", "[0, 0, -1]", "[2, 1.2]", 'kind = "diffuse"\nalbedo = 0.5')
     found = moments(
         small + above,
-        paths=4096,
+        4096,
         eye="[0, -1, 0.5]",
         at="[0, 0, 0]",
         lamp="[0, 0, -900]",
@@ -135,7 +135,7 @@ def test_a_bounce_is_the_integral_over_the_surface_that_is_lit(
     lamp = np.array([0.0, 1.1, 0.3])
     found = moments(
         floor + wall + shade + (mirror if over_mirror else ""),
-        paths=2048,
+        2048,
         at="[0, 1, -0.5]",
         lamp="[0, 1.1, 0.3]",
         aim="[0, 1.1, 9]",

@@ -104,3 +104,40 @@ def test_bad_input_is_reported_in_one_line(arguments: list[str], message: str) -
     assert result.exit_code == 2
     assert message in " ".join(result.output.split())
     assert "Traceback" not in result.output
+
+
+def test_light_that_cannot_be_made_and_a_lens_that_scatters_are_named(tmp_path: Path) -> None:
+    """A varnished floor before a wall shows the wall, which gloss here does not."""
+    path = tmp_path / "varnish.toml"
+    path.write_text("""
+        [camera]
+        look_at_m = [0.0, 2.0, -0.3]
+        [light]
+        position_m = [0.05, 0.0, 0.1]
+        aim_at_m = [0.0, 2.0, 0.0]
+        electrons_per_s = 6e7
+        [device]
+        lens_scatter = { share = 0.02 }
+        [[surface]]
+        kind = "diffuse"
+        centre_m = [0.0, 2.2, 0.0]
+        normal = [0.0, -1.0, 0.0]
+        size_m = [4.0, 3.0]
+        albedo = 0.7
+        [[surface]]
+        kind = "diffuse"
+        centre_m = [0.0, 1.6, -0.7]
+        normal = [0.0, 0.0, 1.0]
+        size_m = [4.0, 1.2]
+        albedo = 0.3
+        gloss = 0.2
+        gloss_exponent = 200
+    """)
+
+    text = run(str(path)).output
+    called, lacks = text.split("Called for, and cannot be made:")
+    assert "gloss-of-surroundings" in lacks
+    assert "gloss-of-surroundings" not in called
+    assert "ideal (but for lens scatter) device" in " ".join(text.split())
+    assert lacks.count("shot-noise") == 1
+    assert "shot-noise" not in called

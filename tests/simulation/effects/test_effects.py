@@ -420,6 +420,7 @@ def test_every_file_of_an_effect_has_its_entry_and_a_name_of_its_own() -> None:
         "_conditions",
         "_effect",
         "_glimpses",
+        "_missing",
     }
 
     assert {effect.__module__.rpartition(".")[2] for effect in EFFECTS} == files

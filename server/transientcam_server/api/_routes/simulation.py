@@ -95,10 +95,7 @@ async def change_simulation(
     responses=documented(kinds.NOT_SIMULATED),
 )
 async def explain_simulation(service: ServiceOf) -> ExplanationDocument:
-    """Return for each effect whether it is called for, why, how large it is and what it costs.
-
-    And what the scene has that cannot be simulated, `not_made`, with its size.
-    """
+    """Return for each effect whether it is called for, why, how large it is and what it costs."""
     explanation = await asyncio.to_thread(_simulation(service).explain)
     return ExplanationDocument.model_validate(explanation.to_document())
 
