@@ -16,8 +16,7 @@ from transientcam_simulation.light._patches import Patches
 from transientcam_simulation.light._recent import Recent
 from transientcam_simulation.scene import Points, Scene, patch_edges_m
 
-HELD_STEPS: Final = 0.5
-"""Of a step, for which what patches give the pixels stands (`HeldLight`)."""
+HELD_STEPS: Final = 0.5  # of a step, for which what patches give the pixels stands
 _STEP_PATCHES = 0.5  # of the largest patches' edges, that anything moves in a step at most
 _LONGEST_S = 3600.0  # of a step
 _EXCHANGES, _SOLVED = 3, 128  # kept
@@ -66,8 +65,8 @@ class FurtherLight:
         """Solve it at a time, or find what is kept."""
 
         def exchange() -> tuple[Exchange, int]:
-            now, patches = self._scene.at(time_s), self.patches.moved(self._offsets(time_s))
-            between = Exchange.between(now, patches)
+            patches = self.patches.moved(self._offsets(time_s))
+            between = Exchange.between(self._scene.at(time_s), patches)
             return between, between.bounces(self._tolerance)
 
         def solve() -> NDArray[np.complex128]:
