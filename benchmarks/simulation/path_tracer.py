@@ -9,6 +9,7 @@ anew in each of several repetitions, whose spread is the standard error.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -335,7 +336,7 @@ def _part(scene: Scene, index: int, time_s: float) -> _Part:
         turn = (time_s / motion.period_s) % 1.0
         along = np.linspace(0, 1, len(knots))
         centre = centre + [np.interp(turn, along, axis) for axis in np.array(knots).T]
-    stated = {
+    stated: dict[str, Any] = {
         "kind": surface.kind,
         "centre": centre,
         "share": surface.reflectivity,

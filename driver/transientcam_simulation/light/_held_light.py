@@ -33,15 +33,17 @@ class HeldLight:
         self._patches, self._still, self._ends = light.patches, still, ends
         self._moments: Recent[float, Moments] = Recent(_FREQUENCIES)
         self._light: Recent[float, NDArray[np.complex64]] = Recent(_FREQUENCIES)
-        self._solve = lambda f_hz: light.irradiance(time_s, f_hz).astype(np.complex64)
+        self._solve: Callable[[float], NDArray[np.complex64]] = lambda f_hz: light.irradiance(
+            time_s, f_hz
+        ).astype(np.complex64)
 
     def moments(self, frequency_hz: float) -> Moments:
         """Moments (H, W) of what stands still, with all of its light and nothing before it."""
 
         def found() -> Moments:
             direct = self._still.moments(frequency_hz)
-            more = self._ends.moments(self._of_patches(frequency_hz), frequency_hz)
-            more = more if frequency_hz else more.real
+            gathered = self._ends.moments(self._of_patches(frequency_hz), frequency_hz)
+            more = gathered if frequency_hz else gathered.real
             return direct + more.reshape(direct.shape).astype(direct.dtype)
 
         return self._moments.get(frequency_hz, found)

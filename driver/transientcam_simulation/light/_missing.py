@@ -104,7 +104,8 @@ class SampledWays:
         if kind == "coarse-patches":
             return self._by_patches(max(frequencies_hz))
         sizes = [self._moments(_KINDS[kind], each) for each in frequencies_hz]
-        return np.sqrt(np.max([_power(one, other) for one, other in sizes], axis=0).clip(0))
+        power = np.max([_power(one, other) for one, other in sizes], axis=0)
+        return np.asarray(np.sqrt(power.clip(0)))
 
     def _moments(self, kind: int, frequency_hz: float) -> NDArray[np.complex128]:
         """Moments (2, P) of pixels by each half of the paths, which know nothing of each other."""
@@ -130,7 +131,7 @@ class SampledWays:
         power = _power(one - seen, other - seen)
         error = np.abs(one - other) ** 2 / 4
         of_all = self.followed.sum() / self._moments(_FIRST, 0.0).real.mean(axis=0).sum()
-        return of_all * np.sqrt(np.where(power > _SURE**2 * error.mean(), power, 0.0))
+        return np.asarray(of_all * np.sqrt(np.where(power > _SURE**2 * error.mean(), power, 0.0)))
 
 
 def sampled_glimpses(

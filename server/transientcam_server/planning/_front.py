@@ -23,7 +23,7 @@ _KEPT: Final = 8
 
 def front_goal(by: str, share: float | None = None, region: Region | None = None) -> Goal:
     """Return the goal that a front is compared by: all sequences reach it."""
-    target = {} if by == "range_error_m" else {by: _WIDE}
+    target: dict[str, Any] = {} if by == "range_error_m" else {by: _WIDE}
     return Goal(share=share, region=region, **target)
 
 

@@ -61,7 +61,7 @@ def sampled(scene: Scene) -> SampledWays:
 def traced(scene: Scene, bounces: int) -> NDArray[np.complex128]:
     scene = replace(scene, transport=replace(scene.transport, diffuse_bounces=bounces))
     tracer = Tracer(scene, SIZE)
-    return tracer.moments(PIXEL, np.array(FREQUENCIES_HZ), paths=2048).mean(axis=0)
+    return np.asarray(tracer.moments(PIXEL, np.array(FREQUENCIES_HZ), paths=2048).mean(axis=0))
 
 
 @pytest.mark.parametrize(

@@ -353,8 +353,15 @@ class Predictor:
         return self._with(self._whole, closely=True)
 
     def _with(self, scene: SceneStatistics, *, closely: bool = False) -> "Predictor":
-        same = {"seed": self._seed, "go_on": self._go_on, "share": self._share}
-        return Predictor(scene, self.sensor, self.settings, closely=closely, **same)
+        return Predictor(
+            scene,
+            self.sensor,
+            self.settings,
+            seed=self._seed,
+            go_on=self._go_on,
+            share=self._share,
+            closely=closely,
+        )
 
     def _harmonics(self, estimator: str, sequence: Sequence) -> int:
         """How many harmonics the estimator looks at."""

@@ -32,7 +32,8 @@ class Region:
                 parts = [part.split(",") for part in value.split("/")]
                 numbers = [[int(each) for each in part] for part in parts]
             else:
-                numbers = [list(each) for each in ([value] if np.ndim(value) == 1 else value)]
+                corners_or_box: Any = [value] if np.ndim(value) == 1 else value
+                numbers = [list(each) for each in corners_or_box]
             if len(numbers) == 1:
                 x, y, width, height = numbers[0]
                 if width < 1 or height < 1:

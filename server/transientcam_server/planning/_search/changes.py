@@ -78,7 +78,7 @@ def in_words(best: Choice, found: list[Change], goal: Goal) -> str:
         )
         for each in found
     ]
-    share = f"{items[most] / best.applied.capture_s:.0%} of the capture is {names[most]}"
+    share = f"{(items[most] or 0.0) / best.applied.capture_s:.0%} of the capture is {names[most]}"
     return f"{': '.join(filter(None, (share, '; '.join(gains))))}."
 
 

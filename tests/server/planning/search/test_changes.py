@@ -19,7 +19,7 @@ def quickest_s(plan: Plan, light: float, readout_s: float) -> float:
     sequence = best.applied.sequence
     target_m = cast(float, plan.goal.range_error_m)
     longest_s = LONGEST_S / light
-    times_s = []
+    times_s: list[float] = []
     for k in range(EXPOSURES):
         exposure_s = 2e-4 * (longest_s / 2e-4) ** (k / (EXPOSURES - 1))
         for takes in TAKES:
