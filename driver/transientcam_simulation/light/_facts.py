@@ -83,9 +83,13 @@ class SceneFacts:
         self._rough = min(_ROUGH_PATCHES, scene.transport.patches)
         self._errors: dict[int, Values] = {}  # by patches a side; 0: the light itself
 
-    @cached_property
+    @property
     def glimpses(self) -> tuple[Glimpse, ...]:
         """Direct light and mirrors on the pixels judged."""
+        return self._glimpses
+
+    @cached_property
+    def _glimpses(self) -> tuple[Glimpse, ...]:
         cosine = cosine_to_axis(self._camera, self._rays(self._camera))
         return tuple(
             Glimpse(each.lits[0].weight.sum(axis=0), each.lits[0].reflectance, cosine, self._shape)

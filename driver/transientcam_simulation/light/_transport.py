@@ -143,9 +143,13 @@ class GivenScenery:
         self._responses = responses
         self._view = View(responses.moments, lambda: np.float32(1))
 
-    @cached_property
+    @property
     def glimpses(self) -> tuple[Glimpse, ...]:
         """All pixels, once."""
+        return self._glimpses
+
+    @cached_property
+    def _glimpses(self) -> tuple[Glimpse, ...]:
         brightness = self._responses.moments(0.0).real
         ones = np.ones(brightness.size)
         shape = brightness.shape[0], brightness.shape[1]
@@ -189,14 +193,22 @@ class SurfaceScenery:
         """Pixels, over the scene's life."""
         return self.facts.glimpses
 
-    @cached_property
+    @property
     def facts(self) -> SceneFacts:
         """How effects change the scene, over its life."""
-        return SceneFacts(self._scene, **self._size)
+        return self._facts
 
     @cached_property
+    def _facts(self) -> SceneFacts:
+        return SceneFacts(self._scene, **self._size)
+
+    @property
     def cosine(self) -> Values:
         """Of the pixels' rays to the lens's axis."""
+        return self._cosine
+
+    @cached_property
+    def _cosine(self) -> Values:
         shape = self._size["height"], self._size["width"]
         return cosine_to_axis(self._camera, camera_rays(self._camera, **self._size)).reshape(shape)
 
