@@ -13,7 +13,7 @@ BIN := .venv/bin
 # Distributions of their own, which extras name.
 PACKAGES := $(foreach each,$(wildcard packages/*),--editable ./$(each))
 BUILT_PAGE := server/transientcam_server/static/index.html
-DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -not -name documents.d.ts -type f 2>/dev/null)
+DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f -not -name '*.d.ts' 2>/dev/null)
 DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace
 
 .DEFAULT_GOAL := help
