@@ -237,6 +237,17 @@ class Reconstructor:
         corrupt = repaired is not None and any(bool(np.any(each)) for each in repaired[1:])
         return Measured(moments, saturated_pixels, kept, repaired, images, low=low, corrupt=corrupt)
 
+    def of_measured(
+        self,
+        moments: Array,
+        *,
+        saturated_pixels: Array | None = None,
+        ambient_dn: float = 0.0,
+        spread: Spread = at_once,
+    ) -> Reconstruction:
+        """Go on from `Reconstruction.measured` (m + 1, ...) of another one, as `Measured` says."""
+        return self(Measured(moments, saturated_pixels, ambient_dn=ambient_dn), spread=spread)
+
     def _require_labels(self) -> tuple[str, int]:
         """Return how b_0 was measured and the number of takes, where raw images can be read."""
         settings, calibration = self.settings, self._calibration

@@ -49,6 +49,7 @@ def test_every_resource_of_the_interface_is_described(document: dict[str, Any]) 
         "GET /api/v1/parameters",
         "GET /api/v1/jobs",
         "GET /api/v1/jobs/{job}",
+        "GET /api/v1/jobs/{job}/map.{form}",
         "POST /api/v1/jobs/{job}/cancel",
         "GET /api/v1/acquisition",
         "PUT /api/v1/acquisition",

@@ -55,7 +55,10 @@ async def read_job(
 async def read_map(
     service: ServiceOf,
     job: _Job,
-    form: Annotated[Literal["npy", "png"], Path(description="values in m, or colours for eyes")],
+    form: Annotated[
+        Literal["npy", "png"],
+        Path(description="values in m, or colours for eyes", examples=["npy"]),
+    ],
 ) -> Response:
     """Return noise and bias together of each pixel (H, W), as the planned sequence would have them.
 

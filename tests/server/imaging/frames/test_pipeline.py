@@ -431,11 +431,11 @@ def test_a_large_frame_takes_all_cores_unless_another_is_computed(
     two_at_once = threading.Barrier(2)
     reconstruct = Recipe.reconstruct
 
-    def noting(*arguments: Any, spread: tm.kernels.Spread) -> tm.Reconstruction:
+    def noting(*arguments: Any, spread: tm.kernels.Spread, **given: Any) -> tm.Reconstruction:
         spreads.append(spread)
         if len(spreads) <= 2:
             two_at_once.wait(10)
-        return reconstruct(*arguments)
+        return reconstruct(*arguments, **given)
 
     monkeypatch.setattr(module, "spread_of", lambda raw: all_cores)
     monkeypatch.setattr(Recipe, "reconstruct", noting)
