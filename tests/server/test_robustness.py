@@ -226,6 +226,8 @@ def test_a_failing_product_is_reported_once_and_again_only_after_it_worked(serve
 def test_a_stage_that_fails_takes_only_what_stands_on_it(
     served: Served, http: httpx.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # without a low frequency, whose phase says which returns are in which turn
+    http.put("/api/v1/sequence", json={"zeroth": "estimated"}).raise_for_status()
     monkeypatch.setattr(tm.Reconstruction, "returns", property(_break))
     http.get(LATEST, params={"wait_s": 10.0})
     following = {"wait_s": 10.0, "after": http.get(LATEST).json()["frame"]}
