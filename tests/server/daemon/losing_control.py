@@ -10,6 +10,7 @@ and how long it was on at most.
 import json
 import math
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -80,6 +81,8 @@ class Zygote:
 
     def _hear(self) -> Any:
         assert self._process.stdout is not None
+        told, _, _ = select.select([self._process.stdout], [], [], 2 * PATIENCE_S)
+        assert told, "the daemon does not come up"
         return json.loads(self._process.stdout.readline())
 
 
