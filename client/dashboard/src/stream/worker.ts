@@ -48,6 +48,11 @@ let connection: StreamConnection | null = null;
 let token: string | null = null;
 /** Of the interface that the stream is of; a worker's own address is another one. */
 let interface_url = "";
+/** Is called once that is known: a recording in the page's address is asked for before. */
+let opened: () => void = () => undefined;
+const open = new Promise<void>((resolve) => {
+  opened = resolve;
+});
 
 function onEvent(event: ConnectionEvent): void {
   if (event.type === "message" && event.message.type === "frame") {
@@ -94,6 +99,7 @@ async function fetchProduct(path: string, product: string): Promise<FrameReport 
 }
 
 async function bring(ticket: number, path: string, products: readonly string[]): Promise<void> {
+  await open;
   const answers = await Promise.all(products.map((product) => fetchProduct(path, product)));
   const reports = answers.filter((answer): answer is FrameReport => "message" in answer);
   const problem = answers.find((answer): answer is Problem => !("message" in answer)) ?? null;
@@ -121,6 +127,7 @@ scope.onmessage = ({ data: command }) => {
       );
       connection.authenticate(token);
       connection.want(command.products);
+      opened();
       break;
     case "authenticate":
       token = command.token;
