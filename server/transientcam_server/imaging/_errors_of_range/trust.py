@@ -78,7 +78,8 @@ def judged(
     if recipe.lamp is not None:
         lens = recipe.lens(*known.shape)
         points_m = lens.points(range_m)
-        bright = brighter_than_white(recipe.lamp, points_m, brightness_dn, sequence.exposure_s)
+        direct_dn = np.asarray(found.direct)  # what came around later adds to the brightness
+        bright = brighter_than_white(recipe.lamp, points_m, direct_dn, sequence.exposure_s)
         shadow = shadowed(recipe.lamp, lens, range_m, np.maximum(error_m, SHADOW * range_m))
     reasons = {
         Trust.NO_RANGE: ~known,
