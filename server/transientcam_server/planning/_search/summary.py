@@ -11,6 +11,8 @@ def summary(best: Choice, twice: Choice | None, scene: SceneStatistics) -> str:
     predicted = best.predicted
     noise_m, bias_m = predicted.range_std.median, predicted.range_bias_m
     first = f"{noise_m * 1e3:.3g} mm noise, {bias_m * 1e3:.3g} mm off"
+    if best.share is not None:  # more than what noise and bias of the median pixel are together
+        first = f"{_error_in_words(best)}, the median one with {first}"
     doubt = _doubt(best, scene)
     if twice is None:
         what = "more frequencies or another estimator" if bias_m > noise_m else "a longer capture"
@@ -19,11 +21,8 @@ def summary(best: Choice, twice: Choice | None, scene: SceneStatistics) -> str:
             + doubt
         )
     factor = twice.applied.capture_s / best.applied.capture_s
-    error_m = twice.range_error.median
-    return (
-        f"{first}: {twice.in_words()} takes {factor:.2g} x as long for {error_m * 1e3:.3g} mm."
-        + doubt
-    )
+    error = _error_in_words(twice)
+    return f"{first}: {twice.in_words()} takes {factor:.2g} x as long for {error}." + doubt
 
 
 def summary_of_front(front: list[Choice], scene: SceneStatistics) -> str:
@@ -32,7 +31,7 @@ def summary_of_front(front: list[Choice], scene: SceneStatistics) -> str:
         return "Nothing reaches any accuracy on this scene."
     finest = front[-1]
     best = (
-        f"the best is {finest.range_error.median * 1e3:.3g} mm in "
+        f"the best is {_error_in_words(finest)} in "
         f"{_time_in_words(finest.applied.capture_s)} ({finest.in_words()})"
     )
     doubt = _doubt(finest, scene)
@@ -71,6 +70,12 @@ def _doubt(choice: Choice, scene: SceneStatistics) -> str:
         " Bias unknown: light that goes on coming, as out of wax or from other walls, would look "
         f"the same, and put the range {choice.predicted.most_bias_m * 1e3:.2g} mm off."
     )
+
+
+def _error_in_words(choice: Choice) -> str:
+    """State the error that targets limit: of the median pixel, or of a share of a capture's."""
+    of_share = "" if choice.share is None else f" for {choice.share:.0%} of the pixels"
+    return f"{choice.range_error.median * 1e3:.3g} mm{of_share}"
 
 
 def _time_in_words(time_s: float) -> str:

@@ -30,6 +30,24 @@ def test_what_half_the_error_costs_is_stated_with_noise_and_bias(
     )
 
 
+def test_the_error_of_a_share_is_stated_beside_noise_and_bias_of_the_median_pixel(
+    capabilities: Capabilities,
+) -> None:
+    best, twice = (
+        dataclasses.replace(
+            choice(capabilities, std_m=of, bias_m=of, capture_s=2e-4 / of, within_m=4 * of),
+            share=0.9,
+        )
+        for of in (2e-3, 1e-3)
+    )
+
+    words = summary(best, twice, SCENE)
+
+    assert words.startswith("8 mm for 90% of the pixels, the median one with 2 mm noise, 2 mm off:")
+    assert words.endswith(" takes 2 x as long for 4 mm for 90% of the pixels.")
+    assert "the best is 4 mm for 90% of the pixels in" in summary_of_front([best, twice], SCENE)
+
+
 @pytest.mark.parametrize(
     ("std_m", "bias_m", "hint"),
     [
