@@ -269,7 +269,11 @@ class SurfaceScenery:
         from transientcam_simulation.light._time_interpolation import Steps
 
         moving = MovingLight(scene, still, soft=MixedPixels.name in effects)
-        held: Callable[[float], HeldLight | None] = lambda _time_s: None  # noqa: E731
+
+        def nothing(_time_s: float) -> None:
+            return None
+
+        held: Callable[[float], HeldLight | None] = nothing
         if further:
             patches = self.facts.patches_a_side(wanted.noise)
             held = held_light(FurtherLight(scene, per_side=patches, tolerance=tolerance), still)

@@ -112,8 +112,8 @@ async def _made(
     progress: Progress,
 ) -> PlanDocument:
     """Plan once there is a place for the address, and put the map into the files of a job."""
-    mapped = request.map and files is not None
-    searched = 0.8 if mapped else 1.0
+    into = files if request.map else None
+    searched = 1.0 if into is None else 0.8
     async with service.planning.place_of(address):
         scene = await _scene(service, request, goal.base, progress.part(0.0, planned.LOOKED))
         made = await service.planning.run(
@@ -122,8 +122,7 @@ async def _made(
             scene,
             progress=progress.part(planned.LOOKED, searched),
         )
-        if mapped:
-            assert files is not None  # noqa: S101 - it is mapped
+        if into is not None:
             error_m = await service.planning.run(
                 service.planner.map_m,
                 scene,
@@ -131,7 +130,7 @@ async def _made(
                 Sequence.from_document(made["sequence"]),
                 progress=progress.part(searched, 1.0),
             )
-            files |= map_files(error_m, goal.range_error_m)
+            into |= map_files(error_m, goal.range_error_m)
         _add_transport(made["price"], service.hub.latest)
         return PlanDocument.model_validate(made)
 
