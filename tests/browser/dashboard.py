@@ -119,6 +119,14 @@ def point_at(page: Page, picture: str, x: int, y: int, *, click: bool = False) -
         page.mouse.click(*at)
 
 
+def read_at(page: Page, x: int, y: int) -> None:
+    """Point at a pixel of the map until it is read: what moves under the pointer takes it away."""
+    pixel = page.locator(".panel-map [data-field=pixel]")
+    point_at(page, "map", x, y)
+    while pixel.text_content() != f"{x}, {y}":
+        point_at(page, "map", x, y)
+
+
 def drop(page: Page, name: str, content: str | bytes) -> None:
     """Hold a file over the page and drop it there."""
     body = content.encode() if isinstance(content, str) else content
