@@ -103,6 +103,7 @@ def test_what_was_reconstructed_is_printed_as_json(
         (["--bins", "0"], 2, "bins"),
         (["--smoothing-px", "-1"], 2, "smoothing-px"),
         (["--threshold", "1.5"], 2, "threshold"),
+        (["--estimator", "music"], 2, "estimator"),
     ],
 )
 def test_an_option_that_cannot_be_used_is_named_and_nothing_written(

@@ -90,7 +90,8 @@ def test_a_recording_is_reconstructed_with_what_was_recorded_unless_settings_are
     one, other = tmp_path / "one.h5", tmp_path / "other.h5"
 
     assert run(["reconstruct", str(source), "-o", str(one)]) == 0
-    assert run(["reconstruct", str(source), "-o", str(other), "--smoothing-px", "0"]) == 0
+    given = ["--smoothing-px", "0", "--estimator", "pisarenko"]
+    assert run(["reconstruct", str(source), "-o", str(other), *given]) == 0
 
     with h5py.File(one) as file:
         settings = json.loads(file.attrs["reconstruction"])
@@ -98,3 +99,4 @@ def test_a_recording_is_reconstructed_with_what_was_recorded_unless_settings_are
     with h5py.File(other) as file:
         settings = json.loads(file.attrs["reconstruction"])
         assert (settings["bias"], settings["smoothing_px"]) == (0.05, 0.0)
+        assert settings["estimator"] == "pisarenko"

@@ -36,7 +36,10 @@ from transientcam_server.recording import Recording
 from transientcam_server.settings import ReconstructionSettings
 
 FRAMES = 3 * BLOCK_FRAMES - 20
-OPTIONS = BatchOptions(("range", "validity"))
+SETTINGS = ReconstructionSettings(
+    estimator="pisarenko"
+)  # the quickest: what is held is who computes
+OPTIONS = BatchOptions(("range", "validity"), SETTINGS)
 LOAD_KERNELS = job.load_kernels
 NOTHING: Any = lambda *_: None  # noqa: E731 - in place of what compiles
 pytestmark = pytest.mark.usefixtures("zarr_clients")
@@ -137,7 +140,7 @@ def test_a_run_that_was_interrupted_is_gone_on_with(
     for name in OPTIONS.products:
         values = begun[name][:][missing]
         assert np.isnan(values).all() if values.dtype.kind in "fc" else (values == 255).all()
-    other = BatchOptions(OPTIONS.products, ReconstructionSettings(bias=0.01))
+    other = BatchOptions(OPTIONS.products, SETTINGS.model_copy(update={"bias": 0.01}))
     with pytest.raises(InputError, match="reconstruction"):
         reconstruct_on(client, str(source), output, other)
 
@@ -184,7 +187,7 @@ def test_workers_that_stay_read_a_replaced_file_anew(
     for frames in (3, 5):
         source.unlink(missing_ok=True)
         record(source, frames)
-        reconstruct_on(client, str(source), str(output), BatchOptions(("range",)))
+        reconstruct_on(client, str(source), str(output), BatchOptions(("range",), SETTINGS))
         shapes.append(xarray.open_zarr(output)["range"].shape[0])
         shutil.rmtree(output)
 

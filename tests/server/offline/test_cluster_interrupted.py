@@ -19,9 +19,13 @@ from transientcam_server.offline import (
 from transientcam_server.offline._cluster import COUNTING, MISSING
 from transientcam_server.offline._job import BLOCK_FRAMES
 from transientcam_server.recording import Recording
+from transientcam_server.settings import ReconstructionSettings
 
 FRAMES = 2 * BLOCK_FRAMES + 4
-OPTIONS = BatchOptions(("range",))
+SETTINGS = ReconstructionSettings(
+    estimator="pisarenko"
+)  # the quickest: what is held is who computes
+OPTIONS = BatchOptions(("range",), SETTINGS)
 HOLD = Hold(
     "transientcam_server.offline._cluster",
     "computed",
@@ -47,7 +51,8 @@ def test_ctrl_c_ends_the_workers_and_leaves_a_store_to_go_on_with(
     source, store = record(tmp_path / "a.h5", FRAMES), tmp_path / "a.zarr"
     interrupt(
         tmp_path,
-        *("reconstruct", str(source), "--product", "range", "-o", str(store)),
+        *("reconstruct", str(source), "--product", "range", "--estimator", "pisarenko"),
+        *("-o", str(store)),
         hold=HOLD,
         once=lambda: there(store) >= BLOCK_FRAMES,
     )
