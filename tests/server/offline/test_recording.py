@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -17,6 +18,7 @@ from transientcam_server.recording import Header, Recording, RecordingWriter
 from transientcam_server.settings import ReconstructionSettings
 
 FRAMES = 4
+QUICK = BatchOptions(settings=ReconstructionSettings(estimator="pisarenko"))
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +56,7 @@ def test_products_are_those_the_service_computes(path: Path, tmp_path: Path) -> 
 def test_a_transient_has_the_times_of_flight_asked_for(path: Path, tmp_path: Path) -> None:
     with Recording(path) as recording:
         reconstruct_recording(
-            recording, tmp_path / "t.h5", BatchOptions(products=("transient",), bins=8)
+            recording, tmp_path / "t.h5", replace(QUICK, products=("transient",), bins=8)
         )
         base_frequency_hz = recording.header.applied.sequence.base_frequency_hz
 
@@ -74,11 +76,11 @@ def test_an_interrupted_run_is_gone_on_with_and_ends_the_same(path: Path, tmp_pa
 
     whole, resumed = tmp_path / "whole.h5", tmp_path / "resumed.h5"
     with Recording(path) as recording:
-        reconstruct_recording(recording, whole, BatchOptions())
+        reconstruct_recording(recording, whole, QUICK)
         with pytest.raises(Interruption):
-            reconstruct_recording(recording, resumed, BatchOptions(), progress=interrupt)
+            reconstruct_recording(recording, resumed, QUICK, progress=interrupt)
         assert not resumed.exists()
-        assert reconstruct_recording(recording, resumed, BatchOptions()) == 2
+        assert reconstruct_recording(recording, resumed, QUICK) == 2
 
     assert sorted(each.name for each in tmp_path.iterdir()) == ["resumed.h5", "whole.h5"]
     with h5py.File(whole) as one, h5py.File(resumed) as other:
@@ -88,7 +90,7 @@ def test_an_interrupted_run_is_gone_on_with_and_ends_the_same(path: Path, tmp_pa
 
 
 def test_a_run_that_a_full_disk_ended_is_gone_on_with(path: Path, tmp_path: Path) -> None:
-    output, options = tmp_path / "a.h5", BatchOptions(products=("range",))
+    output, options = tmp_path / "a.h5", replace(QUICK, products=("range",))
     with Recording(path) as recording:
         with FailingDisk(Fault()).inserted() as disk:
             reconstruct_recording(recording, output, options)
@@ -115,13 +117,13 @@ def test_what_was_begun_otherwise_is_not_gone_on_with(path: Path, tmp_path: Path
 
     with Recording(path) as recording:
         with pytest.raises(KeyboardInterrupt):
-            reconstruct_recording(recording, output, BatchOptions(), progress=interrupt)
-        other = BatchOptions(settings=ReconstructionSettings(bias=0.01))
+            reconstruct_recording(recording, output, QUICK, progress=interrupt)
+        other = replace(QUICK, settings=QUICK.settings.model_copy(update={"bias": 0.01}))
         with pytest.raises(InputError, match=r"reconstruction is .*0\.004.*0\.01"):
             reconstruct_recording(recording, output, other)
-        reconstruct_recording(recording, output, BatchOptions())
+        reconstruct_recording(recording, output, QUICK)
         with pytest.raises(FileExistsError):
-            reconstruct_recording(recording, output, BatchOptions())
+            reconstruct_recording(recording, output, QUICK)
 
 
 def test_the_calibration_that_was_recorded_is_used(path: Path, tmp_path: Path) -> None:
