@@ -65,10 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def chosen(names: Iterable[str]) -> list[Measurement]:
     """Return measurements by their names, or those of pages; ``all`` are those of all pages.
 
-    Raises
-    ------
-    LookupError
-        Naming what is neither.
+    Raises LookupError naming what is neither.
     """
     found: dict[str, Measurement] = {}
     for name in names:

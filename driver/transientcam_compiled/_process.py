@@ -64,10 +64,8 @@ class ChildProcess:
     def start(self) -> None:
         """Start the process, unless it is there; returns at once.
 
-        Raises
-        ------
-        OSError
-            Where the system gives no process, or where Python cannot be started once more.
+        Raises OSError where the system gives no process, or where Python cannot be started once
+        more.
         """
         if self._process is not None:
             if self._process.poll() is None:

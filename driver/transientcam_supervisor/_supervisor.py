@@ -77,10 +77,7 @@ class Supervisor:
     def watch(self, switch: OffSwitch) -> None:
         """Let it watch a camera by this switch from now on; it is started where there is none.
 
-        Raises
-        ------
-        SupervisorEnded
-            It cannot be started, or cannot reach the camera.
+        Raises SupervisorEnded where it cannot be started, or cannot reach the camera.
         """
         if self._process is not None and switch == self._switch:
             return
@@ -113,11 +110,7 @@ class Supervisor:
 
         Returns why the light was switched off by the supervisor, where it was, which goes on with
         that until `dark`.
-
-        Raises
-        ------
-        SupervisorEnded
-            It is gone, or answers nothing: it was stopped.
+        Raises SupervisorEnded where it is gone, or answers nothing: it was stopped.
         """
         now_s = self._clock()
         pause_s = 0.0 if self._alive_s is None else now_s - self._alive_s

@@ -95,10 +95,8 @@ def decode_reflection16(codes: NDArray[Any], brightness: NDArray[Any]) -> NDArra
 def decoded(encoding: str, array: NDArray[Any], document: Mapping[str, Any]) -> NDArray[Any]:
     """Return the array that the codes of a message stand for.
 
-    Raises
-    ------
-    ProtocolError
-        If the encoding is unknown, or one of its fields is missing or does not fit the array.
+    Raises ProtocolError if the encoding is unknown, or one of its fields is missing or does not fit
+    the array.
     """
     if encoding not in ENCODINGS:
         raise ProtocolError("encoding", encoding, f"one of {', '.join((F32, *ENCODINGS))}")

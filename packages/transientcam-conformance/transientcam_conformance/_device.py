@@ -69,13 +69,7 @@ class Device:
             return response
 
     def read(self, path: str, **options: Any) -> dict[str, Any]:
-        """Return the JSON document at a path.
-
-        Raises
-        ------
-        PromiseBroken
-            If there is none.
-        """
+        """Return the JSON document at a path. Raises PromiseBroken if there is none."""
         return self.document(self.send("GET", path, **options))
 
     def document(self, response: httpx.Response, *, status: int = 200) -> dict[str, Any]:
@@ -183,10 +177,7 @@ class Device:
     def control(self) -> Iterator[None]:
         """Hold the lease for a block, and undo its changes at the end.
 
-        Raises
-        ------
-        CheckSkipped
-            If another client holds the lease, or the token allows no changes.
+        Raises CheckSkipped if another client holds the lease, or the token allows no changes.
         """
         if self._lease_id is not None:
             yield

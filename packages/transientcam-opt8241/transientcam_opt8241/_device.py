@@ -115,10 +115,7 @@ class Opt8241:
     def configure(self, applied: AppliedSequence) -> None:
         """Set how long the light is on in a quad.
 
-        Raises
-        ------
-        DeviceRefused
-            The camera says that it cannot.
+        Raises DeviceRefused where the camera says that it cannot.
         """
         duty = round(applied.sequence.exposure_s / DUTY_S)
         self._halt()

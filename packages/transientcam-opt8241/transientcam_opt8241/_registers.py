@@ -50,10 +50,7 @@ class Field:
     def put(self, word: int, value: int) -> int:
         """Return a word with another value in its place.
 
-        Raises
-        ------
-        ValueError
-            It has not so many bits.
+        Raises ValueError where it has not so many bits.
         """
         if value != value & self._mask:
             raise ValueError(f"{value} in {self.high - self.low + 1} bits")

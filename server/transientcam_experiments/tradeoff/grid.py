@@ -89,13 +89,8 @@ def load_grid(name: str) -> Grid:
 
     The file holds ``[[sequence]]`` tables, each a sequence document in which a list in the place
     of a value stands for all of its values, and optionally ``harmonics`` and ``bins``.
-
-    Raises
-    ------
-    InputError
-        Naming the part of the file that cannot be used.
-    SequenceError
-        Naming the field of a sequence.
+    Raises InputError naming the part of the file that cannot be used; SequenceError naming the
+    field of a sequence.
     """
     if name in GRIDS:
         return GRIDS[name]

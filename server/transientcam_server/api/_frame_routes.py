@@ -30,10 +30,7 @@ class ChosenFrame(Protocol):
     async def frame(self) -> Frame:
         """Return the frame.
 
-        Raises
-        ------
-        Problem
-            One of the kinds that `add_frame_routes` was given as ``missing``.
+        Raises Problem: one of the kinds that `add_frame_routes` was given as ``missing``.
         """
         ...
 

@@ -35,10 +35,7 @@ def installed() -> tuple[tuple[str, str], ...]:
 def require_versions(wanted: tuple[tuple[str, str], ...]) -> None:
     """Refuse to compute here for a process that has other versions.
 
-    Raises
-    ------
-    MixedVersions
-        Naming this worker and the package.
+    Raises MixedVersions naming this worker and the package.
     """
     for (name, here), (_, there) in zip(installed(), wanted, strict=True):
         if here != there:
@@ -93,14 +90,9 @@ def spans(frames: int) -> list[tuple[int, int]]:
 def computed(job: Job, first: int, last: int) -> dict[str, NDArray[np.generic]]:
     """Return the products of some frames by name, arrays (last - first, ...).
 
-    Raises
-    ------
-    MixedVersions
-        If this process computes with other versions than the one that made the job.
-    ServerError, TransientcamError, OSError
-        If the recording cannot be opened here.
-    DamagedFrame
-        If a frame is not what was recorded.
+    Raises MixedVersions if this process computes with other versions than the one that made the
+    job; ServerError, TransientcamError, OSError if the recording cannot be opened here;
+    DamagedFrame if a frame is not what was recorded.
     """
     recording, reconstructor = opened(job)
     previous = recording.frame(first - 1) if first else None

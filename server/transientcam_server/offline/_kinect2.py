@@ -119,12 +119,7 @@ def import_kinect2(
 def read_lens(path: Path, rows: Rows = "top") -> Lens:
     """Read the lens of the depth camera from a file of calibrations.
 
-    Raises
-    ------
-    InputError
-        Naming what of the file is not as expected.
-    OSError
-        If it cannot be read.
+    Raises InputError naming what of the file is not as expected; OSError if it cannot be read.
     """
     with _opened(path) as file:
         if LENS not in file:

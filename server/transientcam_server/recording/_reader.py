@@ -112,14 +112,8 @@ class Recording:
     def frame(self, index: int) -> RawFrame:
         """Return a frame, bit for bit as it was captured.
 
-        Raises
-        ------
-        DamagedFrame
-            If its bytes are not the ones that were written.
-        IndexError
-            If there is none.
-        ValueError
-            If the file was closed.
+        Raises DamagedFrame if its bytes are not the ones that were written; IndexError if there is
+        none; ValueError if the file was closed.
         """
         if not self._file:
             raise ValueError(f"{self.path} is closed")

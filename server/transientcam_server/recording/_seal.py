@@ -72,10 +72,7 @@ def unsealed_size(size_bytes: int, end: bytes) -> int:
 def sealed_frames(path: Path) -> list[SealedFrame]:
     """Return the frames of a file from the first to before the first that is not whole.
 
-    Raises
-    ------
-    OSError
-        If it cannot be read.
+    Raises OSError if it cannot be read.
     """
     found: dict[int, SealedFrame] = {}
     with path.open("rb") as stream:

@@ -178,10 +178,7 @@ class Origin:
     async def send_apart(self, change: Change, *, lease_id: str | None = None) -> None:
         """Make a change over a connection of its own; what the origin may yet confirm is lost.
 
-        Raises
-        ------
-        OriginRefused
-            It refuses for good: another try would be refused, too.
+        Raises OriginRefused where it refuses for good: another try would be refused, too.
         """
         headers = {"prefer": f"wait={ATTEMPT_S:g}"}
         if lease_id is not None:
@@ -283,13 +280,7 @@ def _capabilities(document: Mapping[str, Any]) -> Capabilities:
 
 
 def require_same_camera(known: Capabilities, now: Capabilities) -> None:
-    """Refuse an origin that has another camera than before.
-
-    Raises
-    ------
-    CameraError
-        Naming both.
-    """
+    """Refuse an origin that has another camera than before. Raises CameraError naming both."""
     if now != known:
         before, after = f"{known.model} {known.serial}", f"{now.model} {now.serial}"
         raise CameraError(

@@ -113,10 +113,7 @@ class Kinect2:
     def start(self, received: PacketTaker, failed: FailureTaker) -> None:
         """Switch the light on and hand over packets, as `Link.start_images` does.
 
-        Raises
-        ------
-        CameraError
-            The light is off.
+        Raises CameraError where the light is off.
         """
         try:
             found = self._identify()
@@ -137,23 +134,14 @@ class Kinect2:
     def stop(self) -> None:
         """Switch the light off, and hand over nothing more.
 
-        Raises
-        ------
-        CameraError
-            One of the requests failed; all were tried.
+        Raises CameraError: one of the requests failed; all were tried.
         """
         failure = self._attempt(_STOP)
         if failure is not None:
             raise failure
 
     def check(self) -> None:
-        """Ask for the status.
-
-        Raises
-        ------
-        CameraError
-            It does not answer.
-        """
+        """Ask for the status. Raises CameraError where it does not answer."""
         self._do(commands.READ_STATUS)
 
     def close(self) -> None:

@@ -49,10 +49,7 @@ def open_kinect2(
 def list_kinects() -> Iterator[FoundCamera]:
     """List the cameras that are plugged in; none is claimed.
 
-    Raises
-    ------
-    CameraError
-        There is no libusb.
+    Raises CameraError where there is no libusb.
     """
     with _context() as context:
         for device in _kinects(context):

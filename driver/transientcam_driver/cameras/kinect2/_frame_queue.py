@@ -96,10 +96,8 @@ class FrameQueue:
     def take(self, timeout_s: float) -> Arrival | None:
         """Return the next frame; None if there is none in time, or nothing will come.
 
-        Raises
-        ------
-        CameraError
-            What the link failed with; frames that had arrived before are returned first.
+        Raises CameraError: what the link failed with; frames that had arrived before are returned
+        first.
         """
         with self._arrived:
             self._arrived.wait_for(

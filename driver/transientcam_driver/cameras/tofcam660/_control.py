@@ -63,12 +63,8 @@ class ControlConnection:
     def exchange(self, command: Command, data: bytes = b"") -> Answer:
         """Send a command and return its answer.
 
-        Raises
-        ------
-        DeviceRefused
-            The camera does not do it.
-        CameraLost
-            It does not answer in time, or not by the protocol.
+        Raises DeviceRefused where the camera does not do it; CameraLost where it does not answer in
+        time, or not by the protocol.
         """
         try:
             payload = self._payload(pack_request(command, data))

@@ -89,11 +89,7 @@ def offset_m(entries: tuple[CalibrationEntry, ...], temperature_c: float) -> flo
 
     The vendor's client takes it from the entry of 24 MHz, whatever the frequency is: to a distance
     of arg b it adds 6250 - atan_offset + 17.5 (T_calibrated - T) + 330 - 28 - 7/8 * 12500 mm.
-
-    Raises
-    ------
-    ProtocolError
-        There is no entry of 24 MHz.
+    Raises ProtocolError where there is no entry of 24 MHz.
     """
     for entry in entries:
         if entry.frequency_code == _CODE_OF_24_MHZ:
@@ -105,12 +101,8 @@ def offset_m(entries: tuple[CalibrationEntry, ...], temperature_c: float) -> flo
 class Tofcam660:
     """One camera, connected: a `TriggeredDevice`.
 
-    Raises
-    ------
-    CameraUnreachable
-        Nothing answers at that address.
-    CameraError
-        Its firmware is too old, or refuses a setting.
+    Raises CameraUnreachable: nothing answers at that address; CameraError where its firmware is too
+    old, or refuses a setting.
     """
 
     def __init__(self, host: str, options: DeviceOptions | None = None) -> None:

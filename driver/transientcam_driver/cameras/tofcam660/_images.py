@@ -28,12 +28,8 @@ class ImageConnection(Protocol):
     def receive(self, timeout_s: float) -> bytes | None:
         """Return the image, or None if it takes longer.
 
-        Raises
-        ------
-        ImagesLost
-            It will not come, or not whole.
-        CameraLost
-            The connection was closed.
+        Raises ImagesLost where it will not come, or not whole; CameraLost where the connection was
+        closed.
         """
         ...
 
@@ -186,10 +182,7 @@ class TcpImages:
     def expect(self, image_bytes: int) -> None:
         """Wait for an image of this length; what came of another one is left with its connection.
 
-        Raises
-        ------
-        CameraLost
-            The camera takes no new connection.
+        Raises CameraLost where the camera takes no new connection.
         """
         if self._got < len(self._image) or not self._silent():
             self._socket.close()

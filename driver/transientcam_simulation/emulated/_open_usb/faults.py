@@ -42,10 +42,7 @@ class PendingFaults:
     def inject(self, fault: Fault, images: int = 1) -> None:
         """Let a fault happen to so many more images.
 
-        Raises
-        ------
-        CameraError
-            This camera knows no such fault.
+        Raises CameraError where this camera knows no such fault.
         """
         if fault not in self._images:
             raise CameraError(f"the emulated {self._camera} knows no fault {fault!r}")

@@ -43,13 +43,7 @@ class EmulatedRegisters:
     # --- requests ----------------------------------------------------------------------------
 
     def read(self, request: int, value: int, index: int, length: int) -> bytes:
-        """Answer a request.
-
-        Raises
-        ------
-        TransferStalled
-            There is no such request.
-        """
+        """Answer a request. Raises TransferStalled where there is no such request."""
         if request != Request.READ_REGISTER or value not in (reg.BANK_0, reg.BANK_3):
             raise TransferStalled
         return self._words.get((value, index), 0).to_bytes(REGISTER_BYTES, "little")[:length]
@@ -57,10 +51,7 @@ class EmulatedRegisters:
     def write(self, request: int, value: int, index: int, data: bytes) -> None:
         """Take a request; supplies and monitors are accepted without effect.
 
-        Raises
-        ------
-        TransferStalled
-            There is no such request, or it has another length.
+        Raises TransferStalled where there is no such request, or it has another length.
         """
         if len(data) != _LENGTHS.get(request):
             raise TransferStalled

@@ -87,11 +87,8 @@ class History:
     def frame(self, number: int) -> Frame:
         """Return a frame by its number.
 
-        Raises
-        ------
-        Problem
-            ``frame-gone`` for one that was, ``unknown-frame`` for one that was not yet; both say
-            which there are.
+        Raises Problem ``frame-gone`` for one that was, ``unknown-frame`` for one that was not yet;
+        both say which there are.
         """
         if self.latest is not None and number == self.latest.number:
             return self.latest

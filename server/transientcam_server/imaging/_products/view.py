@@ -45,12 +45,9 @@ class Crop:
     ) -> "Crop":
         """Return the crop of a frame of ``height`` x ``width`` pixels; None leaves a part out.
 
-        Raises
-        ------
-        Problem
-            ``invalid-request`` with ``field`` (under ``path``), ``value`` and ``limit`` if the
-            region is not four integers, is empty or not within the frame, or if the decimation
-            is out of range.
+        Raises Problem ``invalid-request`` with ``field`` (under ``path``), ``value`` and ``limit``
+        if the region is not four integers, is empty or not within the frame, or if the decimation
+        is out of range.
         """
         step = 1 if decimation is None else decimation
         if not _is_integer(step) or not 1 <= step <= MAX_DECIMATION:

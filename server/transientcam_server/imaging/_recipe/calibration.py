@@ -65,13 +65,7 @@ class Calibration:
 
 
 def load_calibration(path: Path) -> Calibration:
-    """Read and evaluate a measurement.
-
-    Raises
-    ------
-    CalibrationFileError
-        The file holds none.
-    """
+    """Read and evaluate a measurement. Raises CalibrationFileError where the file holds none."""
     return evaluate(CalibrationCapture.load(path))
 
 
