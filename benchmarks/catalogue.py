@@ -11,36 +11,24 @@ from typing import Any, Final
 
 @dataclass(frozen=True)
 class Measurement:
-    """A function, and what becomes of its tables.
-
-    Attributes
-    ----------
-    name
-        That it is called by.
-    function
-        As in ``speed.density:tables``, below this package.
-    page
-        In docs/, without its suffix. Without one the function writes what it makes by itself.
-    of
-        Paths whose code is measured: where they have changed since, figures are called old.
-    level
-        Of the headings on the page.
-    by_hand
-        Whether it is left out when pages are made: it needs something that is not at hand.
-    given
-        Options that differ from the function's defaults.
-    timed
-        Whether figures depend on the machine.
-    """
+    """A function, and what becomes of its tables."""
 
     name: str
+    """That it is called by."""
     function: str
+    """As in ``speed.density:tables``, below this package."""
     page: str | None = None
+    """In docs/, without its suffix. Without one the function writes what it makes by itself."""
     of: tuple[str, ...] = ()
+    """Paths whose code is measured: where they have changed since, figures are called old."""
     level: int = 2
+    """Of the headings on the page."""
     by_hand: bool = False
+    """Whether it is left out when pages are made: it needs something that is not at hand."""
     given: Mapping[str, Any] = field(default_factory=dict)
+    """Options that differ from the function's defaults."""
     timed: bool = True
+    """Whether figures depend on the machine."""
 
 
 _MOMENTS: Final = ("server/transientcam_moments",)

@@ -39,24 +39,16 @@ def spec(scene: str) -> str:
 
 @dataclass(frozen=True)
 class ObservedFrame:
-    """One frame of the emulated camera, every so many pixels (N, M) of it.
-
-    Attributes
-    ----------
-    moments
-        complex (3, N, M), at 16, 80 and 120 MHz, decoded and computed here.
-    saturated
-        Which pixels have a saturated sample.
-    true_m
-        Range of the first return.
-    slopes
-        x and y of the rays (x, y, 1), as libfreenect2 has them.
-    """
+    """One frame of the emulated camera, every so many pixels (N, M) of it."""
 
     moments: Array
+    """complex (3, N, M), at 16, 80 and 120 MHz, decoded and computed here."""
     saturated: Array
+    """Which pixels have a saturated sample."""
     true_m: Array
+    """Range of the first return."""
     slopes: tuple[Array, Array]
+    """x and y of the rays (x, y, 1), as libfreenect2 has them."""
 
     @classmethod
     def of(cls, scene: str) -> "ObservedFrame":

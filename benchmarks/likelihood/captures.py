@@ -43,18 +43,12 @@ SMOOTHING_BINS: Final = 2.0
 
 @dataclass
 class Won:
-    """How an estimator did over all captures.
-
-    Attributes
-    ----------
-    ratios
-        Of its error over the least one of a capture: median, 90 % and RMSE, each.
-    best
-        In how many captures each of these is the least one.
-    """
+    """How an estimator did over all captures."""
 
     ratios: list[tuple[float, ...]] = field(default_factory=list)
+    """Of its error over the least one of a capture: median, 90 % and RMSE, each."""
     best: list[tuple[bool, ...]] = field(default_factory=list)
+    """In how many captures each of these is the least one."""
 
 
 def tables() -> Iterator[Table]:

@@ -39,18 +39,12 @@ END_AFTER_S = (0.0, 0.5, 2.0, 5.0, 10.0)
 
 @dataclass
 class Unplugs:
-    """What was seen of the camera going and coming.
-
-    Attributes
-    ----------
-    seen_s
-        From the unplug to the notice ``camera-lost``, of each.
-    back_s
-        From the replug to the first new frame.
-    """
+    """What was seen of the camera going and coming."""
 
     seen_s: list[float] = field(default_factory=list)
+    """From the unplug to the notice ``camera-lost``, of each."""
     back_s: list[float] = field(default_factory=list)
+    """From the replug to the first new frame."""
     samples: Samples = field(default_factory=Samples)
     missing: list[int] = field(default_factory=list)
     recorded: int = 0

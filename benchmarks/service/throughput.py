@@ -60,22 +60,15 @@ class Daemon:
 
 @dataclass(frozen=True)
 class Cost:
-    """What frames of one size and order cost one daemon.
-
-    Attributes
-    ----------
-    cpu_ms
-        Processor time of a frame that a viewer takes the range of, beyond that of a daemon that
-        replays without a viewer.
-    replay_ms
-        Processor time of a frame without a viewer.
-    rate_hz
-        Frames a second that the viewer gets where far more are offered.
-    """
+    """What frames of one size and order cost one daemon."""
 
     cpu_ms: float
+    """Processor time of a frame that a viewer takes the range of, beyond that of a daemon that
+    replays without a viewer."""
     replay_ms: float
+    """Processor time of a frame without a viewer."""
     rate_hz: float
+    """Frames a second that the viewer gets where far more are offered."""
 
 
 def record(directory: Path, width: int, height: int, harmonics: int) -> tuple[Path, float]:

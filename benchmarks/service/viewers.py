@@ -55,21 +55,14 @@ def _masked(opcode: Opcode, data: bytes) -> bytes:
 
 @dataclass
 class ViewerRecord:
-    """What one viewer received.
-
-    Attributes
-    ----------
-    numbers
-        Of its frames, in the order they came.
-    latencies_s
-        From the arrival of a frame's last image at the daemon to its last byte here.
-    dropped
-        Frames that the daemon said it was too slow for.
-    """
+    """What one viewer received."""
 
     numbers: list[int] = field(default_factory=list)
+    """Of its frames, in the order they came."""
     latencies_s: list[float] = field(default_factory=list)
+    """From the arrival of a frame's last image at the daemon to its last byte here."""
     dropped: int = 0
+    """Frames that the daemon said it was too slow for."""
     messages: int = 0
     received_bytes: int = 0
 

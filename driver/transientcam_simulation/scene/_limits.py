@@ -22,18 +22,12 @@ _LEAST_PER_SIDE: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """What the light of a scene needs.
-
-    Attributes
-    ----------
-    mirror_paths
-        Chains of mirrors that are followed at most.
-    patches
-        Of scattering surfaces, between which light is followed; 0 where none is.
-    """
+    """What the light of a scene needs."""
 
     mirror_paths: int
+    """Chains of mirrors that are followed at most."""
     patches: int
+    """Of scattering surfaces, between which light is followed; 0 where none is."""
 
 
 def patch_edges_m(scene: Scene, per_side: int, *, moving: int = 0) -> dict[int, float]:

@@ -12,36 +12,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """A sentence of the paper, and what was measured here.
-
-    Attributes
-    ----------
-    source
-        Section or figure of the paper.
-    says
-        The sentence.
-    measure
-        The quantity measured to check it.
-    value
-        The measure's value.
-    shown
-        The same as text.
-    criterion
-        What the value has to be for the statement to hold.
-    passes
-        Whether it is.
-    reason
-        Why ours differs; empty where it does not.
-    """
+    """A sentence of the paper, and what was measured here."""
 
     source: str
+    """Section or figure of the paper."""
     says: str
+    """The sentence."""
     measure: str
+    """The quantity measured to check it."""
     value: float
+    """The measure's value."""
     shown: str
+    """The same as text."""
     criterion: str
+    """What the value has to be for the statement to hold."""
     passes: bool
+    """Whether it is."""
     reason: str = ""
+    """Why ours differs; empty where it does not."""
 
     def to_document(self) -> dict[str, Any]:
         """Return the fields for JSON."""
@@ -122,19 +110,12 @@ class FigureResult:
 
 @dataclass(frozen=True, slots=True)
 class PaperFigure:
-    """One figure of the paper.
-
-    Attributes
-    ----------
-    number, title
-        As in the paper.
-    caption
-        What our picture shows, and how it was captured.
-    make
-        Captures, computes and draws.
-    """
+    """One figure of the paper."""
 
     number: int
     title: str
+    """``number``, ``title``: as in the paper."""
     caption: str
+    """What our picture shows, and how it was captured."""
     make: Callable[[Bench], FigureResult]
+    """Captures, computes and draws."""

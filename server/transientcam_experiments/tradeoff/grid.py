@@ -14,21 +14,14 @@ from transientcam_server.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """The sequences that are captured, and the sizes that computing is measured at.
-
-    Attributes
-    ----------
-    sequences
-        Each a point of the plot of capture time.
-    harmonics
-        m at which computing and transport are measured.
-    bins
-        Times of flight at which densities are evaluated there.
-    """
+    """The sequences that are captured, and the sizes that computing is measured at."""
 
     sequences: tuple[Sequence, ...]
+    """Each a point of the plot of capture time."""
     harmonics: tuple[int, ...] = (3, 4, 8)
+    """m at which computing and transport are measured."""
     bins: tuple[int, ...] = (64, 256)
+    """Times of flight at which densities are evaluated there."""
 
 
 def _around(base: Sequence, **values: tuple[Any, ...]) -> Iterator[Sequence]:

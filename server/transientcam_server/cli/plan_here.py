@@ -31,27 +31,18 @@ LOOK_S: Final = 60.0
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The camera, and what is known of the scene before it.
-
-    Attributes
-    ----------
-    camera
-        As `open_camera` takes it.
-    real_time
-        Whether a simulated one takes its time, too.
-    brightness_dn_per_s
-        Zeroth moment of equal pixels in DN for each second of exposure; None looks at the scene.
-    returns
-        Range in m and weight of each return of such a scene.
-    ambient_dn_per_s
-        Light that is not the camera's; None measures it.
-    """
+    """The camera, and what is known of the scene before it."""
 
     camera: str
+    """As `open_camera` takes it."""
     real_time: bool
+    """Whether a simulated one takes its time, too."""
     brightness_dn_per_s: float | None
+    """Zeroth moment of equal pixels in DN for each second of exposure; None looks at the scene."""
     returns: list[tuple[float, float]]
+    """Range in m and weight of each return of such a scene."""
     ambient_dn_per_s: float | None
+    """Light that is not the camera's; None measures it."""
 
 
 def by_camera(

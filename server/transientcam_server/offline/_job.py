@@ -44,29 +44,20 @@ def require_versions(wanted: tuple[tuple[str, str], ...]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A recording and what is computed of it; small, hashable, and of use in any process.
-
-    Attributes
-    ----------
-    place
-        Path that all processes can read, or address of a daemon's recording.
-    token
-        Bearer token, where the daemon requires one.
-    products, settings, bins
-        As of `BatchOptions`; the settings as JSON.
-    versions
-        Of the process that made the job.
-    run
-        Unlike that of any other job: files may be replaced while workers stay.
-    """
+    """A recording and what is computed of it; small, hashable, and of use in any process."""
 
     place: str
+    """Path that all processes can read, or address of a daemon's recording."""
     token: str | None = field(repr=False)
+    """Bearer token, where the daemon requires one."""
     products: tuple[str, ...]
     settings: str
     bins: int
+    """``products``, ``settings``, ``bins``: as of `BatchOptions`; the settings as JSON."""
     versions: tuple[tuple[str, str], ...] = field(default_factory=installed)
+    """Of the process that made the job."""
     run: str = field(default_factory=lambda: uuid4().hex)
+    """Unlike that of any other job: files may be replaced while workers stay."""
 
     @classmethod
     def of(cls, place: str, options: BatchOptions, *, token: str | None = None) -> "Job":

@@ -47,32 +47,23 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TransientCube:
-    """The result of `reconstruct_measurement`; its fields are the arrays of the file.
-
-    Attributes
-    ----------
-    time_s
-        (T,), from 0 to one period, the period excluded.
-    density
-        (T, H, W), in the unit of the moments per second.
-    cumulative
-        (T, H, W), light up to each time.
-    range_m
-        (H, W), of the first return; NaN without one.
-    direct, indirect, uniform
-        (H, W), weight of the first return, of the later ones, and spread evenly over all times.
-    flags
-        (H, W), `transientcam_moments.Flags`.
-    """
+    """The result of `reconstruct_measurement`; its fields are the arrays of the file."""
 
     time_s: _Array
+    """(T,), from 0 to one period, the period excluded."""
     density: _Array
+    """(T, H, W), in the unit of the moments per second."""
     cumulative: _Array
+    """(T, H, W), light up to each time."""
     range_m: _Array
+    """(H, W), of the first return; NaN without one."""
     direct: _Array
     indirect: _Array
     uniform: _Array
+    """``direct``, ``indirect``, ``uniform``: (H, W), weight of the first return, of the later ones,
+    and spread evenly over all times."""
     flags: _Array
+    """(H, W), `transientcam_moments.Flags`."""
 
 
 def load_measurement(

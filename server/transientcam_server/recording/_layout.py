@@ -62,48 +62,33 @@ _CAPABILITIES: Final = TypeAdapter(Capabilities)
 
 @dataclass(frozen=True)
 class Header:
-    """What is known before the first frame.
-
-    Attributes
-    ----------
-    recording_id, name
-        Its id in the service, and its name for people.
-    started_s
-        Unix time.
-    applied
-        The sequence as the camera really set it.
-    capabilities
-        Of the camera.
-    camera
-        How it was opened, and which scene it simulates.
-    calibration
-        Of the moments: its id, and further properties where known.
-    calibration_planes
-        complex (m+1,) or (m+1, H, W): what moments are divided by; None for the nominal gains.
-    calibration_bad
-        bool (H, W): pixels that show their neighbours' mean instead.
-    calibration_waveform
-        complex (m, K): harmonics of the modulation, see `Gains`.
-    reconstruction
-        Settings at the time of recording.
-    versions
-        Of the software.
-    """
+    """What is known before the first frame."""
 
     recording_id: str
     name: str
+    """``recording_id``, ``name``: its id in the service, and its name for people."""
     started_s: float
+    """Unix time."""
     applied: AppliedSequence
+    """The sequence as the camera really set it."""
     capabilities: Capabilities
+    """Of the camera."""
     camera: Mapping[str, Any] = field(default_factory=dict)
+    """How it was opened, and which scene it simulates."""
     calibration: Mapping[str, Any] = field(default_factory=lambda: {"id": "nominal"})
+    """Of the moments: its id, and further properties where known."""
     calibration_planes: NDArray[np.complexfloating[Any, Any]] | None = None
+    """complex (m+1,) or (m+1, H, W): what moments are divided by; None for the nominal gains."""
     calibration_bad: NDArray[np.bool_] | None = None
+    """bool (H, W): pixels that show their neighbours' mean instead."""
     calibration_waveform: NDArray[np.complexfloating[Any, Any]] | None = None
+    """complex (m, K): harmonics of the modulation, see `Gains`."""
     reconstruction: Mapping[str, Any] = field(default_factory=dict)
+    """Settings at the time of recording."""
     versions: Mapping[str, str] = field(
         default_factory=lambda: {name: version(name) for name in ("transientcam", "h5py", "numpy")}
     )
+    """Of the software."""
 
     @property
     def gains(self) -> Gains | None:

@@ -23,15 +23,10 @@ Parts = Mapping[str, Frame]
 
 @dataclass(slots=True)
 class Collector:
-    """Collects the products of a frame, which come one after the other.
-
-    Attributes
-    ----------
-    products
-        Names of all of them.
-    """
+    """Collects the products of a frame, which come one after the other."""
 
     products: tuple[str, ...]
+    """Names of all of them."""
     _number: int | None = None
     _parts: dict[str, Frame] = field(default_factory=dict)
 

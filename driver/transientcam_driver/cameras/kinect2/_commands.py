@@ -45,20 +45,15 @@ class Command(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request, and how long its answer may be.
-
-    Attributes
-    ----------
-    parameters
-        None, one or four numbers.
-    least_bytes, most_bytes
-        The shortest answer that counts, and the longest that is asked for; 0 for no answer.
-    """
+    """A request, and how long its answer may be."""
 
     command: Command
     parameters: tuple[int, ...] = ()
+    """None, one or four numbers."""
     least_bytes: int = 0
     most_bytes: int = 0
+    """``least_bytes``, ``most_bytes``: the shortest answer that counts, and the longest that is
+    asked for; 0 for no answer."""
 
     def pack(self, sequence: int) -> bytes:
         """Return the bytes of the request with its sequence number."""

@@ -32,20 +32,14 @@ Action = Request | Callable[[Link], None]
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What a camera says of itself.
-
-    Attributes
-    ----------
-    parameters
-        Answer with the parameters of the depth camera, 92 bytes or more.
-    p0
-        Answer with the P0 tables, 1 302 572 bytes or more.
-    """
+    """What a camera says of itself."""
 
     firmware: str
     serial: str
     parameters: bytes
+    """Answer with the parameters of the depth camera, 92 bytes or more."""
     p0: bytes
+    """Answer with the P0 tables, 1 302 572 bytes or more."""
 
 
 _STOP: Final[tuple[Action, ...]] = (

@@ -15,20 +15,14 @@ ROOM_FRAMES: Final = 4
 
 
 class Arrival(NamedTuple):
-    """A frame, and when it was complete.
-
-    Attributes
-    ----------
-    now_s, unix_s
-        By the clock of the camera.
-    lost
-        Images that are missing between the frame handed over before and this one.
-    """
+    """A frame, and when it was complete."""
 
     sub_images: SubImages
     now_s: float
     unix_s: float
+    """``now_s``, ``unix_s``: by the clock of the camera."""
     lost: int
+    """Images that are missing between the frame handed over before and this one."""
 
 
 class FrameQueue:

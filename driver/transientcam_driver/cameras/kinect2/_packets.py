@@ -51,24 +51,16 @@ class Footer(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SubImages:
-    """The nine measured sub-images of a frame.
-
-    Attributes
-    ----------
-    sequence
-        Number of the frame, by the device.
-    timestamp
-        Of the sub-image that came first, in ticks of `TICK_S`.
-    data
-        uint8 (9, `SUB_IMAGE_BYTES`), in the order of their numbers.
-    lost
-        Measured sub-images that are missing since the frame before.
-    """
+    """The nine measured sub-images of a frame."""
 
     sequence: int
+    """Number of the frame, by the device."""
     timestamp: int
+    """Of the sub-image that came first, in ticks of `TICK_S`."""
     data: NDArray[np.uint8]
+    """uint8 (9, `SUB_IMAGE_BYTES`), in the order of their numbers."""
     lost: int
+    """Measured sub-images that are missing since the frame before."""
 
 
 class Assembler:
