@@ -10,9 +10,9 @@ import numpy as np
 import transientcam_moments as tm
 from benchmarks.common.picture import blank, saved
 from benchmarks.common.tables import Table, heads
-from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import TOO_LONG
-from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array
+from tests.driver.cameras.kinect2 import libfreenect2
+from tests.driver.cameras.kinect2.vectors import MULTIPLES, RADIAN_M, Array
 from transientcam_driver.camera import CameraName
 from transientcam_driver.cameras.kinect2 import SAMPLING
 from transientcam_driver.clock import VirtualClock

@@ -8,8 +8,8 @@ import numpy as np
 import transientcam_moments as tm
 from benchmarks.common.tables import Table, verdict
 from benchmarks.common.timing import duration, measure
-from benchmarks.kinect2 import libfreenect2
-from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Scene, folder, load, noise
+from tests.driver.cameras.kinect2 import libfreenect2
+from tests.driver.cameras.kinect2.vectors import MULTIPLES, RADIAN_M, Scene, folder, load, noise
 from transientcam_driver.cameras.kinect2 import SUB_IMAGES, Assembler, Rows, encoder, measurement
 
 SCENES: Final = ("ramp", "noisy", "two_returns")
@@ -76,7 +76,7 @@ def differences() -> Table:
 
 
 def _restated() -> str:
-    """Say how far `benchmarks.kinect2.libfreenect2` is from libfreenect2 itself."""
+    """Say how far `tests.driver.cameras.kinect2.libfreenect2` is from libfreenect2 itself."""
     found = [libfreenect2.agreement(load(name)) for name in SCENES]
     same, apart_mm = (min(each[0] for each in found), max(each[1] for each in found))
     return (

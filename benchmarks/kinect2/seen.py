@@ -12,9 +12,9 @@ import numpy as np
 import transientcam_moments as tm
 from benchmarks.common.records import ROOT
 from benchmarks.common.tables import Cell, Table, heads
-from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import ROUNDING, TOO_LONG
-from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array, noise
+from tests.driver.cameras.kinect2 import libfreenect2
+from tests.driver.cameras.kinect2.vectors import MULTIPLES, RADIAN_M, Array, noise
 from transientcam_driver.camera import CameraName
 from transientcam_driver.cameras.kinect2 import HEIGHT, SAMPLING, WIDTH, Kinect2Camera
 from transientcam_driver.cameras.kinect2._codes import SATURATED_DN
