@@ -11,10 +11,7 @@ _PIECE_BYTES = 65536
 class ByteCounter:
     """Forwards connections to a server until the end of the block.
 
-    Parameters
-    ----------
-    url
-        Of the server, without a path.
+    ``url``: of the server, without a path.
     """
 
     def __init__(self, url: str) -> None:

@@ -42,15 +42,10 @@ class SupervisorEnded(OSError):  # noqa: N818 - says what has happened
 class Supervisor:
     """A process that switches a light off where it does not hear from this one. For one thread.
 
-    Parameters
-    ----------
-    program
-        The Python to start; None where there is none to start.
-    silence_s
-        After so long without a word while the light may be on. It is given up where it says nothing
-        for twice as long.
-    clock
-        Monotonic time in s.
+    ``program``: the Python to start; None where there is none to start.
+    ``silence_s``: after so long without a word while the light may be on. It is given up where it
+    says nothing for twice as long.
+    ``clock``: monotonic time in s.
     """
 
     def __init__(

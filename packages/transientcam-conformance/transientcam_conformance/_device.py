@@ -34,12 +34,8 @@ _SHOWN = 120
 class Device:
     """A running camera, its raw answers, and its state before the checks.
 
-    Parameters
-    ----------
-    url, token
-        As of `Camera`.
-    timeout_s
-        How long an event may take that is not the answer to a request.
+    ``url``, ``token``: as of `Camera`.
+    ``timeout_s``: how long an event may take that is not the answer to a request.
     """
 
     def __init__(self, url: str, *, token: str | None = None, timeout_s: float = 30.0) -> None:

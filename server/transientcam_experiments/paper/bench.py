@@ -65,15 +65,10 @@ class ReconstructedShot:
 class Bench:
     """Captures on demand, each at most once.
 
-    Parameters
-    ----------
-    seed
-        Seed of all random numbers.
-    quick
-        Average fewer takes, and look at fewer points: for a first look, and for tests.
-    waveform
-        A measured correlation function for Figure 3: a .npy (rows, samples) over one period,
-        opposite rows in pairs.
+    ``seed``: seed of all random numbers.
+    ``quick``: average fewer takes, and look at fewer points: for a first look, and for tests.
+    ``waveform``: a measured correlation function for Figure 3: a .npy (rows, samples) over one
+    period, opposite rows in pairs.
     """
 
     def __init__(self, *, seed: int = 1, quick: bool = False, waveform: Path | None = None) -> None:

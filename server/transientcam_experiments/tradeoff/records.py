@@ -44,10 +44,7 @@ def key_of(kind: str, scene: str, point: Mapping[str, Any], conditions: Mapping[
 class Records:
     """The results in a folder.
 
-    Parameters
-    ----------
-    folder
-        Is made where it is missing. Results already in it stay.
+    ``folder``: is made where it is missing. Results already in it stay.
     """
 
     def __init__(self, folder: Path) -> None:

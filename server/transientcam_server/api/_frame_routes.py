@@ -51,14 +51,10 @@ def add_frame_routes(
 ) -> None:
     """Add the routes for a frame, its pixels and its products below ``path``.
 
-    Parameters
-    ----------
-    chosen_by
-        Dependency that returns the frame a request is about.
-    missing
-        Kinds of problems with which a frame cannot be found.
-    frame, pixel, product
-        How the OpenAPI document names each of them, and describes a frame and a product.
+    ``chosen_by``: dependency that returns the frame a request is about.
+    ``missing``: kinds of problems with which a frame cannot be found.
+    ``frame``, ``pixel``, ``product``: how the OpenAPI document names each of them, and describes a
+    frame and a product.
     """
     chosen_of = Depends(chosen_by)
 

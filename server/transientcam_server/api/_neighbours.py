@@ -38,12 +38,8 @@ class NeighbourSearch:
 
     No request is sent to what is found: any host on the network can announce any address.
 
-    Parameters
-    ----------
-    search
-        Takes a while, and runs on another thread; None where the settings allow none.
-    clock
-        In s, monotonic.
+    ``search``: takes a while, and runs on another thread; None where the settings allow none.
+    ``clock``: in s, monotonic.
     """
 
     def __init__(

@@ -50,18 +50,9 @@ def by_camera(
 ) -> tuple[dict[str, Any], bytes]:
     """Plan for a goal, or find the ``front`` of all that no other beats; as JSON, and the map.
 
-    Parameters
-    ----------
-    map_file
-        Whose format a map is to have; None for none.
-
-    Raises
-    ------
-    Problem
-        Where the goal is out of reach, or the camera is not planned for; then with ``takes``, what
-        more of them give.
-    CameraError
-        As the camera does.
+    ``map_file``: whose format a map is to have; None for none.
+    Raises Problem where the goal is out of reach, or the camera is not planned for; then with
+    ``takes``, what more of them give. Raises CameraError as the camera does.
     """
     if not front:
         goal.require_sensible()

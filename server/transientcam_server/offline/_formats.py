@@ -185,19 +185,10 @@ def create_zarr(
 ) -> Any:
     """Make a Zarr store with the columns of its content, and its blocks empty; return its group.
 
-    Parameters
-    ----------
-    place
-        A directory, or any address that fsspec knows.
-    rows_of_chunk
-        How many rows of a block make a chunk.
-    overwrite
-        Whether to replace what is there.
-
-    Raises
-    ------
-    MissingExtra
-        If zarr is not installed.
+    ``place``: a directory, or any address that fsspec knows.
+    ``rows_of_chunk``: how many rows of a block make a chunk.
+    ``overwrite``: whether to replace what is there.
+    Raises MissingExtra if zarr is not installed.
     """
     zarr = library("zarr", "a .zarr")
     attributes = {**content.attributes, STATE: UNFINISHED, EVERY_CHUNK: True}

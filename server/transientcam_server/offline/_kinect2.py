@@ -54,19 +54,10 @@ def import_kinect2(
 ) -> int:
     """Write the frames of a file into a recording, and return how many they are.
 
-    Parameters
-    ----------
-    lens
-        Of that camera, see `read_lens`.
-
-    Raises
-    ------
-    InputError
-        Naming what of the file is not as expected; no recording is left.
-    FileExistsError
-        If the output is there already.
-    OSError
-        If a file cannot be read or written.
+    ``lens``: of that camera, see `read_lens`.
+    Raises InputError naming what of the file is not as expected; no recording is left. Raises
+    FileExistsError if the output is there already. Raises OSError if a file cannot be read or
+    written.
     """
     began_s = source.stat().st_mtime
     with _opened(source) as file:

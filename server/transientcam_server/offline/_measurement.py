@@ -75,20 +75,12 @@ def load_measurement(
 ) -> Measurement:
     """Return the moments that a file holds or that follow from its impulse responses.
 
-    Parameters
-    ----------
-    frequency_hz, harmonics
-        For impulse responses, the modulation to measure them with (23 MHz, 4); for moments, which
-        have their own, at most as many harmonics as there are.
-    background
-        ``median`` subtracts each pixel's median from counts: photons that came at any time.
-
-    Raises
-    ------
-    InputError
-        Naming the file, the key, what it is and what it must be.
-    OSError
-        If the file cannot be read.
+    ``frequency_hz``, ``harmonics``: for impulse responses, the modulation to measure them with (23
+    MHz, 4); for moments, which have their own, at most as many harmonics as there are.
+    ``background``: ``median`` subtracts each pixel's median from counts: photons that came at any
+    time.
+    Raises InputError naming the file, the key, what it is and what it must be; OSError if the file
+    cannot be read.
     """
     arrays = arrays_of(path)
     if "moments" in arrays:

@@ -55,12 +55,8 @@ def seal(row: int, chunk: bytes, values: Mapping[str, object]) -> bytes:
 def unsealed_size(size_bytes: int, end: bytes) -> int:
     """Return how many bytes of a chunk are compressed data.
 
-    Parameters
-    ----------
-    size_bytes
-        Of the chunk, with a seal or without one.
-    end
-        Its last `SIZE_BYTES`, or all of a shorter one.
+    ``size_bytes``: of the chunk, with a seal or without one.
+    ``end``: its last `SIZE_BYTES`, or all of a shorter one.
     """
     if len(end) == SIZE_BYTES and end.startswith(_MAGIC):
         record = np.frombuffer(end[: _SEAL.itemsize], _SEAL)[0]

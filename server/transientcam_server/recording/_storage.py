@@ -49,10 +49,7 @@ class Storage:
     Its methods raise ValueError for what is not there, or not as it should be. Of a damaged file
     h5py may raise anything.
 
-    Parameters
-    ----------
-    size_bytes
-        Of the file.
+    ``size_bytes``: of the file.
     """
 
     def __init__(self, file: swmr.File, size_bytes: int) -> None:

@@ -140,16 +140,11 @@ def create_series(file: File, name: str, dtype: str, **attributes: object) -> Da
 class Appender:
     """Appends rows to a file in SWMR mode, which begins with this object.
 
-    Parameters
-    ----------
-    path
-        Of a file of `LIBVER`, complete but for its rows; the lock is the recording's own.
-    blocks, series
-        Names of the datasets that grow by one each row; ``series`` in the order of writing, the
-        one whose length counts the rows last.
-    seal
-        Returns, for a row, a chunk of it and its values of the series, what is written behind the
-        chunk.
+    ``path``: of a file of `LIBVER`, complete but for its rows; the lock is the recording's own.
+    ``blocks``, ``series``: names of the datasets that grow by one each row; ``series`` in the order
+    of writing, the one whose length counts the rows last.
+    ``seal``: returns, for a row, a chunk of it and its values of the series, what is written behind
+    the chunk.
     """
 
     def __init__(

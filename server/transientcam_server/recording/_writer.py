@@ -19,15 +19,8 @@ from transientcam_server.recording._seal import seal
 class RecordingWriter:
     """An open recording; all methods on one thread.
 
-    Parameters
-    ----------
-    path
-        Of the finished recording; must not exist.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be made.
+    ``path``: of the finished recording; must not exist.
+    Raises OSError if the file cannot be made.
     """
 
     def __init__(

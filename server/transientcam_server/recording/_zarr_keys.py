@@ -48,10 +48,7 @@ class Place:
 class ZarrKeys:
     """The keys of an open recording.
 
-    Parameters
-    ----------
-    recording
-        Also one that is still written: it has the frames that it had when it was opened.
+    ``recording``: also one that is still written: it has the frames that it had when it was opened.
     """
 
     def __init__(self, recording: Recording) -> None:

@@ -52,17 +52,9 @@ def capture_of(
 ) -> RawFrame:
     """Return the capture that products of a frame are of.
 
-    Parameters
-    ----------
-    applied, capabilities
-        Sequence and camera, by which arrays have a shape.
-    number, lost_images, hops
-        Of the capture; the rest is as the origin states it.
-
-    Raises
-    ------
-    ProtocolError
-        An array has another shape or type.
+    ``applied``, ``capabilities``: sequence and camera, by which arrays have a shape.
+    ``number``, ``lost_images``, ``hops``: of the capture; the rest is as the origin states it.
+    Raises ProtocolError where an array has another shape or type.
     """
     meta = next(iter(parts.values())).meta
     pixels = capabilities.height, capabilities.width

@@ -308,12 +308,8 @@ def _left_open(device: Kinect2) -> None:
 class Watch:
     """Calls a function where nothing was noted for a time.
 
-    Parameters
-    ----------
-    interval_s
-        After one to two of these without a note.
-    idle
-        Called on a thread of its own, again and again until something is noted.
+    ``interval_s``: after one to two of these without a note.
+    ``idle``: called on a thread of its own, again and again until something is noted.
     """
 
     def __init__(self, interval_s: float, idle: Callable[[], None]) -> None:

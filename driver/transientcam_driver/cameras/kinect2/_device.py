@@ -66,21 +66,11 @@ class Kinect2:
     Not for several threads at a time. Whatever fails, the rest of what switches the light off is
     tried all the same.
 
-    Parameters
-    ----------
-    link
-        Owned from now on.
-    pause
-        Sleeps for so many seconds.
-    serial
-        The camera that it has to be; None for any.
-
-    Raises
-    ------
-    CameraNotFound
-        It is another camera.
-    CameraError
-        It does not answer, or not by the protocol; the link is closed.
+    ``link``: owned from now on.
+    ``pause``: sleeps for so many seconds.
+    ``serial``: the camera that it has to be; None for any.
+    Raises CameraNotFound where it is another camera. Raises CameraError where it does not answer,
+    or not by the protocol; the link is closed.
     """
 
     def __init__(

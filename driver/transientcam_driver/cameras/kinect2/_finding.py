@@ -27,17 +27,9 @@ def open_kinect2(
 ) -> Kinect2:
     """Open a camera, by its serial number or the first that can be opened.
 
-    Parameters
-    ----------
-    pause
-        Sleeps for so many seconds.
-    transfers
-        Isochronous transfers in flight.
-
-    Raises
-    ------
-    CameraError
-        None can be opened.
+    ``pause``: sleeps for so many seconds.
+    ``transfers``: isochronous transfers in flight.
+    Raises CameraError: none can be opened.
     """
     try:
         return _opened(serial, pause, transfers)

@@ -30,12 +30,9 @@ class FrameQueue:
 
     A frame for which there is no room replaces the oldest one, which counts as lost.
 
-    Parameters
-    ----------
-    counters
-        Counts images, losses, incomplete frames, and stretches that were no image (``resyncs``).
-    clock
-        Of the times of arrival.
+    ``counters``: counts images, losses, incomplete frames, and stretches that were no image
+    (``resyncs``).
+    ``clock``: of the times of arrival.
     """
 
     def __init__(self, counters: Counters, clock: Clock) -> None:

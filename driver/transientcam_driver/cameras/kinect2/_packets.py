@@ -69,14 +69,9 @@ class Assembler:
     A frame is returned with the last of its nine measured sub-images, without waiting for the
     tenth or for the next frame.
 
-    Attributes
-    ----------
-    torn
-        Stretches of bytes that were no whole sub-image.
-    lost
-        Measured sub-images that are missing in all, those of frames without any among them.
-    incomplete_frames
-        Frames that were begun and dropped.
+    ``torn``: stretches of bytes that were no whole sub-image.
+    ``lost``: measured sub-images that are missing in all, those of frames without any among them.
+    ``incomplete_frames``: frames that were begun and dropped.
     """
 
     def __init__(self) -> None:

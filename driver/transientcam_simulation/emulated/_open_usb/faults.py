@@ -29,10 +29,7 @@ class Fault(StrEnum):
 class PendingFaults:
     """Faults of the images to come, of the kinds that a camera can have.
 
-    Parameters
-    ----------
-    camera
-        Its name, for the error.
+    ``camera``: its name, for the error.
     """
 
     def __init__(self, camera: str, *kinds: Fault) -> None:

@@ -30,11 +30,8 @@ _LIMITED: Final = (
 class EmulatedRegisters:
     """Registers, at their defaults after power-up; those that no field is in are kept as written.
 
-    Attributes
-    ----------
-    modulation_hz
-        Frequency of the light: new fields of the PLL take effect when `registers.MOD_PLL_UPDATE`
-        goes from 1 to 0.
+    ``modulation_hz``: frequency of the light: new fields of the PLL take effect when
+    `registers.MOD_PLL_UPDATE` goes from 1 to 0.
     """
 
     def __init__(self) -> None:

@@ -31,13 +31,9 @@ class History:
     What is computed of a former frame is kept for the last few of them that were requested; the
     captures alone are what is bounded here.
 
-    Attributes
-    ----------
-    latest
-        The newest frame, also where its images alone are more than may be kept; None before the
-        first.
-    size_bytes
-        Of the raw images that are kept, never more than ``max_bytes``.
+    ``latest``: the newest frame, also where its images alone are more than may be kept; None before
+    the first.
+    ``size_bytes``: of the raw images that are kept, never more than ``max_bytes``.
     """
 
     def __init__(

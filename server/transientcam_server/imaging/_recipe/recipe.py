@@ -46,15 +46,8 @@ class SettingsVersion:
 def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, field: str) -> None:
     """Refuse an estimator and a sequence that do not go together.
 
-    Parameters
-    ----------
-    field
-        Which of the two the request changes: "estimator" or "harmonics".
-
-    Raises
-    ------
-    Problem
-        ``estimator-misfit``.
+    ``field``: which of the two the request changes: "estimator" or "harmonics".
+    Raises Problem ``estimator-misfit``.
     """
     if not _serves(settings, sequence.sampling):
         raise Problem(
