@@ -1,6 +1,6 @@
 """The types that all figures share: pictures, statements of the paper, and tables."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -88,6 +88,11 @@ class Table:
     title: str
     columns: Sequence[str]
     rows: Sequence[Sequence[Any]]
+
+    @classmethod
+    def of(cls, title: str, rows: Sequence[Mapping[str, Any]]) -> "Table":
+        """Return a table of rows that name their cells by the same columns."""
+        return cls(title, tuple(rows[0]), [tuple(row.values()) for row in rows])
 
     def to_document(self) -> dict[str, Any]:
         """Return the fields for JSON."""
