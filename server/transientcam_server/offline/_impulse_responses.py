@@ -55,7 +55,12 @@ def is_tal(path: Path) -> bool:
 def arrays_of(path: Path) -> dict[str, _Array]:
     """Return the named arrays of an .npz, or those of a file of tal.
 
-    Raises InputError if it is neither; OSError if it cannot be read.
+    Raises
+    ------
+    InputError
+        If it is neither.
+    OSError
+        If it cannot be read.
     """
     if h5py.is_hdf5(path):
         return _of_hdf5(path)
@@ -78,7 +83,10 @@ def impulse_response(
 ) -> tuple[_Array, _Array]:
     """Return the times of the bins (T,) in s, and the responses (H, W, T).
 
-    Raises InputError naming the file, the key, what it is and what it must be.
+    Raises
+    ------
+    InputError
+        Naming the file, the key, what it is and what it must be.
     """
     if "counts" in arrays or "meas" in arrays:
         return _of_counts(path, arrays, background=background)
