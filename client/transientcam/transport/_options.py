@@ -25,7 +25,10 @@ _QUEUED_MESSAGES = 256
 def http_options(*, token: str | None, timeout_s: float) -> dict[str, Any]:
     """Return the options of an httpx client.
 
-    Raises ParameterError if the token is none; it is not shown.
+    Raises
+    ------
+    ParameterError
+        If the token is none; it is not shown.
     """
     # what is unpacked here has no bound: the bytes of an answer count as they travel
     headers = {"user-agent": USER_AGENT, "accept-encoding": "identity"}
@@ -78,7 +81,10 @@ class DownloadProgress:
 def require_direct(connection: Any, url: str) -> None:
     """Refuse a connection that was redirected, before a token is sent over it.
 
-    Raises ProtocolError if ``connection``, of websockets, is not one to ``url``.
+    Raises
+    ------
+    ProtocolError
+        If ``connection``, of websockets, is not one to ``url``.
     """
     found = connection.protocol.uri
     if found != parse_uri(url):

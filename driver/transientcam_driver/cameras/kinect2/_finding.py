@@ -27,9 +27,17 @@ def open_kinect2(
 ) -> Kinect2:
     """Open a camera, by its serial number or the first that can be opened.
 
-    ``pause``: sleeps for so many seconds.
-    ``transfers``: isochronous transfers in flight.
-    Raises CameraError: none can be opened.
+    Parameters
+    ----------
+    pause
+        Sleeps for so many seconds.
+    transfers
+        Isochronous transfers in flight.
+
+    Raises
+    ------
+    CameraError
+        None can be opened.
     """
     try:
         return _opened(serial, pause, transfers)
@@ -41,7 +49,10 @@ def open_kinect2(
 def list_kinects() -> Iterator[FoundCamera]:
     """List the cameras that are plugged in; none is claimed.
 
-    Raises CameraError where there is no libusb.
+    Raises
+    ------
+    CameraError
+        There is no libusb.
     """
     with _context() as context:
         for device in _kinects(context):

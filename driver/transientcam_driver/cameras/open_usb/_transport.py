@@ -244,7 +244,10 @@ def first_of(
 ) -> Claimed:
     """Claim the device with a serial number, or the first that can be claimed.
 
-    Raises CameraError: why the last one that might have been it could not, or `CameraNotFound`.
+    Raises
+    ------
+    CameraError
+        Why the last one that might have been it could not, or `CameraNotFound`.
     """
     trouble: CameraError = CameraNotFound(serial)
     for device in found:
