@@ -83,8 +83,8 @@ def chosen(names: Iterable[str]) -> list[Measurement]:
 
 def function_of(measurement: Measurement) -> Function:
     """Import the function of a measurement."""
-    module, _, name = measurement.function.partition(":")
-    function: Function = getattr(importlib.import_module(f"benchmarks.{module}"), name)
+    module = importlib.import_module(f"benchmarks.{measurement.module}")
+    function: Function = getattr(module, measurement.function)
     return function
 
 
