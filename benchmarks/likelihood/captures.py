@@ -17,12 +17,13 @@ from benchmarks.likelihood.errors import (
     HEAD,
     Array,
     Errors,
+    captured,
     errors_of,
     ranges,
     turn_m,
 )
 from transientcam_driver import Sequence as Capture, Truth
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import Bench, ReconstructedShot
 
 SCENES: Final = ("wall", "mirrors", "corner", "corner-left", "translucent")
 ORDERS: Final = (3, 4, 8)
@@ -126,12 +127,9 @@ def _row(
 ) -> tuple[str, ...]:
     base_hz = 23e6 if m <= MOST_OF_SHORT else 11.5e6
     sequence = Capture(base_frequency_hz=base_hz, harmonics=m, takes=takes, zeroth=zeroth)
-    shot = bench.shot(scene, sequence, options=WITHOUT_OUTLIERS)
-    gains = bench.calibration(sequence, options=WITHOUT_OUTLIERS).gains.planes
+    shot, gains, settings, truth = captured(bench, scene, sequence)
     base_hz = shot.base_frequency_hz
-    settings = replace(shot.found.settings, sensor=tm.noise.Sensor())
     found = ranges(shot.found.measured, settings, calibration=gains)
-    truth = np.where(shot.truth.lit, shot.truth.range_m, np.nan)
     if scene == SOFT:
         truth = with_maxima(shot, truth)
     errors = {

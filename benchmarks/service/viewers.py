@@ -66,6 +66,11 @@ class ViewerRecord:
     messages: int = 0
     received_bytes: int = 0
 
+    @property
+    def missing(self) -> int:
+        """Numbers of frames between the first and the last one that never came."""
+        return self.numbers[-1] - self.numbers[0] + 1 - len(self.numbers)
+
 
 class Viewer:
     """One connection that reads all the time; `read` when there is something."""
@@ -81,6 +86,10 @@ class Viewer:
         if subscribe is not None:
             send(self.connection, subscribe)
         self.connection.setblocking(False)
+
+    def begin_anew(self) -> None:
+        """Forget what was received."""
+        self.seen = ViewerRecord()
 
     def read(self, buffer: memoryview) -> bool:
         """Take what there is; return whether the connection still stands."""

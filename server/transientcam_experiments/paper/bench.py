@@ -99,18 +99,9 @@ class Bench:
     ) -> list[ReconstructedShot]:
         """Capture frames one after the other, and reconstruct them as the daemon would.
 
-        Parameters
-        ----------
-        scene
-            A name, or the path of a .toml.
-        sequence
-            What to capture; with fewer takes for a first look.
-        frames
-            How many.
-        at_s
-            When to begin, after the warm-up.
-        options
-            Further options of the camera's name, as in `WITHOUT_OUTLIERS`.
+        ``scene``: a name, or the path of a .toml.
+        ``at_s``: when to begin, after the warm-up.
+        ``options``: further options of the camera's name, as in `WITHOUT_OUTLIERS`.
         """
         sequence = self.sequence(sequence)
         key = (scene, sequence, frames, at_s, *sorted(options.items()))

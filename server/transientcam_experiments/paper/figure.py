@@ -47,18 +47,10 @@ def check(
     form: str = "{:.3g}",
     otherwise: str = "",
 ) -> Statement:
-    """Check a value against limits.
+    """Check a value against limits, of which one that is no number keeps none.
 
-    Parameters
-    ----------
-    source, says, measure, value
-        As of `Statement`.
-    at_most, at_least
-        The limits; a value that is no number keeps none.
-    form
-        How value and limits are shown.
-    otherwise
-        The reason where the value is outside.
+    The first arguments are those of `Statement`. ``form`` is how value and limits are shown, and
+    ``otherwise`` the reason where the value is outside.
     """
     value = float(value)
     limits = []
