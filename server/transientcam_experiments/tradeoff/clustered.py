@@ -30,7 +30,7 @@ def measure_on(
 ) -> None:
     """Measure the captures that are not in the records yet; these get them in the grid's order.
 
-    ``client``: a `distributed.Client` of the cluster. A scene that is a file is read by its workers.
+    ``client``: a `distributed.Client` of the cluster, whose workers read a scene that is a file.
     ``grid``, ``scene``, ``repetitions``, ``seed``: as of `points_of`.
     ``progress``: called with the kind of each point as it is done.
     Raises MixedVersions, ClusterError where the cluster cannot do it; and as `measure`.
