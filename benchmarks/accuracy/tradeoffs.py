@@ -1,7 +1,7 @@
 """The whole tradeoff of `transientcam tradeoff` on every scene: capturing, computing, sending."""
 
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -85,7 +85,7 @@ def measured(scenes: Mapping[str, str], folder: Path, grid: str) -> tradeoff.Rec
 
 
 def measure(
-    points: Sequence[tradeoff.Point], records: tradeoff.Records, *, scene: str, seed: int
+    points: list[tradeoff.Point], records: tradeoff.Records, *, scene: str, seed: int
 ) -> None:
     """Measure points of a scene, and show how far that is."""
     with Progress() as progress:
