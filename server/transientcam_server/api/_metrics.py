@@ -59,7 +59,9 @@ class Metrics:
         self._last: Captured | None = None
         # every series from the start, so that its rate can be queried
         self.pixels: Mapping[str, int] = {"total": 1} | dict.fromkeys(_FLAGS, 0)
-        self.corrupt = dict.fromkeys(("rejected", "repaired", "filled", "unrepaired"), 0)
+        self.corrupt: dict[str, int] = dict.fromkeys(
+            ("rejected", "repaired", "filled", "unrepaired"), 0
+        )
         self.losses = 0
         self.reconnects = 0
         self.registry.register(_ServiceCollector(service, self))
