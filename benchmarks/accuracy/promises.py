@@ -52,42 +52,39 @@ def tables(
     yield table(rows, refused)
 
 
-def kept(scene: str, goals: dict[str, Goal], captures: int) -> list[PlanOutcome | Refused]:
+def kept(scene: str, goals: dict[str, Goal], captures: int) -> Iterator[PlanOutcome | Refused]:
     """Plan all goals on a scene, and measure what is recommended."""
     name = Path(scene).stem
     try:
         planner, statistics = looked(scene)
     except Problem as problem:
-        return [Refused(name, "look", problem.detail)]
-    outcomes: list[PlanOutcome | Refused] = []
+        yield Refused(name, "look", problem.detail)
+        return
     for wanted, goal in goals.items():
         begin_s = time.process_time()
         try:
             best = planner.plan(goal, statistics).recommended
         except Problem as problem:
-            outcomes.append(Refused(name, wanted, problem.detail))
+            yield Refused(name, wanted, problem.detail)
             continue
         planned_in_s = time.process_time() - begin_s
         values, device_s, full = measured(
             scene, best.applied.sequence, best.estimator, captures, dimmest_dn_per_s(statistics)
         )
-        outcomes.append(
-            PlanOutcome(
-                name,
-                wanted,
-                goal.range_error_m,
-                best.in_words(),
-                best.applied.capture_s,
-                device_s,
-                _predicted(best),
-                (best.predicted.range_error.low, best.predicted.range_error.high),
-                values,
-                full,
-                planned_in_s,
-                best.predicted.bias_known,
-            )
+        yield PlanOutcome(
+            name,
+            wanted,
+            goal.range_error_m,
+            best.in_words(),
+            best.applied.capture_s,
+            device_s,
+            _predicted(best),
+            (best.predicted.range_error.low, best.predicted.range_error.high),
+            values,
+            full,
+            planned_in_s,
+            best.predicted.bias_known,
         )
-    return outcomes
 
 
 def _predicted(choice: Choice) -> dict[str, float]:
@@ -106,7 +103,7 @@ def all_kept(
     """Measure scenes, several at once, and print each plan as soon as its scene is done."""
     rows: list[PlanOutcome] = []
     refused: list[Refused] = []
-    of_scene = partial(kept, goals=goals, captures=captures)
+    of_scene = partial(_listed, goals=goals, captures=captures)
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
         for found in pool.map(of_scene, names):
             for each in found:
@@ -117,3 +114,7 @@ def all_kept(
                     refused.append(each)
                     print(f"{each.scene}, {each.goal}: {each.why}", flush=True)
     return rows, refused
+
+
+def _listed(scene: str, goals: dict[str, Goal], captures: int) -> list[PlanOutcome | Refused]:
+    return list(kept(scene, goals, captures))

@@ -64,7 +64,12 @@ def regrets(
     scene: str, targets: list[str], search_s: float, *, clock: Callable[[], float] = time.monotonic
 ) -> list[Regret]:
     """Search each target on a scene, each for so long."""
-    searches = []
+    return list(_regrets(scene, targets, search_s, clock))
+
+
+def _regrets(
+    scene: str, targets: list[str], search_s: float, clock: Callable[[], float]
+) -> Iterator[Regret]:
     planner, statistics = looked(scene)
     true_m = true_ranges_m(scene)
     dimmest = dimmest_dn_per_s(statistics)
@@ -108,9 +113,17 @@ def regrets(
                     break
                 else:
                     first = place + 1
-        plan = Path(scene).stem, name, best.in_words(), best.applied.capture_s
-        searches.append(Regret(*plan, quickest, quickest_s, searched, len(families), missed))
-    return searches
+        yield Regret(
+            Path(scene).stem,
+            name,
+            best.in_words(),
+            best.applied.capture_s,
+            quickest,
+            quickest_s,
+            searched,
+            len(families),
+            missed,
+        )
 
 
 def every_family(

@@ -22,12 +22,18 @@ _LEAST_PER_SIDE: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """What the light of a scene needs."""
+    """What the light of a scene needs.
+
+    Attributes
+    ----------
+    mirror_paths
+        Chains of mirrors that are followed at most.
+    patches
+        Of scattering surfaces, between which light is followed; 0 where none is.
+    """
 
     mirror_paths: int
-    """Chains of mirrors that are followed at most."""
     patches: int
-    """Of scattering surfaces, between which light is followed; 0 where none is."""
 
 
 def patch_edges_m(scene: Scene, per_side: int, *, moving: int = 0) -> dict[int, float]:
@@ -71,7 +77,10 @@ def cost_of(scene: Scene) -> Cost:
 def require_modest(scene: Scene) -> None:
     """Refuse a scene that would take much memory or time to prepare.
 
-    Raises SceneError naming the key, its value and the limit.
+    Raises
+    ------
+    SceneError
+        Naming the key, its value and the limit.
     """
     surfaces, transport = scene.surfaces, scene.transport
     if len(surfaces) > MOST_SURFACES:
