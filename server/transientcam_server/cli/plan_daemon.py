@@ -25,9 +25,17 @@ def by_daemon(
 
     Ctrl-C, SIGTERM and SIGHUP cancel the job there, too.
 
-    ``wanted``: arguments of `Camera.start_plan`, or, without a target, of `Camera.start_tradeoff`.
-    ``map_file``: whose format a map is to have; None for none.
-    Raises ProblemError: what the daemon refuses the plan with.
+    Parameters
+    ----------
+    wanted
+        Arguments of `Camera.start_plan`, or, without a target, of `Camera.start_tradeoff`.
+    map_file
+        Whose format a map is to have; None for none.
+
+    Raises
+    ------
+    ProblemError
+        What the daemon refuses the plan with.
     """
     with Camera(url, token=token) as camera, console.status("waiting") as status:
 
