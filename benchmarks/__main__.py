@@ -65,10 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def chosen(names: Iterable[str]) -> list[Measurement]:
     """Return measurements by their names, or those of pages; ``all`` are those of all pages.
 
-    Raises
-    ------
-    LookupError
-        Naming what is neither.
+    Raises LookupError naming what is neither.
     """
     found: dict[str, Measurement] = {}
     for name in names:
@@ -86,8 +83,8 @@ def chosen(names: Iterable[str]) -> list[Measurement]:
 
 def function_of(measurement: Measurement) -> Function:
     """Import the function of a measurement."""
-    module, _, name = measurement.function.partition(":")
-    function: Function = getattr(importlib.import_module(f"benchmarks.{module}"), name)
+    module = importlib.import_module(f"benchmarks.{measurement.module}")
+    function: Function = getattr(module, measurement.function)
     return function
 
 

@@ -11,36 +11,39 @@ from typing import Any, Final
 
 @dataclass(frozen=True)
 class Measurement:
-    """A function, and what becomes of its tables.
+    """A function, and what becomes of its tables."""
 
-    Attributes
-    ----------
-    name
-        That it is called by.
-    function
-        As in ``speed.density:tables``, below this package.
-    page
-        In docs/, without its suffix. Without one the function writes what it makes by itself.
-    of
-        Paths whose code is measured: where they have changed since, figures are called old.
-    level
-        Of the headings on the page.
-    by_hand
-        Whether it is left out when pages are made: it needs something that is not at hand.
-    given
-        Options that differ from the function's defaults.
-    timed
-        Whether figures depend on the machine.
-    """
-
-    name: str
-    function: str
+    at: str
+    """Module below this package, and function unless that is ``tables``: ``speed.density``."""
     page: str | None = None
+    """In docs/, without its suffix. Without one the function writes what it makes by itself."""
     of: tuple[str, ...] = ()
+    """Paths whose code is measured: where they have changed since, figures are called old."""
     level: int = 2
+    """Of the headings on the page."""
+    named: str = ""
+    """What it is called by where that is not the name of its module."""
     by_hand: bool = False
+    """Whether it is left out when pages are made: it needs something that is not at hand."""
     given: Mapping[str, Any] = field(default_factory=dict)
+    """Options that differ from the function's defaults."""
     timed: bool = True
+    """Whether figures depend on the machine."""
+
+    @property
+    def module(self) -> str:
+        """Where the function is, below this package."""
+        return self.at.partition(":")[0]
+
+    @property
+    def function(self) -> str:
+        """The name of the function there."""
+        return self.at.partition(":")[2] or "tables"
+
+    @property
+    def name(self) -> str:
+        """That it is called by."""
+        return self.named or self.module.rpartition(".")[2]
 
 
 _MOMENTS: Final = ("server/transientcam_moments",)
@@ -49,163 +52,106 @@ _COMPARISONS: Final = ("server/transientcam_moments/comparisons",)
 _IMAGING: Final = ("server/transientcam_server/imaging",)
 _PLANNED: Final = ("server/transientcam_server/planning", *_MOMENTS, *_IMAGING)
 _TRADED: Final = ("server/transientcam_experiments/tradeoff", *_MOMENTS, *_IMAGING)
+_CAMERA: Final = (*_MOMENTS, *_IMAGING, "driver")
 _DASHBOARD: Final = ("client/dashboard/src",)
 _RECORDING: Final = ("server/transientcam_server/recording",)
+_RELAY: Final = ("server/transientcam_server/relay",)
+_OFFLINE: Final = ("server/transientcam_server/offline",)
+_DAEMON: Final = ("server/transientcam_server/daemon",)
+_CLIENT: Final = ("pyproject.toml", "client/transientcam", *_SERVER)
 
 _ALL: Final = (
     # -- speed
-    *(
-        Measurement(each, f"speed.{each}:tables", "measured/benchmarks", _MOMENTS)
-        for each in (
-            "density",
-            "reconstruction",
-            "stages",
-            "pisarenko",
-            "cumulative",
-            "scaling",
-            "warm_up",
-            "automatic",
-        )
-    ),
+    Measurement("speed.density", "measured/benchmarks", _MOMENTS),
+    Measurement("speed.reconstruction", "measured/benchmarks", _MOMENTS),
+    Measurement("speed.stages", "measured/benchmarks", _MOMENTS),
+    Measurement("speed.pisarenko", "measured/benchmarks", _MOMENTS),
+    Measurement("speed.cumulative", "measured/benchmarks", _MOMENTS),
+    Measurement("speed.scaling", "measured/benchmarks", _MOMENTS),
+    Measurement("speed.warm_up", "measured/benchmarks", _MOMENTS),
+    Measurement("speed.automatic", "measured/benchmarks", _MOMENTS),
     # -- service
-    Measurement(
-        "throughput", "service.throughput:tables", "measured/throughput", (*_MOMENTS, *_SERVER)
-    ),
-    Measurement("stream_load", "service.stream_load:tables", "measured/stream-load", _SERVER),
-    Measurement("first_light", "service.first_light:tables", "measured/first-light", _SERVER),
-    Measurement(
-        "first_program",
-        "service.first_program:tables",
-        "measured/first-program",
-        ("pyproject.toml", "client/transientcam", *_SERVER),
-    ),
-    Measurement("robustness", "service.robustness:tables", "measured/robustness", _SERVER),
-    Measurement("soak", "service.soak:tables", "measured/soak", _SERVER),
-    Measurement(
-        "relay_moments",
-        "service.relay_moments:tables",
-        "relay",
-        ("server/transientcam_server/relay",),
-    ),
-    Measurement(
-        "relay_tree",
-        "service.relay:tables",
-        "relay",
-        ("server/transientcam_server/relay",),
-        level=3,
-    ),
-    Measurement(
-        "cluster", "service.cluster:tables", "cluster", ("server/transientcam_server/offline",), 3
-    ),
-    Measurement(
-        "default_sequence",
-        "service.default_sequence:tables",
-        "measured/default-sequence",
-        (*_MOMENTS, *_IMAGING, "driver"),
-        timed=False,
-    ),
-    Measurement(
-        "autobahn",
-        "service.autobahn:tables",
-        "measured/autobahn",
-        ("server/transientcam_server/daemon",),
-        by_hand=True,
-    ),
+    Measurement("service.throughput", "measured/throughput", (*_MOMENTS, *_SERVER)),
+    Measurement("service.stream_load", "measured/stream-load", _SERVER),
+    Measurement("service.first_light", "measured/first-light", _SERVER),
+    Measurement("service.first_program", "measured/first-program", _CLIENT),
+    Measurement("service.robustness", "measured/robustness", _SERVER),
+    Measurement("service.soak", "measured/soak", _SERVER),
+    Measurement("service.relay_moments", "relay", _RELAY),
+    Measurement("service.relay", "relay", _RELAY, 3, "relay_tree"),
+    Measurement("service.cluster", "cluster", _OFFLINE, 3),
+    Measurement("service.default_sequence", "measured/default-sequence", _CAMERA, timed=False),
+    Measurement("service.autobahn", "measured/autobahn", _DAEMON, by_hand=True),
     # -- recordings
-    Measurement("recording", "recordings.recording:tables", "measured/recording-cost", _RECORDING),
-    Measurement("by_hand", "recordings.by_hand:tables", "recordings", (*_MOMENTS, *_IMAGING), 3),
-    Measurement("power_cuts", "recordings.power_cuts:tables", "measured/power-cuts", _RECORDING),
-    Measurement(
-        "fuzz_recordings",
-        "recordings.fuzz_recordings:tables",
-        "measured/fuzzed-recordings",
-        _RECORDING,
-    ),
+    Measurement("recordings.recording", "measured/recording-cost", _RECORDING),
+    Measurement("recordings.by_hand", "recordings", (*_MOMENTS, *_IMAGING), 3),
+    Measurement("recordings.power_cuts", "measured/power-cuts", _RECORDING),
+    Measurement("recordings.fuzz_recordings", "measured/fuzzed-recordings", _RECORDING),
     # -- estimators
     Measurement(
-        "techniques", "estimators.estimators:techniques", "estimators", _COMPARISONS, timed=False
+        "estimators.estimators:techniques", "estimators", _COMPARISONS, 2, "techniques", timed=False
     ),
-    Measurement("estimators", "estimators.estimators:tables", "estimators", _MOMENTS),
+    Measurement("estimators.estimators", "estimators", _MOMENTS),
+    Measurement("estimators.cameras", "cameras", _MOMENTS, 3, "camera_returns", timed=False),
+    Measurement("estimators.harmonics", "harmonics", (*_MOMENTS, *_IMAGING)),
+    Measurement("estimators.lost_sync", "lost-synchronisation", (*_MOMENTS, "driver")),
+    Measurement("estimators.stability", "measured/stability", _MOMENTS),
     Measurement(
-        "camera_returns", "estimators.cameras:tables", "cameras", _MOMENTS, level=3, timed=False
-    ),
-    Measurement("harmonics", "estimators.harmonics:tables", "harmonics", (*_MOMENTS, *_IMAGING)),
-    Measurement(
-        "lost_sync",
-        "estimators.lost_sync:tables",
-        "lost-synchronisation",
-        (*_MOMENTS, "driver"),
-    ),
-    Measurement("stability", "estimators.stability:tables", "measured/stability", _MOMENTS),
-    Measurement(
-        "calibration_verdicts",
-        "estimators.calibration_verdicts:tables",
+        "estimators.calibration_verdicts",
         "measured/calibration-verdicts",
         (*_IMAGING, "driver"),
         timed=False,
     ),
-    Measurement("corner_strip", "estimators.corner_strip:draw"),
+    Measurement("estimators.corner_strip:draw"),
     # -- likelihood
-    Measurement("sparse", "likelihood.sparse:tables", "measured/likelihood", _MOMENTS),
-    Measurement("captures", "likelihood.captures:tables", "measured/likelihood", _MOMENTS),
-    Measurement("shapes", "likelihood.shapes:tables", "measured/likelihood", _MOMENTS),
-    Measurement("neighbours", "likelihood.neighbours:tables", "measured/likelihood", _MOMENTS),
-    Measurement("likelihood_speed", "likelihood.speed:tables", "measured/likelihood", _MOMENTS),
+    Measurement("likelihood.sparse", "measured/likelihood", _MOMENTS),
+    Measurement("likelihood.captures", "measured/likelihood", _MOMENTS),
+    Measurement("likelihood.shapes", "measured/likelihood", _MOMENTS),
+    Measurement("likelihood.neighbours", "measured/likelihood", _MOMENTS),
+    Measurement("likelihood.speed", "measured/likelihood", _MOMENTS, named="likelihood_speed"),
     # -- simulation
-    *(
-        Measurement(
-            f"simulation_{name}",
-            f"simulation.{function}",
-            "measured/simulation",
-            ("driver",),
-        )
-        for name, function in {
-            "costs": "costs:tables",
-            "rules": "rules:tables",
-            "left_out": "accuracy:tables",
-            "judged": "judge:tables",
-            "noise": "noise:tables",
-        }.items()
-    ),
-    # -- accuracy
-    Measurement("prices", "accuracy.prices:tables", "measured/accuracy", _PLANNED),
-    Measurement("tradeoffs", "accuracy.tradeoffs:tables", "measured/accuracy", _TRADED),
-    Measurement("noise", "accuracy.noise:tables", "measured/accuracy", _TRADED),
-    Measurement("trust", "accuracy.trust:tables", "measured/accuracy", _IMAGING, by_hand=True),
-    Measurement("promises", "accuracy.promises:tables", "measured/plans", _PLANNED),
-    Measurement("calibrating", "accuracy.calibrating:tables", "measured/plans", _PLANNED),
+    Measurement("simulation.costs", "measured/simulation", ("driver",), 2, "simulation_costs"),
+    Measurement("simulation.rules", "measured/simulation", ("driver",), 2, "simulation_rules"),
     Measurement(
-        "checking",
-        "accuracy.calibrating:tables",
-        "measured/plans",
-        _PLANNED,
-        given={"seed": 8},
+        "simulation.accuracy", "measured/simulation", ("driver",), 2, "simulation_left_out"
     ),
-    Measurement("regret", "accuracy.regret:tables", "measured/plans", _PLANNED),
+    Measurement("simulation.judge", "measured/simulation", ("driver",), 2, "simulation_judged"),
+    Measurement("simulation.noise", "measured/simulation", ("driver",), 2, "simulation_noise"),
+    # -- accuracy
+    Measurement("accuracy.prices", "measured/accuracy", _PLANNED),
+    Measurement("accuracy.tradeoffs", "measured/accuracy", _TRADED),
+    Measurement("accuracy.noise", "measured/accuracy", _TRADED),
+    Measurement("accuracy.trust", "measured/accuracy", _IMAGING, by_hand=True),
+    Measurement("accuracy.promises", "measured/plans", _PLANNED),
+    Measurement("accuracy.calibrating", "measured/plans", _PLANNED),
+    Measurement(
+        "accuracy.calibrating", "measured/plans", _PLANNED, 2, "checking", given={"seed": 8}
+    ),
+    Measurement("accuracy.regret", "measured/plans", _PLANNED),
     # -- Kinect v2
     *(
         Measurement(
-            f"kinect2_{name}",
-            f"kinect2.{name}:tables",
+            f"kinect2.{name}",
             "kinect2",
             (*_MOMENTS, "driver"),
+            named=f"kinect2_{name}",
             timed=name == "decoding",
         )
         for name in ("corner", "seen", "returns", "decoding")
     ),
-    Measurement("by_libfreenect2", "kinect2.by_libfreenect2:store", by_hand=True),
+    Measurement("kinect2.by_libfreenect2:store", by_hand=True),
     # -- attacks
-    Measurement("abuse", "abuse.bars:tables", "measured/abuse", _SERVER),
-    Measurement("abuse_before", "abuse.bars:before", "measured/abuse", _SERVER, by_hand=True),
-    Measurement("abuse_soak", "abuse.soaking:tables", "measured/abuse-soak", _SERVER),
+    Measurement("abuse.bars", "measured/abuse", _SERVER, named="abuse"),
+    Measurement("abuse.bars:before", "measured/abuse", _SERVER, 2, "abuse_before", by_hand=True),
+    Measurement("abuse.soaking", "measured/abuse-soak", _SERVER, named="abuse_soak"),
     # -- pages
-    Measurement("dashboard", "pages.dashboard:tables", "measured/dashboard", _DASHBOARD),
-    Measurement("pictures", "pages.pictures:draw"),
-    Measurement("views", "pages.pictures:draw_views", by_hand=True),
-    Measurement("notebooks", "pages.notebooks:draw"),
-    Measurement("mathematics", "pages.mathematics:draw"),
-    Measurement("reference", "pages.reference:reference"),
-    Measurement("examples", "pages.examples:write_examples"),
+    Measurement("pages.dashboard", "measured/dashboard", _DASHBOARD),
+    Measurement("pages.pictures:draw"),
+    Measurement("pages.pictures:draw_views", named="views", by_hand=True),
+    Measurement("pages.notebooks:draw"),
+    Measurement("pages.mathematics:draw"),
+    Measurement("pages.reference:reference"),
+    Measurement("pages.examples:write_examples"),
 )
 MEASUREMENTS: Final = {each.name: each for each in _ALL}
 """By their names, in the order of their pages."""

@@ -113,31 +113,13 @@ def _reconnects(address: _Address) -> Generator[None]:
         yield
 
 
-def _pretends(address: _Address) -> Generator[None]:
-    """Begin to switch the light off, and never do it, over as many connections as there may be."""
-    kept = []
-    try:
+def _beginning(begin: bytes, address: _Address) -> Generator[None]:
+    """Begin something, and never do it, over as many connections as there may be."""
+    with contextlib.ExitStack() as kept:
         for _ in range(_SILENT_AT_ONCE):
-            kept.append(_connect(address))
-            kept[-1].sendall(b"POST /api/v1/acquisition/safe-off HTTP/1.1\r\n")
+            kept.enter_context(_connect(address)).sendall(begin)
             yield
         time.sleep(_TIMEOUT_S)
-    finally:
-        for each in kept:
-            each.close()
-
-
-def _silent(address: _Address) -> Generator[None]:
-    """Connect where TLS is spoken, and say nothing."""
-    kept = []
-    try:
-        for _ in range(_SILENT_AT_ONCE):
-            kept.append(_connect(address))
-            yield
-        time.sleep(_TIMEOUT_S)
-    finally:
-        for each in kept:
-            each.close()
 
 
 def _asking(address: _Address, path: str) -> bytes:
@@ -220,8 +202,8 @@ ATTACKS: Final[dict[str, _Attack]] = {
     "tiny chunks": _sending(_CHUNKED, b"1\r\n \r\n"),
     "connects": _connects,
     "reconnecting readers": _reconnects,
-    "pretended safe-offs": _pretends,
-    "silent TLS handshakes": _silent,
+    "pretended safe-offs": partial(_beginning, b"POST /api/v1/acquisition/safe-off HTTP/1.1\r\n"),
+    "silent TLS handshakes": partial(_beginning, b""),
     "slow readers": _slow_reader,
     "big reads": _big_read,
     "archives": _asking_for(_archive),

@@ -36,34 +36,25 @@ _HISTORY_S: Final = 2.0
 
 @dataclass
 class AttackOutcome:
-    """What healthy clients had during one attack; times in s, None for never.
-
-    Attributes
-    ----------
-    frames
-        Share of the camera's frames that the viewer received, over that without an attack.
-    livez_s, livez_cpu_s
-        The longest answer of /livez: real time, and processor time of the loop's thread meanwhile.
-    lapse_s, safe_off_s
-        From when the light should have gone off to the last capture.
-    beside_s
-        The longest of some safe-offs from the address of the attack, each over a new connection,
-        until it was answered with 200.
-    grown_bytes, left_bytes
-        Memory over that before: at most, and a while after.
-    end_s
-        From SIGTERM to the end.
-    """
+    """What healthy clients had during one attack; times in s, None for never."""
 
     frames: float = 0.0
+    """Share of the camera's frames that the viewer received, over that without an attack."""
     livez_s: float | None = None
     livez_cpu_s: float | None = None
+    """``livez_s``, ``livez_cpu_s``: the longest answer of /livez: real time, and processor time of
+    the loop's thread meanwhile."""
     lapse_s: float | None = None
     safe_off_s: float | None = None
+    """``lapse_s``, ``safe_off_s``: from when the light should have gone off to the last capture."""
     beside_s: float | None = None
+    """The longest of some safe-offs from the address of the attack, each over a new connection,
+    until it was answered with 200."""
     grown_bytes: int = 0
     left_bytes: int = 0
+    """``grown_bytes``, ``left_bytes``: memory over that before: at most, and a while after."""
     end_s: float | None = None
+    """From SIGTERM to the end."""
 
 
 @dataclass

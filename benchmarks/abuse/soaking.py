@@ -10,13 +10,12 @@ import httpx
 
 from benchmarks.abuse.measuring import GIVE_UP_S, RANGE, attacked, prepare, served
 from benchmarks.common.tables import Table, heads
-from benchmarks.service.soak import Samples
+from benchmarks.service.soak import HELD, UNITS, Sample
 from benchmarks.service.viewers import Viewer, cut, watch
 
 CONNECTIONS: Final = 8
 SAMPLE_S: Final = 2.0
 REST_S: Final = 20.0
-_MIB = 2**20
 
 
 @dataclass(frozen=True)
@@ -25,32 +24,36 @@ class Soak:
 
     frames: int
     expected: float
-    before: Samples
-    during: Samples
-    after: Samples
+    before: list[Sample]
+    during: list[Sample]
+    after: list[Sample]
 
 
 def soak(minutes: float) -> Soak:
     """Attack in every way, one after the other, and look at the daemon all the while."""
-    before, during, after = Samples(), Samples(), Samples()
+    before: list[Sample] = []
+    during: list[Sample] = []
+    after: list[Sample] = []
     with (
         served(None, tls=False) as process,
         httpx.Client(base_url=process.url, timeout=GIVE_UP_S) as client,
     ):
         rate_hz = prepare(process, client)
         viewer = Viewer(process.stream_url, RANGE)
-        watch([viewer], duration_s=REST_S, every_s=SAMPLE_S, meanwhile=lambda: before.take(process))
+
+        def look(duration_s: float, samples: list[Sample]) -> float:
+            def take() -> None:
+                samples.append(Sample.of(process))
+
+            return watch([viewer], duration_s=duration_s, every_s=SAMPLE_S, meanwhile=take)
+
+        look(REST_S, before)
         count = len(viewer.seen.numbers)
         with attacked("mixed", process.url, CONNECTIONS):
-            took_s = watch(
-                [viewer],
-                duration_s=60.0 * minutes,
-                every_s=SAMPLE_S,
-                meanwhile=lambda: during.take(process),
-            )
+            took_s = look(60.0 * minutes, during)
         frames = len(viewer.seen.numbers) - count
         time.sleep(1.0)
-        watch([viewer], duration_s=REST_S, every_s=SAMPLE_S, meanwhile=lambda: after.take(process))
+        look(REST_S, after)
         cut([viewer.connection])
     return Soak(frames, rate_hz * took_s, before, during, after)
 
@@ -64,13 +67,9 @@ def tables(*, minutes: float = 10.0) -> Iterator[Table]:
     table.text.append(
         f"Frames of a viewer, of those due: {result.frames} of {result.expected:.0f}."
     )
-    for name, attribute, unit in (
-        ("memory, MiB", "memory_bytes", _MIB),
-        ("descriptors", "descriptors", 1),
-        ("threads", "threads", 1),
-    ):
+    for place, (name, unit) in enumerate(zip(HELD, UNITS, strict=True), start=1):
         before, during, after = (
-            [each / unit for each in getattr(samples, attribute)]
+            [each[place] / unit for each in samples]
             for samples in (result.before, result.during, result.after)
         )
         means = (before, during[:minute], during[-minute:])

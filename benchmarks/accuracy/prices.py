@@ -59,10 +59,7 @@ def priced(front: Front) -> int:
 def price(front: Front, measured_m: float) -> str:
     """State the time from which on the error is below `TARGET_M`, and what rules there.
 
-    Parameters
-    ----------
-    measured_m
-        Error of captures with the choice at `priced`.
+    ``measured_m``: error of captures with the choice at `priced`.
     """
     place = priced(front)
     first = front[place]

@@ -3,17 +3,16 @@
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Final
 
-from rich.progress import Progress, TaskID
+from rich.progress import Progress
 
 import transientcam_moments as tm
 from benchmarks.accuracy.capturing import SEED, short
 from benchmarks.common.measured_scenes import composite_scene
 from benchmarks.common.tables import Column, Table
-from transientcam_driver import Sequence
+from transientcam_driver import Sequence as Capture
 from transientcam_experiments import tradeoff
 
 SCENES: Final = {
@@ -77,18 +76,25 @@ def measured(scenes: Mapping[str, str], folder: Path, grid: str) -> tradeoff.Rec
     """Run the whole tradeoff and report it."""
     tm.kernels.compile()
     records, chosen = tradeoff.Records(folder), tradeoff.load_grid(grid)
-    with Progress() as progress:
-        for name, spec in scenes.items():
-            own = chosen if name == COMPUTED else replace(chosen, harmonics=())
-            points = tradeoff.points_of(own, scene=spec, repetitions=REPETITIONS, seed=SEED)
-            advance = partial(_advance, progress, progress.add_task(name, total=len(points)))
-            tradeoff.measure(points, records, scene=spec, seed=SEED, progress=advance)
+    for name, spec in scenes.items():
+        own = chosen if name == COMPUTED else replace(chosen, harmonics=())
+        points = tradeoff.points_of(own, scene=spec, repetitions=REPETITIONS, seed=SEED)
+        measure(points, records, scene=spec, seed=SEED)
     tradeoff.report(folder, records)
     return records
 
 
-def _advance(progress: Progress, task: TaskID, kind: str) -> None:
-    progress.advance(task)
+def measure(
+    points: list[tradeoff.Point], records: tradeoff.Records, *, scene: str, seed: int
+) -> None:
+    """Measure points of a scene, and show how far that is."""
+    with Progress() as progress:
+        task = progress.add_task(Path(scene).stem, total=len(points))
+
+        def advance(_: str) -> None:
+            progress.advance(task)
+
+        tradeoff.measure(points, records, scene=scene, seed=seed, progress=advance)
 
 
 def _of(kind: str, scene: str, records: tradeoff.Records) -> list[tradeoff.Record]:
@@ -108,8 +114,8 @@ def _scene(name: str, spec: str, records: tradeoff.Records, said: str) -> Table:
         ("sequence", *(column for _, column in _QUANTITIES.values())),
         [
             (
-                short(Sequence.from_document(record.point)),
-                *(_scaled(record, name, factor) for name, (factor, _) in _QUANTITIES.items()),
+                short(Capture.from_document(record.point)),
+                *(scaled(record, name, factor) for name, (factor, _) in _QUANTITIES.items()),
             )
             for record in captures
             if _shown(record)
@@ -127,7 +133,8 @@ def _shown(record: tradeoff.Record) -> bool:
     return usual and (point["exposure_s"] == 0.00192 or video)
 
 
-def _scaled(record: tradeoff.Record, name: str, factor: float) -> float | None:
+def scaled(record: tradeoff.Record, name: str, factor: float) -> float | None:
+    """Return a value in another unit; None where there is none."""
     value = record.values.get(name)
     return None if value is None else factor * value
 
@@ -141,7 +148,7 @@ def _quickest(captures: list[tradeoff.Record]) -> str:
     said = []
     for factor in (10, 3):
         place = next(n for n, error_m in enumerate(errors_m) if error_m <= factor * least_m)
-        sequence = short(Sequence.from_document(captures[place].point))
+        sequence = short(Capture.from_document(captures[place].point))
         took_ms = 1e3 * (captures[place].values["capture_s"] or 0.0)
         error_mm = 1e3 * errors_m[place]
         said.append(f"{sequence} takes {took_ms:.0f} ms for a median error of {error_mm:.3g} mm")
@@ -187,7 +194,7 @@ def _sending(records: tradeoff.Records) -> Table:
         (
             *(record.point[name] for name in ("product", "coding", "harmonics")),
             record.values["bytes"],
-            _scaled(record, "seconds", 1e3),
+            scaled(record, "seconds", 1e3),
             *_errors(record),
         )
         for record in _of("transport", COMPUTED, records)

@@ -16,15 +16,10 @@ def error_picture(
 ) -> Figure:
     """Draw time across and range error up, both logarithmic.
 
-    Parameters
-    ----------
-    tradeoff
-        The answer of `GET /api/v1/tradeoff`, or `Planner.tradeoff_document`: its ``lines``,
-        ``front`` and ``summary``.
-    title
-        Of the scene.
-    present
-        Time of one capture in s and error in m of the present setting.
+    ``tradeoff``: the answer of `GET /api/v1/tradeoff`, or `Planner.tradeoff_document`: its
+    ``lines``, ``front`` and ``summary``.
+    ``title``: of the scene.
+    ``present``: time of one capture in s and error in m of the present setting.
     """
     figure = blank(7.2, 5.0)
     panel: Axes = figure.subplots()

@@ -22,34 +22,23 @@ FIGURES: Final = DOCS / "figures"
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What a measurement found.
-
-    Attributes
-    ----------
-    name
-        Of the measurement.
-    command
-        That repeats it.
-    commit
-        Short name of the commit that was measured; with " and changes" where files were changed.
-    date
-        As in 2026-11-25.
-    machine
-        None where the figures do not depend on it.
-    tables
-        What was found.
-    of_page
-        Whether commit and date are those of the page's last change instead: it was measured
-        before there were records.
-    """
+    """What a measurement found."""
 
     name: str
+    """Of the measurement."""
     command: str
+    """That repeats it."""
     commit: str
+    """Short name of the commit that was measured; with " and changes" where files were changed."""
     date: str
+    """As in 2026-11-25."""
     machine: str | None
+    """None where the figures do not depend on it."""
     tables: Sequence[Table]
+    """What was found."""
     of_page: bool = False
+    """Whether commit and date are those of the page's last change instead: it was measured before
+    there were records."""
 
     def written(self, docs: Path = DOCS) -> Path:
         """Write it, and return the file."""

@@ -27,28 +27,20 @@ def heads(text: str) -> tuple[Column, ...]:
 
 @dataclass(frozen=True)
 class Table:
-    """What was measured, or a part of it.
-
-    Attributes
-    ----------
-    title
-        What it is about: a heading of the page. Without one the part goes on with the one before.
-    columns
-        Texts, or a `Column` of numbers. The first one says what a row is. There may be none: a part
-        may be text alone.
-    rows
-        Sequences of `Cell`, one a column.
-    notes
-        Paragraphs below: how it was measured, and what bars are met. "- " makes an item of a list.
-    text
-        Paragraphs between title and table.
-    """
+    """What was measured, or a part of it."""
 
     title: str
+    """What it is about: a heading of the page. Without one the part goes on with the one before."""
     columns: Sequence[Sequence[str]] = ()
+    """Texts, or a `Column` of numbers. The first one says what a row is. There may be none: a part
+    may be text alone."""
     rows: list[Any] = field(default_factory=list)
+    """Sequences of `Cell`, one a column."""
     notes: list[str] = field(default_factory=list)
+    """Paragraphs below: how it was measured, and what bars are met. "- " makes an item of a
+    list."""
     text: list[str] = field(default_factory=list)
+    """Paragraphs between title and table."""
 
     def shown(self) -> list[list[str]]:
         """Return heads and rows as texts."""

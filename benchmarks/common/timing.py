@@ -8,18 +8,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds a call took, over all repetitions.
-
-    Attributes
-    ----------
-    median_s, low_s, high_s, best_s
-        Median, quartiles and minimum.
-    """
+    """Seconds a call took, over all repetitions."""
 
     median_s: float
     low_s: float
     high_s: float
     best_s: float
+    """``median_s``, ``low_s``, ``high_s``, ``best_s``: median, quartiles and minimum."""
 
     def __str__(self) -> str:
         """As in "1.23 ms ± 4 %": median, and half the distance of the quartiles."""

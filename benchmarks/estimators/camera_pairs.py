@@ -31,19 +31,13 @@ _RADIAN_M: Final = float(tm.range_m(np.float64(1.0), BASE_HZ))
 
 @dataclass(frozen=True)
 class Pixels:
-    """Noisy moments (3, P) of random pairs of returns.
-
-    Attributes
-    ----------
-    range_m
-        Of the nearer and the further return (2, P).
-    b, noise
-        Moments and the noise that is stated to estimators.
-    """
+    """Noisy moments (3, P) of random pairs of returns."""
 
     range_m: NDArray[Any]
+    """Of the nearer and the further return (2, P)."""
     b: NDArray[Any]
     noise: tm.noise.MomentNoise
+    """``b``, ``noise``: moments and the noise that is stated to estimators."""
 
     def off_m(self, found: tm.Likelihood) -> NDArray[Any]:
         """Return how far the nearer return is off (P)."""

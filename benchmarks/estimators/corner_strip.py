@@ -1,16 +1,12 @@
 """Points of the corner, seen from above: the same capture of one take by several estimators."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
-import transientcam_moments as tm
-from benchmarks.likelihood.errors import ESTIMATORS, errors_of, ranges, turn_m
+from benchmarks.likelihood.errors import ESTIMATORS, captured, errors_of, ranges, turn_m
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench
+from transientcam_experiments.paper.bench import Bench
 from transientcam_server.imaging import Intrinsics
 
 FIGURE: Final = "corner-points.png"
@@ -23,12 +19,8 @@ ROWS: Final = slice(40, 80)
 
 def draw(figures: Path) -> None:
     """Draw corner-points.png, and say how far the points are off."""
-    bench = Bench(seed=1)
-    shot = bench.shot("corner", SEQUENCE, options=WITHOUT_OUTLIERS)
-    gains = bench.calibration(SEQUENCE, options=WITHOUT_OUTLIERS).gains.planes
-    settings = replace(shot.found.settings, sensor=tm.noise.Sensor())
+    shot, gains, settings, truth = captured(Bench(seed=1), "corner", SEQUENCE)
     found = ranges(shot.found.measured, settings, calibration=gains)
-    truth = np.where(shot.truth.lit, shot.truth.range_m, np.nan)
     lens = Intrinsics.of_field(FIELD_DEG, width=truth.shape[1], height=truth.shape[0])
     true, middle = lens.points(truth), truth.shape[0] // 2
     with style.style():

@@ -3,13 +3,11 @@
 import itertools
 import tempfile
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from typing import get_args
 
-from rich.progress import Progress, TaskID
-
 import transientcam_moments as tm
+from benchmarks.accuracy.tradeoffs import measure, scaled
 from benchmarks.common.tables import Cell, Column, Table
 from transientcam_experiments import tradeoff
 from transientcam_moments.comparisons import TECHNIQUES, Technique
@@ -44,19 +42,11 @@ def measured(folder: Path) -> list[tradeoff.Record]:
     tm.kernels.compile(harmonics=HARMONICS)
     records = tradeoff.Records(folder)
     grid = tradeoff.Grid((), HARMONICS)
-    with Progress() as progress:
-        for scene in SCENES:
-            every = tradeoff.points_of(grid, scene=scene, repetitions=REPETITIONS, seed=SEED)
-            points = [point for point in every if point.kind == "estimating"]
-            task = progress.add_task(scene, total=len(points))
-            tradeoff.measure(
-                points, records, scene=scene, seed=SEED, progress=partial(_advance, progress, task)
-            )
+    for scene in SCENES:
+        every = tradeoff.points_of(grid, scene=scene, repetitions=REPETITIONS, seed=SEED)
+        points = [point for point in every if point.kind == "estimating"]
+        measure(points, records, scene=scene, seed=SEED)
     return list(records)
-
-
-def _advance(progress: Progress, task: TaskID, kind: str) -> None:
-    progress.advance(task)
 
 
 def _row(technique: Technique) -> tuple[Cell, ...]:
@@ -93,16 +83,11 @@ def _table(title: str, records: list[tradeoff.Record]) -> Table:
     rows = [
         (
             f"`{record.point['estimator']}`",
-            *(_scaled(record, name, factor) for name, (factor, _) in columns.items()),
+            *(scaled(record, name, factor) for name, (factor, _) in columns.items()),
         )
         for record in records
     ]
     return Table(title, ("estimator", *(each for _, each in columns.values())), rows, text=[text])
-
-
-def _scaled(record: tradeoff.Record, name: str, factor: float) -> float | None:
-    value = record.values[name]
-    return None if value is None else factor * value
 
 
 def _best(records: list[tradeoff.Record], quantity: str) -> str:

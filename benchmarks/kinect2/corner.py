@@ -10,9 +10,9 @@ import numpy as np
 import transientcam_moments as tm
 from benchmarks.common.picture import blank, saved
 from benchmarks.common.tables import Table, heads
-from benchmarks.kinect2 import libfreenect2
-from benchmarks.kinect2.decoding import TOO_LONG
-from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array
+from benchmarks.kinect2.decoding import ERRORS, TOO_LONG, errors
+from tests.driver.cameras.kinect2 import libfreenect2
+from tests.driver.cameras.kinect2.vectors import MULTIPLES, RADIAN_M, Array
 from transientcam_driver.camera import CameraName
 from transientcam_driver.cameras.kinect2 import SAMPLING
 from transientcam_driver.clock import VirtualClock
@@ -84,25 +84,8 @@ def tables(figures: Path) -> Iterator[Table]:
 
 def table(corner: Corner) -> Table:
     """Hold the three against the truth."""
-    columns = heads(
-        "one frame of the corner | median error, mm:.1f | 90 %, mm:.1f | mean, mm:+.1f | "
-        "without a range:.2%"
-    )
-    made = Table("A corner of a room", columns)
-    for name, found_m in corner.found_m.items():
-        off_mm = 1e3 * (found_m - corner.true_m)
-        there = np.isfinite(off_mm)
-        size_mm = np.abs(off_mm[there])
-        made.rows.append(
-            (
-                name,
-                np.median(size_mm),
-                np.percentile(size_mm, 90),
-                off_mm[there].mean(),
-                1 - there.mean(),
-            )
-        )
-    return made
+    rows = [(name, *errors(each - corner.true_m)) for name, each in corner.found_m.items()]
+    return Table("A corner of a room", heads(f"one frame of the corner | {ERRORS}"), rows)
 
 
 def draw(corner: Corner, path: Path) -> None:

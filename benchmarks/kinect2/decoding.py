@@ -6,10 +6,18 @@ from typing import Final
 import numpy as np
 
 import transientcam_moments as tm
-from benchmarks.common.tables import Table, verdict
+from benchmarks.common.tables import Cell, Table, verdict
 from benchmarks.common.timing import duration, measure
-from benchmarks.kinect2 import libfreenect2
-from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Scene, folder, load, noise
+from tests.driver.cameras.kinect2 import libfreenect2
+from tests.driver.cameras.kinect2.vectors import (
+    MULTIPLES,
+    RADIAN_M,
+    Array,
+    Scene,
+    folder,
+    load,
+    noise,
+)
 from transientcam_driver.cameras.kinect2 import SUB_IMAGES, Assembler, Rows, encoder, measurement
 
 SCENES: Final = ("ramp", "noisy", "two_returns")
@@ -19,6 +27,8 @@ ROUNDING: Final = 0.29
 """Standard deviation of a sample that is rounded to whole counts."""
 TOO_LONG: Final = libfreenect2.SPEED_OF_LIGHT_M_S / tm.SPEED_OF_LIGHT_M_S
 """libfreenect2 takes the speed of light for 300 000 km/s."""
+ERRORS: Final = "median error, mm:.1f | 90 %, mm:.1f | mean, mm:+.1f | without a range:.2%"
+"""Heads of what `errors` returns."""
 _VARIANTS: Final[dict[str, Rows]] = {"off": "bottom", "off_tables_flipped": "top"}
 
 
@@ -26,6 +36,14 @@ def tables() -> Iterator[Table]:
     """Compare with libfreenect2's outputs, and time the way to moments."""
     yield differences()
     yield speed()
+
+
+def errors(off_m: Array) -> tuple[Cell, ...]:
+    """Return how far ranges are off, NaN where there is none, as columns have it."""
+    there = np.isfinite(off_m)
+    off_mm = 1e3 * off_m[there]
+    median_mm, most_mm = np.percentile(np.abs(off_mm), (50, 90))
+    return median_mm, most_mm, off_mm.mean(), 1 - there.mean()
 
 
 def infrared(scene: Scene) -> float:
@@ -76,7 +94,7 @@ def differences() -> Table:
 
 
 def _restated() -> str:
-    """Say how far `benchmarks.kinect2.libfreenect2` is from libfreenect2 itself."""
+    """Say how far `tests.driver.cameras.kinect2.libfreenect2` is from libfreenect2 itself."""
     found = [libfreenect2.agreement(load(name)) for name in SCENES]
     same, apart_mm = (min(each[0] for each in found), max(each[1] for each in found))
     return (

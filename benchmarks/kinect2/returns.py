@@ -7,9 +7,9 @@ import numpy as np
 
 import transientcam_moments as tm
 from benchmarks.common.tables import Table, verdict
-from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import NOISY_STD, ROUNDING, TOO_LONG
-from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array, Scene, load, noise
+from tests.driver.cameras.kinect2 import libfreenect2
+from tests.driver.cameras.kinect2.vectors import MULTIPLES, RADIAN_M, Array, Scene, load, noise
 from transientcam_driver.cameras.kinect2 import (
     BASE_FREQUENCY_HZ,
     HEIGHT,

@@ -11,10 +11,10 @@ import numpy as np
 
 import transientcam_moments as tm
 from benchmarks.common.records import ROOT
-from benchmarks.common.tables import Cell, Table, heads
-from benchmarks.kinect2 import libfreenect2
-from benchmarks.kinect2.decoding import ROUNDING, TOO_LONG
-from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, Array, noise
+from benchmarks.common.tables import Table, heads
+from benchmarks.kinect2.decoding import ERRORS, ROUNDING, TOO_LONG, errors
+from tests.driver.cameras.kinect2 import libfreenect2
+from tests.driver.cameras.kinect2.vectors import MULTIPLES, RADIAN_M, Array, noise
 from transientcam_driver.camera import CameraName
 from transientcam_driver.cameras.kinect2 import HEIGHT, SAMPLING, WIDTH, Kinect2Camera
 from transientcam_driver.cameras.kinect2._codes import SATURATED_DN
@@ -39,24 +39,16 @@ def spec(scene: str) -> str:
 
 @dataclass(frozen=True)
 class ObservedFrame:
-    """One frame of the emulated camera, every so many pixels (N, M) of it.
-
-    Attributes
-    ----------
-    moments
-        complex (3, N, M), at 16, 80 and 120 MHz, decoded and computed here.
-    saturated
-        Which pixels have a saturated sample.
-    true_m
-        Range of the first return.
-    slopes
-        x and y of the rays (x, y, 1), as libfreenect2 has them.
-    """
+    """One frame of the emulated camera, every so many pixels (N, M) of it."""
 
     moments: Array
+    """complex (3, N, M), at 16, 80 and 120 MHz, decoded and computed here."""
     saturated: Array
+    """Which pixels have a saturated sample."""
     true_m: Array
+    """Range of the first return."""
     slopes: tuple[Array, Array]
+    """x and y of the rays (x, y, 1), as libfreenect2 has them."""
 
     @classmethod
     def of(cls, scene: str) -> "ObservedFrame":
@@ -107,11 +99,7 @@ def stored(scene: str) -> dict[str, Array]:
 
 def tables() -> Iterator[Table]:
     """Hold libfreenect2's depths and our ranges of the same frames against the truth."""
-    columns = heads(
-        "scene, one frame without noise | median error, mm:.1f | 90 %, mm:.1f | "
-        "mean, mm:+.1f | without a range:.2%"
-    )
-    made = Table("Read by libfreenect2", columns)
+    made = Table("Read by libfreenect2", heads(f"scene, one frame without noise | {ERRORS}"))
     apart_mm, same = 0.0, 1.0
     for scene in SCENES:
         seen, theirs = ObservedFrame.of(scene), stored(scene)
@@ -125,7 +113,7 @@ def tables() -> Iterator[Table]:
         }
         for name, range_m in found_m.items():
             if np.isfinite(range_m).any():
-                made.rows.append((f"`{scene}`: {name}", *_errors(range_m - seen.true_m)))
+                made.rows.append((f"`{scene}`: {name}", *errors(range_m - seen.true_m)))
         restated, depth_mm = seen.depth_mm(), theirs["depth_mm"]
         both = (restated > 0) & (depth_mm > 0)
         apart_mm = max(apart_mm, float(np.abs(restated - depth_mm)[both].max()))
@@ -140,15 +128,3 @@ def tables() -> Iterator[Table]:
         f"({same:.2%} of them), and its depths are within {apart_mm:.2f} mm of those that it gave."
     )
     yield made
-
-
-def _errors(off_m: Array) -> tuple[Cell, ...]:
-    off_mm = 1e3 * off_m
-    there = np.isfinite(off_mm)
-    size_mm = np.abs(off_mm[there])
-    return (
-        np.median(size_mm),
-        np.percentile(size_mm, 90),
-        off_mm[there].mean(),
-        1 - there.mean(),
-    )

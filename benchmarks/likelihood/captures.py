@@ -17,12 +17,13 @@ from benchmarks.likelihood.errors import (
     HEAD,
     Array,
     Errors,
+    captured,
     errors_of,
     ranges,
     turn_m,
 )
 from transientcam_driver import Sequence as Capture, Truth
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import Bench, ReconstructedShot
 
 SCENES: Final = ("wall", "mirrors", "corner", "corner-left", "translucent")
 ORDERS: Final = (3, 4, 8)
@@ -43,18 +44,12 @@ SMOOTHING_BINS: Final = 2.0
 
 @dataclass
 class Won:
-    """How an estimator did over all captures.
-
-    Attributes
-    ----------
-    ratios
-        Of its error over the least one of a capture: median, 90 % and RMSE, each.
-    best
-        In how many captures each of these is the least one.
-    """
+    """How an estimator did over all captures."""
 
     ratios: list[tuple[float, ...]] = field(default_factory=list)
+    """Of its error over the least one of a capture: median, 90 % and RMSE, each."""
     best: list[tuple[bool, ...]] = field(default_factory=list)
+    """In how many captures each of these is the least one."""
 
 
 def tables() -> Iterator[Table]:
@@ -132,12 +127,9 @@ def _row(
 ) -> tuple[str, ...]:
     base_hz = 23e6 if m <= MOST_OF_SHORT else 11.5e6
     sequence = Capture(base_frequency_hz=base_hz, harmonics=m, takes=takes, zeroth=zeroth)
-    shot = bench.shot(scene, sequence, options=WITHOUT_OUTLIERS)
-    gains = bench.calibration(sequence, options=WITHOUT_OUTLIERS).gains.planes
+    shot, gains, settings, truth = captured(bench, scene, sequence)
     base_hz = shot.base_frequency_hz
-    settings = replace(shot.found.settings, sensor=tm.noise.Sensor())
     found = ranges(shot.found.measured, settings, calibration=gains)
-    truth = np.where(shot.truth.lit, shot.truth.range_m, np.nan)
     if scene == SOFT:
         truth = with_maxima(shot, truth)
     errors = {

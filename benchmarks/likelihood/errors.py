@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 import transientcam_moments as tm
+from transientcam_driver import Sequence
+from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
 from transientcam_moments.likelihood import MODEL_ERROR
 
 Array = NDArray[Any]
@@ -37,6 +39,15 @@ class Errors:
         lost = f", {self.missing:.1%} without" if self.missing > 0 else ""
         parts = (self.median_mm, self.p90_mm, self.rmse_mm)
         return " / ".join(map(_short, parts)) + f" / {self.bias_mm:+.1f}{lost}"
+
+
+class Captured(NamedTuple):
+    """A capture, gains and settings to reconstruct it with, and the true range (H, W) if lit."""
+
+    shot: ReconstructedShot
+    gains: Array | None
+    settings: tm.Settings
+    truth_m: Array
 
 
 def _short(value: float) -> str:
@@ -85,6 +96,14 @@ def ranges(
             tm.Reconstruction(moments, chosen, calibration=calibration).range_m
         )
     return found
+
+
+def captured(bench: Bench, scene: str, sequence: Sequence) -> Captured:
+    """Capture a scene without outliers, for estimators that know the sensor's noise."""
+    shot = bench.shot(scene, sequence, options=WITHOUT_OUTLIERS)
+    gains = bench.calibration(sequence, options=WITHOUT_OUTLIERS).gains.planes
+    settings = replace(shot.found.settings, sensor=tm.noise.Sensor())
+    return Captured(shot, gains, settings, np.where(shot.truth.lit, shot.truth.range_m, np.nan))
 
 
 def turn_m(base_frequency_hz: float) -> float:

@@ -11,9 +11,9 @@ import transientcam_moments as tm
 from benchmarks.common.data import PAPER, SETTINGS, VGA, images
 from benchmarks.common.tables import Table
 from benchmarks.common.timing import measure
-from benchmarks.likelihood.errors import errors_of, turn_m
+from benchmarks.likelihood.errors import captured, errors_of, turn_m
 from transientcam_driver import Sequence as Capture
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench
+from transientcam_experiments.paper.bench import Bench
 from transientcam_moments.reconstruction import NEIGHBOURS
 
 SCENES: Final = ("wall", "mirrors", "corner")
@@ -39,13 +39,8 @@ def tables() -> Iterator[Table]:
 
 def _errors(bench: Bench, scene: str, takes: int) -> Iterator[str]:
     sequence = Capture(base_frequency_hz=23e6, harmonics=ORDER, takes=takes, zeroth="low-frequency")
-    shot = bench.shot(scene, sequence, options=WITHOUT_OUTLIERS)
-    gains = bench.calibration(sequence, options=WITHOUT_OUTLIERS).gains.planes
-    usual = replace(shot.found.settings, sensor=tm.noise.Sensor(), estimator="likelihood")
-    truth, turn = (
-        np.where(shot.truth.lit, shot.truth.range_m, np.nan),
-        turn_m(shot.base_frequency_hz),
-    )
+    shot, gains, settings, truth = captured(bench, scene, sequence)
+    usual, turn = replace(settings, estimator="likelihood"), turn_m(shot.base_frequency_hz)
     found = {
         name: tm.Reconstruction(
             shot.found.measured, replace(usual, neighbours=name), calibration=gains

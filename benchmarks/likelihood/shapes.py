@@ -25,19 +25,15 @@ SEED: Final = 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Responses:
-    """Impulse responses of pixels: light at times of flight, and where the first return is.
-
-    Attributes
-    ----------
-    time_s : array, shape (T,)
-    light : array, shape (P, T)
-    first_s : array, shape (P,)
-    """
+    """Impulse responses of pixels: light at times of flight, and where the first return is."""
 
     name: str
     time_s: Array
+    """Shape (T,)."""
     light: Array
+    """Shape (P, T)."""
     first_s: Array
+    """Shape (P,)."""
 
     def moments(self, m: int) -> Array:
         """Return moments (m + 1, P) over b_0."""

@@ -42,24 +42,16 @@ OVER_HTTP_EVERY = 10
 
 @dataclass
 class Findings:
-    """What came of many cases.
-
-    Attributes
-    ----------
-    states
-        How often a kind of case was listed as what.
-    wrong
-        Cases by what should not have happened: crashes, hangs, server errors.
-    grown_bytes
-        The most memory that each case took.
-    spent_s
-        The processor time that each case took.
-    """
+    """What came of many cases."""
 
     states: collections.Counter[tuple[str, str]] = field(default_factory=collections.Counter)
+    """How often a kind of case was listed as what."""
     wrong: dict[str, list[int]] = field(default_factory=dict)
+    """Cases by what should not have happened: crashes, hangs, server errors."""
     grown_bytes: list[int] = field(default_factory=list)
+    """The most memory that each case took."""
     spent_s: list[float] = field(default_factory=list)
+    """The processor time that each case took."""
 
     def take(self, outcome: dict[str, Any]) -> None:
         """Count a case."""

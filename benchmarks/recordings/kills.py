@@ -23,22 +23,16 @@ WITHIN_S = 60.0
 
 @dataclass(frozen=True)
 class Kill:
-    """One of them.
-
-    Attributes
-    ----------
-    acknowledged, recovered
-        Frames before, and in the file that the next daemon made whole by itself.
-    whole
-        Whether each of these is there bit for bit, and they follow one another.
-    open_s
-        From the start of the next daemon until the file was whole.
-    """
+    """One of them."""
 
     acknowledged: int
     recovered: int
+    """``acknowledged``, ``recovered``: frames before, and in the file that the next daemon made
+    whole by itself."""
     whole: bool
+    """Whether each of these is there bit for bit, and they follow one another."""
     open_s: float
+    """From the start of the next daemon until the file was whole."""
 
 
 def measure_kills(directory: Path, *, kills: int) -> list[Kill]:

@@ -32,25 +32,17 @@ WHAT = {
 
 @dataclass(frozen=True)
 class Survived:
-    """What was left after a cut.
-
-    Attributes
-    ----------
-    acknowledged, recovered
-        Frames before the cut, and after recovery.
-    lost
-        Acknowledged more than 1 s before, and not there.
-    different
-        Frames that are not as they were written.
-    opened
-        Whether the file can be opened after recovery.
-    """
+    """What was left after a cut."""
 
     acknowledged: int
     recovered: int
+    """``acknowledged``, ``recovered``: frames before the cut, and after recovery."""
     lost: int
+    """Acknowledged more than 1 s before, and not there."""
     different: int
+    """Frames that are not as they were written."""
     opened: bool
+    """Whether the file can be opened after recovery."""
 
 
 def survive(events: list[Event], disk: str, number: int, directory: Path) -> Survived:

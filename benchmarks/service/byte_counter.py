@@ -2,7 +2,6 @@
 
 import socket
 import threading
-from types import TracebackType
 from urllib.parse import urlsplit
 
 _PIECE_BYTES = 65536
@@ -11,10 +10,7 @@ _PIECE_BYTES = 65536
 class ByteCounter:
     """Forwards connections to a server until the end of the block.
 
-    Parameters
-    ----------
-    url
-        Of the server, without a path.
+    ``url``: of the server, without a path.
     """
 
     def __init__(self, url: str) -> None:
@@ -32,12 +28,7 @@ class ByteCounter:
         threading.Thread(target=self._accept, daemon=True).start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         for each in (self._listener, *self._sockets):
             each.close()
 

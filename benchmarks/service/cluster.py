@@ -12,18 +12,18 @@ import xarray
 
 import transientcam
 from benchmarks.common.daemon import daemon
+from benchmarks.common.recordings import record
 from benchmarks.common.tables import Column, Table, heads, verdict
 from benchmarks.service.byte_counter import ByteCounter
-from transientcam_driver import Sequence, open_camera
-from transientcam_driver.clock import VirtualClock
+from transientcam_driver import Sequence
 from transientcam_server.offline import BatchOptions, reconstruct_on
 from transientcam_server.offline._job import BLOCK_FRAMES
-from transientcam_server.recording import Header, RecordingWriter
 from transientcam_server.settings import ReconstructionSettings
 
 FRAMES: Final = 2000
 _CAMERA: Final = "sim:mirrors?seed=5"
 _HARMONICS: Final = 4
+_SEQUENCE: Final = Sequence(harmonics=_HARMONICS, zeroth="estimated", exposure_s=5e-4)
 _DISTINCT: Final = 8
 """Frames that are simulated; the recording repeats them."""
 _PRODUCTS: Final = ("range", "direct", "indirect", "validity", "flags")
@@ -36,25 +36,10 @@ _HOUR_FRAMES: Final = 36_000
 _EMPTY_TASKS: Final = 5000
 
 
-def record(path: Path, frames: int) -> None:
-    """Record frames of the simulated camera at 163 x 120 pixels."""
-    with open_camera(_CAMERA, clock=VirtualClock()) as camera:
-        sequence = Sequence(harmonics=_HARMONICS, zeroth="estimated", exposure_s=5e-4)
-        applied = camera.configure(sequence)
-        camera.start()
-        distinct = [camera.read_frame() for _ in range(min(frames, _DISTINCT))]
-        header = Header(path.stem, path.stem, 1e9, applied, camera.capabilities)
-        writer = RecordingWriter(path, header)
-        for number in range(frames):
-            frame = distinct[number % len(distinct)]
-            writer.append(dataclasses.replace(frame, number=number + 1))
-        writer.close({})
-
-
 def bytes_moved(directory: Path) -> Table:
     """Return what travels from a daemon for a slice of a recording, by every way to read it."""
     path = directory / "slices.h5"
-    record(path, 200)
+    record(path, _CAMERA, _SEQUENCE, 200, distinct=_DISTINCT)
     table = Table(
         "Bytes moved for a slice",
         ("read", *(Column(f"{what}, KiB", ".0f") for what in ("open", "one frame", "ten frames"))),
@@ -108,8 +93,8 @@ class Measured:
 def efficiency(directory: Path) -> tuple[Table, Measured]:
     """Return the time of 2 processes against that of 1."""
     recording, first = directory / "long.h5", directory / "first.h5"
-    record(recording, FRAMES)
-    record(first, 2 * BLOCK_FRAMES)
+    record(recording, _CAMERA, _SEQUENCE, FRAMES, distinct=_DISTINCT)
+    record(first, _CAMERA, _SEQUENCE, 2 * BLOCK_FRAMES, distinct=_DISTINCT)
     options = BatchOptions(_PRODUCTS, ReconstructionSettings(estimator=_ESTIMATOR))
     table = Table(
         f"{FRAMES} frames at 163 x 120, m = {_HARMONICS}",

@@ -58,12 +58,12 @@ def observe(
 ) -> tuple[Cell, ...]:
     """Return what a daemon spends while all viewers look, and how old frames are for them."""
     watch(viewers, duration_s=SETTLE_S)
-    before = [len(each.seen.latencies_s) for each in viewers]
+    for each in viewers:
+        each.begin_anew()
     cpu_s = process.cpu_s()
     elapsed_s = watch(viewers, duration_s=duration_s)
     spent_s = process.cpu_s() - cpu_s
-    fresh = [each.seen.latencies_s[b:] for each, b in zip(viewers, before, strict=True)]
-    latencies = _percentiles([latency_s for each in fresh for latency_s in each])
+    latencies = _percentiles([latency_s for each in viewers for latency_s in each.seen.latencies_s])
     held_mib = process.resident_bytes() / 2**20
     return what, len(viewers), spent_s / elapsed_s, held_mib, latencies
 
@@ -93,8 +93,7 @@ def kill_one(
         while "reconnected" not in [each.kind for each in stream.notices]:
             stream.receive(timeout_s=BACK_WITHIN_S)
         back_s = time.perf_counter() - killed_s
-    numbers = [each.seen.numbers for each in others]
-    missing = sum(each[-1] - each[0] + 1 - len(each) for each in numbers)
+    missing = sum(each.seen.missing for each in others)
     cut(each.connection for each in others)
     return Killed(back_s, len(others), missing)
 

@@ -32,25 +32,18 @@ _ASK_EVERY_S: Final = 0.05
 
 @dataclass(frozen=True)
 class Relayed:
-    """What travels with one number of takes, and how far off the ranges of a relay are.
-
-    Attributes
-    ----------
-    frame_bytes
-        Of each product that can be relayed.
-    apart_m
-        Largest difference of a range of the relay of moments from the origin's; NaN where only one
-        of the two has any.
-    equal
-        Whether they are equal to the bit.
-    """
+    """What travels with one number of takes, and how far off the ranges of a relay are."""
 
     takes: int
     images: int
     frame_rate_hz: float
     frame_bytes: dict[str, int]
+    """Of each product that can be relayed."""
     apart_m: float
+    """Largest difference of a range of the relay of moments from the origin's; NaN where only one
+    of the two has any."""
     equal: bool
+    """Whether they are equal to the bit."""
 
 
 def bytes_of_a_frame(origin: Process, product: str) -> int:

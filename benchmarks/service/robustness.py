@@ -18,7 +18,7 @@ import transientcam
 from benchmarks.common.daemon import VIDEO, daemon
 from benchmarks.common.tables import Table, met
 from benchmarks.recordings import kills as killing
-from benchmarks.service.soak import Samples
+from benchmarks.service.soak import Sample
 from benchmarks.service.viewers import Viewer, cut, watch
 from transientcam.stream_state import Reconnect
 
@@ -39,19 +39,13 @@ END_AFTER_S = (0.0, 0.5, 2.0, 5.0, 10.0)
 
 @dataclass
 class Unplugs:
-    """What was seen of the camera going and coming.
-
-    Attributes
-    ----------
-    seen_s
-        From the unplug to the notice ``camera-lost``, of each.
-    back_s
-        From the replug to the first new frame.
-    """
+    """What was seen of the camera going and coming."""
 
     seen_s: list[float] = field(default_factory=list)
+    """From the unplug to the notice ``camera-lost``, of each."""
     back_s: list[float] = field(default_factory=list)
-    samples: Samples = field(default_factory=Samples)
+    """From the replug to the first new frame."""
+    samples: list[Sample] = field(default_factory=list)
     missing: list[int] = field(default_factory=list)
     recorded: int = 0
 
@@ -74,7 +68,7 @@ def measure_unplugs(directory: Path, *, unplugs: int, viewers: int) -> Unplugs:
             try:
                 for _ in range(unplugs):
                     _unplug(camera, stream, watching, found)
-                    found.samples.take(process)
+                    found.samples.append(Sample.of(process))
             finally:
                 cut(each.connection for each in watching)
         found.recorded = camera.stop_recording(recording["id"])["frames"]
@@ -143,7 +137,8 @@ def tables(*, unplugs: int = 100, viewers: int = 10, kills: int = 100) -> Iterat
 
 
 def _unplugged(seen: Unplugs, viewers: int) -> Table:
-    held, rows = seen.samples, []
+    warm, last = seen.samples[min(WARM_UP, len(seen.samples) - 1)], seen.samples[-1]
+    rows = []
     for name, values_s, bar_s in (
         ("unplug to the notice `camera-lost`", seen.seen_s, SEEN_BAR_S),
         ("replug to the next frame", seen.back_s, BACK_BAR_S),
@@ -156,9 +151,10 @@ def _unplugged(seen: Unplugs, viewers: int) -> Table:
         ("", "median", "longest", "bar"),
         rows,
         [
-            f"Growth from unplug {WARM_UP} to the last: {_growth(held.memory_bytes) / 2**20:+.1f} "
-            f"MiB of memory, {_growth(held.descriptors):+d} descriptors, "
-            f"{_growth(held.threads):+d} threads. "
+            f"Growth from unplug {WARM_UP} to the last: "
+            f"{(last.memory_bytes - warm.memory_bytes) / 2**20:+.1f} MiB of memory, "
+            f"{last.descriptors - warm.descriptors:+d} descriptors, "
+            f"{last.threads - warm.threads:+d} threads. "
             "Frames that a viewer neither received nor had reported as dropped: "
             f"{max(seen.missing)} at most. Frames in the recording: {seen.recorded}."
         ],
@@ -181,7 +177,3 @@ def _ended(ends: list[tuple[float, float, bool]]) -> Table:
         [f"- Bar: {END_BAR_S:g} s, {met(max(end_s for _, end_s, _ in ends) <= END_BAR_S)}."],
         ["With a recording that runs and an empty kernel cache, so long after it listened."],
     )
-
-
-def _growth(values: list[int]) -> int:
-    return values[-1] - values[min(WARM_UP, len(values) - 1)]

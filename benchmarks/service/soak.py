@@ -7,17 +7,17 @@ after the other, each of which is deleted when the next one runs, so that the di
 import statistics
 import tempfile
 import threading
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Final, NamedTuple
 
 import httpx
 import numpy as np
 
 from benchmarks.common.daemon import VIDEO, Process, daemon
 from benchmarks.common.tables import Cell, Table, percentiles
-from benchmarks.service.viewers import Viewer, ViewerRecord, cut, watch
+from benchmarks.service.viewers import Viewer, cut, watch
 
 RANGE = {"type": "subscribe", "v": 1, "subscriptions": [{"product": "range"}]}
 SAMPLE_S = 5.0
@@ -26,40 +26,39 @@ SETTLE_S = 120.0
 """Left out at the beginning: buffers and caches fill until then."""
 
 
-@dataclass
-class Samples:
-    """What the daemon's process held at some times."""
+class Sample(NamedTuple):
+    """What the daemon's process held at some time."""
 
-    time_s: list[float] = field(default_factory=list)
-    memory_bytes: list[int] = field(default_factory=list)
-    descriptors: list[int] = field(default_factory=list)
-    threads: list[int] = field(default_factory=list)
+    time_s: float
+    memory_bytes: int
+    descriptors: int
+    threads: int
 
-    def take(self, process: Process) -> None:
-        """Look once."""
-        self.time_s.append(process.age_s())
-        self.memory_bytes.append(process.resident_bytes())
-        self.descriptors.append(process.descriptors())
-        self.threads.append(process.threads())
+    @classmethod
+    def of(cls, process: Process) -> "Sample":
+        """Look at it now."""
+        held = process.resident_bytes(), process.descriptors(), process.threads()
+        return cls(process.age_s(), *held)
+
+
+HELD: Final = ("memory, MiB", "descriptors", "threads")
+"""What a `Sample` holds, in words."""
+UNITS: Final = (2**20, 1, 1)
 
 
 @dataclass(frozen=True)
 class Soak:
     """What was seen."""
 
-    minutes: float
-    viewers: int
     frames: int
     expected: float
     missing: list[int]
     dropped: list[int]
     latencies_ms: list[float]
-    recordings: int
-    recorded: int
-    recording_dropped: int
+    recorder: "Recorder"
     cpu_s: float
     duration_s: float
-    samples: Samples
+    samples: list[Sample]
 
 
 class Recorder:
@@ -109,16 +108,16 @@ def soak(*, minutes: float, viewers: int, directory: Path) -> Soak:
         applied = client.put("sequence", json=VIDEO).raise_for_status().json()
         process.settle()
         recorder = Recorder(client)
-        samples = Samples()
+        samples: list[Sample] = []
         watching = [Viewer(process.stream_url, RANGE) for _ in range(viewers)]
 
         def look() -> None:
-            samples.take(process)
+            samples.append(Sample.of(process))
 
         try:
             watch(watching, duration_s=SETTLE_S, every_s=SAMPLE_S, meanwhile=look)
             for each in watching:
-                each.seen = ViewerRecord()
+                each.begin_anew()
             cpu_s = process.cpu_s()
             begin_s = process.age_s()
             duration_s = watch(
@@ -128,50 +127,21 @@ def soak(*, minutes: float, viewers: int, directory: Path) -> Soak:
         finally:
             cut(each.connection for each in watching)
             recorder.stop()
-        return _soak(
-            watching, recorder, _since(samples, begin_s), minutes, duration_s, cpu_s, applied
-        )
-
-
-def _since(samples: Samples, begin_s: float) -> Samples:
-    first = next(index for index, each in enumerate(samples.time_s) if each >= begin_s)
-    return Samples(
-        samples.time_s[first:],
-        samples.memory_bytes[first:],
-        samples.descriptors[first:],
-        samples.threads[first:],
-    )
-
-
-def _soak(
-    watching: list[Viewer],
-    recorder: Recorder,
-    samples: Samples,
-    minutes: float,
-    duration_s: float,
-    cpu_s: float,
-    applied: dict[str, Any],
-) -> Soak:
     seen = [each.seen for each in watching]
-    numbers = [each.numbers for each in seen]
     return Soak(
-        minutes=minutes,
-        viewers=len(watching),
-        frames=max(each[-1] for each in numbers) - min(each[0] for each in numbers) + 1,
+        frames=max(each.numbers[-1] for each in seen) - min(each.numbers[0] for each in seen) + 1,
         expected=applied["frame_rate_hz"] * duration_s,
-        missing=[each[-1] - each[0] + 1 - len(each) for each in numbers],
+        missing=[each.missing for each in seen],
         dropped=[each.dropped for each in seen],
         latencies_ms=[1e3 * latency_s for each in seen for latency_s in each.latencies_s],
-        recordings=recorder.recordings,
-        recorded=recorder.frames,
-        recording_dropped=recorder.dropped,
+        recorder=recorder,
         cpu_s=cpu_s,
         duration_s=duration_s,
-        samples=samples,
+        samples=[each for each in samples if each.time_s >= begin_s],
     )
 
 
-def slope(time_s: list[float], values: list[float]) -> tuple[float, float]:
+def slope(time_s: Sequence[float], values: Sequence[float]) -> tuple[float, float]:
     """Return the slope of a line through values, a hour, and its standard error."""
     time_h = np.asarray(time_s) / 3600.0
     (gradient, _), covariance = np.polyfit(time_h, values, 1, cov=True)
@@ -182,6 +152,7 @@ def tables(*, minutes: float = 30.0, viewers: int = 20) -> Iterator[Table]:
     """Run for so many minutes, while so many viewers look on."""
     with tempfile.TemporaryDirectory() as name:
         result = soak(minutes=minutes, viewers=viewers, directory=Path(name))
+    recorder = result.recorder
     missed = f"{statistics.median(result.missing):g} / {max(result.missing)}"
     rows = (
         ("frames captured, of those due", f"{result.frames} of {result.expected:.0f}"),
@@ -190,7 +161,7 @@ def tables(*, minutes: float = 30.0, viewers: int = 20) -> Iterator[Table]:
         ("photon to client, p50 / p99", f"{percentiles(result.latencies_ms, (50, 99))} ms"),
         (
             "recordings, frames in them, frames dropped",
-            f"{result.recordings}, {result.recorded}, {result.recording_dropped}",
+            f"{recorder.recordings}, {recorder.frames}, {recorder.dropped}",
         ),
         ("share of one core", f"{result.cpu_s / result.duration_s:.0%}"),
     )
@@ -209,16 +180,12 @@ def tables(*, minutes: float = 30.0, viewers: int = 20) -> Iterator[Table]:
     yield Table("", columns, list(_rows(result.samples)), text=[text])
 
 
-def _rows(samples: Samples) -> Iterator[list[Cell]]:
-    memory = [each / 2**20 for each in samples.memory_bytes]
+def _rows(samples: list[Sample]) -> Iterator[list[Cell]]:
     minute = max(1, round(60.0 / SAMPLE_S))
-    values: list[float]
-    for name, values, form in (
-        ("memory, MiB", memory, ".1f"),
-        ("descriptors", [float(each) for each in samples.descriptors], ".0f"),
-        ("threads", [float(each) for each in samples.threads], ".0f"),
-    ):
-        gradient, error = slope(samples.time_s, values)
+    times_s, *held = zip(*samples, strict=True)
+    for name, counts, unit, form in zip(HELD, held, UNITS, (".1f", ".0f", ".0f"), strict=True):
+        values = [each / unit for each in counts]
+        gradient, error = slope(times_s, values)
         first, last = statistics.mean(values[:minute]), statistics.mean(values[-minute:])
         cells = [format(each, form) for each in (first, last, min(values), max(values))]
         change = round(gradient, 2) + 0.0  # no minus before a zero

@@ -111,17 +111,14 @@ class Flood:
         """Measure one round."""
         several = [Viewer(url, subscribe(start=1), look=False) for _ in range(viewers)]
         watch(several, duration_s=0.5)
-        before = [(v.seen.received_bytes, v.seen.messages) for v in several]
+        for viewer in several:
+            viewer.begin_anew()
         cpu_s = process.cpu_s()
         elapsed_s = watch(several, duration_s=FLOOD_S)
         spent_s = process.cpu_s() - cpu_s
-        now = [(v.seen.received_bytes, v.seen.messages) for v in several]
         cut(viewer.connection for viewer in several)
-        received, messages = (
-            sum(after[i] - earlier[i] for after, earlier in zip(now, before, strict=True))
-            for i in (0, 1)
-        )
-        self.bytes_s.append(received / elapsed_s)
+        messages = sum(viewer.seen.messages for viewer in several)
+        self.bytes_s.append(sum(viewer.seen.received_bytes for viewer in several) / elapsed_s)
         self.cpu_s_per_message.append(spent_s / max(1, messages))
 
 
@@ -163,10 +160,10 @@ def measure_travel(width: int, height: int, *, duration_s: float) -> tuple[float
     """Return the frames a second that one viewer of range sees, and how long each took, in ms."""
     with daemon("--camera", f"sim:mirrors?width={width}&height={height}") as process:
         viewer = _settled_viewer(process)
-        begin = len(viewer.seen.numbers)
+        viewer.begin_anew()
         elapsed_s = watch([viewer], duration_s=duration_s)
         viewer.connection.close()
-    latencies_ms = [1e3 * latency_s for latency_s in viewer.seen.latencies_s[begin:]]
+    latencies_ms = [1e3 * latency_s for latency_s in viewer.seen.latencies_s]
     return len(latencies_ms) / elapsed_s, latencies_ms
 
 
@@ -227,7 +224,8 @@ def _observe(
     *,
     duration_s: float,
 ) -> Load:
-    before = [(len(viewer.seen.numbers), viewer.seen.dropped) for viewer in healthy]
+    for viewer in healthy:
+        viewer.begin_anew()
     begin_s, cpu_s = time.perf_counter(), process.cpu_s()
     gone_s: list[float] = []
 
@@ -236,20 +234,17 @@ def _observe(
             gone_s.append(time.perf_counter() - begin_s)
 
     elapsed_s = watch(healthy, duration_s=duration_s, meanwhile=look)
-    numbers = [v.seen.numbers[b:] for v, (b, _) in zip(healthy, before, strict=True)]
+    seen = [viewer.seen for viewer in healthy]
+    first, last = min(each.numbers[0] for each in seen), max(each.numbers[-1] for each in seen)
     return Load(
         viewers=len(healthy) + len(sockets),
         stuck=len(sockets),
         duration_s=elapsed_s,
-        rates_hz=[len(each) / elapsed_s for each in numbers],
-        latencies_s=[
-            each
-            for v, (b, _) in zip(healthy, before, strict=True)
-            for each in v.seen.latencies_s[b:]
-        ],
-        dropped=sum(v.seen.dropped - d for v, (_, d) in zip(healthy, before, strict=True)),
-        missing=sum(each[-1] - each[0] + 1 - len(each) for each in numbers),
-        captured=max(each[-1] for each in numbers) - min(each[0] for each in numbers) + 1,
+        rates_hz=[len(each.numbers) / elapsed_s for each in seen],
+        latencies_s=[latency_s for each in seen for latency_s in each.latencies_s],
+        dropped=sum(each.dropped for each in seen),
+        missing=sum(each.missing for each in seen),
+        captured=last - first + 1,
         cpu_s=process.cpu_s() - cpu_s,
         resident_bytes=process.resident_bytes(),
         gone_s=gone_s[0] if gone_s else None,

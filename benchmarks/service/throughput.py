@@ -19,12 +19,11 @@ import httpx
 
 from benchmarks.common.daemon import VIDEO, Process, running
 from benchmarks.common.machine import commit_of
+from benchmarks.common.recordings import record
 from benchmarks.common.records import ROOT
 from benchmarks.common.tables import Table, heads, met
 from benchmarks.service.viewers import Viewer, ViewerRecord, cut, watch
-from transientcam_driver import Sequence, open_camera
-from transientcam_driver.clock import VirtualClock
-from transientcam_server.recording import Header, RecordingWriter
+from transientcam_driver import Sequence
 
 SIZES: Final = ((163, 120), (640, 480))
 HARMONICS: Final = (3, 4, 8)
@@ -60,38 +59,15 @@ class Daemon:
 
 @dataclass(frozen=True)
 class Cost:
-    """What frames of one size and order cost one daemon.
-
-    Attributes
-    ----------
-    cpu_ms
-        Processor time of a frame that a viewer takes the range of, beyond that of a daemon that
-        replays without a viewer.
-    replay_ms
-        Processor time of a frame without a viewer.
-    rate_hz
-        Frames a second that the viewer gets where far more are offered.
-    """
+    """What frames of one size and order cost one daemon."""
 
     cpu_ms: float
+    """Processor time of a frame that a viewer takes the range of, beyond that of a daemon that
+    replays without a viewer."""
     replay_ms: float
+    """Processor time of a frame without a viewer."""
     rate_hz: float
-
-
-def record(directory: Path, width: int, height: int, harmonics: int) -> tuple[Path, float]:
-    """Record some frames of the simulated camera; return the file and its frame rate."""
-    path = directory / f"{width}-{harmonics}.h5"
-    spec = f"sim:mirrors?width={width}&height={height}&seed=1"
-    with open_camera(spec, clock=VirtualClock()) as camera:
-        base_hz = BASE_HZ[harmonics]
-        applied = camera.configure(Sequence(base_frequency_hz=base_hz, harmonics=harmonics))
-        header = Header(path.stem, path.stem, time.time(), applied, camera.capabilities)
-        writer = RecordingWriter(path, header)
-        camera.start()
-        for _ in range(RECORDED_FRAMES):
-            writer.append(camera.read_frame())
-        writer.close({})
-    return path, applied.frame_rate_hz
+    """Frames a second that the viewer gets where far more are offered."""
 
 
 @contextmanager
@@ -122,8 +98,7 @@ def viewed(
     """Return what one viewer saw, in which time, and what the daemon spent in it."""
     viewer = Viewer(process.stream_url, _subscribe(*products, computed=computed))
     watch([viewer], duration_s=_SETTLE_S)
-    viewer.seen.numbers.clear()
-    viewer.seen.latencies_s.clear()
+    viewer.begin_anew()
     before_s = process.cpu_s()
     elapsed_s = watch([viewer], duration_s=duration_s)
     spent_s = process.cpu_s() - before_s
@@ -186,7 +161,12 @@ def tables(*, against: Path | None = None, seconds: float = 8.0) -> Iterator[Tab
     with tempfile.TemporaryDirectory() as name:
         for width, height in SIZES:
             for harmonics in HARMONICS:
-                recording, rate_hz = record(Path(name), width, height, harmonics)
+                recording = Path(name) / f"{width}-{harmonics}.h5"
+                spec = f"sim:mirrors?width={width}&height={height}&seed=1"
+                sequence = Sequence(base_frequency_hz=BASE_HZ[harmonics], harmonics=harmonics)
+                rate_hz = record(
+                    recording, spec, sequence, RECORDED_FRAMES, distinct=RECORDED_FRAMES
+                ).frame_rate_hz
                 for when, daemon in daemons.items():
                     cost = measure(daemon, recording, rate_hz, width, duration_s=seconds)
                     print(f"{width} x {height}, m = {harmonics}, {when}: {cost}", flush=True)

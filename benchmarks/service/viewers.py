@@ -55,23 +55,21 @@ def _masked(opcode: Opcode, data: bytes) -> bytes:
 
 @dataclass
 class ViewerRecord:
-    """What one viewer received.
-
-    Attributes
-    ----------
-    numbers
-        Of its frames, in the order they came.
-    latencies_s
-        From the arrival of a frame's last image at the daemon to its last byte here.
-    dropped
-        Frames that the daemon said it was too slow for.
-    """
+    """What one viewer received."""
 
     numbers: list[int] = field(default_factory=list)
+    """Of its frames, in the order they came."""
     latencies_s: list[float] = field(default_factory=list)
+    """From the arrival of a frame's last image at the daemon to its last byte here."""
     dropped: int = 0
+    """Frames that the daemon said it was too slow for."""
     messages: int = 0
     received_bytes: int = 0
+
+    @property
+    def missing(self) -> int:
+        """Numbers of frames between the first and the last one that never came."""
+        return self.numbers[-1] - self.numbers[0] + 1 - len(self.numbers)
 
 
 class Viewer:
@@ -88,6 +86,10 @@ class Viewer:
         if subscribe is not None:
             send(self.connection, subscribe)
         self.connection.setblocking(False)
+
+    def begin_anew(self) -> None:
+        """Forget what was received."""
+        self.seen = ViewerRecord()
 
     def read(self, buffer: memoryview) -> bool:
         """Take what there is; return whether the connection still stands."""

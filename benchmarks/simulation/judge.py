@@ -5,17 +5,18 @@ camera give on average, less what the tracer says of them, in units of the noise
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.common.tables import Table, heads
 from benchmarks.simulation.accuracy import READOUT_S, SEQUENCES, SIZE, START_S
-from benchmarks.simulation.path_tracer import REPETITIONS, Tracer
 from benchmarks.simulation.scenes import BUILT_IN, scene_named, unseen
+from tests.simulation.light.path_tracer import REPETITIONS, Tracer
 from transientcam_driver.sequence import ImageLabel, Sequence
 from transientcam_simulation.effects import EFFECTS, LightEffect
 from transientcam_simulation.emulated import world_of
@@ -26,8 +27,7 @@ _CERTAIN = 2  # standard errors of the tracer
 Values = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
+class Verdict(NamedTuple):
     """The simulation less the tracer, in units of the noise, over pixels that any light reaches.
 
     ``error`` is the tracer's own, ``beyond_half`` the share of pixels that differ by more than
@@ -152,16 +152,5 @@ def tables(
             continue
         for sequence in sequences:
             each = judge(scene, sequence, pixels=pixels, paths=paths, as_stated=not unlimited)
-            table.rows.append(
-                (
-                    each.scene,
-                    each.sequence,
-                    each.rms,
-                    each.error,
-                    each.largest,
-                    each.beyond_half,
-                    each.range_mm,
-                    ", ".join(each.missing) or "-",
-                )
-            )
+            table.rows.append((*each[:-1], ", ".join(each.missing) or "-"))
     yield table

@@ -24,21 +24,14 @@ _Array = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Ceiling:
-    """Rates of a number of cores together, in float32.
-
-    Attributes
-    ----------
-    fused_s
-        Fused multiply-adds of single numbers a second.
-    cached_bytes_s
-        Bytes written a second to 4 MiB a core that are written again and again.
-    stream_bytes_s
-        Bytes written a second past the caches to 128 MiB a core.
-    """
+    """Rates of a number of cores together, in float32."""
 
     fused_s: float
+    """Fused multiply-adds of single numbers a second."""
     cached_bytes_s: float
+    """Bytes written a second to 4 MiB a core that are written again and again."""
     stream_bytes_s: float
+    """Bytes written a second past the caches to 128 MiB a core."""
 
 
 @njit(nogil=True, error_model="numpy")

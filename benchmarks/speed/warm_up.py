@@ -16,19 +16,13 @@ _FRAME_WITHIN_S = 10.0
 
 @dataclass(frozen=True)
 class WarmUp:
-    """What there was how long after a change, in s.
-
-    Attributes
-    ----------
-    first_frame_s
-        The first frame of it, computed in NumPy where the kernel was not there.
-    estimator_s, all_s
-        The kernel of the estimator, and all that live frames use.
-    """
+    """What there was how long after a change, in s."""
 
     first_frame_s: float
+    """The first frame of it, computed in NumPy where the kernel was not there."""
     estimator_s: float
     all_s: float
+    """``estimator_s``, ``all_s``: the kernel of the estimator, and all that live frames use."""
 
 
 def warmed_up(process: Process, camera: Camera, sequence_id: int, begin_s: float) -> WarmUp:

@@ -28,14 +28,9 @@ class ThreadsApart(ThreadPoolExecutor):
     there all threads share the caller's until the scheduler moves them, after some 20 ms of work,
     and a film takes one. Where a system cannot say, it places the threads by itself.
 
-    Parameters
-    ----------
-    threads : int
-        How many there are at most.
-    name : str
-        How their names begin.
-    processor : callable, optional
-        Returns the processor that the calling thread runs on, or less than 0.
+    ``threads``: how many there are at most.
+    ``name``: how their names begin.
+    ``processor``: returns the processor that the calling thread runs on, or less than 0.
     """
 
     def __init__(self, threads: int, name: str, processor: Callable[[], int] = _processor) -> None:

@@ -27,12 +27,8 @@ class Cache:
     numba notices a change of the file that a function is in, but not of the files whose functions
     and constants it is made of: there is a directory for each state of all these files.
 
-    Parameters
-    ----------
-    sources : str
-        Names of the modules, and packages of modules, that code is compiled of.
-    environ : mapping, optional
-        In the place of the environment of the process.
+    ``sources``: names of the modules, and packages of modules, that code is compiled of.
+    ``environ``: in the place of the environment of the process.
     """
 
     def __init__(self, *sources: str, environ: Mapping[str, str] = os.environ) -> None:

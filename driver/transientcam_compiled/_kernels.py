@@ -105,12 +105,9 @@ class Kernels(Generic[Key]):
     def want(self, key: Key, *, computing: bool = False) -> None:
         """Have a kernel made ready in the background; returns at once, also where it cannot be.
 
-        Parameters
-        ----------
-        computing
-            NumPy computes the same on this thread now, and `returned` is called after it. Loading
-            begins then, or after `LATEST_S`: it would take the interpreter's lock from the call
-            again and again, and make it several times as long.
+        ``computing``: NumPy computes the same on this thread now, and `returned` is called after
+        it. Loading begins then, or after `LATEST_S`: it would take the interpreter's lock from the
+        call again and again, and make it several times as long.
         """
         if not self.automatic or key in self._seen:
             return

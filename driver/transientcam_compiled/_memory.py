@@ -26,10 +26,7 @@ class Pool:
 
     No call waits: where another thread is at it, memory is taken from the system, or goes back.
 
-    Parameters
-    ----------
-    most_bytes : int
-        What is kept at most; more than that goes back to the system at once.
+    ``most_bytes``: what is kept at most; more than that goes back to the system at once.
     """
 
     def __init__(self, most_bytes: int = MOST_BYTES) -> None:

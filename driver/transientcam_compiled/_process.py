@@ -39,15 +39,10 @@ class ChildProcess:
     It ends with the thread that started it, however that ends and whatever it does then. For one
     thread.
 
-    Parameters
-    ----------
-    inside
-        Returns the context that everything is called in there.
-    idle
-        Called there after each second without a call.
-    memory_bytes
-        For data beyond that of its libraries (``RLIMIT_DATA``): what needs more raises
-        `MemoryError` there.
+    ``inside``: returns the context that everything is called in there.
+    ``idle``: called there after each second without a call.
+    ``memory_bytes``: for data beyond that of its libraries (``RLIMIT_DATA``): what needs more
+    raises `MemoryError` there.
     """
 
     def __init__(
@@ -64,10 +59,8 @@ class ChildProcess:
     def start(self) -> None:
         """Start the process, unless it is there; returns at once.
 
-        Raises
-        ------
-        OSError
-            Where the system gives no process, or where Python cannot be started once more.
+        Raises OSError where the system gives no process, or where Python cannot be started once
+        more.
         """
         if self._process is not None:
             if self._process.poll() is None:

@@ -39,12 +39,8 @@ _PRESENT_MEMORY: Final = 1  # MCL_CURRENT of mlockall(2)
 class Watch:
     """Hears the owner of a camera, and switches its light off where it hears nothing.
 
-    Parameters
-    ----------
-    owner
-        The socket to it.
-    silence_s
-        After so long without a message while the light may be on.
+    ``owner``: the socket to it.
+    ``silence_s``: after so long without a message while the light may be on.
     """
 
     def __init__(self, owner: socket.socket, silence_s: float) -> None:
@@ -62,12 +58,8 @@ class Watch:
     def run(self, wake: int, process: int) -> None:
         """Watch until the owner says that it needs no more, or until the end of either process.
 
-        Parameters
-        ----------
-        wake
-            Is readable once this process was asked to end.
-        process
-            A file descriptor of the owner's process.
+        ``wake``: is readable once this process was asked to end.
+        ``process``: a file descriptor of the owner's process.
         """
         waiting = select.poll()
         for file in (self._owner.fileno(), wake, process):

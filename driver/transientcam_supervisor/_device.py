@@ -51,10 +51,7 @@ _DISCONNECT_CLAIM: Final = _number(2, 27, _CLAIM.size)
 class Device:
     """What is at the place of an off switch, opened and not disturbed.
 
-    Raises
-    ------
-    OSError
-        It cannot be opened.
+    Raises OSError where it cannot be opened.
     """
 
     def __init__(self, switch: OffSwitch) -> None:

@@ -42,15 +42,10 @@ class SupervisorEnded(OSError):  # noqa: N818 - says what has happened
 class Supervisor:
     """A process that switches a light off where it does not hear from this one. For one thread.
 
-    Parameters
-    ----------
-    program
-        The Python to start; None where there is none to start.
-    silence_s
-        After so long without a word while the light may be on. It is given up where it says nothing
-        for twice as long.
-    clock
-        Monotonic time in s.
+    ``program``: the Python to start; None where there is none to start.
+    ``silence_s``: after so long without a word while the light may be on. It is given up where it
+    says nothing for twice as long.
+    ``clock``: monotonic time in s.
     """
 
     def __init__(
@@ -77,10 +72,7 @@ class Supervisor:
     def watch(self, switch: OffSwitch) -> None:
         """Let it watch a camera by this switch from now on; it is started where there is none.
 
-        Raises
-        ------
-        SupervisorEnded
-            It cannot be started, or cannot reach the camera.
+        Raises SupervisorEnded where it cannot be started, or cannot reach the camera.
         """
         if self._process is not None and switch == self._switch:
             return
@@ -113,11 +105,7 @@ class Supervisor:
 
         Returns why the light was switched off by the supervisor, where it was, which goes on with
         that until `dark`.
-
-        Raises
-        ------
-        SupervisorEnded
-            It is gone, or answers nothing: it was stopped.
+        Raises SupervisorEnded where it is gone, or answers nothing: it was stopped.
         """
         now_s = self._clock()
         pause_s = 0.0 if self._alive_s is None else now_s - self._alive_s

@@ -76,26 +76,18 @@ def _plain(value: int | bytes) -> int | bytes:
 
 @dataclass(frozen=True, slots=True)
 class OffSwitch:
-    """How another process switches a camera's light off.
-
-    Attributes
-    ----------
-    at
-        Where the camera is: a device node of usbfs, ``HOST:PORT``.
-    steps
-        What switches it off, in this order; all are tried, whatever fails. None: nothing but its
-        owner does.
-    start_s
-        How long a start may take before the light is on: the owner says nothing meanwhile.
-    ends_s
-        Each request lights for so long at most, and is then over by itself; 0 where the light of a
-        request stays on.
-    """
+    """How another process switches a camera's light off."""
 
     at: str = ""
+    """Where the camera is: a device node of usbfs, ``HOST:PORT``."""
     steps: tuple[Step, ...] = ()
+    """What switches it off, in this order; all are tried, whatever fails. None: nothing but its
+    owner does."""
     start_s: float = 0.0
+    """How long a start may take before the light is on: the owner says nothing meanwhile."""
     ends_s: float = 0.0
+    """Each request lights for so long at most, and is then over by itself; 0 where the light of a
+    request stays on."""
 
     def pack(self) -> bytes:
         """Return it as text that `unpack` takes."""

@@ -156,16 +156,11 @@ def accelerated(
 ) -> Callable[[Planar], Planar]:
     """Have the kernel ``name`` stand in for a planar function wherever there is one for its data.
 
-    Parameters
-    ----------
-    name
-        One of the kernels of the module's table. It takes the same positional arguments, and may
-        return None to leave them to the function.
-    order
-        Returns m from those arguments.
-    of
-        Character of the only type of array that the kernel takes: any of float32, float64,
-        complex64 and complex128, when left out.
+    ``name``: one of the kernels of the module's table. It takes the same positional arguments, and
+    may return None to leave them to the function.
+    ``order``: returns m from those arguments.
+    ``of``: character of the only type of array that the kernel takes: any of float32, float64,
+    complex64 and complex128, when left out.
     """
 
     def decorate(planar: Planar) -> Planar:
@@ -212,10 +207,7 @@ def _of(key: Key, pixels: int, *, computing: bool = False) -> Kernel | None:
 def on_threads(threads: int | None) -> Spread:
     """Return a way to do an image on so many threads, or on all cores, of which one is this.
 
-    Raises
-    ------
-    ParameterError
-        For less than one thread.
+    Raises ParameterError for less than one thread.
     """
     if threads is not None and (
         isinstance(threads, bool) or not isinstance(threads, int) or threads < 1

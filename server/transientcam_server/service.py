@@ -353,10 +353,7 @@ class Service:
     async def record(self, options: RecordingOptions, *, history_s: float | None) -> dict[str, Any]:
         """Start a recording, with the frames of the last seconds if wanted, and describe it.
 
-        Raises
-        ------
-        Problem
-            As `Library.start`; ``only-moments`` without images.
+        Raises Problem as `Library.start`; ``only-moments`` without images.
         """
         self.require_images("Images are recorded")
         if not history_s:
@@ -402,11 +399,8 @@ class Service:
     def reconstruct_with(self, settings: ReconstructionSettings) -> SettingsVersion:
         """Compute frames from the next one on with other settings.
 
-        Raises
-        ------
-        Problem
-            ``estimator-misfit`` where the estimator needs other frequencies than there are,
-            ``only-moments`` for what is done with images that this service does not have.
+        Raises Problem ``estimator-misfit`` where the estimator needs other frequencies than there
+        are, ``only-moments`` for what is done with images that this service does not have.
         """
         require_estimator(settings, self.applied.sequence, field="estimator")
         possible = self._of_origin(settings)
@@ -437,11 +431,7 @@ class Service:
         """Refuse what needs images, where this service relays moments alone.
 
         ``done`` says what, for a sentence that goes on with "at the origin".
-
-        Raises
-        ------
-        Problem
-            ``only-moments``, with the address of the origin.
+        Raises Problem ``only-moments``, with the address of the origin.
         """
         if self.relay is not None and not self.has_images:
             url = self.relay.url

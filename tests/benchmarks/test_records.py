@@ -61,9 +61,8 @@ def test_no_other_page_has_a_place_for_a_measurement() -> None:
 @pytest.mark.parametrize("name", MEASUREMENTS)
 def test_what_is_measured_is_there(name: str) -> None:
     measurement = MEASUREMENTS[name]
-    module, _, function = measurement.function.partition(":")
-    source = ROOT / "benchmarks" / f"{module.replace('.', '/')}.py"
-    assert f"\ndef {function}(" in source.read_text(encoding="utf-8")
+    source = ROOT / "benchmarks" / f"{measurement.module.replace('.', '/')}.py"
+    assert f"\ndef {measurement.function}(" in source.read_text(encoding="utf-8")
     assert all((ROOT / path).exists() for path in measurement.of)
     assert measurement.page is None or measurement.of
 

@@ -97,6 +97,6 @@ def test_a_name_means_a_measurement_or_a_page_and_not_both() -> None:
 
 
 def test_given_options_go_before_the_functions_own(asked: Asked) -> None:
-    measurement = Measurement("x", "y:z", given={"minutes": 7.0})
+    measurement = Measurement("y:z", given={"minutes": 7.0})
     runner.run(measurement, runner.function_of(measurement), {}, write=False)
     assert asked["minutes"] == 7.0

@@ -24,24 +24,16 @@ Checks = Callable[[], Iterable[Reported]]
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """The result of one check.
-
-    Attributes
-    ----------
-    level
-        ``fault``: a part will not work; ``warning``: it will, but not fully or not as well.
-    check
-        What was checked.
-    message
-        What was found.
-    remedy
-        What to do about it; None where there is nothing to do.
-    """
+    """The result of one check."""
 
     level: Level
+    """``fault``: a part will not work; ``warning``: it will, but not fully or not as well."""
     check: str
+    """What was checked."""
     message: str
+    """What was found."""
     remedy: str | None = None
+    """What to do about it; None where there is nothing to do."""
 
     def to_document(self) -> dict[str, Any]:
         """Return what ``--json`` prints."""

@@ -80,10 +80,8 @@ def rerun(
 def _open(recording: rr.RecordingStream, *, spawn: bool, to: str | None, file: Path | None) -> None:
     """Set where a recording goes.
 
-    Raises
-    ------
-    OSError
-        If the file cannot be written, no viewer can be started, or the address is none of one.
+    Raises OSError if the file cannot be written, no viewer can be started, or the address is none
+    of one.
     """
     sinks: list[rr.GrpcSink | rr.FileSink] = []
     try:

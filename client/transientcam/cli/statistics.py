@@ -14,25 +14,18 @@ _WINDOW_S: Final = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """The statistics at one frame.
-
-    Attributes
-    ----------
-    rate_hz
-        Frames a second over the last seconds; None until there are two.
-    latency_s
-        From the arrival of the last image at the daemon to here, if both clocks agree.
-    median
-        Over the pixels that have a value; None where there are none, or the product has more than
-        one value a pixel.
-    """
+    """The statistics at one frame."""
 
     frame: int
     product: str
     unit: str
     rate_hz: float | None
+    """Frames a second over the last seconds; None until there are two."""
     latency_s: float
+    """From the arrival of the last image at the daemon to here, if both clocks agree."""
     median: float | None
+    """Over the pixels that have a value; None where there are none, or the product has more than
+    one value a pixel."""
     dropped: int
     lost_images: int
 

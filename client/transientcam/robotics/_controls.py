@@ -44,10 +44,7 @@ class Controls:
     def read(self, names: Iterable[str] = ()) -> dict[str, Any]:
         """Return the values of these parameters that have one, by name; of all, if none is named.
 
-        Raises
-        ------
-        ServerUnreachable, ProblemError
-            If the daemon does not answer.
+        Raises ServerUnreachable, ProblemError if the daemon does not answer.
         """
         chosen = frozenset(names)
         return {
@@ -59,12 +56,9 @@ class Controls:
     def write(self, values: Mapping[str, Any]) -> None:
         """Set parameters; where one cannot be set, those of the same document are not either.
 
-        Raises
-        ------
-        ParameterError
-            If nothing may be changed, or a parameter is unknown or read-only.
-        ServerUnreachable, ProblemError
-            If the daemon does not answer, refuses a value, or another client has the lease.
+        Raises ParameterError if nothing may be changed, or a parameter is unknown or read-only;
+        ServerUnreachable, ProblemError if the daemon does not answer, refuses a value, or another
+        client has the lease.
         """
         known = self._parameters()
         for name, value in values.items():
@@ -83,13 +77,8 @@ class Controls:
         """Wait for a frame that is not there yet, and return its metadata.
 
         A camera that is stopped is started for it, and stopped again.
-
-        Raises
-        ------
-        ParameterError
-            If it is stopped and may not be started.
-        ServerUnreachable, ProblemError
-            If the daemon does not answer, no frame comes, or another client has the lease.
+        Raises ParameterError if it is stopped and may not be started; ServerUnreachable,
+        ProblemError if the daemon does not answer, no frame comes, or another client has the lease.
         """
         with self._one_at_a_time:
             newest: int | None = self._camera.frames["last"]

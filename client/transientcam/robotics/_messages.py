@@ -26,28 +26,21 @@ _ENCODINGS: Final = {"<f4": "32FC1", "<u2": "16UC1", "|u1": "mono8"}
 
 @dataclass(frozen=True, slots=True)
 class Pinhole:
-    """A lens; without distortion pixel (c, r) looks along ((c - cx) / fx, (r - cy) / fy, 1).
-
-    Attributes
-    ----------
-    fx, fy, cx, cy
-        Focal lengths and principal point in pixels; whole numbers are the centres of pixels.
-    width, height
-        Of the image, in pixels.
-    source
-        Where they are known from; ``assumed`` is a guess of the service.
-    distortion
-        k1, k2, p1, p2, k3 in the order of OpenCV (ROS calls it ``plumb_bob``), or empty.
-    """
+    """A lens; without distortion pixel (c, r) looks along ((c - cx) / fx, (r - cy) / fy, 1)."""
 
     fx: float
     fy: float
     cx: float
     cy: float
+    """``fx``, ``fy``, ``cx``, ``cy``: focal lengths and principal point in pixels; whole numbers
+    are the centres of pixels."""
     width: int
     height: int
+    """``width``, ``height``: of the image, in pixels."""
     source: str
+    """Where they are known from; ``assumed`` is a guess of the service."""
     distortion: tuple[float, ...] = ()
+    """k1, k2, p1, p2, k3 in the order of OpenCV (ROS calls it ``plumb_bob``), or empty."""
 
     @classmethod
     def of_document(cls, document: Mapping[str, Any]) -> Self:

@@ -47,10 +47,8 @@ def without_secrets(url: str) -> str:
 def parse_address(url: str) -> Address:
     """Return the address that ``url`` means; without a scheme it is taken for ``http``.
 
-    Raises
-    ------
-    ParameterError
-        If it has another scheme than http or https, no host, a bad port, a query or a fragment.
+    Raises ParameterError if it has another scheme than http or https, no host, a bad port, a query
+    or a fragment.
     """
     limit = "an address like http://127.0.0.1:8000"
     try:

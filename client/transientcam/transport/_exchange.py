@@ -47,12 +47,8 @@ def within(timeout_s: float) -> Iterator[Deadline]:
 def exchange(client: httpx.Client, url: str, request: Request[Any], *, timeout_s: float) -> Answer:
     """Return the answer to a request.
 
-    Raises
-    ------
-    httpx.HTTPError
-        If there is none, or none in time.
-    ProtocolError
-        If it is longer than such an answer may be, or encoded, which was not requested.
+    Raises httpx.HTTPError if there is none, or none in time; ProtocolError if it is longer than
+    such an answer may be, or encoded, which was not requested.
     """
     options = request_options(request, timeout_s=timeout_s)
     with within(options["timeout"]), client.stream(request.method, url, **options) as response:
@@ -90,10 +86,7 @@ async def read_async(response: httpx.Response, *, most_bytes: int) -> Answer:
 def require_plain(response: httpx.Response) -> None:
     """Refuse an answer whose length says nothing of what it unpacks to.
 
-    Raises
-    ------
-    ProtocolError
-        If it is encoded, which was not requested.
+    Raises ProtocolError if it is encoded, which was not requested.
     """
     encoding = response.headers.get("content-encoding", "identity").strip().lower()
     if encoding != "identity":
@@ -113,10 +106,7 @@ def _answer(response: httpx.Response, body: bytes) -> Answer:
 class _Body:
     """The body of an answer, as far as it has arrived.
 
-    Raises
-    ------
-    ProtocolError
-        Wherever it turns out to be encoded, or too long.
+    Raises ProtocolError: wherever it turns out to be encoded, or too long.
     """
 
     def __init__(self, response: httpx.Response, *, most_bytes: int) -> None:

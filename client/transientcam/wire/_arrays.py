@@ -22,12 +22,8 @@ def wire_array(array: NDArray[Any]) -> NDArray[Any]:
     """Return ``array`` in the form that messages hold: C order, little-endian, a known dtype.
 
     The same object comes back where it already has that form.
-
-    Raises
-    ------
-    ParameterError
-        If its dtype is none of `DTYPES` in any byte order, it has more than 6 dimensions or
-        does not fit into one message.
+    Raises ParameterError if its dtype is none of `DTYPES` in any byte order, it has more than 6
+    dimensions or does not fit into one message.
     """
     name = array.dtype.newbyteorder("<").str
     if name not in DTYPES:
@@ -49,10 +45,7 @@ def buffer(array: NDArray[Any]) -> memoryview:
 def array_document(array: NDArray[Any]) -> dict[str, Any]:
     """Return the map that stands for ``array``; its data is a view, not a copy.
 
-    Raises
-    ------
-    ParameterError
-        As `wire_array` does.
+    Raises ParameterError as `wire_array` does.
     """
     array = wire_array(array)
     return {"dtype": array.dtype.str, "shape": list(array.shape), "data": buffer(array)}
@@ -61,11 +54,8 @@ def array_document(array: NDArray[Any]) -> dict[str, Any]:
 def parse_array(document: Mapping[str, Any], *, path: str = "array") -> NDArray[Any]:
     """Return the array an untrusted map stands for, as a read-only view of its data.
 
-    Raises
-    ------
-    ProtocolError
-        If the dtype is none of `DTYPES`, a length is negative or there are too many, or the data
-        is not exactly as long as dtype and shape say.
+    Raises ProtocolError if the dtype is none of `DTYPES`, a length is negative or there are too
+    many, or the data is not exactly as long as dtype and shape say.
     """
     name = fields.text(document, "dtype", path=path)
     if name not in DTYPES:

@@ -27,11 +27,8 @@ def pack(document: Mapping[str, Any]) -> bytes:
 def unpack(data: bytes | bytearray | memoryview | str, *, max_bytes: int) -> dict[str, Any]:
     """Return the map that untrusted bytes hold; every map within has string keys.
 
-    Raises
-    ------
-    ProtocolError
-        If the message is text, longer than ``max_bytes``, no msgpack, more than one value or not
-        a map, or holds a key that is no string or an extension type.
+    Raises ProtocolError if the message is text, longer than ``max_bytes``, no msgpack, more than
+    one value or not a map, or holds a key that is no string or an extension type.
     """
     if isinstance(data, str):
         raise ProtocolError("message", "text", "binary")

@@ -95,10 +95,8 @@ def decode_reflection16(codes: NDArray[Any], brightness: NDArray[Any]) -> NDArra
 def decoded(encoding: str, array: NDArray[Any], document: Mapping[str, Any]) -> NDArray[Any]:
     """Return the array that the codes of a message stand for.
 
-    Raises
-    ------
-    ProtocolError
-        If the encoding is unknown, or one of its fields is missing or does not fit the array.
+    Raises ProtocolError if the encoding is unknown, or one of its fields is missing or does not fit
+    the array.
     """
     if encoding not in ENCODINGS:
         raise ProtocolError("encoding", encoding, f"one of {', '.join((F32, *ENCODINGS))}")
@@ -153,33 +151,23 @@ def measured_error(coefficients: NDArray[Any], coded: Coded) -> tuple[float, flo
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
-    """One way to send an array in codes; writer and reader side by side.
-
-    Attributes
-    ----------
-    fits
-        Called as ``fits(axes, dtype)``: whether products like this can be sent so.
-    encode
-        Returns the codes of an array and the fields that a decoder needs.
-    decode
-        Called as ``decode(codes, document)`` with the whole message; raises ProtocolError.
-    fields
-        JSON schemas of those fields, by name.
-    dtype, shape
-        Of the codes, for an array of a shape.
-    error
-        Called as ``error(array, coded)``: median and maximum error of an approximate encoding;
-        None for one without.
-    """
+    """One way to send an array in codes; writer and reader side by side."""
 
     name: str
     fits: Callable[[tuple[str, ...], str], bool]
+    """Called as ``fits(axes, dtype)``: whether products like this can be sent so."""
     encode: Callable[[NDArray[Any]], Coded]
+    """Returns the codes of an array and the fields that a decoder needs."""
     decode: Callable[[NDArray[Any], Mapping[str, Any]], NDArray[Any]]
+    """Called as ``decode(codes, document)`` with the whole message; raises ProtocolError."""
     fields: Mapping[str, Mapping[str, Any]]
+    """JSON schemas of those fields, by name."""
     dtype: str = "<u2"
     shape: Callable[[tuple[int, ...]], tuple[int, ...]] = lambda shape: shape
+    """``dtype``, ``shape``: of the codes, for an array of a shape."""
     error: Callable[[NDArray[Any], Coded], tuple[float, float]] | None = None
+    """Called as ``error(array, coded)``: median and maximum error of an approximate encoding; None
+    for one without."""
 
 
 _NUMBER: Final = {"type": "number"}

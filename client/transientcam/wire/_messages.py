@@ -185,10 +185,7 @@ def encode_frame(
 ) -> bytes:
     """Return one product of a frame as bytes, for the stream (with ``channel``) and for REST.
 
-    Raises
-    ------
-    ParameterError
-        If the array's dtype does not travel.
+    Raises ParameterError if the array's dtype does not travel.
     """
     document = frame_document(
         product=product,

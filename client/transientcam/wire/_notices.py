@@ -9,20 +9,14 @@ _Types = str | tuple[str, ...]
 
 @dataclass(frozen=True, slots=True)
 class NoticeKind:
-    """One kind of notice.
-
-    Attributes
-    ----------
-    keys
-        The names of JSON types by key; several where it may be either.
-    optional
-        Those of them that may be left out.
-    """
+    """One kind of notice."""
 
     name: str
     summary: str
     keys: Mapping[str, _Types] = field(default_factory=dict)
+    """The names of JSON types by key; several where it may be either."""
     optional: tuple[str, ...] = ()
+    """Those of them that may be left out."""
 
 
 _OR_NIL = ("string", "null")

@@ -54,10 +54,7 @@ _FRAME_KEYS = frozenset(
 def parse_client_message(data: bytes | bytearray | memoryview | str) -> ClientMessage:
     """Return the message of a client, from untrusted bytes.
 
-    Raises
-    ------
-    ProtocolError
-        Naming the first part that docs/stream.md does not allow.
+    Raises ProtocolError naming the first part that docs/stream.md does not allow.
     """
     document = unpack(data, max_bytes=MAX_CLIENT_MESSAGE_BYTES)
     kind = fields.text(document, "type")
@@ -73,10 +70,7 @@ def parse_server_message(
 ) -> ServerMessage:
     """Return the message of a server, from untrusted bytes.
 
-    Raises
-    ------
-    ProtocolError
-        Naming the first part that docs/stream.md does not allow.
+    Raises ProtocolError naming the first part that docs/stream.md does not allow.
     """
     document = unpack(data, max_bytes=max_bytes)
     match fields.text(document, "type"):
@@ -98,10 +92,7 @@ def parse_frame(
 ) -> Frame:
     """Return the frame that the body of a REST answer holds.
 
-    Raises
-    ------
-    ProtocolError
-        As `parse_server_message`, and if the message is no frame.
+    Raises ProtocolError as `parse_server_message`, and if the message is no frame.
     """
     message = parse_server_message(data, max_bytes=max_bytes)
     if not isinstance(message, Frame):
@@ -112,10 +103,7 @@ def parse_frame(
 def parse_channels(document: Mapping[str, Any]) -> tuple[Channel, ...]:
     """Return the channels that a hello or a ``sequence-changed`` notice lists.
 
-    Raises
-    ------
-    ProtocolError
-        Naming the first part that docs/stream.md does not allow.
+    Raises ProtocolError naming the first part that docs/stream.md does not allow.
     """
     items = fields.sequence(document, "channels", max_length=_MAX_CHANNELS)
     return tuple(_channel(item, f"channels[{index}]") for index, item in enumerate(items))

@@ -12,22 +12,15 @@ _IMAGE: Final = ("y", "x")
 
 @dataclass(frozen=True, slots=True)
 class Product:
-    """One kind of array that a frame offers.
-
-    Attributes
-    ----------
-    unit
-        Of the values: ``m``, ``DN`` (digital numbers of the sensor), ``DN/s`` or ``1``.
-    axes
-        Names of the axes, slowest first.
-    dtype
-        As numpy writes it, byte order included.
-    """
+    """One kind of array that a frame offers."""
 
     name: str
     unit: str
+    """Of the values: ``m``, ``DN`` (digital numbers of the sensor), ``DN/s`` or ``1``."""
     axes: tuple[str, ...]
+    """Names of the axes, slowest first."""
     dtype: str
+    """As numpy writes it, byte order included."""
     summary: str
 
     @property

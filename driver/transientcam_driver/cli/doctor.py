@@ -37,14 +37,9 @@ def checks(
 ) -> Iterator[Reported]:
     """Check libusb, the device nodes, the udev rule and the cameras; Kinects v2 by themselves.
 
-    Parameters
-    ----------
-    config
-        The file of settings; no check here depends on it.
-    root
-        Root of the file system.
-    backend
-        A pyusb backend; the system's libusb without one.
+    ``config``: the file of settings; no check here depends on it.
+    ``root``: root of the file system.
+    ``backend``: a pyusb backend; the system's libusb without one.
     """
     backend = backend or system_libusb()
     if backend is None:

@@ -44,12 +44,8 @@ class Plugged:
 def checks(*, root: Path = Path("/"), package: Callable[[], Any] = libusb) -> Iterator[Reported]:
     """Check port, permissions, memory and package; one line where none is plugged in.
 
-    Parameters
-    ----------
-    root
-        Root of the file system.
-    package
-        Returns the package ``usb1``, or raises a `CameraError`.
+    ``root``: root of the file system.
+    ``package``: returns the package ``usb1``, or raises a `CameraError`.
     """
     found = tuple(_plugged_in(root))
     if not found:

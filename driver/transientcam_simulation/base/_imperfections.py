@@ -85,23 +85,16 @@ class DarkCurrent:
 
 @dataclass(frozen=True, slots=True)
 class Lens:
-    """How a lens departs from a pinhole.
-
-    Attributes
-    ----------
-    distortion
-        k1, k2, p1, p2, k3 of Brown's model, in units of the focal length: a point at (x, y) before
-        the lens is seen at x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), and
-        likewise in y, which points up.
-    centre
-        Where the axis meets the image, right of and below its middle, in widths of the image.
-    vignetting
-        Light falls with this power of the cosine to the axis; 4 is that of a thin lens.
-    """
+    """How a lens departs from a pinhole."""
 
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    """k1, k2, p1, p2, k3 of Brown's model, in units of the focal length: a point at (x, y) before
+    the lens is seen at x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), and likewise
+    in y, which points up."""
     centre: tuple[float, float] = (0.0, 0.0)
+    """Where the axis meets the image, right of and below its middle, in widths of the image."""
     vignetting: float = 0.0
+    """Light falls with this power of the cosine to the axis; 4 is that of a thin lens."""
 
     @property
     def bends(self) -> bool:

@@ -84,12 +84,8 @@ def _normal_share(x: NDArray[np.float64]) -> NDArray[np.float64]:
 class SparseResponses:
     """A few returns a pixel: sharp ones, or widened by the material they come from.
 
-    Parameters
-    ----------
-    delay_s, weight
-        (K, H, W) in any order; a weight of 0 means absent.
-    scatter
-        Width of the returns: (H, W) of all of a pixel, or (K, H, W) of each.
+    ``delay_s``, ``weight``: (K, H, W) in any order; a weight of 0 means absent.
+    ``scatter``: width of the returns: (H, W) of all of a pixel, or (K, H, W) of each.
     """
 
     def __init__(

@@ -35,10 +35,7 @@ def _load(name: str) -> dict[str, Callable[..., Any]]:
 class ImageKernels:
     """The compiled kernels of a process; ``TRANSIENTCAM_KERNELS`` as `Kernels` reads it.
 
-    Attributes
-    ----------
-    kernels : Kernels
-        The kernels of each module: they become ready together.
+    ``kernels``: the kernels of each module: they become ready together.
     """
 
     def __init__(self, environ: Mapping[str, str]) -> None:

@@ -15,23 +15,16 @@ class Noise:
     """The noise of one complex moment of a pixel, in units of brightness.
 
     A moment is made of four images, (I0 - I180) + i (I90 - I270), and has twice their noise.
-
-    Attributes
-    ----------
-    scale_e
-        Electrons of an exposure at a brightness of 1.
-    white_e
-        Electrons of unmodulated light in an image of a white surface.
-    dark_e2
-        Variance of an image without light: of the read-out, the rounding and the dark current.
-    takes
-        Over which moments are averaged.
     """
 
     scale_e: float
+    """Electrons of an exposure at a brightness of 1."""
     white_e: float
+    """Electrons of unmodulated light in an image of a white surface."""
     dark_e2: float
+    """Variance of an image without light: of the read-out, the rounding and the dark current."""
     takes: int
+    """Over which moments are averaged."""
 
     def deviation(self, brightness: Values | float, reflectance: Values | float) -> Values:
         """Return the root mean square error of a moment, real and imaginary part together."""
@@ -43,22 +36,16 @@ class Noise:
 
 @dataclass(frozen=True)
 class Glimpse:
-    """Pixels at one time of the scene's life, flat.
-
-    Attributes
-    ----------
-    brightness, reflectance
-        (P) zeroth moments, and the share of light that falls on a surface that reaches the camera.
-    cosine
-        (P) of the angle between pixels' rays and the lens's axis.
-    shape
-        Rows and columns of these pixels.
-    """
+    """Pixels at one time of the scene's life, flat."""
 
     brightness: Values
     reflectance: Values
+    """``brightness``, ``reflectance``: (P) zeroth moments, and the share of light that falls on a
+    surface that reaches the camera."""
     cosine: Values
+    """(P) of the angle between pixels' rays and the lens's axis."""
     shape: tuple[int, int]
+    """Rows and columns of these pixels."""
 
     @cached_property
     def lit(self) -> NDArray[np.bool_]:

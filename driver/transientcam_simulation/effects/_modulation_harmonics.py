@@ -70,11 +70,7 @@ def measured_harmonics(path: Path) -> dict[int, complex]:
 
     With rows in opposite pairs, their difference counts, which has no background; else the first
     row. Time zero is where the fundamental peaks.
-
-    Raises
-    ------
-    SceneError
-        The file cannot be read, or has other content.
+    Raises SceneError where the file cannot be read, or has other content.
     """
     rows = _read(path)
     wave = rows[0] - rows[1] if len(rows) % 2 == 0 else rows[0]

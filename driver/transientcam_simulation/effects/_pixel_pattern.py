@@ -78,10 +78,7 @@ def delays_s(
 def read_offsets_rad(path: Path) -> NDArray[np.float64]:
     """Read phase offsets (H, W) about their mean: int16 width, height, then codes of 1/4096 turn.
 
-    Raises
-    ------
-    SceneError
-        The file cannot be read, or has other content.
+    Raises SceneError where the file cannot be read, or has other content.
     """
     try:
         words = np.frombuffer(path.read_bytes(), dtype="<i2")

@@ -46,10 +46,7 @@ RESOLUTIONS = ((DEFAULT_WIDTH, DEFAULT_HEIGHT), (320, 240), (640, 480))
 def find_scene(name: str) -> Scene:
     """Load a built-in scene by its name, or a scene file by its path.
 
-    Raises
-    ------
-    SceneError
-        There is no such scene, or its file is not valid.
+    Raises SceneError where there is no such scene, or its file is not valid.
     """
     if name.endswith(".toml"):
         return load_scene(Path(name))
@@ -100,10 +97,7 @@ def world_of(
 ) -> World:
     """Build the renderer of a scene and its sensor.
 
-    Raises
-    ------
-    SceneError
-        A file that the scene names cannot be read, or has other content.
+    Raises SceneError where a file that the scene names cannot be read, or has other content.
     """
     _read_device_files(scene.device)
     return World(
@@ -167,13 +161,8 @@ def world_before(
 
     Sensor, imperfections and what is off of its noise stay those of the scene given; ``seen_by``
     gives another scene the device's own lens.
-
-    Raises
-    ------
-    SceneError
-        A file that the scene names cannot be read, or has other content.
-    CompilerMissing
-        It moves, and there is no compiler.
+    Raises SceneError where a file that the scene names cannot be read, or has other content;
+    CompilerMissing where it moves, and there is no compiler.
     """
 
     def world_of_scene(scene: Scene) -> World:
@@ -203,10 +192,7 @@ def world_before(
 def checked_effects(effects: Mapping[str, str]) -> dict[str, str]:
     """Return choices of effects by name, after checking that they exist.
 
-    Raises
-    ------
-    EffectError
-        Naming the first that is not.
+    Raises EffectError naming the first that is not.
     """
     optional = [effect.name for effect in EFFECTS if effect.optional]
     for name, choice in effects.items():

@@ -46,12 +46,7 @@ class PluggedCamera(ABC, Generic[Link]):
     def connect(self) -> Link:
         """Open the camera.
 
-        Raises
-        ------
-        CameraNotFound
-            The cable is out.
-        CameraBusy
-            It is open already.
+        Raises CameraNotFound where the cable is out; CameraBusy where it is open already.
         """
         with self.changed:
             if not self.plugged:
@@ -93,10 +88,7 @@ class PluggedCamera(ABC, Generic[Link]):
     def inject(self, fault: Fault, images: int = 1) -> None:
         """Let a fault happen to the next images.
 
-        Raises
-        ------
-        CameraError
-            This camera knows no such fault.
+        Raises CameraError where this camera knows no such fault.
         """
         with self.changed:
             self._faults.inject(fault, images)

@@ -25,15 +25,10 @@ class DifferentialPixels:
     A difference is ``2048 + (A - B) / 2``: a tap alone reads 1/2 (b_0 + Re(b exp(-i theta))), both
     together Re(b exp(-i theta)) / 2, without what they have in common.
 
-    Parameters
-    ----------
-    world
-        The light in front of the sensor. What a scene needs for a frequency is kept for as long as
-        the scene stays.
-    saturated
-        The code of a pixel of which a tap is full.
-    phases_rad
-        Of the images of a frequency.
+    ``world``: the light in front of the sensor. What a scene needs for a frequency is kept for as
+    long as the scene stays.
+    ``saturated``: the code of a pixel of which a tap is full.
+    ``phases_rad``: of the images of a frequency.
     """
 
     def __init__(

@@ -50,13 +50,7 @@ class SimulatedScene:
 
     @classmethod
     def of(cls, name: CameraName, scene: str) -> "SimulatedScene":
-        """Read the options of a name.
-
-        Raises
-        ------
-        SpecError
-            Naming the part that is not valid.
-        """
+        """Read the options of a name. Raises SpecError naming the part that is not valid."""
         options = name.options
         if not scene.startswith(_OF_FILE) and not options.keys().isdisjoint(_OPTIONS_OF_FILE):
             reason = f"{', '.join(_OPTIONS_OF_FILE)} belong to sim:measured:PATH.npz"
@@ -76,10 +70,7 @@ class SimulatedScene:
     def load(self) -> Scene:
         """Load the scene, with the changes that the name has.
 
-        Raises
-        ------
-        SceneError
-            The scene is not valid.
+        Raises SceneError where the scene is not valid.
         """
         scene = self._found()
         if self.device is not None:
@@ -98,10 +89,7 @@ class SimulatedScene:
 def scene_of(name: CameraName) -> SimulatedScene:
     """Return the scene that a name of this plug-in is for.
 
-    Raises
-    ------
-    SpecError
-        Naming the part that is not valid.
+    Raises SpecError naming the part that is not valid.
     """
     PLUGIN.require_options(name)
     if not name.address:
@@ -112,10 +100,7 @@ def scene_of(name: CameraName) -> SimulatedScene:
 def resolution(name: CameraName) -> tuple[int, int]:
     """Return the width and height of the sensor that a name is for.
 
-    Raises
-    ------
-    SpecError
-        Naming the part that is not valid.
+    Raises SpecError naming the part that is not valid.
     """
     if "width" not in name.options and "height" not in name.options:
         return DEFAULT_WIDTH, DEFAULT_HEIGHT

@@ -45,13 +45,7 @@ _OPTIONS: Final = {
 
 
 def device_options(name: CameraName) -> DeviceOptions:
-    """Read how the camera of a name is used.
-
-    Raises
-    ------
-    SpecError
-        Naming the part that is not valid.
-    """
+    """Read how the camera of a name is used. Raises SpecError naming the part that is not valid."""
     emulated = name.address == EMULATED
     data_over: Any = name.choice("data", get_args(DataOver))
     return DeviceOptions(

@@ -64,12 +64,8 @@ class Quadratures:
 class Canvas:
     """Quadratures of one frequency of a moving scene: only regions that change are computed.
 
-    Parameters
-    ----------
-    background
-        The view without what moves.
-    quadratures_of
-        Computes those of a region of a view; of all of it where the region is None.
+    ``background``: the view without what moves.
+    ``quadratures_of``: computes those of a region of a view; of all of it where the region is None.
     """
 
     def __init__(

@@ -26,10 +26,7 @@ _NONE = np.float32(0)
 class ReadOut:
     """The stages of an image behind its mean electrons.
 
-    Parameters
-    ----------
-    effects
-        In the order in which they happen.
+    ``effects``: in the order in which they happen.
     """
 
     def __init__(self, effects: list[ImageEffect]) -> None:

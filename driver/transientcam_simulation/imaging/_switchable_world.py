@@ -12,10 +12,7 @@ from transientcam_simulation.imaging._world import World
 class SwitchableWorld:
     """A renderer whose world can be exchanged at any time.
 
-    Attributes
-    ----------
-    world
-        The one that images are taken of at present.
+    ``world``: the one that images are taken of at present.
     """
 
     def __init__(self, world: World) -> None:

@@ -18,16 +18,3 @@ from transientcam_simulation.light._transport import (
     View,
     Views,
 )
-
-__all__ = [
-    "GivenScenery",
-    "LightRequirements",
-    "Region",
-    "Scenery",
-    "View",
-    "Views",
-    "holds",
-    "load_compiled",
-    "load_responses",
-    "shared_scenery",
-]

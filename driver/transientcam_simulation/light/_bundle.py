@@ -23,28 +23,21 @@ _ACROSS = 0.05  # cosine to the middle line, below which a line's place beside i
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """Lines ``apex + t way`` of H x W pixels, and where tiles of pixels lie among them.
-
-    Attributes
-    ----------
-    near
-        (H, W) t from which a line counts; it counts up to ``far``. (1, W) where all are the same.
-    frame
-        (3, 3) the middle line, and two unit vectors across it.
-    low, high
-        (2, R, C) along these two, tangents of the angles of a tile's lines to the middle line.
-    rows
-        Lowest and highest (2, R) of these in each row of tiles.
-    """
+    """Lines ``apex + t way`` of H x W pixels, and where tiles of pixels lie among them."""
 
     apex: Points
     way: tuple[Plane, Plane, Plane]
     near: Plane
+    """(H, W) t from which a line counts; it counts up to ``far``. (1, W) where all are the same."""
     far: Plane
     frame: NDArray[np.float64]
+    """(3, 3) the middle line, and two unit vectors across it."""
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+    """``low``, ``high``: (2, R, C) along these two, tangents of the angles of a tile's lines to the
+    middle line."""
     rows: tuple[NDArray[np.float64], NDArray[np.float64]]
+    """Lowest and highest (2, R) of these in each row of tiles."""
 
     @classmethod
     def of(

@@ -19,10 +19,7 @@ _log = logging.getLogger("transientcam_driver")
 def load_compiled() -> None:
     """Compile what computes the light of surfaces that move, or load it from the cache; once.
 
-    Raises
-    ------
-    CompilerMissing
-        numba is not installed, or does not work here.
+    Raises CompilerMissing: numba is not installed, or does not work here.
     """
     with _LOADING:
         if _MOVING in sys.modules:

@@ -16,18 +16,12 @@ from transientcam_simulation.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class Within:
-    """The light of several rays in each of some pixels.
-
-    Attributes
-    ----------
-    pixel
-        (P) by index, rising.
-    rays
-        For each place in a pixel, all pixels.
-    """
+    """The light of several rays in each of some pixels."""
 
     pixel: NDArray[np.intp]
+    """(P) by index, rising."""
     rays: Lit
+    """For each place in a pixel, all pixels."""
 
     def of_pixels(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return what belongs to the rays (..., R P) by place and pixel (..., R, P)."""
@@ -45,10 +39,7 @@ class FollowedRays:
     Which pixels need several rays depends on the noise and the frequencies of a sequence; what one
     of these rays sees does not.
 
-    Parameters
-    ----------
-    scene
-        Standing still, with a camera.
+    ``scene``: standing still, with a camera.
     """
 
     def __init__(self, scene: Scene, *, width: int, height: int) -> None:
@@ -73,12 +64,8 @@ class FollowedRays:
     def within(self, pixel: NDArray[np.intp], count: int = RAYS) -> Within:
         """Return the light of several rays in each pixel.
 
-        Parameters
-        ----------
-        pixel
-            (P) by index, rising, none twice; at least one.
-        count
-            Of rays in each pixel.
+        ``pixel``: (P) by index, rising, none twice; at least one.
+        ``count``: of rays in each pixel.
         """
         with self._adding:
             kept = self._kept.get(count)

@@ -51,22 +51,15 @@ class Shadow:
 
 @dataclass(frozen=True, slots=True)
 class _Dimmed:
-    """What shadows (N) leave of light.
-
-    Attributes
-    ----------
-    chains, regions
-        (N) chains of mirrors, and (N, 4) regions, as numbers.
-    light
-        (N, H, W) shares that are left, in the regions.
-    marks
-        (N, H, C) whether any pixel of successive chunks of a region's row has less than all.
-    """
+    """What shadows (N) leave of light."""
 
     chains: NDArray[np.int64]
     regions: NDArray[np.int64]
+    """``chains``, ``regions``: (N) chains of mirrors, and (N, 4) regions, as numbers."""
     light: NDArray[np.float32]
+    """(N, H, W) shares that are left, in the regions."""
     marks: NDArray[np.bool_]
+    """(N, H, C) whether any pixel of successive chunks of a region's row has less than all."""
 
     @classmethod
     def by(cls, shadows: list[Shadow], uncovered: Plane) -> "_Dimmed":

@@ -123,13 +123,7 @@ def area_weights(count: int, source: int) -> NDArray[np.float64]:
 
 
 def load_responses(scene: Scene, *, width: int, height: int) -> DenseResponses:
-    """Read the files of a scene.
-
-    Raises
-    ------
-    SceneError
-        Naming the file and what is wrong with it.
-    """
+    """Read the files of a scene. Raises SceneError naming the file and what is wrong with it."""
     return DenseResponses(
         [_part(response) for response in scene.responses], width=width, height=height
     )

@@ -28,28 +28,3 @@ from transientcam_simulation.scene._scene import (
     TimeZero,
     Viewpoint,
 )
-
-__all__ = [
-    "BUILT_IN",
-    "Background",
-    "Bilinear",
-    "Cells",
-    "Diffuser",
-    "Ellipsoid",
-    "Light",
-    "Motion",
-    "Points",
-    "Rectangle",
-    "ResponseFile",
-    "Scene",
-    "SceneInfo",
-    "Shape",
-    "Surface",
-    "TimeZero",
-    "Viewpoint",
-    "blocked_by_mask",
-    "list_scenes",
-    "load_scene",
-    "parse_scene",
-    "patch_edges_m",
-]

@@ -73,10 +73,7 @@ def list_scenes() -> tuple[SceneInfo, ...]:
 def load_scene(path: Path) -> Scene:
     """Read a scene file.
 
-    Raises
-    ------
-    SceneError
-        Naming the file, the key, its value and what is allowed.
+    Raises SceneError naming the file, the key, its value and what is allowed.
     """
     return _scene(_open(path), name=path.stem, file=path)
 
@@ -84,10 +81,7 @@ def load_scene(path: Path) -> Scene:
 def parse_scene(text: str) -> Scene:
     """Read the text of a scene file that comes from elsewhere; it may name no other file.
 
-    Raises
-    ------
-    SceneError
-        As `load_scene`; and if it would take much memory or time to prepare.
+    Raises SceneError as `load_scene`; and if it would take much memory or time to prepare.
     """
     try:
         content = tomllib.loads(text)

@@ -12,22 +12,15 @@ Repeat = Literal["restart", "back", "loop"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Offsets visited one after the other, at equal intervals of a period.
-
-    Attributes
-    ----------
-    path_m
-        (N, 3) offsets from the surface's place.
-    period_s
-        Time until it repeats.
-    repeat
-        How the path's end joins its start: "restart" jumps, "back" goes the way back, "loop"
-        goes on straight to the start.
-    """
+    """Offsets visited one after the other, at equal intervals of a period."""
 
     path_m: Points
+    """(N, 3) offsets from the surface's place."""
     period_s: float
+    """Time until it repeats."""
     repeat: Repeat = "restart"
+    """How the path's end joins its start: "restart" jumps, "back" goes the way back, "loop" goes on
+    straight to the start."""
 
     @property
     def _knots_m(self) -> Points:

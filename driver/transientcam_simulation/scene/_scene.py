@@ -116,22 +116,15 @@ class Surface:
 
 @dataclass(frozen=True, slots=True)
 class Transport:
-    """How far light is followed.
-
-    Attributes
-    ----------
-    mirror_bounces
-        Most mirrors on the way of light to a surface, and on a ray of the camera.
-    diffuse_bounces
-        How often light goes from surface to surface before the camera sees it; None: until what is
-        left is below the noise.
-    patches
-        Into how many patches the longest side of a surface is cut to compute that.
-    """
+    """How far light is followed."""
 
     mirror_bounces: int = 2
+    """Most mirrors on the way of light to a surface, and on a ray of the camera."""
     diffuse_bounces: int | None = None
+    """How often light goes from surface to surface before the camera sees it; None: until what is
+    left is below the noise."""
     patches: int = 24
+    """Into how many patches the longest side of a surface is cut to compute that."""
 
 
 @dataclass(frozen=True, slots=True)

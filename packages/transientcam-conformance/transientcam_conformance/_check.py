@@ -11,23 +11,16 @@ from transientcam_conformance._device import Device
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One promise and the function that tries it.
-
-    Attributes
-    ----------
-    group, name
-        Its name in reports and on the command line.
-    promise
-        The sentence of the contract.
-    run
-        Returns if the promise is kept; else raises `PromiseBroken`, or `CheckSkipped` if it cannot
-        be tried.
-    """
+    """One promise and the function that tries it."""
 
     group: str
     name: str
+    """``group``, ``name``: its name in reports and on the command line."""
     promise: str
+    """The sentence of the contract."""
     run: Callable[[Device], None]
+    """Returns if the promise is kept; else raises `PromiseBroken`, or `CheckSkipped` if it cannot
+    be tried."""
 
 
 def checks(group: str, module: ModuleType) -> tuple[Check, ...]:

@@ -34,12 +34,8 @@ _SHOWN = 120
 class Device:
     """A running camera, its raw answers, and its state before the checks.
 
-    Parameters
-    ----------
-    url, token
-        As of `Camera`.
-    timeout_s
-        How long an event may take that is not the answer to a request.
+    ``url``, ``token``: as of `Camera`.
+    ``timeout_s``: how long an event may take that is not the answer to a request.
     """
 
     def __init__(self, url: str, *, token: str | None = None, timeout_s: float = 30.0) -> None:
@@ -69,13 +65,7 @@ class Device:
             return response
 
     def read(self, path: str, **options: Any) -> dict[str, Any]:
-        """Return the JSON document at a path.
-
-        Raises
-        ------
-        PromiseBroken
-            If there is none.
-        """
+        """Return the JSON document at a path. Raises PromiseBroken if there is none."""
         return self.document(self.send("GET", path, **options))
 
     def document(self, response: httpx.Response, *, status: int = 200) -> dict[str, Any]:
@@ -183,10 +173,7 @@ class Device:
     def control(self) -> Iterator[None]:
         """Hold the lease for a block, and undo its changes at the end.
 
-        Raises
-        ------
-        CheckSkipped
-            If another client holds the lease, or the token allows no changes.
+        Raises CheckSkipped if another client holds the lease, or the token allows no changes.
         """
         if self._lease_id is not None:
             yield

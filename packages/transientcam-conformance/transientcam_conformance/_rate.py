@@ -36,10 +36,7 @@ class Rate:
 def measured_rate(device: Device) -> Rate:
     """Stream frames of one small product, and count those that come in the time of the camera.
 
-    Raises
-    ------
-    PromiseBroken
-        If none come.
+    Raises PromiseBroken if none come.
     """
     with device.capturing(), device.stream("flags") as stream:
         stated_hz = float(device.sequence["frame_rate_hz"])

@@ -13,17 +13,12 @@ Outcome = Literal["passed", "failed", "skipped"]
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """The result of one check.
-
-    Attributes
-    ----------
-    reason
-        Why it failed or was skipped; None if it passed.
-    """
+    """The result of one check."""
 
     check: Check
     outcome: Outcome
     reason: str | None
+    """Why it failed or was skipped; None if it passed."""
     duration_s: float
 
     def to_document(self) -> dict[str, Any]:
@@ -40,25 +35,18 @@ class Result:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """The results of all checks.
-
-    Attributes
-    ----------
-    camera
-        Model, serial and firmware of the camera, name and version of its service; empty if
-        they could not be read.
-    began_s
-        Unix time.
-    slow
-        The camera's rate where it did not keep it, and checks were skipped for that.
-    """
+    """The results of all checks."""
 
     url: str
     camera: Mapping[str, Any]
+    """Model, serial and firmware of the camera, name and version of its service; empty if they
+    could not be read."""
     began_s: float
+    """Unix time."""
     duration_s: float
     results: Sequence[Result]
     slow: Rate | None = None
+    """The camera's rate where it did not keep it, and checks were skipped for that."""
 
     @property
     def counts(self) -> dict[str, int]:

@@ -58,10 +58,7 @@ _MALFORMED: Final = (KeyError, IndexError, TypeError, ValueError, AttributeError
 def chosen(groups: Collection[str], *, quick: bool = False) -> tuple[Check, ...]:
     """Return the checks of some groups; of all, where none is named, or all quick ones.
 
-    Raises
-    ------
-    ParameterError
-        If there is no such group.
+    Raises ParameterError if there is no such group.
     """
     for each in groups:
         if each not in GROUPS:
@@ -85,11 +82,7 @@ def run(
     ``begin`` and ``end`` are called with each check and its result. Where a check fails whose
     promise rests on frames that arrive in time, ``rate`` measures whether they do; it is skipped,
     and the report says so, where the camera (or a laden machine) does not keep its rate.
-
-    Raises
-    ------
-    ServerUnreachable, ProblemError, ProtocolError
-        If no camera answers at the address.
+    Raises ServerUnreachable, ProblemError, ProtocolError if no camera answers at the address.
     """
     began_s, start_s = unix_s(), clock()
     camera = _identity(device)

@@ -25,10 +25,7 @@ class Control:
     def get(self, field: Field) -> int:
         """Read a field from the camera.
 
-        Raises
-        ------
-        CameraError
-            The camera does not answer, or the answer has another length.
+        Raises CameraError where the camera does not answer, or the answer has another length.
         """
         with self._lock:
             return field.of(self._read(field))
@@ -36,10 +33,7 @@ class Control:
     def set(self, values: Mapping[Field, int]) -> None:
         """Write fields, one register after the other; the other bits of each stay.
 
-        Raises
-        ------
-        CameraError
-            As `get`.
+        Raises CameraError as `get`.
         """
         with self._lock:
             words: dict[tuple[int, int], int] = {}

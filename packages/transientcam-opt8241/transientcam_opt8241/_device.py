@@ -79,17 +79,9 @@ class Opt8241:
     Its sensor runs, and its light is on, only from `trigger` until the frame is there; without its
     owner it runs on.
 
-    Parameters
-    ----------
-    link
-        To the camera.
-    quads
-        Phases of a frequency, 4 or 6.
-
-    Raises
-    ------
-    CameraError
-        The camera does not answer.
+    ``link``: to the camera.
+    ``quads``: phases of a frequency, 4 or 6.
+    Raises CameraError where the camera does not answer.
     """
 
     def __init__(self, link: Link, *, quads: int = 4) -> None:
@@ -115,10 +107,7 @@ class Opt8241:
     def configure(self, applied: AppliedSequence) -> None:
         """Set how long the light is on in a quad.
 
-        Raises
-        ------
-        DeviceRefused
-            The camera says that it cannot.
+        Raises DeviceRefused where the camera says that it cannot.
         """
         duty = round(applied.sequence.exposure_s / DUTY_S)
         self._halt()

@@ -12,26 +12,18 @@ REGISTER_BYTES: Final = 3
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """Some bits of a register.
-
-    Attributes
-    ----------
-    slave, register
-        Where it is.
-    high, low
-        Its first and its last bit, the highest one first.
-    default
-        Its value after a reset.
-    signed
-        Whether it is a two's complement.
-    """
+    """Some bits of a register."""
 
     slave: int
     register: int
+    """``slave``, ``register``: where it is."""
     high: int
     low: int
+    """``high``, ``low``: its first and its last bit, the highest one first."""
     default: int = 0
+    """Its value after a reset."""
     signed: bool = False
+    """Whether it is a two's complement."""
 
     @property
     def place(self) -> tuple[int, int]:
@@ -50,10 +42,7 @@ class Field:
     def put(self, word: int, value: int) -> int:
         """Return a word with another value in its place.
 
-        Raises
-        ------
-        ValueError
-            It has not so many bits.
+        Raises ValueError where it has not so many bits.
         """
         if value != value & self._mask:
             raise ValueError(f"{value} in {self.high - self.low + 1} bits")

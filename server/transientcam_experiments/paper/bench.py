@@ -65,15 +65,10 @@ class ReconstructedShot:
 class Bench:
     """Captures on demand, each at most once.
 
-    Parameters
-    ----------
-    seed
-        Seed of all random numbers.
-    quick
-        Average fewer takes, and look at fewer points: for a first look, and for tests.
-    waveform
-        A measured correlation function for Figure 3: a .npy (rows, samples) over one period,
-        opposite rows in pairs.
+    ``seed``: seed of all random numbers.
+    ``quick``: average fewer takes, and look at fewer points: for a first look, and for tests.
+    ``waveform``: a measured correlation function for Figure 3: a .npy (rows, samples) over one
+    period, opposite rows in pairs.
     """
 
     def __init__(self, *, seed: int = 1, quick: bool = False, waveform: Path | None = None) -> None:
@@ -104,18 +99,9 @@ class Bench:
     ) -> list[ReconstructedShot]:
         """Capture frames one after the other, and reconstruct them as the daemon would.
 
-        Parameters
-        ----------
-        scene
-            A name, or the path of a .toml.
-        sequence
-            What to capture; with fewer takes for a first look.
-        frames
-            How many.
-        at_s
-            When to begin, after the warm-up.
-        options
-            Further options of the camera's name, as in `WITHOUT_OUTLIERS`.
+        ``scene``: a name, or the path of a .toml.
+        ``at_s``: when to begin, after the warm-up.
+        ``options``: further options of the camera's name, as in `WITHOUT_OUTLIERS`.
         """
         sequence = self.sequence(sequence)
         key = (scene, sequence, frames, at_s, *sorted(options.items()))

@@ -86,18 +86,7 @@ def samples(
 ) -> _Array:
     """Return what a contender measures of a response (N, draws), with Gaussian noise.
 
-    Parameters
-    ----------
-    contender
-        Technique and frequencies.
-    response
-        The light.
-    noise
-        Deviation of each real measurement over the brightness.
-    draws
-        How often.
-    rng
-        All chance.
+    ``noise``: deviation of each real measurement over the brightness.
     """
     if contender.technique.measures == "code":
         clean: _Array = _code_samples(contender, response)

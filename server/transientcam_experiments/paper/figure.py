@@ -1,6 +1,6 @@
 """The types that all figures share: pictures, statements of the paper, and tables."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -12,36 +12,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """A sentence of the paper, and what was measured here.
-
-    Attributes
-    ----------
-    source
-        Section or figure of the paper.
-    says
-        The sentence.
-    measure
-        The quantity measured to check it.
-    value
-        The measure's value.
-    shown
-        The same as text.
-    criterion
-        What the value has to be for the statement to hold.
-    passes
-        Whether it is.
-    reason
-        Why ours differs; empty where it does not.
-    """
+    """A sentence of the paper, and what was measured here."""
 
     source: str
+    """Section or figure of the paper."""
     says: str
+    """The sentence."""
     measure: str
+    """The quantity measured to check it."""
     value: float
+    """The measure's value."""
     shown: str
+    """The same as text."""
     criterion: str
+    """What the value has to be for the statement to hold."""
     passes: bool
+    """Whether it is."""
     reason: str = ""
+    """Why ours differs; empty where it does not."""
 
     def to_document(self) -> dict[str, Any]:
         """Return the fields for JSON."""
@@ -59,18 +47,10 @@ def check(
     form: str = "{:.3g}",
     otherwise: str = "",
 ) -> Statement:
-    """Check a value against limits.
+    """Check a value against limits, of which one that is no number keeps none.
 
-    Parameters
-    ----------
-    source, says, measure, value
-        As of `Statement`.
-    at_most, at_least
-        The limits; a value that is no number keeps none.
-    form
-        How value and limits are shown.
-    otherwise
-        The reason where the value is outside.
+    The first arguments are those of `Statement`. ``form`` is how value and limits are shown, and
+    ``otherwise`` the reason where the value is outside.
     """
     value = float(value)
     limits = []
@@ -101,6 +81,11 @@ class Table:
     columns: Sequence[str]
     rows: Sequence[Sequence[Any]]
 
+    @classmethod
+    def of(cls, title: str, rows: Sequence[Mapping[str, Any]]) -> "Table":
+        """Return a table of rows that name their cells by the same columns."""
+        return cls(title, tuple(rows[0]), [tuple(row.values()) for row in rows])
+
     def to_document(self) -> dict[str, Any]:
         """Return the fields for JSON."""
         return {
@@ -122,19 +107,12 @@ class FigureResult:
 
 @dataclass(frozen=True, slots=True)
 class PaperFigure:
-    """One figure of the paper.
-
-    Attributes
-    ----------
-    number, title
-        As in the paper.
-    caption
-        What our picture shows, and how it was captured.
-    make
-        Captures, computes and draws.
-    """
+    """One figure of the paper."""
 
     number: int
     title: str
+    """``number``, ``title``: as in the paper."""
     caption: str
+    """What our picture shows, and how it was captured."""
     make: Callable[[Bench], FigureResult]
+    """Captures, computes and draws."""

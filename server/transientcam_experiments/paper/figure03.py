@@ -76,13 +76,7 @@ def _waveforms(bench: Bench) -> dict[str, _Array]:
 
 
 def _rows(path: Path) -> _Array:
-    """Read a measured correlation function.
-
-    Raises
-    ------
-    InputError
-        The file holds none.
-    """
+    """Read a measured correlation function. Raises InputError where the file holds none."""
     try:
         rows = np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:

@@ -148,24 +148,17 @@ def _statements(
 def _table(b: _Array, phase: _Array, truth: _Array, densities: dict[float, _Array]) -> Table:
     rows = []
     for b_0, density in densities.items():
-        eigenvalue = float(tm.smallest_eigenvalue(np.concatenate([[b_0], b[1:]])[:, None])[0])
+        changed = np.concatenate([[b_0], b[1:]])
         rows.append(
-            (
-                round(b_0, 2),
-                eigenvalue,
-                _highest(b, b_0),
-                _error(density, truth),
-                _concentrated(b, phase, density),
-            )
+            {
+                "b_0": round(b_0, 2),
+                "smallest eigenvalue": float(tm.smallest_eigenvalue(changed[:, None])[0]),
+                "highest peak per rad": _highest(b, b_0),
+                "distance from the truth": _error(density, truth),
+                f"light within {_WINDOW_RAD} rad of m returns": _concentrated(b, phase, density),
+            }
         )
-    columns = (
-        "b_0",
-        "smallest eigenvalue",
-        "highest peak per rad",
-        "distance from the truth",
-        f"light within {_WINDOW_RAD} rad of m returns",
-    )
-    return Table("The same b_1 to b_5 with different b_0", columns, rows)
+    return Table.of("The same b_1 to b_5 with different b_0", rows)
 
 
 def _draw(

@@ -112,23 +112,16 @@ def _table(
     shot: ReconstructedShot, where: _Array, errors: list[tuple[_Array, _Array]], noise: list[float]
 ) -> Table:
     rows = [
-        (
-            name,
-            float(np.median(_ranked_truth(shot)[1][k][where])),
-            float(np.median(np.abs(errors[k][0][where])) * 1e12),
-            noise[k] * 1e12,
-            float(np.median(np.abs(errors[k][1][where]))) * 100,
-        )
+        {
+            "return": name,
+            "true strength / DN": float(np.median(_ranked_truth(shot)[1][k][where])),
+            "median error of time / ps": float(np.median(np.abs(errors[k][0][where])) * 1e12),
+            "deviation between captures / ps": noise[k] * 1e12,
+            "median error of strength / %": float(np.median(np.abs(errors[k][1][where]))) * 100,
+        }
         for k, name in enumerate(_NAMES)
     ]
-    columns = (
-        "return",
-        "true strength / DN",
-        "median error of time / ps",
-        "deviation between captures / ps",
-        "median error of strength / %",
-    )
-    return Table("Pixels with three returns", columns, rows)
+    return Table.of("Pixels with three returns", rows)
 
 
 def _draw(time_s: _Array, weight: _Array) -> Any:

@@ -240,36 +240,21 @@ def _share(shot: ReconstructedShot) -> float:
 
 
 def _table(captures: dict[str, list[ReconstructedShot]]) -> Table:
-    rows = []
-    for name, pair in captures.items():
-        shot = pair[0]
-        sequence = shot.applied.sequence
-        label = "Fig. 1: m = 4, single take" if name == "1" else title(name)
-        rows.append(
-            (
-                label,
-                sequence.takes,
-                shot.applied.capture_s,
-                100 * _separated(shot),
-                float(np.median(_heights(shot))),
-                100 * _stray(shot),
-                100 * _noise(pair),
-                100 * _share(shot),
-                shot.found.rejected_images,
-            )
-        )
-    columns = (
-        "captured with",
-        "takes",
-        "capture / s",
-        "three returns separated / %",
-        "height of the highest peak / (1/ns)",
-        "light beside the wave / %",
-        "difference of two captures / %",
-        "biased / %",
-        "images left out as outliers",
-    )
-    return Table("Three prices", columns, rows)
+    rows = [
+        {
+            "captured with": "Fig. 1: m = 4, single take" if name == "1" else title(name),
+            "takes": pair[0].applied.sequence.takes,
+            "capture / s": pair[0].applied.capture_s,
+            "three returns separated / %": 100 * _separated(pair[0]),
+            "height of the highest peak / (1/ns)": float(np.median(_heights(pair[0]))),
+            "light beside the wave / %": 100 * _stray(pair[0]),
+            "difference of two captures / %": 100 * _noise(pair),
+            "biased / %": 100 * _share(pair[0]),
+            "images left out as outliers": pair[0].found.rejected_images,
+        }
+        for name, pair in captures.items()
+    ]
+    return Table.of("Three prices", rows)
 
 
 def _draw(first: dict[str, ReconstructedShot]) -> Any:

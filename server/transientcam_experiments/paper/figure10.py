@@ -143,34 +143,22 @@ def _statements(shot: ReconstructedShot, walls: dict[str, _Wall]) -> list[Statem
 
 def _table(walls: dict[str, _Wall]) -> Table:
     rows = [
-        (
-            name,
-            wall.true_width_ns,
-            wall.width_ns,
-            wall.width_without_ns,
-            100 * wall.error,
-            100 * wall.error_without,
-            100 * wall.eigenvalue,
-            wall.exact_width_ns,
-            100 * wall.exact_error,
-            100 * wall.true_eigenvalue,
-        )
+        {
+            "pixels of the": name,
+            "true width / ns": wall.true_width_ns,
+            "width / ns": wall.width_ns,
+            "width, b_0 estimated / ns": wall.width_without_ns,
+            "error / % of b_0": 100 * wall.error,
+            "error, b_0 estimated / % of b_0": 100 * wall.error_without,
+            "smallest eigenvalue / % of b_0": 100 * wall.eigenvalue,
+            "width, exact moments / ns": wall.exact_width_ns,
+            "error, exact moments / % of b_0": 100 * wall.exact_error,
+            "true smallest eigenvalue / % of b_0": 100 * wall.true_eigenvalue,
+        }
         for name, wall in walls.items()
     ]
-    columns = (
-        "pixels of the",
-        "true width / ns",
-        "width / ns",
-        "width, b_0 estimated / ns",
-        "error / % of b_0",
-        "error, b_0 estimated / % of b_0",
-        "smallest eigenvalue / % of b_0",
-        "width, exact moments / ns",
-        "error, exact moments / % of b_0",
-        "true smallest eigenvalue / % of b_0",
-    )
-    return Table(
-        "Time of the middle half of the light, and error of the cumulative density", columns, rows
+    return Table.of(
+        "Time of the middle half of the light, and error of the cumulative density", rows
     )
 
 

@@ -213,27 +213,18 @@ def _statements(ranged: list[Ranged], shot: ReconstructedShot) -> list[Statement
 
 def _table(ranged: list[Ranged]) -> Table:
     rows = [
-        (
-            each.entry.label,
-            each.entry.m,
-            each.entry.frequencies,
-            1e3 * each.rms_m,
-            1e3 * each.median_m,
-            1e3 * each.bias_m,
-            100 * each.outliers,
-        )
+        {
+            "technique": each.entry.label,
+            "m": each.entry.m,
+            "MHz": each.entry.frequencies,
+            "RMS / mm": 1e3 * each.rms_m,
+            "median absolute error / mm": 1e3 * each.median_m,
+            "median error / mm": 1e3 * each.bias_m,
+            f"off by more than {OUTLIER_M:g} m, or none / %": 100 * each.outliers,
+        }
         for each in sorted(ranged, key=lambda each: each.rms_m)
     ]
-    columns = (
-        "technique",
-        "m",
-        "MHz",
-        "RMS / mm",
-        "median absolute error / mm",
-        "median error / mm",
-        f"off by more than {OUTLIER_M:g} m, or none / %",
-    )
-    return Table("Error of the range of the corner", columns, rows)
+    return Table.of("Error of the range of the corner", rows)
 
 
 def _remarks(ranged: list[Ranged]) -> list[str]:

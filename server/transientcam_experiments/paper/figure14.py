@@ -131,24 +131,21 @@ def _table(frames: dict[float, ReconstructedShot]) -> Table:
     rows = []
     for at_s, shot in frames.items():
         where = _mirrored(shot)
-        ours, single = (np.abs(each)[where] for each in _time_errors_s(shot))
-        rows.append(
-            (
-                at_s,
-                100 * float(np.nanmedian(np.abs(_wrong(shot))[where])),
-                100 * _outliers(shot),
-                float(tm.SPEED_OF_LIGHT_M_S * np.nanmedian(ours) / 2 * 1e3),
-                float(tm.SPEED_OF_LIGHT_M_S * np.nanmedian(single) / 2 * 1e3),
-            )
+        wrong = np.abs(_wrong(shot))[where]
+        ours_mm, single_mm = (
+            float(tm.SPEED_OF_LIGHT_M_S * np.nanmedian(np.abs(each)[where]) / 2 * 1e3)
+            for each in _time_errors_s(shot)
         )
-    columns = (
-        "time / s",
-        "median error of indirect light / %",
-        f"pixels with more than {_OUTLIER:.0%} wrong / %",
-        "median error of range / mm",
-        "by a single frequency / mm",
-    )
-    return Table("Pixels with light over both mirrors (outliers: all lit pixels)", columns, rows)
+        rows.append(
+            {
+                "time / s": at_s,
+                "median error of indirect light / %": 100 * float(np.nanmedian(wrong)),
+                f"pixels with more than {_OUTLIER:.0%} wrong / %": 100 * _outliers(shot),
+                "median error of range / mm": ours_mm,
+                "by a single frequency / mm": single_mm,
+            }
+        )
+    return Table.of("Pixels with light over both mirrors (outliers: all lit pixels)", rows)
 
 
 def _draw(frames: dict[float, ReconstructedShot]) -> Any:

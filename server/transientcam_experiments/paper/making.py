@@ -32,10 +32,7 @@ def made_by_worker(
 ) -> tuple[dict[str, Any], bytes]:
     """Return the same of a bench that this process keeps: what a task is.
 
-    Raises
-    ------
-    MixedVersions
-        If this process computes with other versions than the one that asks.
+    Raises MixedVersions if this process computes with other versions than the one that asks.
     """
     require_versions(versions)
     tm.kernels.use_one_thread()  # a worker has a process, or a thread, for every core

@@ -17,19 +17,15 @@ _TIMES: Final = 800
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """Cumulative densities over the brightness: the true one, without and with noise.
-
-    Attributes
-    ----------
-    time_s : array, shape (T)
-    truth, clean : array, shape (T)
-    noisy : array, shape (T, D)
-    """
+    """Cumulative densities over the brightness: the true one, without and with noise."""
 
     time_s: _Array
+    """Shape (T)."""
     truth: _Array
     clean: _Array
+    """``truth``, ``clean``: shape (T)."""
     noisy: _Array
+    """Shape (T, D)."""
 
     @property
     def clean_error(self) -> float:

@@ -41,11 +41,8 @@ def document_of(
 class Page:
     """The page in a folder, with all figures that were ever made there.
 
-    Parameters
-    ----------
-    folder
-        Gets the page, ``figures/paper`` with a picture a figure, and a JSON document of all
-        numbers beside the pictures.
+    ``folder``: gets the page, ``figures/paper`` with a picture a figure, and a JSON document of all
+    numbers beside the pictures.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -30,23 +30,10 @@ def measure_on(
 ) -> None:
     """Measure the captures that are not in the records yet; these get them in the grid's order.
 
-    Parameters
-    ----------
-    client
-        A `distributed.Client` of the cluster. A scene that is a file is read by its workers.
-    grid, scene, repetitions, seed
-        As of `points_of`.
-    records
-        Where results are and go.
-    progress
-        Called with the kind of each point as it is done.
-
-    Raises
-    ------
-    MixedVersions, ClusterError
-        The cluster cannot do it.
-    SpecError, SceneError, SequenceError
-        As `measure`.
+    ``client``: a `distributed.Client` of the cluster, whose workers read a scene that is a file.
+    ``grid``, ``scene``, ``repetitions``, ``seed``: as of `points_of`.
+    ``progress``: called with the kind of each point as it is done.
+    Raises MixedVersions, ClusterError where the cluster cannot do it; and as `measure`.
     """
     from transientcam_server.offline import completed
 

@@ -32,21 +32,14 @@ QUANTITIES: Final[dict[str, str]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """The moments of a frame, and its true range.
-
-    Attributes
-    ----------
-    moments
-        (m + 1, H, W), biased.
-    base_frequency_hz
-        Of the moments.
-    truth_m
-        (H, W) range of the first return, NaN where no light is.
-    """
+    """The moments of a frame, and its true range."""
 
     moments: _Array
+    """(m + 1, H, W), biased."""
     base_frequency_hz: float
+    """Of the moments."""
     truth_m: _Array
+    """(H, W) range of the first return, NaN where no light is."""
 
 
 def points(harmonics: int) -> Iterator[tuple[Technique, Mapping[str, Any]]]:

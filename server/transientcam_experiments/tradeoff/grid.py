@@ -14,21 +14,14 @@ from transientcam_server.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """The sequences that are captured, and the sizes that computing is measured at.
-
-    Attributes
-    ----------
-    sequences
-        Each a point of the plot of capture time.
-    harmonics
-        m at which computing and transport are measured.
-    bins
-        Times of flight at which densities are evaluated there.
-    """
+    """The sequences that are captured, and the sizes that computing is measured at."""
 
     sequences: tuple[Sequence, ...]
+    """Each a point of the plot of capture time."""
     harmonics: tuple[int, ...] = (3, 4, 8)
+    """m at which computing and transport are measured."""
     bins: tuple[int, ...] = (64, 256)
+    """Times of flight at which densities are evaluated there."""
 
 
 def _around(base: Sequence, **values: tuple[Any, ...]) -> Iterator[Sequence]:
@@ -89,13 +82,8 @@ def load_grid(name: str) -> Grid:
 
     The file holds ``[[sequence]]`` tables, each a sequence document in which a list in the place
     of a value stands for all of its values, and optionally ``harmonics`` and ``bins``.
-
-    Raises
-    ------
-    InputError
-        Naming the part of the file that cannot be used.
-    SequenceError
-        Naming the field of a sequence.
+    Raises InputError naming the part of the file that cannot be used; SequenceError naming the
+    field of a sequence.
     """
     if name in GRIDS:
         return GRIDS[name]

@@ -110,27 +110,12 @@ def measure(
     progress: Callable[[str], None],
     clock: Callable[[], float] = time.perf_counter,
 ) -> None:
-    """Measure the points that are not in the records yet.
+    """Measure the points of a scene, from `points_of`, that are not in the records yet.
 
-    Parameters
-    ----------
-    points
-        Of one scene, from `points_of`.
-    records
-        Where results are and go.
-    scene, seed
-        Which world, and its chance.
-    progress
-        Called with the kind of each finished point, also of those that were measured before.
-    clock
-        Of the machine, for how long each point takes.
-
-    Raises
-    ------
-    SpecError, SceneError
-        The scene cannot be opened.
-    SequenceError
-        The camera cannot run a sequence of the grid.
+    ``progress``: called with the kind of each finished point, also of those measured before.
+    ``clock``: of the machine, for how long each point takes.
+    Raises SpecError, SceneError where the scene cannot be opened; SequenceError where the camera
+    cannot run a sequence of the grid.
     """
     left = [point for point in points if point.key not in records]
     for point in points:

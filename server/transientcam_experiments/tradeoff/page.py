@@ -76,12 +76,8 @@ document.addEventListener('click', (event) => {
 def page(records: Iterable[Record], plots: Mapping[tuple[str, str], bytes]) -> str:
     """Return the page.
 
-    Parameters
-    ----------
-    records
-        The results.
-    plots
-        SVG by scene and name of the plot.
+    ``records``: the results.
+    ``plots``: SVG by scene and name of the plot.
     """
     results = list(records)
     scenes = list(dict.fromkeys(record.scene for record in results))

@@ -13,31 +13,22 @@ FILE: Final = "points.jsonl"
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """The results at one point.
-
-    Attributes
-    ----------
-    kind
-        "capture", "computing", "estimating" or "transport".
-    scene
-        Name of the scene.
-    point
-        The settings; scene and conditions complete them.
-    conditions
-        Seed, repetitions and the like: what else is needed to repeat it.
-    values, spread
-        Mean and standard deviation over the repetitions, by quantity; None where it has none.
-    took_s
-        Time that the measurement took.
-    """
+    """The results at one point."""
 
     kind: str
+    """"capture", "computing", "estimating" or "transport"."""
     scene: str
+    """Name of the scene."""
     point: Mapping[str, Any]
+    """The settings; scene and conditions complete them."""
     conditions: Mapping[str, Any]
+    """Seed, repetitions and the like: what else is needed to repeat it."""
     values: Mapping[str, float | None]
     spread: Mapping[str, float | None]
+    """``values``, ``spread``: mean and standard deviation over the repetitions, by quantity; None
+    where it has none."""
     took_s: float = field(default=0.0, compare=False)
+    """Time that the measurement took."""
 
     @property
     def key(self) -> str:
@@ -53,10 +44,7 @@ def key_of(kind: str, scene: str, point: Mapping[str, Any], conditions: Mapping[
 class Records:
     """The results in a folder.
 
-    Parameters
-    ----------
-    folder
-        Is made where it is missing. Results already in it stay.
+    ``folder``: is made where it is missing. Results already in it stay.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -15,19 +15,13 @@ LEAST_LIGHT: Final = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """Some pixels with all of their light.
-
-    Attributes
-    ----------
-    y, x
-        (P) indices.
-    light
-        Of each pixel, times of flight in s and the share of its light that comes back at each.
-    """
+    """Some pixels with all of their light."""
 
     y: _Array
     x: _Array
+    """``y``, ``x``: (P) indices."""
     light: tuple[tuple[_Array, _Array], ...]
+    """Of each pixel, times of flight in s and the share of its light that comes back at each."""
 
 
 def sample_pixels(truth: Truth, *, pixels: int, seed: int) -> Sample:

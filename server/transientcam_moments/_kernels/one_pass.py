@@ -45,67 +45,51 @@ class Stages(NamedTuple):
 
 
 class Planes(NamedTuple):
-    """What a pass makes of a frame, each array with the pixels (...) last, and a new one.
-
-    Attributes
-    ----------
-    smoothed : array, shape (m + 1, ...), complex64
-        Calibrated and smoothed moments before biasing, b_0 estimated where it is not measured.
-    brightness : array, shape (...)
-        b_0 after biasing: in place of b_0 it makes the moments valid.
-    validity : array, shape (...)
-        Smallest eigenvalue over b_0 before biasing.
-    flags : array, shape (...), uint8
-        Of `transientcam_moments.Flags`.
-    phase_rad, weight, count : array, shapes (m, ...), (m, ...), (...)
-        Returns, as in `Returns`.
-    uniform, direct, indirect, range_m : array, shape (...)
-        What the returns say; range NaN where there is none.
-    redone : int
-        Pixels whose returns needed double precision.
-    """
+    """What a pass makes of a frame, each array with the pixels (...) last, and a new one."""
 
     smoothed: Any
+    """Shape (m + 1, ...), complex64: calibrated and smoothed moments before biasing, b_0 estimated
+    where it is not measured."""
     brightness: Any
+    """Shape (...): b_0 after biasing: in place of b_0 it makes the moments valid."""
     validity: Any
+    """Shape (...): smallest eigenvalue over b_0 before biasing."""
     flags: Any
+    """Shape (...), uint8: of `transientcam_moments.Flags`."""
     phase_rad: Any
     weight: Any
     count: Any
+    """``phase_rad``, ``weight``, ``count``: shapes (m, ...), (m, ...), (...): returns, as in
+    `Returns`."""
     uniform: Any
     direct: Any
     indirect: Any
     range_m: Any
+    """``uniform``, ``direct``, ``indirect``, ``range_m``: shape (...): what the returns say; range
+    NaN where there is none."""
     redone: int = 0
+    """Pixels whose returns needed double precision."""
 
 
 @dataclass(frozen=True)
 class Constants:
-    """What is the same for every frame.
-
-    Attributes
-    ----------
-    settings : Settings
-        Of the reconstruction.
-    inverse : array, shape (m + 1,) or (m + 1, ...), complex128
-        What measured moments are multiplied with, the reciprocal of a calibration; pixels where it
-        isn't finite have no moments.
-    taps : array, shape (2 R + 1,), optional
-        Weights of the smoothing along both axes of the pixels, sum 1; None for none.
-    range_per_rad_m : float
-        Range of a phase of 1 rad.
-    bad : integer array, shape (B,), optional
-        Flat places of the pixels to be flagged as replaced.
-    replaced : callable, optional
-        Takes raw images (N, P) and returns uncalibrated moments (m + 1, B) for those pixels.
-    """
+    """What is the same for every frame."""
 
     settings: Any
+    """Of the reconstruction."""
     inverse: Any
+    """Shape (m + 1,) or (m + 1, ...), complex128: what measured moments are multiplied with, the
+    reciprocal of a calibration; pixels where it isn't finite have no moments."""
     taps: Any
+    """Shape (2 R + 1,): weights of the smoothing along both axes of the pixels, sum 1;
+    None for none."""
     range_per_rad_m: float
+    """Range of a phase of 1 rad."""
     bad: Any = None
+    """Integers (B,): flat places of the pixels to be flagged as replaced."""
     replaced: Callable[[Any], Any] | None = None
+    """Takes raw images (N, P) and returns uncalibrated moments (m + 1, B) for
+    those pixels."""
 
 
 class OnePass:
@@ -114,14 +98,10 @@ class OnePass:
     Results are new arrays. What does not leave the pass lives in scratch space, which is kept for
     later frames: one for each call that ever ran at the same time as others.
 
-    Parameters
-    ----------
-    stages : Stages
-        Of the order that the frames have.
-    shape : tuple of int
-        Of the pixels; with taps, height and width, the latter at least `LEAST_WIDTH`.
-    constants : Constants
-        What is the same for every frame.
+    ``stages``: of the order that the frames have.
+    ``shape``: tuple of int, of the pixels; with taps, height and width, the latter at least
+    `LEAST_WIDTH`.
+    ``constants``: what is the same for every frame.
     """
 
     def __init__(self, stages: Stages, shape: tuple[int, ...], constants: Constants) -> None:

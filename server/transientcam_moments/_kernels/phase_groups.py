@@ -26,27 +26,20 @@ _REMEMBERED: Final = 4096  # phases; more are a computation rather than a film
 
 
 class Groups(NamedTuple):
-    """Phases in n groups.
-
-    Attributes
-    ----------
-    rows : array, shape (n, 4)
-        Of the phases of a group; of a pair in the first two. A phase alone has its row twice, and
-        what is evaluated for the first is right.
-    waves : array, shape (n, 4 m)
-        cos and sin of j phi for the first two of a group; but for `ANY`, of their distance from
-        the centre.
-    centre : array, shape (2 m)
-        cos and sin of j times the phase that the first two lie as far before as behind.
-    together : int
-        `ANY` two phases; two that are `MIRRORED`; or four of a whole `TURN`: two that are
-        mirrored, and those half a turn from each.
-    """
+    """Phases in n groups."""
 
     rows: Any
+    """Shape (n, 4): of the phases of a group; of a pair in the first two. A phase alone has its row
+    twice, and what is evaluated for the first is right."""
     waves: Any
+    """Shape (n, 4 m): cos and sin of j phi for the first two of a group; but for `ANY`, of their
+    distance from the centre."""
     centre: Any
+    """Shape (2 m): cos and sin of j times the phase that the first two lie as far before as
+    behind."""
     together: int
+    """`ANY` two phases; two that are `MIRRORED`; or four of a whole `TURN`: two that are
+    mirrored, and those half a turn from each."""
 
 
 @njit(nogil=True, error_model="numpy")

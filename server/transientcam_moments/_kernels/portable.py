@@ -67,32 +67,6 @@ from transientcam_moments.moment_problem import (
 )
 from transientcam_moments.noise import first_order, interpolation
 
-__all__ = [
-    "arctangent_ratio",
-    "bank",
-    "close",
-    "eps",
-    "infinity",
-    "large",
-    "larger",
-    "largest",
-    "least",
-    "length_up_to",
-    "logarithm",
-    "lost_by_squaring",
-    "magnitude",
-    "not_a_number",
-    "product_bank",
-    "repeat",
-    "root",
-    "select",
-    "small",
-    "smaller",
-    "some",
-    "square_bank",
-    "tiny",
-]
-
 types: Any = numba_types
 cgutils: Any = numba_cgutils
 

@@ -89,10 +89,7 @@ def real_type(b: Array) -> Any:
 def phases(phase_rad: Array, *, like: Array) -> Array:
     """Return phases as a one-dimensional real array in the namespace and precision of `like`.
 
-    Raises
-    ------
-    ShapeError
-        When there is more than one axis or the elements are not real numbers.
+    Raises ShapeError when there is more than one axis or the elements are not real numbers.
     """
     xp = namespace(like)
     array = as_array(phase_rad)

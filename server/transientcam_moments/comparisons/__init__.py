@@ -1,7 +1,8 @@
 """The techniques that the paper is compared with, and its own, in one form.
 
 Each takes moments (m + 1, ...), one of them samples of a code, and gives an `Estimate`: returns or
-a density, with the cumulative response and the phase of the first return. All compute in double
+a density, with the cumulative response and the phase of the first return. With fewer moments than
+it needs, or an option out of its range, it raises a `ParameterError`. All compute in double
 precision with NumPy. ::
 
     from transientcam_moments import comparisons

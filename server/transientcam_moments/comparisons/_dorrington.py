@@ -17,18 +17,6 @@ _TRIED = 10  # of these pairs
 def dorrington(b: Array) -> SparseEstimate:
     """Fit two returns to b_1 and b_2, pixel by pixel.
 
-    Parameters
-    ----------
-    b : array, shape (m + 1, ...)
-        Moments, m >= 2; b_0 and those after b_2 are not looked at.
-
-    Raises
-    ------
-    ParameterError
-        When m < 2.
-
-    Notes
-    -----
     Two phases and two weights >= 0 against the four numbers that two frequencies give, by SciPy's
     `least_squares` (trust region reflective). It starts from the pairs of a coarse grid that fit
     best, because a descent from anywhere ends in local minima.

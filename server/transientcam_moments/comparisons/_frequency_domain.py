@@ -17,19 +17,14 @@ _BLOCK_PIXELS = 1024
 def frequency_domain(b: Array, *, returns: int = 2, threshold: float = 0.1) -> SparseEstimate:
     """Estimate returns from the peaks of the Fourier transform of b_1 .. b_m over frequency.
 
+    m is at least 3, and better 16 or 32.
+
     Parameters
     ----------
-    b : array, shape (m + 1, ...)
-        Moments, m >= 3 and better 16 or 32; b_0 is not looked at.
     returns : int
         The most that are looked for.
     threshold : float
         Peaks lower than this share of the highest one don't count, 0 to 1.
-
-    Raises
-    ------
-    ParameterError
-        When m < 3, or for another number of returns than 1 to m.
 
     Notes
     -----

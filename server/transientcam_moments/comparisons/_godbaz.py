@@ -11,25 +11,8 @@ _LEAST = 4
 
 
 def godbaz(b: Array) -> SparseEstimate:
-    """Estimate two returns from b_1 .. b_4.
+    """Estimate two returns from b_1 .. b_4; only one where the moments are those of one.
 
-    Parameters
-    ----------
-    b : array, shape (m + 1, ...)
-        Moments, m >= 4; b_0 and those after b_4 are not looked at.
-
-    Returns
-    -------
-    SparseEstimate
-        One return where the moments are those of one return to rounding.
-
-    Raises
-    ------
-    ParameterError
-        When m < 4.
-
-    Notes
-    -----
     With c_i = b_{i+1} = a_1 z_1^{i+1} + a_2 z_2^{i+1} the z are the roots of z^2 + P_1 z + P_0,
     P_1 = (c_0 c_3 - c_1 c_2) / D, P_0 = (c_2^2 - c_1 c_3) / D, D = c_1^2 - c_0 c_2. The original
     models returns as Cauchy densities, whose width is 1 - |z|; here, as where the paper compares,

@@ -11,25 +11,8 @@ _LEAST = 2
 
 
 def high_frequency(b: Array) -> SparseEstimate:
-    """Estimate one return from the two highest frequencies.
+    """Estimate one return, of weight |b_m|, from b_{m-1} and b_m, m >= 2.
 
-    Parameters
-    ----------
-    b : array, shape (m + 1, ...)
-        Moments, m >= 2; only b_{m-1} and b_m are looked at.
-
-    Returns
-    -------
-    SparseEstimate
-        A return of weight |b_m|.
-
-    Raises
-    ------
-    ParameterError
-        When m < 2.
-
-    Notes
-    -----
     The beat of the two, arg(b_m conj(b_{m-1})), has no ambiguity within the turn and chooses among
     the m phases that b_m alone allows; it may be off by pi / m. The frequencies are high where
     m f is above the bandwidth of the indirect light.

@@ -19,8 +19,6 @@ def inverse_fourier(
 
     Parameters
     ----------
-    b : array, shape (m + 1, ...)
-        Moments.
     window : {"hann", "none"}
         What the harmonics are weighted with against ringing.
     correction : {"lift", "clip", "none"}
@@ -28,11 +26,6 @@ def inverse_fourier(
         that leaves none; "clip" makes them 0 and scales the rest to b_0; "none" leaves them.
     bins : int
         Of phase, more than 2 m.
-
-    Raises
-    ------
-    ParameterError
-        For another window or correction, or too few bins.
 
     Notes
     -----

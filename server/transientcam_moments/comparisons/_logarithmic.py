@@ -26,8 +26,6 @@ def logarithmic(
 
     Parameters
     ----------
-    b : array, shape (m + 1, ...)
-        Moments; b_0 is not looked at.
     epsilon : float
         Tolerance, as of `sra`, above 0 and at most 1.
     delta : float
@@ -36,11 +34,6 @@ def logarithmic(
         Linear programs, at least 1; the first is that of `sra`.
     bins : int
         Phases k 2 pi / bins that light may come back at, more than 2 m.
-
-    Raises
-    ------
-    ParameterError
-        For an argument outside of that.
 
     Notes
     -----

@@ -21,19 +21,12 @@ def matching_pursuit(
 
     Parameters
     ----------
-    b : array, shape (m + 1, ...)
-        Moments, m >= 2; b_0 is not looked at.
     returns : int
         The most that are looked for.
     bins : int
         Of phase.
     tolerance : float
         Of the residual relative to the moments, at which a pixel needs no further return.
-
-    Raises
-    ------
-    ParameterError
-        When m < 2, or for another number of returns than 1 to m.
 
     Notes
     -----

@@ -13,19 +13,12 @@ _LEAST = 3
 
 
 def matrix_pencil(b: Array, *, returns: int | None = None) -> SparseEstimate:
-    """Estimate returns from b_1 .. b_m.
+    """Estimate returns from b_1 .. b_m, m >= 3.
 
     Parameters
     ----------
-    b : array, shape (m + 1, ...)
-        Moments, m >= 3; b_0 is not looked at.
     returns : int, optional
         How many, at most (m - 1) // 2, which is the default.
-
-    Raises
-    ------
-    ParameterError
-        When m < 3, or for more returns than that.
 
     Notes
     -----

@@ -26,10 +26,10 @@ def regularised(
 ) -> GridEstimate:
     """Estimate densities that come close to the moments and vary little.
 
+    b_0 is not looked at. Only moments (m + 1, H, W) have neighbouring pixels.
+
     Parameters
     ----------
-    b : array, shape (m + 1, ..., H, W) or (m + 1, ...)
-        Moments; b_0 is not looked at. Only (m + 1, H, W) has neighbouring pixels.
     temporal, spatial : float
         Weights of the priors, >= 0.
     delta : float
@@ -39,11 +39,6 @@ def regularised(
         Of phase, more than 2 m.
     iterations : int
         Most steps of the solver.
-
-    Raises
-    ------
-    ParameterError
-        For an argument outside of that.
 
     Notes
     -----

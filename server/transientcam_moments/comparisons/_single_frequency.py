@@ -9,13 +9,7 @@ from transientcam_moments.comparisons._technique import Technique
 
 
 def single_frequency(b: Array) -> SparseEstimate:
-    """Estimate one return at arg b_1 of weight |b_1|.
-
-    Parameters
-    ----------
-    b : array, shape (m + 1, ...)
-        Moments; only b_1 is looked at.
-    """
+    """Estimate one return at arg b_1 of weight |b_1|; nothing else is looked at."""
     pixels = pixels_of(b, least=1, name="single-frequency", last=1)
     first = pixels.b[1:2]
     return pixels.sparse(np.angle(first), np.abs(first))

@@ -14,18 +14,6 @@ _LEAST = 6
 def spumic(b: Array) -> SparseEstimate:
     """Estimate two returns from b_1 .. b_6.
 
-    Parameters
-    ----------
-    b : array, shape (m + 1, ...)
-        Moments, m >= 6; b_0 and those after b_6 are not looked at.
-
-    Raises
-    ------
-    ParameterError
-        When m < 6.
-
-    Notes
-    -----
     A filter (u_0, u_1, u_2) with u_0 c_i + u_1 c_{i+1} + u_2 c_{i+2} = 0 along the moments, and
     along their conjugates backwards, by total least squares: the singular vector of the smallest
     singular value. Its roots are the returns' exp(i phi); their weights follow by non-negative

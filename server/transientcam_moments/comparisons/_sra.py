@@ -32,8 +32,6 @@ def sra(
 
     Parameters
     ----------
-    b : array, shape (m + 1, ...)
-        Moments; b_0 is not looked at.
     epsilon : float
         Largest 1-norm of what is left of b_1 .. b_m, relative to theirs, 0 to 1. At 0 the answer
         is known in closed form and the grid is not used.
@@ -42,11 +40,6 @@ def sra(
     harmonics : sequence of int, optional
         Which multiples of the base frequency the planes of `b` are; 0 to m when left out. Where
         they are others, m is the largest, and the tolerance above 0.
-
-    Raises
-    ------
-    ParameterError
-        For a tolerance, a number of bins or harmonics outside of that.
 
     Notes
     -----

@@ -24,28 +24,16 @@ _DENSER = 1.5  # power of the distance from there, by which nodes get closer to 
 
 
 def sra_table(b: Array, *, nodes: int | None = None, epsilon: float = EPSILON) -> SparseEstimate:
-    """Look up the first return that `sra` finds for b_1, b_2 and b_3.
+    """Look up the first return that `sra` finds for b_1, b_2 and b_3; no other is returned.
 
     Parameters
     ----------
-    b : array, shape (m + 1, ...)
-        Moments, m >= 3; b_0 and those after b_3 are not looked at.
     nodes : int, optional
         Of the table along each of its axes, odd and at least 3; `NODES` when left out. The first
         call with a number builds the table, a linear program for every second of its nodes, which
         takes seconds.
     epsilon : float
         Tolerance, as of `sra`, above 0.
-
-    Returns
-    -------
-    SparseEstimate
-        The first return alone.
-
-    Raises
-    ------
-    ParameterError
-        When m < 3, or for another number of nodes.
 
     Notes
     -----

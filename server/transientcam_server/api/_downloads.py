@@ -84,15 +84,8 @@ async def answer(
 def part(data: bytes, wanted: str | None, *, media_type: str, tag: str) -> Response:
     """Return bytes, or the range of them that is wanted; of several ranges all.
 
-    Parameters
-    ----------
-    wanted
-        The Range header, None also where If-Range names something else than ``tag``.
-
-    Raises
-    ------
-    Problem
-        ``range-not-satisfiable``.
+    ``wanted``: the Range header, None also where If-Range names something else than ``tag``.
+    Raises Problem ``range-not-satisfiable``.
     """
     headers = {"ETag": tag, "Accept-Ranges": "bytes"}
     span = _span(wanted, len(data))

@@ -39,10 +39,7 @@ def of_bytes(content: bytes) -> str:
 def of_file(path: Path) -> str:
     """Return what names the content of a file, by when and how long it was written.
 
-    Raises
-    ------
-    OSError
-        If it is gone.
+    Raises OSError if it is gone.
     """
     found = path.stat()
     return of_bytes(f"{found.st_ino} {found.st_mtime_ns} {found.st_size}".encode())
@@ -57,10 +54,7 @@ def names(header: str | None, tag: str) -> bool:
 def require(if_match: str | None, tag: str, *, otherwise: ProblemKind) -> None:
     """Refuse a change of something that is not in use any more.
 
-    Raises
-    ------
-    Problem
-        Of the kind ``otherwise``.
+    Raises Problem of the kind ``otherwise``.
     """
     if if_match is not None and not names(if_match, tag):
         raise Problem(

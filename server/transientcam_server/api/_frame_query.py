@@ -81,10 +81,8 @@ class FrameQuery:
     def view_of(self, product: Product, frame: Frame) -> View:
         """Return which part of the frame's product that is.
 
-        Raises
-        ------
-        Problem
-            ``invalid-request`` for what this product does not have or this frame cannot give.
+        Raises Problem ``invalid-request`` for what this product does not have or this frame cannot
+        give.
         """
         self._require_meaning(product)
         height, width = frame.shape
@@ -158,13 +156,7 @@ FrameQueryOf = Annotated[FrameQuery, Depends(_frame_query)]
 
 
 def choose(product: Product, suffix: str | None, query: FrameQuery) -> Encoding:
-    """Return the format that a request selects for a product.
-
-    Raises
-    ------
-    Problem
-        ``not-acceptable``.
-    """
+    """Return the format that a request selects for a product. Raises Problem ``not-acceptable``."""
     encoding = negotiate(product, suffix=suffix, accept=query.accept)
     return COLOUR_PNG if query.view is not None and encoding is PNG else encoding
 

@@ -30,10 +30,7 @@ class ChosenFrame(Protocol):
     async def frame(self) -> Frame:
         """Return the frame.
 
-        Raises
-        ------
-        Problem
-            One of the kinds that `add_frame_routes` was given as ``missing``.
+        Raises Problem: one of the kinds that `add_frame_routes` was given as ``missing``.
         """
         ...
 
@@ -54,14 +51,10 @@ def add_frame_routes(
 ) -> None:
     """Add the routes for a frame, its pixels and its products below ``path``.
 
-    Parameters
-    ----------
-    chosen_by
-        Dependency that returns the frame a request is about.
-    missing
-        Kinds of problems with which a frame cannot be found.
-    frame, pixel, product
-        How the OpenAPI document names each of them, and describes a frame and a product.
+    ``chosen_by``: dependency that returns the frame a request is about.
+    ``missing``: kinds of problems with which a frame cannot be found.
+    ``frame``, ``pixel``, ``product``: how the OpenAPI document names each of them, and describes a
+    frame and a product.
     """
     chosen_of = Depends(chosen_by)
 

@@ -59,7 +59,9 @@ class Metrics:
         self._last: Captured | None = None
         # every series from the start, so that its rate can be queried
         self.pixels: Mapping[str, int] = {"total": 1} | dict.fromkeys(_FLAGS, 0)
-        self.corrupt = dict.fromkeys(("rejected", "repaired", "filled", "unrepaired"), 0)
+        self.corrupt: dict[str, int] = dict.fromkeys(
+            ("rejected", "repaired", "filled", "unrepaired"), 0
+        )
         self.losses = 0
         self.reconnects = 0
         self.registry.register(_ServiceCollector(service, self))
@@ -122,146 +124,108 @@ class _ServiceCollector(Collector):
         yield from self._clients()
 
     def _build(self) -> Iterator[Metric]:
-        service = self._service
-        capabilities = service.camera.capabilities
-        yield InfoMetricFamily(
-            "transientcam_build",
-            "Versions of what runs here.",
-            value={
-                "version": service.identity["version"],
-                "api": "v1",
-                "model": capabilities.model,
-                "firmware": capabilities.firmware,
-            },
-        )
+        capabilities = self._service.camera.capabilities
+        versions = {
+            "version": self._service.identity["version"],
+            "api": "v1",
+            "model": capabilities.model,
+            "firmware": capabilities.firmware,
+        }
+        yield InfoMetricFamily("transientcam_build", "Versions of what runs here.", value=versions)
 
     def _device(self) -> Iterator[Metric]:
         state = self._service.acquisition.status().state
-        yield GaugeMetricFamily(
-            "transientcam_device_connected", "Whether the camera answers.", state != "lost"
+        yield _gauge("device_connected", "Whether the camera answers.", state != "lost")
+        yield _gauge(
+            "acquisition_running", "Whether frames are being captured.", state == "streaming"
         )
-        yield GaugeMetricFamily(
-            "transientcam_acquisition_running",
-            "Whether frames are being captured.",
-            state == "streaming",
-        )
-        yield CounterMetricFamily(
-            "transientcam_device_losses", "How often the camera was lost.", self._metrics.losses
-        )
-        yield CounterMetricFamily(
-            "transientcam_device_reconnects",
-            "How often a lost camera came back.",
-            self._metrics.reconnects,
+        yield _counter("device_losses", "How often the camera was lost.", self._metrics.losses)
+        yield _counter(
+            "device_reconnects", "How often a lost camera came back.", self._metrics.reconnects
         )
         counters = self._service.camera.counters
-        images = CounterMetricFamily(
-            "transientcam_images",
+        yield _counter(
+            "images",
             "Images from the camera, by what became of them.",
-            labels=("result",),
+            {"received": counters.images, "lost": counters.lost, "corrupt": counters.corrupt},
+            by="result",
         )
-        for result, count in (
-            ("received", counters.images),
-            ("lost", counters.lost),
-            ("corrupt", counters.corrupt),
-        ):
-            images.add_metric((result,), count)
-        yield images
-        corrupt = CounterMetricFamily(
-            "transientcam_spoilt_images",
+        yield _counter(
+            "spoilt_images",
             "Images unlike the others, of frames that were computed, by what became of them.",
-            labels=("result",),
+            self._metrics.corrupt,
+            by="result",
         )
-        for result, count in self._metrics.corrupt.items():
-            corrupt.add_metric((result,), count)
-        yield corrupt
-        yield CounterMetricFamily(
-            "transientcam_usb_resynchronisations",
+        yield _counter(
+            "usb_resynchronisations",
             "How often the beginning of an image had to be searched for.",
             counters.resyncs,
         )
 
     def _frames(self) -> Iterator[Metric]:
         status = self._service.acquisition.status()
-        yield CounterMetricFamily(
-            "transientcam_frames_captured", "Frames since the service started.", status.frames
-        )
-        yield GaugeMetricFamily(
-            "transientcam_frame_age_seconds", "Since the last frame arrived.", status.frame_age_s
-        )
+        yield _counter("frames_captured", "Frames since the service started.", status.frames)
+        yield _gauge("frame_age_seconds", "Since the last frame arrived.", status.frame_age_s)
         latest = self._service.hub.latest
         if latest is None:
             return
         if (temperature_c := latest.raw.temperature_c) is not None:
-            yield GaugeMetricFamily(
-                "transientcam_sensor_temperature_celsius",
-                "Of the camera, with its last frame.",
-                temperature_c,
+            yield _gauge(
+                "sensor_temperature_celsius", "Of the camera, with its last frame.", temperature_c
             )
-        shares = GaugeMetricFamily(
-            "transientcam_pixels_flagged_ratio",
-            "Share of the pixels of the last frame that was looked at that carry a flag.",
-            labels=("flag",),
-        )
         pixels = self._metrics.pixels
-        for flag, count in pixels.items():
-            if flag not in ("total", "valid"):
-                shares.add_metric((flag,), count / pixels["total"])
-        yield shares
+        yield _gauge(
+            "pixels_flagged_ratio",
+            "Share of the pixels of the last frame that was looked at that carry a flag.",
+            {
+                flag: count / pixels["total"]
+                for flag, count in pixels.items()
+                if flag not in ("total", "valid")
+            },
+            by="flag",
+        )
 
     def _history(self) -> Iterator[Metric]:
         history = self._service.history
-        yield GaugeMetricFamily(
-            "transientcam_history_frames", "Former frames that can still be had.", history.count
-        )
-        yield GaugeMetricFamily(
-            "transientcam_history_bytes", "Memory of their raw images.", history.size_bytes
-        )
-        yield GaugeMetricFamily(
-            "transientcam_history_limit_bytes",
-            "What it may be at most.",
-            history.settings.max_bytes,
-        )
+        yield _gauge("history_frames", "Former frames that can still be had.", history.count)
+        yield _gauge("history_bytes", "Memory of their raw images.", history.size_bytes)
+        yield _gauge("history_limit_bytes", "What it may be at most.", history.settings.max_bytes)
 
     def _calibration(self) -> Iterator[Metric]:
         calibrations = self._service.calibrations
-        yield GaugeMetricFamily(
-            "transientcam_calibration_active",
+        yield _gauge(
+            "calibration_active",
             "Whether a measurement calibrates frames, where it fits the sequence.",
             calibrations.active_id != NOMINAL_ID,
         )
-        captured_unix_s = calibrations.active_since_s
-        if captured_unix_s is not None:
-            yield GaugeMetricFamily(
-                "transientcam_calibration_timestamp_seconds",
+        if (captured_unix_s := calibrations.active_since_s) is not None:
+            yield _gauge(
+                "calibration_timestamp_seconds",
                 "When the active calibration was measured.",
                 captured_unix_s,
             )
-        drift = calibrations.known_drift
-        if drift is not None:
-            yield GaugeMetricFamily(
-                "transientcam_calibration_invalid_pixels_ratio",
+        if (drift := calibrations.known_drift) is not None:
+            yield _gauge(
+                "calibration_invalid_pixels_ratio",
                 "Share of pixels whose moments contradict each other by more than noise explains.",
                 drift.invalid_share,
             )
 
     def _clients(self) -> Iterator[Metric]:
         hub = self._service.hub
-        yield GaugeMetricFamily("transientcam_stream_clients", "Streams open now.", hub.clients)
-        yield GaugeMetricFamily(
-            "transientcam_preview_clients",
+        lease = self._service.lease.current
+        yield _gauge("stream_clients", "Streams open now.", hub.clients)
+        yield _gauge(
+            "preview_clients",
             "Clients that receive a preview as MJPEG now.",
             self._service.mjpeg_clients,
         )
-        yield CounterMetricFamily(
-            "transientcam_frames_dropped",
+        yield _counter(
+            "frames_dropped",
             "Frames that clients were too slow for, of all clients together.",
             hub.dropped,
         )
-        yield GaugeMetricFamily(
-            "transientcam_lease_held",
-            "Whether a client holds the lease.",
-            self._service.lease.current is not None,
-        )
+        yield _gauge("lease_held", "Whether a client holds the lease.", lease is not None)
 
 
 class RecordingCollector(Collector):
@@ -272,38 +236,28 @@ class RecordingCollector(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """Return the values of this moment."""
-        totals = self._library.totals
-        yield GaugeMetricFamily(
-            "transientcam_recording_active",
-            "Whether frames are being recorded.",
-            self._library.active_id is not None,
+        library, totals = self._library, self._library.totals
+        yield _gauge(
+            "recording_active", "Whether frames are being recorded.", library.active_id is not None
         )
-        yield CounterMetricFamily(
-            "transientcam_recording_frames", "Frames that were recorded.", totals.frames
-        )
-        yield CounterMetricFamily(
-            "transientcam_recording_dropped_frames",
+        yield _counter("recording_frames", "Frames that were recorded.", totals.frames)
+        yield _counter(
+            "recording_dropped_frames",
             "Frames that the disk was too slow for.",
             totals.dropped_frames,
         )
-        yield CounterMetricFamily(
-            "transientcam_recording_bytes", "Bytes that were written.", totals.size_bytes
+        yield _counter("recording_bytes", "Bytes that were written.", totals.size_bytes)
+        yield _counter(
+            "recordings_ended", "Recordings, by why they ended.", totals.ended, by="reason"
         )
-        ended = CounterMetricFamily(
-            "transientcam_recordings_ended", "Recordings, by why they ended.", labels=("reason",)
-        )
-        for reason, count in totals.ended.items():
-            ended.add_metric((reason,), count)
-        yield ended
-        yield GaugeMetricFamily(
-            "transientcam_disk_waiting_seconds",
+        yield _gauge(
+            "disk_waiting_seconds",
             "How long the disk of the recordings has not answered.",
-            self._library.disk_waiting_s,
+            library.disk_waiting_s,
         )
-        free_bytes = self._library.known_free_bytes
-        if free_bytes is not None:
-            yield GaugeMetricFamily(
-                "transientcam_recording_disk_free_bytes",
+        if (free_bytes := library.known_free_bytes) is not None:
+            yield _gauge(
+                "recording_disk_free_bytes",
                 "What the disk has left where recordings are kept.",
                 free_bytes,
             )
@@ -321,38 +275,57 @@ class RelayCollector(Collector):
         if relay is None:
             return
         counters = relay.relayed
-        yield CounterMetricFamily(
-            "transientcam_relay_reconnects",
-            "How often the origin was found again.",
-            counters.reconnects,
+        yield _counter(
+            "relay_reconnects", "How often the origin was found again.", counters.reconnects
         )
-        yield CounterMetricFamily(
-            "transientcam_relay_origin_restarts",
+        yield _counter(
+            "relay_origin_restarts",
             "How often the origin was started anew meanwhile.",
             counters.restarts,
         )
-        yield CounterMetricFamily(
-            "transientcam_relay_dropped_frames",
+        yield _counter(
+            "relay_dropped_frames",
             "Frames that the origin dropped because relay or network were too slow.",
             counters.dropped_frames,
         )
-        yield from self._hops()
-
-    def _hops(self) -> Iterator[Metric]:
         latest = self._service.hub.latest
-        latency = GaugeMetricFamily(
-            "transientcam_relay_hop_latency_seconds",
+        hops = {} if latest is None else {str(k): hop for k, hop in enumerate(latest.raw.hops, 1)}
+        yield _gauge(
+            "relay_hop_latency_seconds",
             "From the arrival of the last frame at the service before to that at the relay, by "
             "both clocks; hop 1 is the nearest to the camera.",
-            labels=("hop",),
+            {number: hop.latency_s for number, hop in hops.items()},
+            by="hop",
         )
-        missed = CounterMetricFamily(
-            "transientcam_relay_hop_missed_frames",
+        yield _counter(
+            "relay_hop_missed_frames",
             "Frames that a relay never got of the service before it.",
-            labels=("hop",),
+            {number: hop.missed_frames for number, hop in hops.items()},
+            by="hop",
         )
-        for number, hop in enumerate(() if latest is None else latest.raw.hops, 1):
-            latency.add_metric((str(number),), hop.latency_s)
-            missed.add_metric((str(number),), hop.missed_frames)
-        yield latency
-        yield missed
+
+
+def _gauge(name: str, meaning: str, value: float | Mapping[str, float], by: str = "") -> Metric:
+    """Return a value that rises and falls; several of them, each with its value of a label."""
+    return _filled(GaugeMetricFamily, name, meaning, value, by)
+
+
+def _counter(name: str, meaning: str, value: float | Mapping[str, float], by: str = "") -> Metric:
+    """Return a value that only rises; several of them, each with its value of a label."""
+    return _filled(CounterMetricFamily, name, meaning, value, by)
+
+
+def _filled(
+    family: type[GaugeMetricFamily | CounterMetricFamily],
+    name: str,
+    meaning: str,
+    value: float | Mapping[str, float],
+    by: str,
+) -> Metric:
+    full_name = f"transientcam_{name}"
+    if not isinstance(value, Mapping):
+        return family(full_name, meaning, value)
+    metric = family(full_name, meaning, labels=(by,))
+    for label, each in value.items():
+        metric.add_metric((label,), each)
+    return metric

@@ -12,10 +12,7 @@ _BY_MEDIA_TYPE = {encoding.media_type: encoding for encoding in ENCODINGS.values
 def negotiate(product: Product, *, suffix: str | None, accept: str | None) -> Encoding:
     """Return the encoding that a suffix names, else the one an Accept header prefers.
 
-    Raises
-    ------
-    Problem
-        ``not-acceptable``, with the list of those the product has.
+    Raises Problem ``not-acceptable``, with the list of those the product has.
     """
     supported = [encoding for encoding in ENCODINGS.values() if encoding.fits(product)]
     if suffix is not None:

@@ -23,21 +23,14 @@ OFF: Final = "The setting `announce` is `off`, so that this service sends and re
 
 @dataclass(frozen=True, slots=True)
 class Neighbours:
-    """What is known of the network.
-
-    Attributes
-    ----------
-    cameras
-        Each with the time since it answered, in s; by name.
-    left_out
-        How many more were announced, which are not listed.
-    reason
-        Why the network was not searched; None where it was.
-    """
+    """What is known of the network."""
 
     cameras: tuple[tuple[FoundCamera, float], ...] = ()
+    """Each with the time since it answered, in s; by name."""
     left_out: int = 0
+    """How many more were announced, which are not listed."""
     reason: str | None = None
+    """Why the network was not searched; None where it was."""
 
 
 class NeighbourSearch:
@@ -45,12 +38,8 @@ class NeighbourSearch:
 
     No request is sent to what is found: any host on the network can announce any address.
 
-    Parameters
-    ----------
-    search
-        Takes a while, and runs on another thread; None where the settings allow none.
-    clock
-        In s, monotonic.
+    ``search``: takes a while, and runs on another thread; None where the settings allow none.
+    ``clock``: in s, monotonic.
     """
 
     def __init__(

@@ -65,11 +65,7 @@ def as_job(
     """Start a job that does the work beside those of the camera; its result is the answer.
 
     While it runs, its result is what the work shows of it. The work may fill in ``files``.
-
-    Raises
-    ------
-    Problem
-        ``too-many-jobs``.
+    Raises Problem ``too-many-jobs``.
     """
 
     async def run(job: Job) -> dict[str, Any]:
@@ -86,10 +82,8 @@ def as_job(
 async def require_plannable(service: Service, address: str) -> None:
     """Refuse a camera whose captures are not predicted.
 
-    Raises
-    ------
-    Problem
-        ``target-unreachable``, with ``takes``: what more of them give, by the newest frame.
+    Raises Problem ``target-unreachable``, with ``takes``: what more of them give, by the newest
+    frame.
     """
     try:
         families.require_plannable(service.camera.capabilities)
@@ -101,10 +95,7 @@ async def require_plannable(service: Service, address: str) -> None:
 def require_scene(service: Service) -> None:
     """Refuse to look at the scene of a service that has no images to do it by.
 
-    Raises
-    ------
-    Problem
-        ``only-moments``.
+    Raises Problem ``only-moments``.
     """
     if service.looks.needs_frame:
         service.require_images("The scene is seen")

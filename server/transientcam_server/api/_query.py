@@ -12,11 +12,7 @@ async def require_known(request: Request) -> None:
     """Refuse a read whose query has a parameter that its route does not document.
 
     Changes have none: their values are in the body. They pass, `safe-off` above all.
-
-    Raises
-    ------
-    Problem
-        ``invalid-request``, with the first such parameter and those that there are.
+    Raises Problem ``invalid-request``, with the first such parameter and those that there are.
     """
     if not request.query_params or request.method not in ("GET", "HEAD"):
         return

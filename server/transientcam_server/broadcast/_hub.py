@@ -104,10 +104,7 @@ class Hub:
     async def newest(self, *, after: int, wait_s: float) -> Frame:
         """Return the newest frame once its number is greater than ``after``.
 
-        Raises
-        ------
-        Problem
-            ``no-frame-yet`` if none came within ``wait_s``, ``shutting-down``.
+        Raises Problem ``no-frame-yet`` if none came within ``wait_s``, ``shutting-down``.
         """
         self.reads += 1
         with contextlib.suppress(TimeoutError):

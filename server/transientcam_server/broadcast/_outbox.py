@@ -72,10 +72,7 @@ class Outbox:
     newest frame alone. A client that resumes gets every frame that the past still has, in order
     and as fast as it takes them, and with the newest it is one like all others.
 
-    Attributes
-    ----------
-    owner
-        As whom the client has authenticated; None before it has.
+    ``owner``: as whom the client has authenticated; None before it has.
     """
 
     def __init__(self, *, depth: int) -> None:

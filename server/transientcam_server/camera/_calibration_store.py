@@ -38,34 +38,24 @@ _ABANDONED_S: Final = 24 * 3600.0
 
 @dataclass(frozen=True, slots=True)
 class StoredCalibration:
-    """A calibration on disk, without its images.
-
-    Attributes
-    ----------
-    path
-        Its file.
-    subject
-        Device and sequence that it fits.
-    captured_unix_s
-        When its last image arrived.
-    notes
-        ``name``, and what else is stored with it.
-    verdict
-        Whether it was measured on a diffuser.
-    waveform
-        Harmonics of the modulation (m, K), see `Gains`; None where none are known.
-    """
+    """A calibration on disk, without its images."""
 
     id: str
     path: Path
+    """Its file."""
     size_bytes: int
     subject: CalibrationSubject
+    """Device and sequence that it fits."""
     model: str
     captured_unix_s: float
+    """When its last image arrived."""
     temperature_c: float | None
     notes: Mapping[str, Any]
+    """``name``, and what else is stored with it."""
     verdict: Verdict
+    """Whether it was measured on a diffuser."""
     waveform: NDArray[Any] | None
+    """Harmonics of the modulation (m, K), see `Gains`; None where none are known."""
 
     @property
     def usable(self) -> bool:
@@ -76,12 +66,8 @@ class StoredCalibration:
 class CalibrationStore:
     """The stored calibrations. Reads and writes files, so call it on a worker.
 
-    Parameters
-    ----------
-    settings
-        Directory, largest number and size.
-    given
-        File that the service was started with, in any directory.
+    ``settings``: directory, largest number and size.
+    ``given``: file that the service was started with, in any directory.
     """
 
     def __init__(
@@ -109,13 +95,7 @@ class CalibrationStore:
         return sorted(found.values(), key=lambda each: each.captured_unix_s, reverse=True)
 
     def get(self, calibration_id: str) -> StoredCalibration:
-        """Return a calibration.
-
-        Raises
-        ------
-        Problem
-            ``unknown-calibration``.
-        """
+        """Return a calibration. Raises Problem ``unknown-calibration``."""
         for each in self.all():
             if each.id == calibration_id:
                 return each
@@ -128,13 +108,7 @@ class CalibrationStore:
         )
 
     def add(self, capture: CalibrationCapture) -> StoredCalibration:
-        """Store a measurement.
-
-        Raises
-        ------
-        Problem
-            ``calibration-not-stored``.
-        """
+        """Store a measurement. Raises Problem ``calibration-not-stored``."""
         self.require_room()
         with self._part() as part:
             try:
@@ -159,10 +133,7 @@ class CalibrationStore:
     def import_file(self, part: Path) -> StoredCalibration:
         """Store a file that was received; a calibration that exists stays as it is.
 
-        Raises
-        ------
-        Problem
-            ``invalid-calibration``, ``calibration-not-stored``.
+        Raises Problem ``invalid-calibration``, ``calibration-not-stored``.
         """
         try:
             capture = CalibrationCapture.load(part, max_bytes=self._settings.max_bytes)
@@ -183,11 +154,8 @@ class CalibrationStore:
     def delete(self, calibration_id: str) -> StoredCalibration:
         """Delete a calibration permanently.
 
-        Raises
-        ------
-        Problem
-            ``unknown-calibration``, ``calibration-in-use`` for the one that the service was
-            started with, ``calibration-not-stored`` where the disk refuses.
+        Raises Problem ``unknown-calibration``, ``calibration-in-use`` for the one that the service
+        was started with, ``calibration-not-stored`` where the disk refuses.
         """
         stored = self.get(calibration_id)
         if stored.path == self._given:
@@ -237,10 +205,7 @@ class CalibrationStore:
     def require_room(self) -> None:
         """Refuse one more calibration where the limit is reached.
 
-        Raises
-        ------
-        Problem
-            ``calibration-not-stored``.
+        Raises Problem ``calibration-not-stored``.
         """
         most = self._settings.max_count
         if len(self.all()) >= most:
@@ -261,10 +226,7 @@ class CalibrationStore:
     def new_part(self) -> Path:
         """Create a file for a calibration that is not complete yet; the caller removes it.
 
-        Raises
-        ------
-        Problem
-            ``calibration-not-stored``.
+        Raises Problem ``calibration-not-stored``.
         """
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
@@ -344,12 +306,7 @@ def _loaded(path: Path, size_bytes: int) -> StoredCalibration | None:
 def load_given(path: Path) -> Calibration:
     """Read and evaluate a file that a request names, unless it was not measured on a diffuser.
 
-    Raises
-    ------
-    CalibrationFileError
-        The file holds none.
-    Problem
-        ``calibration-doubted``.
+    Raises CalibrationFileError where the file holds none; Problem ``calibration-doubted``.
     """
     calibration = load_calibration(path)
     verdict = verdict_of(calibration.capture)

@@ -21,31 +21,21 @@ Change = Literal["granted", "released", "lapsed", "taken-over"]
 
 @dataclass(frozen=True, slots=True)
 class Lease:
-    """Permission to change the camera, for the client that presents its ``id``.
-
-    Attributes
-    ----------
-    id
-        The secret that its holder sends with every change.
-    holder
-        Name that the holder gave itself.
-    by
-        Authenticated identity of the holder.
-    rank
-        Rank of the holder; a client of a lower rank cannot take it over.
-    on_lapse
-        Whether the capture, and with it the light, stops when it is not renewed in time.
-    expires_s
-        By the manager's clock.
-    """
+    """Permission to change the camera, for the client that presents its ``id``."""
 
     id: str = field(repr=False)
+    """The secret that its holder sends with every change."""
     holder: str
+    """Name that the holder gave itself."""
     by: str
+    """Authenticated identity of the holder."""
     rank: int
+    """Rank of the holder; a client of a lower rank cannot take it over."""
     duration_s: float
     on_lapse: OnLapse
+    """Whether the capture, and with it the light, stops when it is not renewed in time."""
     expires_s: float
+    """By the manager's clock."""
 
 
 class Timer(Protocol):
@@ -62,15 +52,10 @@ Report = Callable[[Change, Lease, Lease | None], None]
 class LeaseManager:
     """Grants, renews and ends the lease; at most one exists at a time.
 
-    Parameters
-    ----------
-    report
-        Called with every change; a renewal is not one.
-    call_later
-        Schedules a call after a delay in seconds.
-    due
-        Called with the lease that is valid from now on, None for none: what acts on its end
-        although nothing is scheduled any more.
+    ``report``: called with every change; a renewal is not one.
+    ``call_later``: schedules a call after a delay in seconds.
+    ``due``: called with the lease that is valid from now on, None for none: what acts on its end
+    although nothing is scheduled any more.
     """
 
     def __init__(
@@ -110,10 +95,8 @@ class LeaseManager:
     ) -> Lease:
         """Grant the lease to a client.
 
-        Raises
-        ------
-        Problem
-            ``lease-held`` if another client has it, and ``takeover`` is false or the rank too low.
+        Raises Problem ``lease-held`` if another client has it, and ``takeover`` is false or the
+        rank too low.
         """
         former = self.current
         if former is not None and not (takeover and rank >= former.rank):
@@ -128,10 +111,7 @@ class LeaseManager:
     ) -> Lease:
         """Restart the lease's duration, on its former terms where none are given.
 
-        Raises
-        ------
-        Problem
-            ``lease-lost`` if it is not the current one.
+        Raises Problem ``lease-lost`` if it is not the current one.
         """
         lease = self._require_current(lease_id)
         return self._keep(
@@ -145,10 +125,7 @@ class LeaseManager:
     def release(self, lease_id: str | None) -> None:
         """End the lease; the camera goes on as its holder left it.
 
-        Raises
-        ------
-        Problem
-            ``lease-lost`` if it is not the current one.
+        Raises Problem ``lease-lost`` if it is not the current one.
         """
         lease = self._require_current(lease_id)
         self._forget()
@@ -157,10 +134,8 @@ class LeaseManager:
     def check(self, lease_id: str | None) -> None:
         """Allow a change under this lease, or under none while no client holds one.
 
-        Raises
-        ------
-        Problem
-            ``lease-held`` if another client has the lease, ``lease-lost`` if it has ended.
+        Raises Problem ``lease-held`` if another client has the lease, ``lease-lost`` if it has
+        ended.
         """
         lease = self.current
         if lease_id is not None:

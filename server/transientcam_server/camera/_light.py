@@ -19,14 +19,9 @@ class LightGuard:
 
     Each method is one assignment or reads each value once, so that no thread waits for another.
 
-    Parameters
-    ----------
-    unserved_s
-        For so long the clients' loop may not turn.
-    unused_s
-        For so long a capture may go on that nobody uses.
-    clock
-        Time in s; that of the leases.
+    ``unserved_s``: for so long the clients' loop may not turn.
+    ``unused_s``: for so long a capture may go on that nobody uses.
+    ``clock``: time in s; that of the leases.
     """
 
     def __init__(

@@ -8,10 +8,7 @@ from concurrent.futures import Future
 class OffSwitch:
     """Runs one function for all who ask while it waits to be run.
 
-    Parameters
-    ----------
-    switch_off
-        Switches the light off; may raise `CameraError`.
+    ``switch_off``: switches the light off; may raise `CameraError`.
     """
 
     def __init__(self, switch_off: Callable[[], None]) -> None:

@@ -24,10 +24,7 @@ class OriginLease:
     async def take(self, lease: Lease, *, takeover: bool) -> None:
         """Take it on the terms of a lease that was granted here.
 
-        Raises
-        ------
-        OriginRefused, CameraLost
-            It cannot be had.
+        Raises OriginRefused, CameraLost where it cannot be had.
         """
         take = partial(
             self._relay.take_lease,

@@ -82,10 +82,7 @@ class SharedAcquisition(Acquisition):
     ) -> "Future[_T]":
         """Refuse exclusive use of the camera, which is not this service's to give.
 
-        Raises
-        ------
-        Problem
-            ``camera-busy``, always.
+        Raises Problem ``camera-busy``, always.
         """
         url = self._origin.url
         raise Problem(kinds.CAMERA_BUSY, f"The camera belongs to {url}: calibrate it there.")

@@ -13,12 +13,8 @@ class Supervision:
 
     For the thread that owns the camera.
 
-    Parameters
-    ----------
-    camera
-        Whose light it is; None for none.
-    silence_s
-        The light goes off after so long without a `beat`.
+    ``camera``: whose light it is; None for none.
+    ``silence_s``: the light goes off after so long without a `beat`.
     """
 
     def __init__(self, camera: Camera | None, *, silence_s: float) -> None:
@@ -28,10 +24,7 @@ class Supervision:
     def starting(self) -> str | None:
         """Have the camera watched before its light is switched on; as `beat`.
 
-        Raises
-        ------
-        CameraError
-            There is no supervisor; the light has to stay off.
+        Raises CameraError where there is no supervisor; the light has to stay off.
         """
         switch = None if self._camera is None else self._camera.off_switch
         if switch is None or not switch.steps:
@@ -45,10 +38,7 @@ class Supervision:
     def beat(self, *, lit: bool) -> str | None:
         """Say that the light is under control; return why it has to be off until somebody starts.
 
-        Parameters
-        ----------
-        lit
-            Whether it may be on.
+        ``lit``: whether it may be on.
         """
         return self._told(self._supervisor.alive if lit else self._supervisor.dark)
 

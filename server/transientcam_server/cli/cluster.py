@@ -27,12 +27,8 @@ _CONNECT_WITHIN_S = 10
 def cluster_client(workers: int | None, address: str | None, console: Terminal) -> Iterator[Any]:
     """Connect to a cluster, or start one on this machine that ends with the block.
 
-    Raises
-    ------
-    MissingExtra
-        If distributed is not installed.
-    ClusterError
-        If no scheduler answers at the address.
+    Raises MissingExtra if distributed is not installed; ClusterError if no scheduler answers at the
+    address.
     """
     if workers is not None and address is not None:
         raise typer.BadParameter("--workers and --dask exclude each other", param_hint="--dask")

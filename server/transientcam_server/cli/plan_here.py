@@ -31,27 +31,18 @@ LOOK_S: Final = 60.0
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The camera, and what is known of the scene before it.
-
-    Attributes
-    ----------
-    camera
-        As `open_camera` takes it.
-    real_time
-        Whether a simulated one takes its time, too.
-    brightness_dn_per_s
-        Zeroth moment of equal pixels in DN for each second of exposure; None looks at the scene.
-    returns
-        Range in m and weight of each return of such a scene.
-    ambient_dn_per_s
-        Light that is not the camera's; None measures it.
-    """
+    """The camera, and what is known of the scene before it."""
 
     camera: str
+    """As `open_camera` takes it."""
     real_time: bool
+    """Whether a simulated one takes its time, too."""
     brightness_dn_per_s: float | None
+    """Zeroth moment of equal pixels in DN for each second of exposure; None looks at the scene."""
     returns: list[tuple[float, float]]
+    """Range in m and weight of each return of such a scene."""
     ambient_dn_per_s: float | None
+    """Light that is not the camera's; None measures it."""
 
 
 def by_camera(
@@ -59,18 +50,9 @@ def by_camera(
 ) -> tuple[dict[str, Any], bytes]:
     """Plan for a goal, or find the ``front`` of all that no other beats; as JSON, and the map.
 
-    Parameters
-    ----------
-    map_file
-        Whose format a map is to have; None for none.
-
-    Raises
-    ------
-    Problem
-        Where the goal is out of reach, or the camera is not planned for; then with ``takes``, what
-        more of them give.
-    CameraError
-        As the camera does.
+    ``map_file``: whose format a map is to have; None for none.
+    Raises Problem where the goal is out of reach, or the camera is not planned for; then with
+    ``takes``, what more of them give. Raises CameraError as the camera does.
     """
     if not front:
         goal.require_sensible()

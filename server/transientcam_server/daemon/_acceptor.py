@@ -64,12 +64,8 @@ def turns_of_requests(
 class Admission:
     """Decides which connections are accepted.
 
-    Parameters
-    ----------
-    limits
-        How many there may be, together and of one address, and how fast new ones may come.
-    clock
-        Time in s.
+    ``limits``: how many there may be, together and of one address, and how fast new ones may come.
+    ``clock``: time in s.
     """
 
     def __init__(self, limits: LimitSettings, *, clock: Callable[[], float]) -> None:

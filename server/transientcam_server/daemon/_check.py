@@ -17,10 +17,7 @@ from transientcam_server.settings import Settings
 def require_usable(configuration: Configuration) -> None:
     """Read what the settings name, without opening a camera or listening.
 
-    Raises
-    ------
-    SettingsError
-        Naming what cannot be read and where it was named.
+    Raises SettingsError naming what cannot be read and where it was named.
     """
     settings = configuration.settings
     mistakes = []

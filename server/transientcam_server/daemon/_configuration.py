@@ -71,11 +71,7 @@ def load(
     """Return the settings of this process, and where each was set.
 
     ``command_line`` holds what was given there (None: not given), ``file`` the file named there.
-
-    Raises
-    ------
-    SettingsError
-        Naming every value that cannot be used and where it was given.
+    Raises SettingsError naming every value that cannot be used and where it was given.
     """
     loaded = _load(command_line, file=file, environment=environment)
     mistakes = [
@@ -92,10 +88,7 @@ def load(
 def tokens_file_of(file: Path | None, *, environment: Mapping[str, str]) -> Path:
     """Return where a service with these settings looks for its tokens.
 
-    Raises
-    ------
-    SettingsError
-        As `load_settings`, but it does not matter whether there are tokens yet.
+    Raises SettingsError as `load_settings`, but it does not matter whether there are tokens yet.
     """
     settings = _load({}, file=file, environment=environment).settings
     mistakes = [each for each in _homeless(settings) if each.place == "tokens_file"]

@@ -27,10 +27,7 @@ def switches_off(begin: bytes) -> bool | None:
 
     It does once it is complete: what pretends to be one gains nothing by its first line.
 
-    Parameters
-    ----------
-    begin
-        What has arrived of it, from its first byte on.
+    ``begin``: what has arrived of it, from its first byte on.
     """
     begin = begin.lstrip(b"\r\n")  # RFC 9112, 2.2
     if not any(begin.startswith(each) or each.startswith(begin) for each in _BEGINS):

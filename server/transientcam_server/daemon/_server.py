@@ -51,10 +51,7 @@ def configure_logging(settings: Settings) -> None:
 def listen(host: str, port: int) -> socket.socket:
     """Return a listening socket; its connections inherit its options.
 
-    Raises
-    ------
-    AddressUnavailable
-        If the address cannot be listened on.
+    Raises AddressUnavailable if the address cannot be listened on.
     """
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
@@ -217,10 +214,7 @@ def serve_app(
 ) -> None:
     """Serve on a listening socket until a signal ends it; ``on_listening`` once it answers.
 
-    Raises
-    ------
-    KeyboardInterrupt
-        If the signal was SIGINT.
+    Raises KeyboardInterrupt if the signal was SIGINT.
     """
     give_back_large_blocks()
     server = Server(app, settings, on_listening=on_listening)

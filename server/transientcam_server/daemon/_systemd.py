@@ -26,19 +26,13 @@ ROUNDS_PER_WATCHDOG: Final = 3
 
 @dataclass(frozen=True, slots=True)
 class ServiceManager:
-    """The service manager that started this process, if it accepts notifications.
-
-    Attributes
-    ----------
-    address
-        Its socket: a path, or a name in Linux' abstract namespace (which begins with a zero);
-        None where there is none.
-    watchdog_s
-        After how much silence it restarts this process; None for never.
-    """
+    """The service manager that started this process, if it accepts notifications."""
 
     address: str | None = None
+    """Its socket: a path, or a name in Linux' abstract namespace (which begins with a zero); None
+    where there is none."""
     watchdog_s: float | None = None
+    """After how much silence it restarts this process; None for never."""
 
     @classmethod
     def of(cls, environment: Mapping[str, str], *, pid: int | None = None) -> Self:

@@ -225,14 +225,9 @@ class OriginRefused(ServerError, CameraError):  # noqa: N818 - says what is wron
 class Problem(ServerError):  # noqa: N818 - RFC 9457 calls it so
     """A request that cannot be answered.
 
-    Attributes
-    ----------
-    kind
-        What sort of problem, with its HTTP status and its page.
-    detail
-        One sentence about this occurrence.
-    extensions
-        What a program may want to read: mostly ``field``, ``value`` and ``limit``.
+    ``kind``: what sort of problem, with its HTTP status and its page.
+    ``detail``: one sentence about this occurrence.
+    ``extensions``: what a program may want to read: mostly ``field``, ``value`` and ``limit``.
     """
 
     def __init__(self, kind: ProblemKind, detail: str, **extensions: object) -> None:

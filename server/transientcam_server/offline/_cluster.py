@@ -186,21 +186,11 @@ def completed(
 ) -> Generator[tuple[tuple[Any, ...], Any], None, None]:
     """Yield each task with its result as it is done; close it, and the tasks that are left end.
 
-    Parameters
-    ----------
-    client
-        Of the cluster.
-    function
-        Of a module that every worker has, or else it is sent there.
-    tasks
-        Arguments of one call each.
-
-    Raises
-    ------
-    ClusterError
-        If the scheduler is lost, or a task ended several workers.
-    Exception
-        Whatever a task raises.
+    ``client``: of the cluster.
+    ``function``: of a module that every worker has, or else it is sent there.
+    ``tasks``: arguments of one call each.
+    Raises ClusterError if the scheduler is lost, or a task ended several workers; Exception
+    whatever a task raises.
     """
     assert client.scheduler is not None  # noqa: S101 - it is connected
     address = str(client.scheduler.address)

@@ -39,14 +39,9 @@ KNOWN: Final = {
 class ComputedFrame:
     """A frame of a recording; see `transientcam.RecordedFrame`.
 
-    Parameters
-    ----------
-    index
-        Counted from 0.
-    recipe
-        What it is computed with.
-    read
-        Returns the images of a frame by its index.
+    ``index``: counted from 0.
+    ``recipe``: what it is computed with.
+    ``read``: returns the images of a frame by its index.
     """
 
     def __init__(self, index: int, recipe: Recipe, read: Callable[[int], RawFrame]) -> None:

@@ -61,12 +61,7 @@ Sink = Callable[[Path, Content], AbstractContextManager[Put]]
 def write(output: Path, content: Content, rows: Iterable[Row], sink: Sink) -> None:
     """Write a file, whole or not at all; ``rows`` come block by block, in the order of frames.
 
-    Raises
-    ------
-    FileExistsError
-        If the output is there already.
-    OSError
-        If the output cannot be written.
+    Raises FileExistsError if the output is there already; OSError if the output cannot be written.
     """
     with whole(output) as scratch, sink(scratch, content) as put:
         for name, index, values in rows:
@@ -77,10 +72,7 @@ def write(output: Path, content: Content, rows: Iterable[Row], sink: Sink) -> No
 def whole(output: Path) -> Iterator[Path]:
     """Yield a path to write to, which becomes ``output`` in the end; nothing is left of a failure.
 
-    Raises
-    ------
-    FileExistsError
-        If the output is there already.
+    Raises FileExistsError if the output is there already.
     """
     if output.exists():
         raise FileExistsError(17, "it is there already", str(output))
@@ -98,12 +90,8 @@ def sink_of(
 ) -> Sink:
     """Return what writes the format that the suffix of ``output`` names.
 
-    Raises
-    ------
-    NotConvertible
-        If it names none; the error lists them, and ``also`` those that are written elsewhere.
-    MissingExtra
-        If the format's library is not installed.
+    Raises NotConvertible if it names none; the error lists them, and ``also`` those that are
+    written elsewhere. Raises MissingExtra if the format's library is not installed.
     """
     sink = sinks.get(output.suffix.lower())
     if sink is None:
@@ -197,19 +185,10 @@ def create_zarr(
 ) -> Any:
     """Make a Zarr store with the columns of its content, and its blocks empty; return its group.
 
-    Parameters
-    ----------
-    place
-        A directory, or any address that fsspec knows.
-    rows_of_chunk
-        How many rows of a block make a chunk.
-    overwrite
-        Whether to replace what is there.
-
-    Raises
-    ------
-    MissingExtra
-        If zarr is not installed.
+    ``place``: a directory, or any address that fsspec knows.
+    ``rows_of_chunk``: how many rows of a block make a chunk.
+    ``overwrite``: whether to replace what is there.
+    Raises MissingExtra if zarr is not installed.
     """
     zarr = library("zarr", "a .zarr")
     attributes = {**content.attributes, STATE: UNFINISHED, EVERY_CHUNK: True}
@@ -254,10 +233,7 @@ def finish_zarr(place: str) -> None:
 def naming_address(place: str) -> Iterator[None]:
     """Say in errors of a store which address it has: each backend of fsspec raises its own.
 
-    Raises
-    ------
-    StorageError
-        In place of any other error of the block, where ``place`` is an address.
+    Raises StorageError in place of any other error of the block, where ``place`` is an address.
     """
     try:
         yield

@@ -12,12 +12,8 @@ from transientcam_server.recording import Recording
 class ByFrame:
     """An array whose first axis are frames; NumPy's basic indexing reads them one by one.
 
-    Parameters
-    ----------
-    shape, dtype
-        Of the whole.
-    frame
-        Returns the values of a frame by its index.
+    ``shape``, ``dtype``: of the whole.
+    ``frame``: returns the values of a frame by its index.
     """
 
     def __init__(

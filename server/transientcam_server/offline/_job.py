@@ -35,10 +35,7 @@ def installed() -> tuple[tuple[str, str], ...]:
 def require_versions(wanted: tuple[tuple[str, str], ...]) -> None:
     """Refuse to compute here for a process that has other versions.
 
-    Raises
-    ------
-    MixedVersions
-        Naming this worker and the package.
+    Raises MixedVersions naming this worker and the package.
     """
     for (name, here), (_, there) in zip(installed(), wanted, strict=True):
         if here != there:
@@ -47,29 +44,20 @@ def require_versions(wanted: tuple[tuple[str, str], ...]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A recording and what is computed of it; small, hashable, and of use in any process.
-
-    Attributes
-    ----------
-    place
-        Path that all processes can read, or address of a daemon's recording.
-    token
-        Bearer token, where the daemon requires one.
-    products, settings, bins
-        As of `BatchOptions`; the settings as JSON.
-    versions
-        Of the process that made the job.
-    run
-        Unlike that of any other job: files may be replaced while workers stay.
-    """
+    """A recording and what is computed of it; small, hashable, and of use in any process."""
 
     place: str
+    """Path that all processes can read, or address of a daemon's recording."""
     token: str | None = field(repr=False)
+    """Bearer token, where the daemon requires one."""
     products: tuple[str, ...]
     settings: str
     bins: int
+    """``products``, ``settings``, ``bins``: as of `BatchOptions`; the settings as JSON."""
     versions: tuple[tuple[str, str], ...] = field(default_factory=installed)
+    """Of the process that made the job."""
     run: str = field(default_factory=lambda: uuid4().hex)
+    """Unlike that of any other job: files may be replaced while workers stay."""
 
     @classmethod
     def of(cls, place: str, options: BatchOptions, *, token: str | None = None) -> "Job":
@@ -93,14 +81,9 @@ def spans(frames: int) -> list[tuple[int, int]]:
 def computed(job: Job, first: int, last: int) -> dict[str, NDArray[np.generic]]:
     """Return the products of some frames by name, arrays (last - first, ...).
 
-    Raises
-    ------
-    MixedVersions
-        If this process computes with other versions than the one that made the job.
-    ServerError, TransientcamError, OSError
-        If the recording cannot be opened here.
-    DamagedFrame
-        If a frame is not what was recorded.
+    Raises MixedVersions if this process computes with other versions than the one that made the
+    job; ServerError, TransientcamError, OSError if the recording cannot be opened here;
+    DamagedFrame if a frame is not what was recorded.
     """
     recording, reconstructor = opened(job)
     previous = recording.frame(first - 1) if first else None

@@ -54,19 +54,10 @@ def import_kinect2(
 ) -> int:
     """Write the frames of a file into a recording, and return how many they are.
 
-    Parameters
-    ----------
-    lens
-        Of that camera, see `read_lens`.
-
-    Raises
-    ------
-    InputError
-        Naming what of the file is not as expected; no recording is left.
-    FileExistsError
-        If the output is there already.
-    OSError
-        If a file cannot be read or written.
+    ``lens``: of that camera, see `read_lens`.
+    Raises InputError naming what of the file is not as expected; no recording is left. Raises
+    FileExistsError if the output is there already. Raises OSError if a file cannot be read or
+    written.
     """
     began_s = source.stat().st_mtime
     with _opened(source) as file:
@@ -119,12 +110,7 @@ def import_kinect2(
 def read_lens(path: Path, rows: Rows = "top") -> Lens:
     """Read the lens of the depth camera from a file of calibrations.
 
-    Raises
-    ------
-    InputError
-        Naming what of the file is not as expected.
-    OSError
-        If it cannot be read.
+    Raises InputError naming what of the file is not as expected; OSError if it cannot be read.
     """
     with _opened(path) as file:
         if LENS not in file:

@@ -47,32 +47,23 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TransientCube:
-    """The result of `reconstruct_measurement`; its fields are the arrays of the file.
-
-    Attributes
-    ----------
-    time_s
-        (T,), from 0 to one period, the period excluded.
-    density
-        (T, H, W), in the unit of the moments per second.
-    cumulative
-        (T, H, W), light up to each time.
-    range_m
-        (H, W), of the first return; NaN without one.
-    direct, indirect, uniform
-        (H, W), weight of the first return, of the later ones, and spread evenly over all times.
-    flags
-        (H, W), `transientcam_moments.Flags`.
-    """
+    """The result of `reconstruct_measurement`; its fields are the arrays of the file."""
 
     time_s: _Array
+    """(T,), from 0 to one period, the period excluded."""
     density: _Array
+    """(T, H, W), in the unit of the moments per second."""
     cumulative: _Array
+    """(T, H, W), light up to each time."""
     range_m: _Array
+    """(H, W), of the first return; NaN without one."""
     direct: _Array
     indirect: _Array
     uniform: _Array
+    """``direct``, ``indirect``, ``uniform``: (H, W), weight of the first return, of the later ones,
+    and spread evenly over all times."""
     flags: _Array
+    """(H, W), `transientcam_moments.Flags`."""
 
 
 def load_measurement(
@@ -84,20 +75,12 @@ def load_measurement(
 ) -> Measurement:
     """Return the moments that a file holds or that follow from its impulse responses.
 
-    Parameters
-    ----------
-    frequency_hz, harmonics
-        For impulse responses, the modulation to measure them with (23 MHz, 4); for moments, which
-        have their own, at most as many harmonics as there are.
-    background
-        ``median`` subtracts each pixel's median from counts: photons that came at any time.
-
-    Raises
-    ------
-    InputError
-        Naming the file, the key, what it is and what it must be.
-    OSError
-        If the file cannot be read.
+    ``frequency_hz``, ``harmonics``: for impulse responses, the modulation to measure them with (23
+    MHz, 4); for moments, which have their own, at most as many harmonics as there are.
+    ``background``: ``median`` subtracts each pixel's median from counts: photons that came at any
+    time.
+    Raises InputError naming the file, the key, what it is and what it must be; OSError if the file
+    cannot be read.
     """
     arrays = arrays_of(path)
     if "moments" in arrays:

@@ -15,10 +15,7 @@ _FRAMES: Final = 6
 def require(what: str) -> None:
     """Check that ``what`` can make pictures, before the hours that it may take.
 
-    Raises
-    ------
-    MissingExtra
-        If matplotlib is not installed.
+    Raises MissingExtra if matplotlib is not installed.
     """
     try:
         import matplotlib  # noqa: F401 - only whether it is there

@@ -246,10 +246,7 @@ def _repair(part: Path, document: Mapping[str, str]) -> None:
 def require_same(part: Path | str, begun: Mapping[str, Any], document: Mapping[str, str]) -> None:
     """Refuse to go on with products that were begun of something else, or otherwise.
 
-    Raises
-    ------
-    InputError
-        If they were.
+    Raises InputError if they were.
     """
     for key, value in document.items():
         if begun.get(key) != value:

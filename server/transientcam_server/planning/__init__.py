@@ -22,29 +22,3 @@ from transientcam_server.planning._search.families import require_plannable
 from transientcam_server.planning._search.goal import SHARE, Goal
 from transientcam_server.planning._search.pareto import flat_from, front
 from transientcam_server.planning._search.plan import Plan
-
-__all__ = [
-    "ESTIMATORS",
-    "SHARE",
-    "FrontCache",
-    "Goal",
-    "Looks",
-    "Plan",
-    "Planner",
-    "PlanningProcess",
-    "PlanningQueue",
-    "Progress",
-    "Region",
-    "Report",
-    "SceneStatistics",
-    "families",
-    "flat_from",
-    "front",
-    "front_goal",
-    "in_words",
-    "map_files",
-    "predict_takes",
-    "require_plannable",
-    "takes_of",
-    "uniform_scene",
-]

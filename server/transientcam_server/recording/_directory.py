@@ -18,23 +18,11 @@ class Directory:
         self.path = path
 
     def make(self) -> None:
-        """Create it.
-
-        Raises
-        ------
-        OSError
-            If it cannot be created.
-        """
+        """Create it. Raises OSError if it cannot be created."""
         self.path.mkdir(parents=True, exist_ok=True)
 
     def free_bytes(self) -> int:
-        """Return the free space of its disk.
-
-        Raises
-        ------
-        OSError
-            If it does not exist yet.
-        """
+        """Return the free space of its disk. Raises OSError if it does not exist yet."""
         return shutil.disk_usage(self.path).free
 
     def new(self, recording_id: str) -> Path:
@@ -68,12 +56,7 @@ class Directory:
     def remove(self, recording_id: str) -> None:
         """Delete all files of a recording, finished or not, for good.
 
-        Raises
-        ------
-        RecordingInUse
-            If it is being written or recovered.
-        OSError
-            If one cannot be deleted.
+        Raises RecordingInUse if it is being written or recovered; OSError if one cannot be deleted.
         """
         path = self.new(recording_id)
         part = path.with_name(path.name + ".part")

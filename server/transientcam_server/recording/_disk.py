@@ -68,11 +68,8 @@ class DiskFile(io.RawIOBase):
     def synchronise(self) -> None:
         """Bring the file to the disk.
 
-        Raises
-        ------
-        OSError
-            If that fails, or a write did before. It is never tried again: what the system then
-            says is no longer of these bytes.
+        Raises OSError if that fails, or a write did before. It is never tried again: what the
+        system then says is no longer of these bytes.
         """
         self.require_written()
         try:
@@ -178,11 +175,7 @@ def open_to_write(path: Path, mode: str) -> Iterator[tuple[Any, DiskFile]]:
     """Open an HDF5 file to write, and bring it to the disk in the end.
 
     Whoever writes much asks `DiskFile.require_written` from time to time.
-
-    Raises
-    ------
-    OSError
-        If it cannot be opened or written.
+    Raises OSError if it cannot be opened or written.
     """
     file, disk = open_disk(path, mode)
     with disk:

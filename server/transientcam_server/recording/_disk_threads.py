@@ -67,10 +67,8 @@ class DiskThreads:
     async def run(self, work: Callable[..., _T], *arguments: Any) -> _T:
         """Return the result of ``work`` on one of the threads.
 
-        Raises
-        ------
-        Problem
-            ``disk-stalled``, if nothing is done for so long. Work that has begun goes on.
+        Raises Problem ``disk-stalled``, if nothing is done for so long. Work that has begun goes
+        on.
         """
         result = asyncio.wrap_future(self.submit(work, *arguments))
         latest_s = self._clock() + max(_LONGEST_S, self._stalled_s)

@@ -73,10 +73,7 @@ class RecordedFrames:
     async def frame(self, name: str, settings: SettingsChoice = "recorded") -> Frame:
         """Return a frame by its number, or the last one that was written.
 
-        Raises
-        ------
-        Problem
-            ``unknown-frame``, ``recording-damaged``.
+        Raises Problem ``unknown-frame``, ``recording-damaged``.
         """
         number = len(await self.captured_unix_s()) if name == LATEST else int(name)
         reconstruction = self._reconstruction(settings)
@@ -123,11 +120,8 @@ class RecordedFramesCache:
     async def opened(self, recording_id: str) -> RecordedFrames:
         """Return the frames of a recording, whole or still being written.
 
-        Raises
-        ------
-        Problem
-            ``unknown-recording``, ``recording-unfinished`` (while it is being recovered), or
-            ``recording-damaged``.
+        Raises Problem ``unknown-recording``, ``recording-unfinished`` (while it is being
+        recovered), or ``recording-damaged``.
         """
         find = partial(self._library.find, recording_id)
         disk = self._library.disk
@@ -192,10 +186,7 @@ def _read_frame(find: Find, number: int) -> RawFrame:
 def open_found(find: Find) -> Recording:
     """Open the file that ``find`` returns, also one that is finished, and renamed, this moment.
 
-    Raises
-    ------
-    Problem
-        Those of ``find``, and ``recording-damaged``.
+    Raises Problem: those of ``find``, and ``recording-damaged``.
     """
     try:
         try:

@@ -53,10 +53,7 @@ class CheckedReader(io.RawIOBase):
     def readinto(self, buffer: "WriteableBuffer", /) -> int:
         """Fill a buffer as far as the file goes; return how many bytes that were.
 
-        Raises
-        ------
-        ValueError
-            If a damaged heap begins there.
+        Raises ValueError if a damaged heap begins there.
         """
         into = memoryview(buffer).cast("B")
         data = _read(self._stream, self._at, len(into))
@@ -79,10 +76,7 @@ class CheckedReader(io.RawIOBase):
 def require_sound_heaps(stream: IO[bytes]) -> None:
     """Refuse a file with a damaged heap anywhere, also one that nothing refers to.
 
-    Raises
-    ------
-    ValueError
-        If there is one.
+    Raises ValueError if there is one.
     """
     size_bytes = stream.seek(0, os.SEEK_END)
     for first in range(0, size_bytes, _BLOCK_BYTES):

@@ -62,48 +62,33 @@ _CAPABILITIES: Final = TypeAdapter(Capabilities)
 
 @dataclass(frozen=True)
 class Header:
-    """What is known before the first frame.
-
-    Attributes
-    ----------
-    recording_id, name
-        Its id in the service, and its name for people.
-    started_s
-        Unix time.
-    applied
-        The sequence as the camera really set it.
-    capabilities
-        Of the camera.
-    camera
-        How it was opened, and which scene it simulates.
-    calibration
-        Of the moments: its id, and further properties where known.
-    calibration_planes
-        complex (m+1,) or (m+1, H, W): what moments are divided by; None for the nominal gains.
-    calibration_bad
-        bool (H, W): pixels that show their neighbours' mean instead.
-    calibration_waveform
-        complex (m, K): harmonics of the modulation, see `Gains`.
-    reconstruction
-        Settings at the time of recording.
-    versions
-        Of the software.
-    """
+    """What is known before the first frame."""
 
     recording_id: str
     name: str
+    """``recording_id``, ``name``: its id in the service, and its name for people."""
     started_s: float
+    """Unix time."""
     applied: AppliedSequence
+    """The sequence as the camera really set it."""
     capabilities: Capabilities
+    """Of the camera."""
     camera: Mapping[str, Any] = field(default_factory=dict)
+    """How it was opened, and which scene it simulates."""
     calibration: Mapping[str, Any] = field(default_factory=lambda: {"id": "nominal"})
+    """Of the moments: its id, and further properties where known."""
     calibration_planes: NDArray[np.complexfloating[Any, Any]] | None = None
+    """complex (m+1,) or (m+1, H, W): what moments are divided by; None for the nominal gains."""
     calibration_bad: NDArray[np.bool_] | None = None
+    """bool (H, W): pixels that show their neighbours' mean instead."""
     calibration_waveform: NDArray[np.complexfloating[Any, Any]] | None = None
+    """complex (m, K): harmonics of the modulation, see `Gains`."""
     reconstruction: Mapping[str, Any] = field(default_factory=dict)
+    """Settings at the time of recording."""
     versions: Mapping[str, str] = field(
         default_factory=lambda: {name: version(name) for name in ("transientcam", "h5py", "numpy")}
     )
+    """Of the software."""
 
     @property
     def gains(self) -> Gains | None:
@@ -213,11 +198,8 @@ def row(raw: RawFrame, *, dropped_frames: int) -> dict[str, object]:
 def read_header(storage: Storage, *, with_images: bool = True) -> Header:
     """Return what `image` holds; ``with_images`` is false where those cannot be read.
 
-    Raises
-    ------
-    KeyError, TypeError, ValueError, RecursionError, DriverError
-        If the file is no recording, or one of a newer format; h5py may raise anything else of a
-        damaged one.
+    Raises KeyError, TypeError, ValueError, RecursionError, DriverError if the file is no recording,
+    or one of a newer format; h5py may raise anything else of a damaged one.
     """
     if storage.attribute("format") != FORMAT:
         raise ValueError(f"its format is {storage.attribute('format')!r}")
@@ -298,10 +280,7 @@ def _waveform(storage: Storage, harmonics: int) -> NDArray[Any] | None:
 def read_labels(storage: Storage, applied: AppliedSequence) -> tuple[ImageLabel, ...]:
     """Return what each image shows; takes and harmonics are those of the sequence.
 
-    Raises
-    ------
-    KeyError, ValueError
-        If they are not.
+    Raises KeyError, ValueError if they are not.
     """
     columns: dict[str, list[Any]] = {
         name: storage.values(name, axes=1, dtype=dtype).tolist() for name, dtype in _LABELS.items()
@@ -325,10 +304,7 @@ def read_labels(storage: Storage, applied: AppliedSequence) -> tuple[ImageLabel,
 def read_series(storage: Storage) -> dict[str, NDArray[Any]]:
     """Return `SERIES`; one may be longer than another while the file is written.
 
-    Raises
-    ------
-    KeyError, ValueError
-        If one is not there, or is a time that is no number.
+    Raises KeyError, ValueError if one is not there, or is a time that is no number.
     """
     found = {name: storage.values(name, axes=1, dtype=kind) for name, (kind, _) in SERIES.items()}
     for name in ("host_time_s", "device_time_s", "capture_s"):
@@ -348,10 +324,7 @@ def read_document(storage: Storage, name: str) -> dict[str, Any]:
 def read_end(storage: Storage) -> dict[str, Any]:
     """Return how the recording ended; empty while it has not.
 
-    Raises
-    ------
-    ValueError
-        If it says so in another way than a recorder does.
+    Raises ValueError if it says so in another way than a recorder does.
     """
     end = read_document(storage, "end")
     for name in ("reason", "problem"):
@@ -367,10 +340,7 @@ def read_end(storage: Storage) -> dict[str, Any]:
 def parsed(text: str | bytes) -> dict[str, Any]:
     """Return a JSON object that can be sent on: without NaN, half characters, or great depth.
 
-    Raises
-    ------
-    ValueError, RecursionError
-        If it is something else.
+    Raises ValueError, RecursionError if it is something else.
     """
     document = json.loads(text)
     if not isinstance(document, dict):
@@ -382,10 +352,8 @@ def parsed(text: str | bytes) -> dict[str, Any]:
 def require_plain(document: Mapping[str, Any]) -> None:
     """Refuse a JSON document that cannot be sent on.
 
-    Raises
-    ------
-    ValueError, RecursionError
-        If it has NaN, half a character, or more than `MAX_DEPTH` levels.
+    Raises ValueError, RecursionError if it has NaN, half a character, or more than `MAX_DEPTH`
+    levels.
     """
     json.dumps(document, ensure_ascii=False, allow_nan=False).encode()
     level: list[Any] = [document]

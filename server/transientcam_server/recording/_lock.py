@@ -45,10 +45,7 @@ class Lock:
 def create(path: Path) -> Lock:
     """Make an empty file, locked for its writer; the descriptor can write.
 
-    Raises
-    ------
-    OSError
-        If it cannot be made, or is there already.
+    Raises OSError if it cannot be made, or is there already.
     """
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
     # another service may be looking whether this new file is in use: that is soon over
@@ -62,12 +59,8 @@ def create(path: Path) -> Lock:
 def take(path: Path) -> Lock:
     """Lock an unfinished file that no process writes.
 
-    Raises
-    ------
-    RecordingInUse
-        If it is being written, recovered or deleted.
-    OSError
-        If there is no such file, or it may not be written.
+    Raises RecordingInUse if it is being written, recovered or deleted; OSError if there is no such
+    file, or it may not be written.
     """
     held = _locked(os.open(path, os.O_RDWR | os.O_CLOEXEC), fcntl.LOCK_EX | fcntl.LOCK_NB, path)
     if not held.is_of(path):  # it was renamed or deleted in between

@@ -36,10 +36,7 @@ def not_stored(place: Path, error: OSError) -> Problem:
 def require_annotations(annotations: Mapping[str, Any]) -> None:
     """Refuse annotations that are too long or cannot be written as JSON.
 
-    Raises
-    ------
-    Problem
-        ``invalid-request``.
+    Raises Problem ``invalid-request``.
     """
     try:
         size = len(layout.encoded(annotations))

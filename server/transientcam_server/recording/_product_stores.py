@@ -34,43 +34,30 @@ _DIGITS: Final = 18
 
 @dataclass(frozen=True, slots=True)
 class ProductStore:
-    """A store, as its metadata describe it.
-
-    Attributes
-    ----------
-    id
-        Name of its directory, without the suffix.
-    recording_id, title
-        Of the recording whose products these are.
-    products
-        Names.
-    bins
-        Times of flight of products over time.
-    reconstruction
-        Settings that they were computed with.
-    complete
-        Whether all frames are in it.
-    generation
-        Names what it holds: another one of the same id has another.
-    has_every_chunk
-        Whether also chunks of the fill value alone are written, so that one that is not there was
-        deleted.
-    problem
-        Why it cannot be read; None where it can, else all that is above is empty.
-    """
+    """A store, as its metadata describe it."""
 
     id: str
+    """Name of its directory, without the suffix."""
     path: Path
     recording_id: str
     title: str
+    """``recording_id``, ``title``: of the recording whose products these are."""
     products: tuple[str, ...]
+    """Names."""
     bins: int
+    """Times of flight of products over time."""
     frames: int
     reconstruction: Mapping[str, Any]
+    """Settings that they were computed with."""
     complete: bool
+    """Whether all frames are in it."""
     generation: str = ""
+    """Names what it holds: another one of the same id has another."""
     has_every_chunk: bool = False
+    """Whether also chunks of the fill value alone are written, so that one that is not there was
+    deleted."""
     problem: str | None = None
+    """Why it cannot be read; None where it can, else all that is above is empty."""
 
     @property
     def state(self) -> Literal["complete", "unfinished", "damaged"]:

@@ -25,20 +25,11 @@ class Recording:
     One that is still being written, or whose writer died, shows the frames it had when it was
     opened.
 
-    Parameters
-    ----------
-    path
-        Of the file.
-    source
-        An open binary file with what stands at ``path``, where that is elsewhere; closed with the
-        recording.
-
-    Raises
-    ------
-    NotARecording
-        If the file cannot be read as one.
-    OSError
-        If there is no such file, or it may not be read.
+    ``path``: of the file.
+    ``source``: an open binary file with what stands at ``path``, where that is elsewhere; closed
+    with the recording.
+    Raises NotARecording if the file cannot be read as one; OSError if there is no such file, or it
+    may not be read.
     """
 
     def __init__(self, path: Path, *, source: IO[bytes] | None = None) -> None:
@@ -112,14 +103,8 @@ class Recording:
     def frame(self, index: int) -> RawFrame:
         """Return a frame, bit for bit as it was captured.
 
-        Raises
-        ------
-        DamagedFrame
-            If its bytes are not the ones that were written.
-        IndexError
-            If there is none.
-        ValueError
-            If the file was closed.
+        Raises DamagedFrame if its bytes are not the ones that were written; IndexError if there is
+        none; ValueError if the file was closed.
         """
         if not self._file:
             raise ValueError(f"{self.path} is closed")

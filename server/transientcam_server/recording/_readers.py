@@ -31,10 +31,7 @@ class Readers:
     def reading(self, path: Path) -> Iterator[None]:
         """Open and close a file inside the block; it begins when no writer is closing the file.
 
-        Raises
-        ------
-        OSError
-            If there is no such file.
+        Raises OSError if there is no such file.
         """
         file = _identity(path)
         with self._changed:

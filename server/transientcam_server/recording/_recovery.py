@@ -20,15 +20,9 @@ def recover(part: Path) -> Path:
 
     Frames are kept up to the first that is torn; a writer's death tears at most the last, which
     was not acknowledged. Whenever this is interrupted, there is one file to begin with anew.
-
-    Raises
-    ------
-    NotARecording
-        If nothing can be read of it; it stays where it is.
-    RecordingInUse
-        If it is being written, or another program recovers it.
-    OSError
-        If the copy cannot be written; it stays where it is.
+    Raises NotARecording if nothing can be read of it; it stays where it is. Raises RecordingInUse
+    if it is being written, or another program recovers it. Raises OSError if the copy cannot be
+    written; it stays where it is.
     """
     path = part.with_name(part.name.removesuffix(".part"))
     if path == part:

@@ -46,10 +46,7 @@ class ReplaySpec:
 def parse_replay(name: CameraName) -> ReplaySpec:
     """Read ``recording:PATH[?speed=original|fast|2.0&loop=on|off]``.
 
-    Raises
-    ------
-    SpecError
-        Naming what cannot be read.
+    Raises SpecError naming what cannot be read.
     """
     if not name.address:
         raise SpecError(name.spec, "it names no recording")
@@ -76,11 +73,7 @@ class ReplayCamera(HostCamera):
     last one. In a loop frame numbers and device times go on counting, as a camera's do; host
     times stay those of the recording. All frames have the epoch of the sequence, which is the
     same for all of them, also where the camera counted it anew after an unplug.
-
-    Raises
-    ------
-    NotARecording, OSError
-        If the file cannot be replayed.
+    Raises NotARecording, OSError if the file cannot be replayed.
     """
 
     def __init__(
@@ -115,10 +108,7 @@ class ReplayCamera(HostCamera):
     def validate(self, sequence: Sequence) -> AppliedSequence:
         """Return the sequence that was recorded, if it is the requested one.
 
-        Raises
-        ------
-        SequenceError
-            Naming the first field that differs.
+        Raises SequenceError naming the first field that differs.
         """
         applied = self.capabilities.apply(sequence)
         recorded, requested = self.applied.sequence.to_document(), applied.sequence.to_document()
@@ -147,13 +137,7 @@ class ReplayCamera(HostCamera):
             self._pause()
 
     def status(self) -> Status:
-        """Return the status that a device would report.
-
-        Raises
-        ------
-        CameraLost
-            After the last frame.
-        """
+        """Return the status that a device would report. Raises CameraLost after the last frame."""
         with self._changed:
             self._require_open()
             self._require_more()
@@ -201,10 +185,7 @@ class ReplayCamera(HostCamera):
     def reconnect(self) -> None:
         """Do nothing unless the recording is over, which stays so.
 
-        Raises
-        ------
-        CameraLost
-            There are no more frames.
+        Raises CameraLost where there are no more frames.
         """
         with self._changed:
             self._require_open()

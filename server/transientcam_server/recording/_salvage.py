@@ -24,13 +24,8 @@ def salvage(source: swmr.File, target: Path, rows: int, *, row_axis: str) -> Non
     dataset that can grow is cut to ``rows``. Copying whole groups or repairing in place
     (`h5clear`) were tried and fail on such files: the end of the allocated space that the file
     states is out of date.
-
-    Raises
-    ------
-    ValueError
-        If it is not as an `Appender` writes it; of a damaged file h5py may raise anything else.
-    OSError
-        If the copy cannot be written.
+    Raises ValueError if it is not as an `Appender` writes it; of a damaged file h5py may raise
+    anything else. Raises OSError if the copy cannot be written.
     """
     storage = Storage(source, Path(source.filename).stat().st_size)
     datasets = {name: storage.dataset(name) for name in source}
@@ -59,12 +54,8 @@ def salvage(source: swmr.File, target: Path, rows: int, *, row_axis: str) -> Non
 def rebuild(part: Path, target: Path, frames: Sequence[SealedFrame]) -> None:
     """Make a recording anew of frames found in an unfinished one, and bring it to the disk.
 
-    Raises
-    ------
-    NotARecording
-        If what was known before the first frame cannot be read, or its frames have no seals.
-    OSError
-        If it cannot be written.
+    Raises NotARecording if what was known before the first frame cannot be read, or its frames have
+    no seals; OSError if it cannot be written.
     """
     try:
         with swmr.open_unfinished(part) as source:

@@ -55,12 +55,8 @@ def seal(row: int, chunk: bytes, values: Mapping[str, object]) -> bytes:
 def unsealed_size(size_bytes: int, end: bytes) -> int:
     """Return how many bytes of a chunk are compressed data.
 
-    Parameters
-    ----------
-    size_bytes
-        Of the chunk, with a seal or without one.
-    end
-        Its last `SIZE_BYTES`, or all of a shorter one.
+    ``size_bytes``: of the chunk, with a seal or without one.
+    ``end``: its last `SIZE_BYTES`, or all of a shorter one.
     """
     if len(end) == SIZE_BYTES and end.startswith(_MAGIC):
         record = np.frombuffer(end[: _SEAL.itemsize], _SEAL)[0]
@@ -72,10 +68,7 @@ def unsealed_size(size_bytes: int, end: bytes) -> int:
 def sealed_frames(path: Path) -> list[SealedFrame]:
     """Return the frames of a file from the first to before the first that is not whole.
 
-    Raises
-    ------
-    OSError
-        If it cannot be read.
+    Raises OSError if it cannot be read.
     """
     found: dict[int, SealedFrame] = {}
     with path.open("rb") as stream:

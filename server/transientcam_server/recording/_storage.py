@@ -36,12 +36,8 @@ _PIPELINES: Final = ((), (_DEFLATE,), (h5py.h5z.FILTER_SHUFFLE, _DEFLATE))
 def open_unknown(path: Path) -> Iterator[swmr.File]:
     """Open a file of unknown origin to read it.
 
-    Raises
-    ------
-    ValueError
-        If its texts are damaged, as of every read.
-    OSError
-        If it cannot be read, or is no HDF5 file; h5py may raise anything else of a damaged one.
+    Raises ValueError if its texts are damaged, as of every read. Raises OSError if it cannot be
+    read, or is no HDF5 file; h5py may raise anything else of a damaged one.
     """
     with CheckedReader(path.open("rb")) as checked, swmr.open_file(checked, "r") as file:
         yield file
@@ -53,10 +49,7 @@ class Storage:
     Its methods raise ValueError for what is not there, or not as it should be. Of a damaged file
     h5py may raise anything.
 
-    Parameters
-    ----------
-    size_bytes
-        Of the file.
+    ``size_bytes``: of the file.
     """
 
     def __init__(self, file: swmr.File, size_bytes: int) -> None:
@@ -128,11 +121,7 @@ def read_rows(dataset: swmr.Dataset, first: int = 0, last: int | None = None) ->
 
     Chunks are read past HDF5's filters: these take five times as long, under a lock of the whole
     process, and expand without a limit.
-
-    Raises
-    ------
-    ValueError
-        If a chunk is damaged, or there are more than `MAX_CHUNKS`.
+    Raises ValueError if a chunk is damaged, or there are more than `MAX_CHUNKS`.
     """
     _require_few_chunks(dataset, first, last)
     filters = _filters(dataset)
@@ -166,10 +155,7 @@ def place_of_chunk(
 ) -> tuple[int, int]:
     """Return the offset and the size in bytes of a chunk in a file of ``size_bytes``.
 
-    Raises
-    ------
-    ValueError
-        If it was never written, or without its filters, or lies outside of the file.
+    Raises ValueError if it was never written, or without its filters, or lies outside of the file.
     """
     found = dataset.id.get_chunk_info_by_coord(corner)
     if found.byte_offset is None:

@@ -52,11 +52,7 @@ def open_unfinished(path: Path) -> File:
     be refused beside it. HDF5 reads a block whose checksum does not hold again, in case it is being
     written, and waits twice as long each time, from 1 ns on: at its default of 100 attempts
     a damaged file would never be given up.
-
-    Raises
-    ------
-    OSError
-        If it cannot be opened.
+    Raises OSError if it cannot be opened.
     """
     access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
     access.set_file_locking(False, True)
@@ -92,10 +88,7 @@ def expanded(
 ) -> NDArray[Any]:
     """Return the block of a chunk, however much more it would expand to.
 
-    Raises
-    ------
-    ValueError
-        If the chunk is damaged, or holds another number of bytes.
+    Raises ValueError if the chunk is damaged, or holds another number of bytes.
     """
     size_bytes = math.prod(shape) * dtype.itemsize
     inflating = isal_zlib.decompressobj()
@@ -147,16 +140,11 @@ def create_series(file: File, name: str, dtype: str, **attributes: object) -> Da
 class Appender:
     """Appends rows to a file in SWMR mode, which begins with this object.
 
-    Parameters
-    ----------
-    path
-        Of a file of `LIBVER`, complete but for its rows; the lock is the recording's own.
-    blocks, series
-        Names of the datasets that grow by one each row; ``series`` in the order of writing, the
-        one whose length counts the rows last.
-    seal
-        Returns, for a row, a chunk of it and its values of the series, what is written behind the
-        chunk.
+    ``path``: of a file of `LIBVER`, complete but for its rows; the lock is the recording's own.
+    ``blocks``, ``series``: names of the datasets that grow by one each row; ``series`` in the order
+    of writing, the one whose length counts the rows last.
+    ``seal``: returns, for a row, a chunk of it and its values of the series, what is written behind
+    the chunk.
     """
 
     def __init__(
@@ -182,10 +170,7 @@ class Appender:
     def append(self, blocks: Mapping[str, NDArray[Any]], series: Mapping[str, object]) -> None:
         """Write one row; once this returns, the death of this process does not take it back.
 
-        Raises
-        ------
-        OSError
-            If it cannot be written.
+        Raises OSError if it cannot be written.
         """
         row = self.rows
         self._disk.require_written()
@@ -218,10 +203,7 @@ class Appender:
     def overwrite(self, name: str, value: bytes) -> None:
         """Replace the fixed-length text of a scalar dataset.
 
-        Raises
-        ------
-        OSError
-            If it cannot be written.
+        Raises OSError if it cannot be written.
         """
         dataset = self._file[name]
         dataset[()] = value
@@ -231,10 +213,7 @@ class Appender:
     def close(self) -> None:
         """Finish the file, on the disk.
 
-        Raises
-        ------
-        OSError
-            If it, or what was appended, cannot be written.
+        Raises OSError if it, or what was appended, cannot be written.
         """
         with self._disk:
             self._file.close()
@@ -243,13 +222,7 @@ class Appender:
 
 
 def synchronise(path: Path) -> None:
-    """Bring a file, or the names in a directory, to the disk.
-
-    Raises
-    ------
-    OSError
-        If that fails.
-    """
+    """Bring a file, or the names in a directory, to the disk. Raises OSError if that fails."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -19,15 +19,8 @@ from transientcam_server.recording._seal import seal
 class RecordingWriter:
     """An open recording; all methods on one thread.
 
-    Parameters
-    ----------
-    path
-        Of the finished recording; must not exist.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be made.
+    ``path``: of the finished recording; must not exist.
+    Raises OSError if the file cannot be made.
     """
 
     def __init__(
@@ -72,10 +65,7 @@ class RecordingWriter:
     def append(self, raw: RawFrame, *, dropped_frames: int = 0) -> None:
         """Write a frame; once this returns, the death of this process does not take it back.
 
-        Raises
-        ------
-        OSError
-            If it cannot be written; the frames before are safe.
+        Raises OSError if it cannot be written; the frames before are safe.
         """
         row = layout.row(raw, dropped_frames=dropped_frames)
         self._rows.append({"raw": raw.images}, row)
@@ -91,10 +81,8 @@ class RecordingWriter:
     def close(self, end: Mapping[str, Any]) -> None:
         """Finish the file and give it its name.
 
-        Raises
-        ------
-        OSError
-            If it cannot be finished; ``.part`` stays, and recovery makes a recording of it.
+        Raises OSError if it cannot be finished; ``.part`` stays, and recovery makes a recording of
+        it.
         """
         # the lock is held also while it gets its name
         with self._lock, READERS.ending(self._lock.descriptor):
@@ -112,13 +100,7 @@ def annotate(path: Path, annotations: Mapping[str, Any]) -> None:
     HDF5 is not used: a file that it has open for writing is lost if this process dies meanwhile.
     The annotations have a fixed place and size, so that their bytes can be replaced without it;
     the worst is then that the annotations themselves are torn.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    ValueError
-        If they are too long.
+    Raises OSError if the file cannot be written; ValueError if they are too long.
     """
     data = layout.encoded(annotations)
     if len(data) > layout.ANNOTATIONS_BYTES:

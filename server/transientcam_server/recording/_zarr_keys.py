@@ -48,10 +48,7 @@ class Place:
 class ZarrKeys:
     """The keys of an open recording.
 
-    Parameters
-    ----------
-    recording
-        Also one that is still written: it has the frames that it had when it was opened.
+    ``recording``: also one that is still written: it has the frames that it had when it was opened.
     """
 
     def __init__(self, recording: Recording) -> None:
@@ -61,12 +58,7 @@ class ZarrKeys:
     def value(self, key: str) -> bytes:
         """Return what stands at a key, such as ``.zmetadata`` or ``raw/3.0.0.0``.
 
-        Raises
-        ------
-        KeyError
-            If nothing does.
-        DamagedFrame
-            If a chunk is not where the file says.
+        Raises KeyError if nothing does; DamagedFrame if a chunk is not where the file says.
         """
         array, _, part = key.rpartition("/")
         if key == CONSOLIDATED:
@@ -125,10 +117,7 @@ class ZarrKeys:
     def places(self) -> Iterator[tuple[str, Place]]:
         """Yield the key and the place of every chunk of the images, which are in chunks.
 
-        Raises
-        ------
-        DamagedFrame
-            If one is not where the file says.
+        Raises DamagedFrame if one is not where the file says.
         """
         counts = map(_count, self._recording.shape, self._raw_chunks)
         for numbers in itertools.product(*map(range, counts)):

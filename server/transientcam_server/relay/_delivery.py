@@ -34,15 +34,10 @@ class Delivery:
     It may be asked for again and again, from any thread; a confirmation is good for those who
     asked before the attempt that it answers.
 
-    Parameters
-    ----------
-    send
-        Sends the request once. `OriginRefused` is final, any other error is not.
-    changed
-        Called on a thread of this delivery when it takes long, with False, and when that has ended,
-        with True.
-    pauses_s
-        As `PAUSES_S`.
+    ``send``: sends the request once. `OriginRefused` is final, any other error is not.
+    ``changed``: called on a thread of this delivery when it takes long, with False, and when that
+    has ended, with True.
+    ``pauses_s``: as `PAUSES_S`.
     """
 
     def __init__(

@@ -23,15 +23,10 @@ Parts = Mapping[str, Frame]
 
 @dataclass(slots=True)
 class Collector:
-    """Collects the products of a frame, which come one after the other.
-
-    Attributes
-    ----------
-    products
-        Names of all of them.
-    """
+    """Collects the products of a frame, which come one after the other."""
 
     products: tuple[str, ...]
+    """Names of all of them."""
     _number: int | None = None
     _parts: dict[str, Frame] = field(default_factory=dict)
 
@@ -57,17 +52,9 @@ def capture_of(
 ) -> RawFrame:
     """Return the capture that products of a frame are of.
 
-    Parameters
-    ----------
-    applied, capabilities
-        Sequence and camera, by which arrays have a shape.
-    number, lost_images, hops
-        Of the capture; the rest is as the origin states it.
-
-    Raises
-    ------
-    ProtocolError
-        An array has another shape or type.
+    ``applied``, ``capabilities``: sequence and camera, by which arrays have a shape.
+    ``number``, ``lost_images``, ``hops``: of the capture; the rest is as the origin states it.
+    Raises ProtocolError where an array has another shape or type.
     """
     meta = next(iter(parts.values())).meta
     pixels = capabilities.height, capabilities.width

@@ -37,36 +37,26 @@ Change = Callable[[transientcam.AsyncCamera], Awaitable[object]]
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """An origin at one moment.
-
-    Attributes
-    ----------
-    service_id, path
-        Of the origin, and of all services from there to the camera, itself first.
-    version
-        Of its software.
-    role
-        What this relay may do there.
-    capabilities, sensor, intrinsics
-        Of its camera.
-    sequence
-        That is captured: the document of ``GET /sequence``.
-    calibration
-        That is active there; None for nominal gains.
-    spoilt_images
-        What becomes there of images that lost their synchronisation.
-    """
+    """An origin at one moment."""
 
     service_id: str
     path: tuple[str, ...]
+    """``service_id``, ``path``: of the origin, and of all services from there to the camera, itself
+    first."""
     version: str
+    """Of its software."""
     role: str
+    """What this relay may do there."""
     capabilities: Capabilities
     sensor: tm.noise.Sensor | None
     intrinsics: Mapping[str, Any]
+    """``capabilities``, ``sensor``, ``intrinsics``: of its camera."""
     sequence: Mapping[str, Any]
+    """That is captured: the document of ``GET /sequence``."""
     calibration: Calibration | None
+    """That is active there; None for nominal gains."""
     spoilt_images: CorruptImages
+    """What becomes there of images that lost their synchronisation."""
 
 
 class Origin:
@@ -178,10 +168,7 @@ class Origin:
     async def send_apart(self, change: Change, *, lease_id: str | None = None) -> None:
         """Make a change over a connection of its own; what the origin may yet confirm is lost.
 
-        Raises
-        ------
-        OriginRefused
-            It refuses for good: another try would be refused, too.
+        Raises OriginRefused where it refuses for good: another try would be refused, too.
         """
         headers = {"prefer": f"wait={ATTEMPT_S:g}"}
         if lease_id is not None:
@@ -283,13 +270,7 @@ def _capabilities(document: Mapping[str, Any]) -> Capabilities:
 
 
 def require_same_camera(known: Capabilities, now: Capabilities) -> None:
-    """Refuse an origin that has another camera than before.
-
-    Raises
-    ------
-    CameraError
-        Naming both.
-    """
+    """Refuse an origin that has another camera than before. Raises CameraError naming both."""
     if now != known:
         before, after = f"{known.model} {known.serial}", f"{now.model} {now.serial}"
         raise CameraError(

@@ -21,10 +21,7 @@ TIMEOUT_S: Final = 10.0
 def _address(name: CameraName) -> str:
     """Read what is relayed, without reaching for it.
 
-    Raises
-    ------
-    SpecError
-        Naming the part that is not valid.
+    Raises SpecError naming the part that is not valid.
     """
     if name.options.get("product") == "coefficients":
         reason = (
@@ -49,10 +46,7 @@ def _address(name: CameraName) -> str:
 def _token(name: CameraName, environment: Mapping[str, str]) -> str | None:
     """Read the token of the origin: a file goes before the environment.
 
-    Raises
-    ------
-    SpecError
-        The file cannot be read, or holds nothing.
+    Raises SpecError where the file cannot be read, or holds nothing.
     """
     path = name.options.get("token_file")
     if path is None:

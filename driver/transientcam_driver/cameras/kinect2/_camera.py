@@ -185,14 +185,9 @@ class Kinect2Camera(HostCamera):
     def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
         """Wait for the next complete frame.
 
-        Raises
-        ------
-        FrameTimeout
-            None was complete in time; the camera goes on capturing.
-        NotStreaming
-            The camera was not started, or was stopped meanwhile.
-        CameraLost
-            It was unplugged, does not answer, or sends nothing whole; see ``reconnect``.
+        Raises FrameTimeout: none was complete in time; the camera goes on capturing. Raises
+        NotStreaming where the camera was not started, or was stopped meanwhile. Raises CameraLost
+        where it was unplugged, does not answer, or sends nothing whole; see ``reconnect``.
         """
         with self._reading:
             end_s = self._now_s() + timeout_s
@@ -313,12 +308,8 @@ def _left_open(device: Kinect2) -> None:
 class Watch:
     """Calls a function where nothing was noted for a time.
 
-    Parameters
-    ----------
-    interval_s
-        After one to two of these without a note.
-    idle
-        Called on a thread of its own, again and again until something is noted.
+    ``interval_s``: after one to two of these without a note.
+    ``idle``: called on a thread of its own, again and again until something is noted.
     """
 
     def __init__(self, interval_s: float, idle: Callable[[], None]) -> None:

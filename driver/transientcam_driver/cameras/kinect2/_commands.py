@@ -45,20 +45,15 @@ class Command(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """A request, and how long its answer may be.
-
-    Attributes
-    ----------
-    parameters
-        None, one or four numbers.
-    least_bytes, most_bytes
-        The shortest answer that counts, and the longest that is asked for; 0 for no answer.
-    """
+    """A request, and how long its answer may be."""
 
     command: Command
     parameters: tuple[int, ...] = ()
+    """None, one or four numbers."""
     least_bytes: int = 0
     most_bytes: int = 0
+    """``least_bytes``, ``most_bytes``: the shortest answer that counts, and the longest that is
+    asked for; 0 for no answer."""
 
     def pack(self, sequence: int) -> bytes:
         """Return the bytes of the request with its sequence number."""
@@ -98,10 +93,7 @@ def is_completion(data: bytes) -> bool:
 def completed_sequence(data: bytes, request: Request) -> int:
     """Return the sequence number that a completion is for.
 
-    Raises
-    ------
-    ProtocolError
-        It is no completion.
+    Raises ProtocolError where it is no completion.
     """
     if not is_completion(data):
         raise ProtocolError(f"{request.name} was not completed: {_shown(data)} came instead")
@@ -110,13 +102,7 @@ def completed_sequence(data: bytes, request: Request) -> int:
 
 
 def checked_answer(data: bytes, request: Request) -> bytes:
-    """Return the answer to a request.
-
-    Raises
-    ------
-    ProtocolError
-        It is too short.
-    """
+    """Return the answer to a request. Raises ProtocolError where it is too short."""
     if len(data) < request.least_bytes:
         size = f"{len(data)} bytes, at least {request.least_bytes} are needed"
         raise ProtocolError(f"the answer to {request.name} has {size}")
@@ -135,10 +121,7 @@ def firmware_version(answer: bytes) -> str:
 def serial_number(answer: bytes) -> str:
     """Return the serial number: two bytes a character, up to the first that is zero.
 
-    Raises
-    ------
-    ProtocolError
-        It is empty, or holds what cannot be printed.
+    Raises ProtocolError where it is empty, or holds what cannot be printed.
     """
     text = answer[: len(answer) // 2 * 2].decode("utf-16-le", errors="replace").split("\0")[0]
     if not text or not text.isascii() or not text.isprintable():

@@ -32,20 +32,14 @@ Action = Request | Callable[[Link], None]
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What a camera says of itself.
-
-    Attributes
-    ----------
-    parameters
-        Answer with the parameters of the depth camera, 92 bytes or more.
-    p0
-        Answer with the P0 tables, 1 302 572 bytes or more.
-    """
+    """What a camera says of itself."""
 
     firmware: str
     serial: str
     parameters: bytes
+    """Answer with the parameters of the depth camera, 92 bytes or more."""
     p0: bytes
+    """Answer with the P0 tables, 1 302 572 bytes or more."""
 
 
 _STOP: Final[tuple[Action, ...]] = (
@@ -72,21 +66,11 @@ class Kinect2:
     Not for several threads at a time. Whatever fails, the rest of what switches the light off is
     tried all the same.
 
-    Parameters
-    ----------
-    link
-        Owned from now on.
-    pause
-        Sleeps for so many seconds.
-    serial
-        The camera that it has to be; None for any.
-
-    Raises
-    ------
-    CameraNotFound
-        It is another camera.
-    CameraError
-        It does not answer, or not by the protocol; the link is closed.
+    ``link``: owned from now on.
+    ``pause``: sleeps for so many seconds.
+    ``serial``: the camera that it has to be; None for any.
+    Raises CameraNotFound where it is another camera. Raises CameraError where it does not answer,
+    or not by the protocol; the link is closed.
     """
 
     def __init__(
@@ -113,10 +97,7 @@ class Kinect2:
     def start(self, received: PacketTaker, failed: FailureTaker) -> None:
         """Switch the light on and hand over packets, as `Link.start_images` does.
 
-        Raises
-        ------
-        CameraError
-            The light is off.
+        Raises CameraError where the light is off.
         """
         try:
             found = self._identify()
@@ -137,23 +118,14 @@ class Kinect2:
     def stop(self) -> None:
         """Switch the light off, and hand over nothing more.
 
-        Raises
-        ------
-        CameraError
-            One of the requests failed; all were tried.
+        Raises CameraError: one of the requests failed; all were tried.
         """
         failure = self._attempt(_STOP)
         if failure is not None:
             raise failure
 
     def check(self) -> None:
-        """Ask for the status.
-
-        Raises
-        ------
-        CameraError
-            It does not answer.
-        """
+        """Ask for the status. Raises CameraError where it does not answer."""
         self._do(commands.READ_STATUS)
 
     def close(self) -> None:

@@ -52,17 +52,10 @@ def samples(
 def packets(sub_images: NDArray[np.uint8], *, sequence: int, timestamp: int) -> Iterator[bytes]:
     """Return the packets of a frame, with one of length zero behind each sub-image.
 
-    Parameters
-    ----------
-    sub_images : uint8 array, shape (9 or 10, `SUB_IMAGE_BYTES`)
-        Of `codes.sub_images`; the tenth one, of unknown meaning, is 0 where it is left out.
-    sequence, timestamp
-        Of the frame, unsigned numbers of 32 bits.
-
-    Raises
-    ------
-    ValueError
-        For sub-images of another shape.
+    ``sub_images``: uint8 array, shape (9 or 10, `SUB_IMAGE_BYTES`), of `codes.sub_images`; the
+    tenth one, of unknown meaning, is 0 where it is left out.
+    ``sequence``, ``timestamp``: of the frame, unsigned numbers of 32 bits.
+    Raises ValueError for sub-images of another shape.
     """
     if sub_images.shape not in ((MEASURED, SUB_IMAGE_BYTES), (SUB_IMAGES, SUB_IMAGE_BYTES)):
         raise ValueError(f"sub-images of shape {sub_images.shape}, not (9, {SUB_IMAGE_BYTES})")

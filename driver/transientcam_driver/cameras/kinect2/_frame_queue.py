@@ -15,20 +15,14 @@ ROOM_FRAMES: Final = 4
 
 
 class Arrival(NamedTuple):
-    """A frame, and when it was complete.
-
-    Attributes
-    ----------
-    now_s, unix_s
-        By the clock of the camera.
-    lost
-        Images that are missing between the frame handed over before and this one.
-    """
+    """A frame, and when it was complete."""
 
     sub_images: SubImages
     now_s: float
     unix_s: float
+    """``now_s``, ``unix_s``: by the clock of the camera."""
     lost: int
+    """Images that are missing between the frame handed over before and this one."""
 
 
 class FrameQueue:
@@ -36,12 +30,9 @@ class FrameQueue:
 
     A frame for which there is no room replaces the oldest one, which counts as lost.
 
-    Parameters
-    ----------
-    counters
-        Counts images, losses, incomplete frames, and stretches that were no image (``resyncs``).
-    clock
-        Of the times of arrival.
+    ``counters``: counts images, losses, incomplete frames, and stretches that were no image
+    (``resyncs``).
+    ``clock``: of the times of arrival.
     """
 
     def __init__(self, counters: Counters, clock: Clock) -> None:
@@ -96,10 +87,8 @@ class FrameQueue:
     def take(self, timeout_s: float) -> Arrival | None:
         """Return the next frame; None if there is none in time, or nothing will come.
 
-        Raises
-        ------
-        CameraError
-            What the link failed with; frames that had arrived before are returned first.
+        Raises CameraError: what the link failed with; frames that had arrived before are returned
+        first.
         """
         with self._arrived:
             self._arrived.wait_for(

@@ -20,10 +20,7 @@ class FrameMaker:
     Times are those of the stream's timestamps. Since no request for the camera's clock is known,
     the first frame of a run has the time of its arrival, less what a frame takes.
 
-    Parameters
-    ----------
-    since_s
-        When the camera was opened: the zero of ``device_time_s``.
+    ``since_s``: when the camera was opened: the zero of ``device_time_s``.
     """
 
     def __init__(self, since_s: float) -> None:

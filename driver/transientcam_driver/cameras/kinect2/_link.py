@@ -19,14 +19,10 @@ class Link(Protocol):
     """An opened device: bulk transfers of commands, a few control requests, a stream of packets.
 
     Each method but ``close`` raises `CameraLost` where the device does not answer within a second.
-
-    Attributes
-    ----------
-    node
-        Device node of usbfs; empty without one.
     """
 
     node: str
+    """Device node of usbfs; empty without one."""
 
     def write(self, data: bytes) -> None:
         """Send a request to the command endpoint."""

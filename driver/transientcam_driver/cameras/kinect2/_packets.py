@@ -51,24 +51,16 @@ class Footer(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SubImages:
-    """The nine measured sub-images of a frame.
-
-    Attributes
-    ----------
-    sequence
-        Number of the frame, by the device.
-    timestamp
-        Of the sub-image that came first, in ticks of `TICK_S`.
-    data
-        uint8 (9, `SUB_IMAGE_BYTES`), in the order of their numbers.
-    lost
-        Measured sub-images that are missing since the frame before.
-    """
+    """The nine measured sub-images of a frame."""
 
     sequence: int
+    """Number of the frame, by the device."""
     timestamp: int
+    """Of the sub-image that came first, in ticks of `TICK_S`."""
     data: NDArray[np.uint8]
+    """uint8 (9, `SUB_IMAGE_BYTES`), in the order of their numbers."""
     lost: int
+    """Measured sub-images that are missing since the frame before."""
 
 
 class Assembler:
@@ -77,14 +69,9 @@ class Assembler:
     A frame is returned with the last of its nine measured sub-images, without waiting for the
     tenth or for the next frame.
 
-    Attributes
-    ----------
-    torn
-        Stretches of bytes that were no whole sub-image.
-    lost
-        Measured sub-images that are missing in all, those of frames without any among them.
-    incomplete_frames
-        Frames that were begun and dropped.
+    ``torn``: stretches of bytes that were no whole sub-image.
+    ``lost``: measured sub-images that are missing in all, those of frames without any among them.
+    ``incomplete_frames``: frames that were begun and dropped.
     """
 
     def __init__(self) -> None:

@@ -41,13 +41,7 @@ class DepthParameters:
 
     @classmethod
     def unpack(cls, response: bytes) -> Self:
-        """Read the camera's answer.
-
-        Raises
-        ------
-        ProtocolError
-            It is too short, or no lens.
-        """
+        """Read the camera's answer. Raises ProtocolError where it is too short, or no lens."""
         if len(response) < RESPONSE_BYTES:
             raise ProtocolError(f"camera parameters of {len(response)} bytes, not {RESPONSE_BYTES}")
         fx, fy, _, *others = _LAYOUT.unpack_from(response)[:10]

@@ -40,10 +40,7 @@ class P0Tables:
     def unpack(cls, response: bytes) -> Self:
         """Read the camera's answer; bytes behind it are left out.
 
-        Raises
-        ------
-        ProtocolError
-            It is too short.
+        Raises ProtocolError where it is too short.
         """
         if len(response) < RESPONSE_BYTES:
             raise ProtocolError(f"P0 tables of {len(response)} bytes, not {RESPONSE_BYTES}")

@@ -104,10 +104,7 @@ class UsbLink:
     def start_images(self, received: PacketTaker, failed: FailureTaker) -> None:
         """Keep transfers in flight, and hand over every packet of them.
 
-        Raises
-        ------
-        CameraError
-            Not enough of them can be had: usbfs has too little memory.
+        Raises CameraError: not enough of them can be had: usbfs has too little memory.
         """
         handle = self._opened()
         self._stopping = False

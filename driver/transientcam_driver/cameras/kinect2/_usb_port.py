@@ -32,10 +32,7 @@ _SUPER_SPEED: Final = 4
 def libusb() -> Any:
     """Return the package ``usb1``.
 
-    Raises
-    ------
-    CameraError
-        It is not installed, or the system has no libusb.
+    Raises CameraError where it is not installed, or the system has no libusb.
     """
     try:
         import usb1
@@ -89,10 +86,8 @@ def bytes_per_interval(device: Any) -> int:
 def require_bandwidth(device: Any) -> None:
     """Refuse a port that is too slow.
 
-    Raises
-    ------
-    CameraError
-        It is no USB 3 port, or its depth endpoint may send less than its images need.
+    Raises CameraError where it is no USB 3 port, or its depth endpoint may send less than its
+    images need.
     """
     if device.getDeviceSpeed() < _SUPER_SPEED:
         raise CameraError(f"the Kinect v2 at {node_of(device)} is on a port slower than USB 3")

@@ -103,13 +103,8 @@ class UsbCamera(HostCamera):
         """Set a sequence; while streaming, the next frame is the new sequence's.
 
         Frames of the sequence before are not delivered any more once this returns.
-
-        Raises
-        ------
-        SequenceError
-            The sequence is not possible; nothing was changed.
-        CameraLost
-            The camera is gone; the sequence is not remembered.
+        Raises SequenceError where the sequence is not possible; nothing was changed. Raises
+        CameraLost where the camera is gone; the sequence is not remembered.
         """
         self._capabilities.validate(sequence)
         with self._control:
@@ -174,14 +169,9 @@ class UsbCamera(HostCamera):
         """After CameraLost: find the same device again, restore the sequence, resume streaming.
 
         Does nothing unless the camera is disconnected.
-
-        Raises
-        ------
-        CameraNotFound
-            It is still absent; try again later.
-        CameraError
-            It is there but cannot be opened: not yet (a node without its permissions, a second
-            unplugging), or because another program has claimed it.
+        Raises CameraNotFound where it is still absent; try again later. Raises CameraError where it
+        is there but cannot be opened: not yet (a node without its permissions, a second
+        unplugging), or because another program has claimed it.
         """
         with self._reading, self._control:
             self._require_open()

@@ -25,17 +25,9 @@ class ControlConnection:
     Whatever comes in place of an answer, `exchange` ends within ``answer_s``, and closes the
     connection: behind a broken answer the next could not be separated from its rest.
 
-    Parameters
-    ----------
-    answer_s
-        Time for a connection, and for each answer.
-    clock
-        Monotonic time in s.
-
-    Raises
-    ------
-    CameraUnreachable
-        Nothing answers at that address.
+    ``answer_s``: time for a connection, and for each answer.
+    ``clock``: monotonic time in s.
+    Raises CameraUnreachable: nothing answers at that address.
     """
 
     def __init__(
@@ -63,12 +55,8 @@ class ControlConnection:
     def exchange(self, command: Command, data: bytes = b"") -> Answer:
         """Send a command and return its answer.
 
-        Raises
-        ------
-        DeviceRefused
-            The camera does not do it.
-        CameraLost
-            It does not answer in time, or not by the protocol.
+        Raises DeviceRefused where the camera does not do it; CameraLost where it does not answer in
+        time, or not by the protocol.
         """
         try:
             payload = self._payload(pack_request(command, data))

@@ -55,33 +55,24 @@ DataOver = Literal["auto", "tcp", "udp"]
 
 @dataclass(frozen=True, slots=True)
 class DeviceOptions:
-    """How a TOFcam660 is used.
-
-    Attributes
-    ----------
-    data_over
-        What images travel over; ``auto`` is TCP where the firmware has it.
-    region
-        The part of the sensor that is read.
-    settle_s
-        Time for each change of the frequency.
-    answer_s, image_s
-        Time for an answer, and for an image.
-    multiples
-        Which multiples of the base frequency are measured; 1 to m where it is empty.
-    control_port, data_port, udp_port
-        Of the camera for commands and images over TCP; and of this machine, for those over UDP.
-    """
+    """How a TOFcam660 is used."""
 
     data_over: DataOver = "auto"
+    """What images travel over; ``auto`` is TCP where the firmware has it."""
     region: Region = FULL
+    """The part of the sensor that is read."""
     settle_s: float = SETTLE_S
+    """Time for each change of the frequency."""
     answer_s: float = 1.0
     image_s: float = 1.0
+    """``answer_s``, ``image_s``: time for an answer, and for an image."""
     multiples: tuple[int, ...] = ()
+    """Which multiples of the base frequency are measured; 1 to m where it is empty."""
     control_port: int = CONTROL_PORT
     data_port: int = DATA_PORT
     udp_port: int = DATA_PORT
+    """``control_port``, ``data_port``, ``udp_port``: of the camera for commands and images over
+    TCP; and of this machine, for those over UDP."""
 
 
 def offset_m(entries: tuple[CalibrationEntry, ...], temperature_c: float) -> float:
@@ -89,11 +80,7 @@ def offset_m(entries: tuple[CalibrationEntry, ...], temperature_c: float) -> flo
 
     The vendor's client takes it from the entry of 24 MHz, whatever the frequency is: to a distance
     of arg b it adds 6250 - atan_offset + 17.5 (T_calibrated - T) + 330 - 28 - 7/8 * 12500 mm.
-
-    Raises
-    ------
-    ProtocolError
-        There is no entry of 24 MHz.
+    Raises ProtocolError where there is no entry of 24 MHz.
     """
     for entry in entries:
         if entry.frequency_code == _CODE_OF_24_MHZ:
@@ -105,12 +92,8 @@ def offset_m(entries: tuple[CalibrationEntry, ...], temperature_c: float) -> flo
 class Tofcam660:
     """One camera, connected: a `TriggeredDevice`.
 
-    Raises
-    ------
-    CameraUnreachable
-        Nothing answers at that address.
-    CameraError
-        Its firmware is too old, or refuses a setting.
+    Raises CameraUnreachable: nothing answers at that address; CameraError where its firmware is too
+    old, or refuses a setting.
     """
 
     def __init__(self, host: str, options: DeviceOptions | None = None) -> None:

@@ -91,11 +91,7 @@ def dcs_images(data: bytes, region: Region, integration_us: int) -> NDArray[np.u
 
     ``DCS_k = ZERO_DN + A cos(phi - k pi / 2)``, so that image k has the phase k pi / 2. A pixel
     that overflowed or is saturated has the highest code of the converter.
-
-    Raises
-    ------
-    ImagesLost
-        These are not the images that were asked for.
+    Raises ImagesLost: these are not the images that were asked for.
     """
     header = ImageHeader.unpack(data)
     found = (header.kind, header.columns, header.rows, header.integration_us[0])

@@ -28,12 +28,8 @@ class ImageConnection(Protocol):
     def receive(self, timeout_s: float) -> bytes | None:
         """Return the image, or None if it takes longer.
 
-        Raises
-        ------
-        ImagesLost
-            It will not come, or not whole.
-        CameraLost
-            The connection was closed.
+        Raises ImagesLost where it will not come, or not whole; CameraLost where the connection was
+        closed.
         """
         ...
 
@@ -45,19 +41,10 @@ class ImageConnection(Protocol):
 class UdpImages:
     """Images in pieces, which may be lost, doubled or out of order.
 
-    Parameters
-    ----------
-    camera
-        The only address that packets are taken from.
-    port
-        Where the camera sends them to; 0 takes any free port.
-    image_s
-        Time for a whole image, from when it is expected.
-
-    Raises
-    ------
-    CameraError
-        Another program has the port.
+    ``camera``: the only address that packets are taken from.
+    ``port``: where the camera sends them to; 0 takes any free port.
+    ``image_s``: time for a whole image, from when it is expected.
+    Raises CameraError: another program has the port.
     """
 
     def __init__(
@@ -162,15 +149,8 @@ class UdpImages:
 class TcpImages:
     """Images one behind the other on a connection; nothing says where one begins.
 
-    Parameters
-    ----------
-    image_s
-        Time for a whole image, from when it is expected; and for the connection.
-
-    Raises
-    ------
-    CameraLost
-        The camera takes no connection.
+    ``image_s``: time for a whole image, from when it is expected; and for the connection.
+    Raises CameraLost where the camera takes no connection.
     """
 
     def __init__(
@@ -186,10 +166,7 @@ class TcpImages:
     def expect(self, image_bytes: int) -> None:
         """Wait for an image of this length; what came of another one is left with its connection.
 
-        Raises
-        ------
-        CameraLost
-            The camera takes no new connection.
+        Raises CameraLost where the camera takes no new connection.
         """
         if self._got < len(self._image) or not self._silent():
             self._socket.close()

@@ -105,10 +105,7 @@ def _framed(payload: bytes) -> bytes:
 def payload_bytes(head: bytes) -> int:
     """Return the length of the payload behind the first 8 bytes.
 
-    Raises
-    ------
-    ProtocolError
-        There is no start marker, or the length is none that an answer has.
+    Raises ProtocolError where there is no start marker, or the length is none that an answer has.
     """
     start, size = _HEAD.unpack(head)
     if start != START:
@@ -119,13 +116,7 @@ def payload_bytes(head: bytes) -> int:
 
 
 def require_end(tail: bytes) -> None:
-    """Check the last 4 bytes.
-
-    Raises
-    ------
-    ProtocolError
-        They are not the end marker.
-    """
+    """Check the last 4 bytes. Raises ProtocolError where they are not the end marker."""
     (end,) = _TAIL.unpack(tail)
     if end != END:
         raise ProtocolError(f"{end:#010x} in place of the end marker {END:#010x}")
@@ -142,10 +133,7 @@ class Answer:
     def of(cls, payload: bytes, command: Command) -> "Answer":
         """Read a payload.
 
-        Raises
-        ------
-        DeviceRefused
-            The camera did not do what the command says.
+        Raises DeviceRefused where the camera did not do what the command says.
         """
         kind, data = payload[0], bytes(payload[1:])
         if kind == AnswerType.NOT_ACKNOWLEDGED:
@@ -160,10 +148,7 @@ class Answer:
     def fields(self, kind: AnswerType, layout: str) -> tuple[int, ...]:
         """Return the numbers of an answer of this type.
 
-        Raises
-        ------
-        ProtocolError
-            It is an answer of another type or length.
+        Raises ProtocolError where it is an answer of another type or length.
         """
         expected = struct.calcsize(layout)
         if self.kind != kind or len(self.data) != expected:
@@ -197,10 +182,7 @@ def pack_calibration(entries: tuple[CalibrationEntry, ...]) -> bytes:
 def unpack_calibration(answer: Answer) -> tuple[CalibrationEntry, ...]:
     """Read the answer to READ_CALIBRATION.
 
-    Raises
-    ------
-    ProtocolError
-        It holds no whole number of entries.
+    Raises ProtocolError where it holds no whole number of entries.
     """
     if answer.kind != AnswerType.CALIBRATION or len(answer.data) % _ENTRY.size:
         raise ProtocolError(f"calibration data of {len(answer.data)} bytes, type {answer.kind}")

@@ -41,10 +41,7 @@ def build_kinect2(
 ) -> tuple[EmulatedKinect2, SimulationHandle]:
     """Build an emulated camera, and the handle on it.
 
-    Raises
-    ------
-    SceneError
-        A file that the scene names cannot be read.
+    Raises SceneError where a file that the scene names cannot be read.
     """
     sensor = replace(scene.sensor, bits=BITS, gain_e_per_dn=GAIN_E_PER_DN, dark_dn=float(ZERO_DN))
     field_deg = FIELD_OF_VIEW_DEG if scene.camera is None else scene.camera.field_of_view_deg

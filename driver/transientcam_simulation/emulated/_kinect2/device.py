@@ -37,14 +37,9 @@ class Pixels(Protocol):
 class EmulatedKinect2(PluggedCamera["EmulatedLink"]):
     """An emulated camera, and its cable; a fault loses or shortens a packet of an image.
 
-    Parameters
-    ----------
-    power_on
-        Makes the firmware, at the start and when the cable is plugged in again.
-    pixels
-        What its frames show.
-    clock
-        Paces its frames. Where they take longer to make than 1/30 s, they come later.
+    ``power_on``: makes the firmware, at the start and when the cable is plugged in again.
+    ``pixels``: what its frames show.
+    ``clock``: paces its frames. Where they take longer to make than 1/30 s, they come later.
     """
 
     def __init__(

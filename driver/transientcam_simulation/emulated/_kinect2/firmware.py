@@ -80,10 +80,7 @@ class EmulatedFirmware:
     def write(self, data: bytes) -> None:
         """Take a request; an answer that was not read is dropped.
 
-        Raises
-        ------
-        TransferStalled
-            It is none, or not possible now.
+        Raises TransferStalled where it is none, or not possible now.
         """
         self._pending.clear()
         if len(data) < _HEADER.size or (len(data) - _HEADER.size) // 4 not in _PARAMETERS:
@@ -101,10 +98,7 @@ class EmulatedFirmware:
     def read(self, most_bytes: int) -> bytes:
         """Return the next transfer of the answer endpoint.
 
-        Raises
-        ------
-        TransferStalled
-            There is none, or it is longer than what is asked for.
+        Raises TransferStalled where there is none, or it is longer than what is asked for.
         """
         if not self._pending or len(self._pending[0]) > most_bytes:
             raise TransferStalled

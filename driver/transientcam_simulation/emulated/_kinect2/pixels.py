@@ -38,12 +38,8 @@ class DifferencePixels:
     that of a pixel of `Sensor` with half of the light b_0, whatever g is. What a real one has
     is not known. It is saturated where a tap is full.
 
-    Parameters
-    ----------
-    gains
-        Of `P0Tables.gains`.
-    seed
-        Of the noise.
+    ``gains``: of `P0Tables.gains`.
+    ``seed``: of the noise.
     """
 
     def __init__(self, world: SwitchableWorld, gains: NDArray[np.complex64], *, seed: int) -> None:

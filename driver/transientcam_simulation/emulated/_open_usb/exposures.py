@@ -51,10 +51,7 @@ class Exposures:
     frame; storing goes on with a frame that has room (8.3), so that a host that is always too
     slow gets whole frames.
 
-    Parameters
-    ----------
-    room
-        Images the FIFO holds.
+    ``room``: images the FIFO holds.
     """
 
     def __init__(self, room: int) -> None:

@@ -29,10 +29,7 @@ class Fault(StrEnum):
 class PendingFaults:
     """Faults of the images to come, of the kinds that a camera can have.
 
-    Parameters
-    ----------
-    camera
-        Its name, for the error.
+    ``camera``: its name, for the error.
     """
 
     def __init__(self, camera: str, *kinds: Fault) -> None:
@@ -42,10 +39,7 @@ class PendingFaults:
     def inject(self, fault: Fault, images: int = 1) -> None:
         """Let a fault happen to so many more images.
 
-        Raises
-        ------
-        CameraError
-            This camera knows no such fault.
+        Raises CameraError where this camera knows no such fault.
         """
         if fault not in self._images:
             raise CameraError(f"the emulated {self._camera} knows no fault {fault!r}")

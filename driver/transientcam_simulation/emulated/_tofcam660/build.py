@@ -24,12 +24,8 @@ def build_tofcam660(
 ) -> tuple[EmulatedTofcam660, SimulationHandle]:
     """Build an emulated camera, which listens from now on, and the handle on it.
 
-    Raises
-    ------
-    SceneError
-        A file that the scene names cannot be read.
-    CameraError
-        A port cannot be had.
+    Raises SceneError where a file that the scene names cannot be read; CameraError where a port
+    cannot be had.
     """
     scene = with_bits(scene, _BITS)
     world, prepare = world_before(scene, width=COLUMNS, height=ROWS, seed=seed, readout_s=READOUT_S)

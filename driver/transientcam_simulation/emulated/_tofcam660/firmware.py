@@ -66,12 +66,8 @@ _Words = NDArray[np.uint16]
 class EmulatedFirmware:
     """Settings and what they make of the light.
 
-    Parameters
-    ----------
-    pixels
-        The sensor.
-    clock
-        Time since power-up, in s.
+    ``pixels``: the sensor.
+    ``clock``: time since power-up, in s.
     """
 
     pixels: DifferentialPixels

@@ -107,10 +107,7 @@ class EmulatedTofcam660:
     def inject(self, fault: Fault, images: int = 1) -> None:
         """Lose or spoil the next images.
 
-        Raises
-        ------
-        CameraError
-            This camera knows no such fault.
+        Raises CameraError where this camera knows no such fault.
         """
         self._faults.inject(fault, images)
 

@@ -21,10 +21,7 @@ def build_opt8241(
 ) -> tuple[EmulatedOpt8241, SimulationHandle]:
     """Build an emulated camera, and the handle on it.
 
-    Raises
-    ------
-    SceneError
-        A file that the scene names cannot be read.
+    Raises SceneError where a file that the scene names cannot be read.
     """
     scene = with_bits(scene, BITS)
     readout_s = QUAD_S - MOST_DUTY * DUTY_S

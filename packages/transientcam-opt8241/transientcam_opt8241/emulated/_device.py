@@ -34,14 +34,9 @@ class EmulatedOpt8241(PluggedCamera["EmulatedLink"]):
     Frames come at the pace that its registers set, or later where they take longer to make. The
     first one after each start is still the last one before it.
 
-    Parameters
-    ----------
-    pixels
-        What its frames show.
-    serial
-        Its serial number.
-    clock
-        Paces its frames.
+    ``pixels``: what its frames show.
+    ``serial``: its serial number.
+    ``clock``: paces its frames.
     """
 
     def __init__(self, pixels: Pixels, *, serial: str, clock: Clock) -> None:

@@ -30,11 +30,8 @@ _LIMITED: Final = (
 class EmulatedRegisters:
     """Registers, at their defaults after power-up; those that no field is in are kept as written.
 
-    Attributes
-    ----------
-    modulation_hz
-        Frequency of the light: new fields of the PLL take effect when `registers.MOD_PLL_UPDATE`
-        goes from 1 to 0.
+    ``modulation_hz``: frequency of the light: new fields of the PLL take effect when
+    `registers.MOD_PLL_UPDATE` goes from 1 to 0.
     """
 
     def __init__(self) -> None:
@@ -43,13 +40,7 @@ class EmulatedRegisters:
     # --- requests ----------------------------------------------------------------------------
 
     def read(self, request: int, value: int, index: int, length: int) -> bytes:
-        """Answer a request.
-
-        Raises
-        ------
-        TransferStalled
-            There is no such request.
-        """
+        """Answer a request. Raises TransferStalled where there is no such request."""
         if request != Request.READ_REGISTER or value not in (reg.BANK_0, reg.BANK_3):
             raise TransferStalled
         return self._words.get((value, index), 0).to_bytes(REGISTER_BYTES, "little")[:length]
@@ -57,10 +48,7 @@ class EmulatedRegisters:
     def write(self, request: int, value: int, index: int, data: bytes) -> None:
         """Take a request; supplies and monitors are accepted without effect.
 
-        Raises
-        ------
-        TransferStalled
-            There is no such request, or it has another length.
+        Raises TransferStalled where there is no such request, or it has another length.
         """
         if len(data) != _LENGTHS.get(request):
             raise TransferStalled

@@ -49,10 +49,7 @@ class Guard:
     def identify(self, headers: Headers, *, first_message: str | None = None) -> Principal:
         """Return who sends a request with these headers, or a stream with this first message.
 
-        Raises
-        ------
-        Problem
-            ``token-required`` without a token where one is needed, ``token-refused``.
+        Raises Problem ``token-required`` without a token where one is needed, ``token-refused``.
         """
         token = first_message if first_message is not None else _shown(headers)
         if token is not None:

@@ -66,10 +66,7 @@ async def admit(request: Request, service: ServiceOf) -> None:
 def require(request: Request, service: Service, wanted: Needs) -> None:
     """Refuse a request that lacks what it needs.
 
-    Raises
-    ------
-    Problem
-        ``role-too-low``, ``may-not-light``, or as `LeaseManager.check`.
+    Raises Problem ``role-too-low``, ``may-not-light``, or as `LeaseManager.check`.
     """
     principal: Principal = request.state.principal
     if principal.role < wanted.role:

@@ -94,10 +94,7 @@ class TokenFile:
     def tokens(self) -> tuple[Token, ...]:
         """Return what is kept of every token.
 
-        Raises
-        ------
-        TokenFileError
-            If the file cannot be read; no token is valid then.
+        Raises TokenFileError if the file cannot be read; no token is valid then.
         """
         self._refresh()
         return tuple(self._tokens.values())
@@ -105,10 +102,7 @@ class TokenFile:
     def find(self, text: str, *, now: datetime) -> Token | None:
         """Return the token that ``text`` is; None if it is none that is valid now.
 
-        Raises
-        ------
-        TokenFileError
-            As `tokens`.
+        Raises TokenFileError as `tokens`.
         """
         self._refresh()
         parts = text.split("_", 2)
@@ -118,13 +112,7 @@ class TokenFile:
         return token if token is not None and same and not token.expired(now) else None
 
     def has(self, token_id: str, *, now: datetime) -> bool:
-        """Return whether the token of this id is still valid.
-
-        Raises
-        ------
-        TokenFileError
-            As `tokens`.
-        """
+        """Return whether the token of this id is still valid. Raises TokenFileError as `tokens`."""
         self._refresh()
         token = self._tokens.get(token_id)
         return token is not None and not token.expired(now)
@@ -155,13 +143,7 @@ class TokenFile:
         return token, text
 
     def revoke(self, token_id: str) -> Token:
-        """Make a token invalid.
-
-        Raises
-        ------
-        UnknownToken
-            If there is none with this id.
-        """
+        """Make a token invalid. Raises UnknownToken if there is none with this id."""
         with self._changing() as tokens:
             if token_id not in tokens:
                 raise UnknownToken(token_id, str(self.path))

@@ -40,11 +40,7 @@ class AnswerBudget:
         """Count an answer until the block ends.
 
         A client that waits for nothing else may have one answer of any size, where there is room.
-
-        Raises
-        ------
-        Problem
-            ``too-many-answers`` where there is no room for it.
+        Raises Problem ``too-many-answers`` where there is no room for it.
         """
         most, most_of_one = self._limits.answers_bytes, self._limits.answers_bytes_per_address
         theirs, total = self._of_client[client], self.total_bytes

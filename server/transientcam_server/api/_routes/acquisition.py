@@ -100,10 +100,7 @@ async def switch_off(service: ServiceOf, prefer: _Prefer = None) -> AcquisitionD
 async def _confirmed(service: Service, off: "Future[None]", prefer: str | None) -> None:
     """Wait until the light is off, and a moment until that is kept.
 
-    Raises
-    ------
-    Problem
-        ``light-unconfirmed`` where that takes too long; what is under way goes on.
+    Raises Problem ``light-unconfirmed`` where that takes too long; what is under way goes on.
     """
     asked = _WAIT.search(prefer or "")
     wait_s = CONFIRMED_S if asked is None else min(float(asked[1]), MOST_WAIT_S)

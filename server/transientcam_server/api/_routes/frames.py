@@ -36,11 +36,8 @@ class ChosenFrame:
     async def frame(self) -> Frame:
         """Return it, waiting for a frame that is not captured yet as the request allows.
 
-        Raises
-        ------
-        Problem
-            ``no-frame-yet``, ``unknown-frame``, ``frame-gone``, or ``invalid-request`` for
-            ``after`` with a number.
+        Raises Problem ``no-frame-yet``, ``unknown-frame``, ``frame-gone``, or ``invalid-request``
+        for ``after`` with a number.
         """
         hub, history = self.service.hub, self.service.history
         if self.name == LATEST:

@@ -12,22 +12,16 @@ SCENE_SHARE: Final = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One test.
-
-    Attributes
-    ----------
-    test
-        Its name, a key of `REASONS`.
-    value, limit
-        What was found (NaN: nothing could be), and the most that a diffuser may have.
-    unit
-        ``m``, ``rad`` or ``share``.
-    """
+    """One test."""
 
     test: str
+    """Its name, a key of `REASONS`."""
     value: float
     limit: float
+    """``value``, ``limit``: what was found (NaN: nothing could be), and the most that a diffuser
+    may have."""
     unit: str
+    """``m``, ``rad`` or ``share``."""
 
     @property
     def kept(self) -> bool:
@@ -71,28 +65,19 @@ _FLAT_WALL: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Whether a calibration was measured on a diffuser, and what that rests on.
-
-    Attributes
-    ----------
-    word
-        ``diffusor``; ``scene``; or ``in-doubt``, where it may be either.
-    findings
-        The tests.
-    block_px
-        Side in pixels of the blocks that were judged.
-    blocks
-        A text for each row of blocks with a character a block: ``.`` like a diffuser, ``#``
-        unlike one, ``?`` not judged.
-    reference
-        What the measurement was compared with: the id of a calibration, or ``nominal``.
-    """
+    """Whether a calibration was measured on a diffuser, and what that rests on."""
 
     word: Word
+    """``diffusor``; ``scene``; or ``in-doubt``, where it may be either."""
     findings: tuple[Finding, ...]
+    """The tests."""
     block_px: int
+    """Side in pixels of the blocks that were judged."""
     blocks: tuple[str, ...]
+    """A text for each row of blocks with a character a block: ``.`` like a diffuser, ``#`` unlike
+    one, ``?`` not judged."""
     reference: str
+    """What the measurement was compared with: the id of a calibration, or ``nominal``."""
 
     @property
     def trusted(self) -> bool:

@@ -13,10 +13,7 @@ from transientcam_server.imaging._products.products import Product
 def stream_encoding(name: str) -> Encoding:
     """Return what writes the messages of an encoding of the wire contract.
 
-    Raises
-    ------
-    KeyError
-        If there is none of that name.
+    Raises KeyError if there is none of that name.
     """
     if name == wire.F32:
         return MSGPACK

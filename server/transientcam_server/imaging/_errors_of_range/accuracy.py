@@ -48,29 +48,20 @@ _SEED: Final = 0
 
 @dataclass(frozen=True, eq=False)
 class RangeAccuracy:
-    """Predicted errors of a frame's range.
-
-    Attributes
-    ----------
-    std_m
-        (H, W) standard deviation by the noise of the sensor; NaN without a range.
-    bias_m
-        (H, W) how far the range is off for good, without sign, as far as the frame shows it; NaN
-        without a range, and where there is one frequency alone.
-    error_m
-        (H, W) half width of the interval that holds the range of this pixel with 90 % probability;
-        NaN where the bias is.
-    trust
-        (H, W) `Trust`: why a range is not to be trusted, 0 where it is.
-    every_px
-        The errors are of one pixel in so many rows and columns, and stand for those around it.
-    """
+    """Predicted errors of a frame's range."""
 
     std_m: _Array
+    """(H, W) standard deviation by the noise of the sensor; NaN without a range."""
     bias_m: _Array
+    """(H, W) how far the range is off for good, without sign, as far as the frame shows it; NaN
+    without a range, and where there is one frequency alone."""
     error_m: _Array
+    """(H, W) half width of the interval that holds the range of this pixel with 90 % probability;
+    NaN where the bias is."""
     trust: _Array
+    """(H, W) `Trust`: why a range is not to be trusted, 0 where it is."""
     every_px: int = 1
+    """The errors are of one pixel in so many rows and columns, and stand for those around it."""
 
     def to_document(self) -> RangeAccuracyDocument:
         """Return shares, and errors of the median pixel with a range, as a frame's metadata do."""

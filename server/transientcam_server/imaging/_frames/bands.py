@@ -43,21 +43,15 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class Banded:
-    """How a product is sent in bands.
-
-    Attributes
-    ----------
-    shape
-        Of the whole array.
-    bands
-        In the order in which they are sent.
-    """
+    """How a product is sent in bands."""
 
     product: Product
     encoding: Encoding
     view: View
     shape: tuple[int, ...]
+    """Of the whole array."""
     bands: tuple[Band, ...]
+    """In the order in which they are sent."""
 
     @property
     def data_bytes(self) -> int:

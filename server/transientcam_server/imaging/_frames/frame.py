@@ -188,10 +188,7 @@ class Frame:
     async def with_moments(self, compute: Callable[..., _T], *arguments: Any) -> _T:
         """Return what ``compute(recipe, reconstruction, meta, *arguments)`` gives on a worker.
 
-        Raises
-        ------
-        Problem
-            ``product-failed`` if it raised.
+        Raises Problem ``product-failed`` if it raised.
         """
         with self._failure_of("moments"):
             found = await self.reconstruction("moments")
@@ -268,11 +265,8 @@ class Frame:
     async def product(self, product: Product, view: View = EVERYTHING) -> _Array:
         """Return a product, whole unless it is one over time; times only for those.
 
-        Raises
-        ------
-        Problem
-            ``product-failed`` if its computation raised, ``answer-too-large`` if it would take
-            more memory than an answer may.
+        Raises Problem ``product-failed`` if its computation raised, ``answer-too-large`` if it
+        would take more memory than an answer may.
         """
         view = view if product.over_time else EVERYTHING
         array: _Array = await self._once(
@@ -292,10 +286,7 @@ class Frame:
     ) -> bytes:
         """Return a product as bytes, encoded once for all who request the same ones.
 
-        Raises
-        ------
-        Problem
-            As `product`.
+        Raises Problem as `product`.
         """
         whole = self._whole if view.crop.is_whole else self._crops
         data: bytes = await self._once(
@@ -309,11 +300,7 @@ class Frame:
         """Return the bytes of a product: its head, then each band once the one before was taken.
 
         They keep what they are computed from, and not the frame: a client may take long.
-
-        Raises
-        ------
-        Problem
-            As `product`; later, while the bands are computed, ``product-failed``.
+        Raises Problem as `product`; later, while the bands are computed, ``product-failed``.
         """
         product, view = planned.product, planned.view
         self._require_size(product, view, MAX_ANSWER_BYTES)
@@ -476,10 +463,7 @@ async def _alone(averaged: "asyncio.Future[tm.Measured | None]") -> tm.Measured 
 async def _shared(future: "asyncio.Future[_T]") -> _T:
     """Wait for what others may wait for too: a caller that stops waiting does not stop it.
 
-    Raises
-    ------
-    Problem
-        ``shutting-down`` where the workers were closed meanwhile.
+    Raises Problem ``shutting-down`` where the workers were closed meanwhile.
     """
     try:
         return future.result() if future.done() else await asyncio.shield(future)

@@ -31,13 +31,9 @@ class History:
     What is computed of a former frame is kept for the last few of them that were requested; the
     captures alone are what is bounded here.
 
-    Attributes
-    ----------
-    latest
-        The newest frame, also where its images alone are more than may be kept; None before the
-        first.
-    size_bytes
-        Of the raw images that are kept, never more than ``max_bytes``.
+    ``latest``: the newest frame, also where its images alone are more than may be kept; None before
+    the first.
+    ``size_bytes``: of the raw images that are kept, never more than ``max_bytes``.
     """
 
     def __init__(
@@ -87,11 +83,8 @@ class History:
     def frame(self, number: int) -> Frame:
         """Return a frame by its number.
 
-        Raises
-        ------
-        Problem
-            ``frame-gone`` for one that was, ``unknown-frame`` for one that was not yet; both say
-            which there are.
+        Raises Problem ``frame-gone`` for one that was, ``unknown-frame`` for one that was not yet;
+        both say which there are.
         """
         if self.latest is not None and number == self.latest.number:
             return self.latest

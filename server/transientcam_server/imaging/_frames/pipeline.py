@@ -173,10 +173,7 @@ class Pipeline:
     def product(self, name: str) -> Product:
         """Return a product this camera has.
 
-        Raises
-        ------
-        Problem
-            ``unknown-product``, with the list of known ones.
+        Raises Problem ``unknown-product``, with the list of known ones.
         """
         try:
             return self.products[name]

@@ -34,30 +34,20 @@ FIRST: Final = "light"
 
 @dataclass(slots=True)
 class Computed:
-    """The reconstruction of one frame, as far as it was computed.
-
-    Attributes
-    ----------
-    reconstruction
-        None before the first stage, or where that failed.
-    failures
-        Of the stages that were requested last.
-    pixels
-        How many pixels carry each flag.
-    ambient_dn
-        Light in DN an image that is not the camera's, in the median pixel; None without a sensor.
-    frames_averaged
-        How many frames a pixel rests on; None where frames are not averaged.
-    range_noise
-        Predicted deviation of the range, as the metadata have it; None before the returns.
-    """
+    """The reconstruction of one frame, as far as it was computed."""
 
     reconstruction: tm.Reconstruction | None = None
+    """None before the first stage, or where that failed."""
     failures: dict[str, Exception] = field(default_factory=dict)
+    """Of the stages that were requested last."""
     pixels: PixelCountsDocument | None = None
+    """How many pixels carry each flag."""
     ambient_dn: float | None = None
+    """Light in DN an image that is not the camera's, in the median pixel; None without a sensor."""
     frames_averaged: FramesAveragedDocument | None = None
+    """How many frames a pixel rests on; None where frames are not averaged."""
     range_noise: PredictedStdDocument | None = None
+    """Predicted deviation of the range, as the metadata have it; None before the returns."""
 
 
 def compute(

@@ -44,55 +44,38 @@ def _no_fields(recipe: Recipe, raw: RawFrame, view: View) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Product:
-    """An array clients can ask for.
-
-    Attributes
-    ----------
-    description
-        Name, unit and axes, as the wire contract has them.
-    needs
-        Its input: ``raw``, ``truth``, ``accuracy`` or the name of a stage.
-    compute
-        Called as ``compute(recipe, input, view)``, on a worker. A product over time is computed
-        for the crop of the view alone, any other one whole.
-    over_time
-        Whether it is evaluated at times of flight that the request names.
-    of_view
-        Whether it is computed for the pixels of a view alone, as those over time are, too; any
-        other one is computed whole, once for all views.
-    of_row
-        Whether it is one row of the picture, which the request may name.
-    of_toeplitz
-        Whether it needs the moments of consecutive multiples of one frequency, 0 to m.
-    of_brightness
-        Whether it needs b_0, which is measured, or else estimated from such moments.
-    reads
-        Attributes of its input that a product over time is computed from; it may be computed for
-        long, and the rest of the frame need not stay for that.
-    of_noise
-        Whether it is predicted from the noise of the sensor, which must be known.
-    steps
-        Of a 16-bit PNG; None for steps of one unit.
-    fields
-        Called as ``fields(recipe, raw, view)``: what the messages of this product alone hold.
-    archive
-        Called in the same way, on a worker: what an archive of this product holds beside that,
-        arrays of any size.
-    """
+    """An array clients can ask for."""
 
     description: wire.Product
+    """Name, unit and axes, as the wire contract has them."""
     needs: str
+    """Its input: ``raw``, ``truth``, ``accuracy`` or the name of a stage."""
     compute: Callable[[Recipe, Any, View], _Array]
+    """Called as ``compute(recipe, input, view)``, on a worker. A product over time is computed for
+    the crop of the view alone, any other one whole."""
     over_time: bool = False
+    """Whether it is evaluated at times of flight that the request names."""
     of_view: bool = False
+    """Whether it is computed for the pixels of a view alone, as those over time are, too; any other
+    one is computed whole, once for all views."""
     of_row: bool = False
+    """Whether it is one row of the picture, which the request may name."""
     of_noise: bool = False
+    """Whether it is predicted from the noise of the sensor, which must be known."""
     of_toeplitz: bool = False
+    """Whether it needs the moments of consecutive multiples of one frequency, 0 to m."""
     of_brightness: bool = False
+    """Whether it needs b_0, which is measured, or else estimated from such moments."""
     reads: tuple[str, ...] = ()
+    """Attributes of its input that a product over time is computed from; it may be computed for
+    long, and the rest of the frame need not stay for that."""
     steps: Steps | None = None
+    """Of a 16-bit PNG; None for steps of one unit."""
     fields: Callable[[Recipe, RawFrame, View], dict[str, Any]] = _no_fields
+    """Called as ``fields(recipe, raw, view)``: what the messages of this product alone hold."""
     archive: Callable[[Recipe, RawFrame, View], dict[str, Any]] = _no_fields
+    """Called in the same way, on a worker: what an archive of this product holds beside that,
+    arrays of any size."""
 
     @property
     def name(self) -> str:

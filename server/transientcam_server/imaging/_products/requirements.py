@@ -12,14 +12,9 @@ def absent_products(
 ) -> dict[str, str]:
     """Return the products that frames of a camera do not have, each with the reason.
 
-    Parameters
-    ----------
-    truth_known
-        Whether a simulation knows the true range.
-    noise_known
-        Whether the noise of the sensor is stated, or there are images to tell it.
-    images_known
-        Whether they have images, and not their moments alone.
+    ``truth_known``: whether a simulation knows the true range.
+    ``noise_known``: whether the noise of the sensor is stated, or there are images to tell it.
+    ``images_known``: whether they have images, and not their moments alone.
     """
 
     def lacks(product: Product) -> str | None:
@@ -38,10 +33,7 @@ def absent_products(
 def unmet(product: Product, sampling: Sampling, zeroths: Collection[str]) -> str | None:
     """Return why frames have too few frequencies for a product; None where they do not.
 
-    Parameters
-    ----------
-    zeroths
-        Where the zeroth moment may come from.
+    ``zeroths``: where the zeroth moment may come from.
     """
     if sampling.consecutive:
         return None

@@ -21,17 +21,12 @@ class Crop:
     """The pixels of a frame that are requested: every ``decimation``-th of ``region``, both ways.
 
     Equal crops of equal frames are the same bytes, so one may be part of a key.
-
-    Attributes
-    ----------
-    region
-        Column and row of the first pixel, width and height, in pixels of the frame; None for all.
-    decimation
-        1 for every pixel. The region's first pixel is always among those that stay.
     """
 
     region: tuple[int, int, int, int] | None = None
+    """Column and row of the first pixel, width and height, in pixels of the frame; None for all."""
     decimation: int = 1
+    """1 for every pixel. The region's first pixel is always among those that stay."""
 
     @classmethod
     def of(
@@ -45,12 +40,9 @@ class Crop:
     ) -> "Crop":
         """Return the crop of a frame of ``height`` x ``width`` pixels; None leaves a part out.
 
-        Raises
-        ------
-        Problem
-            ``invalid-request`` with ``field`` (under ``path``), ``value`` and ``limit`` if the
-            region is not four integers, is empty or not within the frame, or if the decimation
-            is out of range.
+        Raises Problem ``invalid-request`` with ``field`` (under ``path``), ``value`` and ``limit``
+        if the region is not four integers, is empty or not within the frame, or if the decimation
+        is out of range.
         """
         step = 1 if decimation is None else decimation
         if not _is_integer(step) or not 1 <= step <= MAX_DECIMATION:
@@ -140,21 +132,14 @@ def _invalid(field: str, value: object, limit: str) -> Problem:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The part of a product that is requested; equal views of one frame are the same bytes.
-
-    Attributes
-    ----------
-    time_s
-        Times of flight of a product over time.
-    crop
-        Region and decimation.
-    y
-        Row of a streak, in pixels of the whole frame.
-    """
+    """The part of a product that is requested; equal views of one frame are the same bytes."""
 
     time_s: tuple[float, ...] = ()
+    """Times of flight of a product over time."""
     crop: Crop = WHOLE
+    """Region and decimation."""
     y: int | None = None
+    """Row of a streak, in pixels of the whole frame."""
 
 
 def evenly(base_frequency_hz: float, bins: int = DEFAULT_BINS) -> tuple[float, ...]:

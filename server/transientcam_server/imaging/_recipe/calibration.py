@@ -20,29 +20,20 @@ FACTORY_ID = "factory"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gains:
-    """What moments are divided by, of one calibration.
-
-    Attributes
-    ----------
-    id
-        Name of the calibration.
-    planes : array, shape (m + 1, H, W), complex64
-        The gain of each moment and pixel.
-    bad : boolean array, shape (H, W)
-        Pixels that are hot, stuck, noisy or dead, and show their neighbours' mean instead; None
-        where none are known.
-    waveform : array, shape (m, K), complex128
-        Odd harmonics of the modulation that are taken out of the moments; None where none are
-        known.
-    temperature_c
-        Of the camera when they were measured; None where that is not known.
-    """
+    """What moments are divided by, of one calibration."""
 
     id: str
+    """Name of the calibration."""
     planes: _Array
+    """Shape (m + 1, H, W), complex64: the gain of each moment and pixel."""
     bad: _Array | None
+    """Boolean array, shape (H, W): pixels that are hot, stuck, noisy or dead, and show their
+    neighbours' mean instead; None where none are known."""
     waveform: _Array | None = None
+    """Shape (m, K), complex128: odd harmonics of the modulation that are taken out of the moments;
+    None where none are known."""
     temperature_c: float | None = None
+    """Of the camera when they were measured; None where that is not known."""
 
     @property
     def bad_pixels(self) -> int:
@@ -65,13 +56,7 @@ class Calibration:
 
 
 def load_calibration(path: Path) -> Calibration:
-    """Read and evaluate a measurement.
-
-    Raises
-    ------
-    CalibrationFileError
-        The file holds none.
-    """
+    """Read and evaluate a measurement. Raises CalibrationFileError where the file holds none."""
     return evaluate(CalibrationCapture.load(path))
 
 

@@ -18,24 +18,18 @@ class MomentFrame(RawFrame):
     """A capture that enters a pipeline behind the step from images to moments.
 
     ``images`` is empty, (0, H, W); ``labels`` are those of the images that were captured.
-
-    Attributes
-    ----------
-    moments
-        complex64 (m + 1, H, W) in DN: calibrated, bad pixels replaced, neither smoothed nor biased.
-    saturated
-        bool (H, W): pixels that were saturated in an image.
-    treated
-        What was done to the images, under the names `OF_IMAGES`.
-    ambient_dn
-        Light in DN an image that is not the camera's, of the median pixel: all are taken to have
-        that.
     """
 
     moments: NDArray[np.complex64]
+    """complex64 (m + 1, H, W) in DN: calibrated, bad pixels replaced, neither smoothed nor
+    biased."""
     saturated: NDArray[np.bool_]
+    """bool (H, W): pixels that were saturated in an image."""
     treated: Mapping[str, Any]
+    """What was done to the images, under the names `OF_IMAGES`."""
     ambient_dn: float = 0.0
+    """Light in DN an image that is not the camera's, of the median pixel: all are taken to have
+    that."""
 
     @property
     def size_bytes(self) -> int:

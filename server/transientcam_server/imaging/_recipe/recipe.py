@@ -28,15 +28,10 @@ _KERNELS_OF: Final[dict[str, tuple[str, ...]]] = {
 
 @dataclass(frozen=True, slots=True)
 class SettingsVersion:
-    """Settings of the reconstruction, and the number that frames computed with them carry.
-
-    Attributes
-    ----------
-    id
-        Counts the settings from 1, those the service started with.
-    """
+    """Settings of the reconstruction, and the number that frames computed with them carry."""
 
     id: int
+    """Counts the settings from 1, those the service started with."""
     settings: ReconstructionSettings
 
     def followed_by(self, settings: ReconstructionSettings) -> "SettingsVersion":
@@ -51,15 +46,8 @@ class SettingsVersion:
 def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, field: str) -> None:
     """Refuse an estimator and a sequence that do not go together.
 
-    Parameters
-    ----------
-    field
-        Which of the two the request changes: "estimator" or "harmonics".
-
-    Raises
-    ------
-    Problem
-        ``estimator-misfit``.
+    ``field``: which of the two the request changes: "estimator" or "harmonics".
+    Raises Problem ``estimator-misfit``.
     """
     if not _serves(settings, sequence.sampling):
         raise Problem(
@@ -110,34 +98,24 @@ def listed(multiples: tuple[int, ...]) -> str:
 
 @dataclass(frozen=True)
 class Recipe:
-    """All that a frame is computed with beside its images.
-
-    Attributes
-    ----------
-    applied, settings
-        The sequence that was captured, and how its images become moments and returns.
-    full_scale
-        The largest value that the sensor gives, in DN.
-    gains
-        Of the calibration; None for the nominal ones.
-    settings_version
-        Counts the settings there were.
-    intrinsics
-        Where the pixels look; None for a usual field of view.
-    sensor
-        Whose noise the images have; None where no one states it.
-    lamp
-        Its place and brightness; None where they are not known.
-    """
+    """All that a frame is computed with beside its images."""
 
     applied: AppliedSequence
     settings: ReconstructionSettings
+    """``applied``, ``settings``: the sequence that was captured, and how its images become moments
+    and returns."""
     full_scale: float
+    """The largest value that the sensor gives, in DN."""
     gains: Gains | None = None
+    """Of the calibration; None for the nominal ones."""
     settings_version: int = 1
+    """Counts the settings there were."""
     intrinsics: Intrinsics | None = None
+    """Where the pixels look; None for a usual field of view."""
     sensor: tm.noise.Sensor | None = None
+    """Whose noise the images have; None where no one states it."""
     lamp: Lamp | None = None
+    """Its place and brightness; None where they are not known."""
 
     @property
     def technique(self) -> str:

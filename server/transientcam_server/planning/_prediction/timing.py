@@ -29,14 +29,9 @@ class ReconstructionTimer:
 
     That of one thread, as of a worker of the daemon, whatever else the machine does.
 
-    Parameters
-    ----------
-    capabilities
-        Of the camera: the size of its images.
-    settings
-        Of the reconstruction, but for the estimator.
-    clock
-        Of the thread that computes.
+    ``capabilities``: of the camera: the size of its images.
+    ``settings``: of the reconstruction, but for the estimator.
+    ``clock``: of the thread that computes.
     """
 
     def __init__(

@@ -27,12 +27,8 @@ class PlanningProcess:
     where a call is given up. Once it is idle it makes kernels ready: a plan is a look and, right
     after it, a search.
 
-    Parameters
-    ----------
-    most_s
-        How long one call may take.
-    clock
-        Time in s.
+    ``most_s``: how long one call may take.
+    ``clock``: time in s.
     """
 
     def __init__(
@@ -47,22 +43,11 @@ class PlanningProcess:
     def run(self, compute: Callable[..., _T], *arguments: object, progress: Progress) -> _T:
         """Return ``compute(*arguments, progress)`` of the other process; waits for it.
 
-        Parameters
-        ----------
-        compute
-            A function of a module, or a method of what can be pickled.
-        arguments
-            Pickled.
-        progress
-            Of this process. What it raises kills the other one, and is raised here.
-
-        Raises
-        ------
-        Problem
-            ``shutting-down`` from `close` on, ``plan-too-long`` after ``most_s``,
-            ``planning-ended`` where the process is gone.
-        Exception
-            What ``compute`` raises.
+        ``compute``: a function of a module, or a method of what can be pickled.
+        ``arguments``: are pickled.
+        ``progress``: of this process. What it raises kills the other one, and is raised here.
+        Raises Problem ``shutting-down`` from `close` on, ``plan-too-long`` after ``most_s``,
+        ``planning-ended`` where the process is gone; Exception: what ``compute`` raises.
         """
 
         def ask() -> None:

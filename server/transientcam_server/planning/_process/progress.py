@@ -12,14 +12,9 @@ Show = Callable[[dict[str, Any]], None]
 class Progress:
     """Steps of work, reported by the work itself.
 
-    Parameters
-    ----------
-    report
-        Receives all that becomes known; called from the thread of the work.
-    first, last
-        Shares of the whole at which this work begins and ends.
-    show
-        Receives the result as far as there is one; called from the thread of the work.
+    ``report``: receives all that becomes known; called from the thread of the work.
+    ``first``, ``last``: shares of the whole at which this work begins and ends.
+    ``show``: receives the result as far as there is one; called from the thread of the work.
     """
 
     def __init__(

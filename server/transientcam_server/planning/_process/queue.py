@@ -43,14 +43,9 @@ class Planning(Protocol):
 class PlanningQueue:
     """Lets requests wait for plans; on the event loop, and what is planned in another process.
 
-    Parameters
-    ----------
-    process
-        That plans.
-    wait_s
-        How long a request waits for a place.
-    idle_s
-        How long the process stays for the next plan.
+    ``process``: that plans.
+    ``wait_s``: how long a request waits for a place.
+    ``idle_s``: how long the process stays for the next plan.
     """
 
     def __init__(
@@ -71,11 +66,8 @@ class PlanningQueue:
         """Count a request of an address until the block ends, once there is a place for it.
 
         Waiting costs nothing: a client that is refused at once asks again at once.
-
-        Raises
-        ------
-        Problem
-            ``planning-busy`` where no place comes free in time, ``shutting-down`` from `close` on.
+        Raises Problem ``planning-busy`` where no place comes free in time, ``shutting-down`` from
+        `close` on.
         """
         async with self._change:
             try:
@@ -103,10 +95,7 @@ class PlanningQueue:
     async def run(self, compute: Callable[..., _T], *arguments: object, progress: Progress) -> _T:
         """Return ``compute(*arguments, progress)`` of the process, when no other plan is computed.
 
-        Raises
-        ------
-        Problem
-            ``shutting-down`` from `close` on.
+        Raises Problem ``shutting-down`` from `close` on.
         """
         async with self._one_at_a_time:
             if self._closing:

@@ -23,28 +23,19 @@ ComputingTime = Callable[[Sequence, str], float | None]
 
 @dataclass(slots=True, eq=False)
 class Candidate:
-    """One member of a family, with what is predicted of it for a goal.
-
-    Attributes
-    ----------
-    family, member
-        Frequencies and estimator; exposure and takes.
-    affordable
-        Whether it is within the budgets of the goal.
-    goal
-        Whose targets are predicted.
-    predictor
-        Of the scene.
-    reconstruct_s
-        Returns the computing time of a frame in s, if it is known.
-    """
+    """One member of a family, with what is predicted of it for a goal."""
 
     family: Family
     member: Member
+    """``family``, ``member``: frequencies and estimator; exposure and takes."""
     affordable: bool
+    """Whether it is within the budgets of the goal."""
     goal: Goal
+    """Whose targets are predicted."""
     predictor: Predictor
+    """Of the scene."""
     reconstruct_s: Callable[[], float | None]
+    """Returns the computing time of a frame in s, if it is known."""
     _choice: Choice | None = None
 
     @property

@@ -29,22 +29,15 @@ FILLED: Final = 0.9
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One sequence of a family: the longer it takes, the less noise it has.
-
-    Attributes
-    ----------
-    exposure_s, takes
-        In what it differs from the others of its family.
-    capture_s
-        Time of one capture.
-    scale
-        Its noise over that of the predictor's nominal sequence.
-    """
+    """One sequence of a family: the longer it takes, the less noise it has."""
 
     exposure_s: float
     takes: int
+    """``exposure_s``, ``takes``: in what it differs from the others of its family."""
     capture_s: float
+    """Time of one capture."""
     scale: float
+    """Its noise over that of the predictor's nominal sequence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,10 +59,8 @@ class Family:
 def require_plannable(capabilities: Capabilities) -> None:
     """Refuse a camera whose captures are not predicted.
 
-    Raises
-    ------
-    Problem
-        ``target-unreachable``, for other multiples than 1 to m or another number of phases than 4.
+    Raises Problem ``target-unreachable``, for other multiples than 1 to m or another number of
+    phases than 4.
     """
     sampling = capabilities.sampling
     if sampling.consecutive and len(sampling.phases_rad) == 4:
@@ -89,10 +80,7 @@ def require_plannable(capabilities: Capabilities) -> None:
 def families(goal: Goal, predictor: Predictor, capabilities: Capabilities) -> list[Family]:
     """Return what the camera can run that saturates nothing and is not ambiguous.
 
-    Raises
-    ------
-    Problem
-        ``target-unreachable`` where there is nothing, with the reason.
+    Raises Problem ``target-unreachable`` where there is nothing, with the reason.
     """
     require_plannable(capabilities)
     longest_s = min(predictor.longest_exposure_s() * FILLED, capabilities.max_exposure_s)

@@ -11,22 +11,15 @@ from transientcam_server.planning._search.search import best_choice
 
 @dataclass(frozen=True, slots=True)
 class Shortfall:
-    """Why nothing suits a goal.
-
-    Attributes
-    ----------
-    field
-        The target or budget that is out of reach, by itself or ``together`` with the others.
-    best
-        Of a target, the most accurate within the budgets; of a budget, the shortest of all.
-    dearer
-        The one for the target whatever it costs, where there are budgets.
-    """
+    """Why nothing suits a goal."""
 
     field: str
+    """The target or budget that is out of reach, by itself or ``together`` with the others."""
     best: Choice
+    """Of a target, the most accurate within the budgets; of a budget, the shortest of all."""
     together: bool = False
     dearer: Choice | None = None
+    """The one for the target whatever it costs, where there are budgets."""
 
 
 def shortfall(
@@ -34,12 +27,8 @@ def shortfall(
 ) -> Shortfall:
     """Return what falls short where no choice reaches the targets within the budgets.
 
-    Parameters
-    ----------
-    best
-        By the leading target, within the budgets; None where nothing is.
-    curves, unlimited
-        All candidates, by the goal and without its budgets.
+    ``best``: by the leading target, within the budgets; None where nothing is.
+    ``curves``, ``unlimited``: all candidates, by the goal and without its budgets.
     """
     if best is None:
         return _of_budgets(goal, unlimited)

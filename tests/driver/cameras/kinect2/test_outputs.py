@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import transientcam_moments as tm
-from benchmarks.kinect2 import libfreenect2
 from benchmarks.kinect2.decoding import infrared
-from benchmarks.kinect2.vectors import MULTIPLES, RADIAN_M, load, noise
+from tests.driver.cameras.kinect2 import libfreenect2
 from tests.driver.cameras.kinect2.conftest import Load
+from tests.driver.cameras.kinect2.vectors import MULTIPLES, RADIAN_M, load, noise
 
 pytestmark = pytest.mark.data
 

@@ -26,12 +26,9 @@ class PacketDecoder:
     neither swallows nor delays the packets behind it. After pixels with a wrong checksum the
     search goes on right behind the header, because a shortened image has its successor inside.
 
-    Attributes
-    ----------
-    resyncs
-        How often bytes had to be passed over.
-    odd_payload_bytes
-        Length in the last intact header that announced another one (usb-protocol 10.11), or None.
+    ``resyncs``: how often bytes had to be passed over.
+    ``odd_payload_bytes``: length in the last intact header that announced another one (usb-protocol
+    10.11), or None.
     """
 
     def __init__(self, *, payload_bytes: int) -> None:

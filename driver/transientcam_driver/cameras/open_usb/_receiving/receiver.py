@@ -60,10 +60,8 @@ class Receiver:
     def require_images_of_the_size_announced(self) -> None:
         """Compare the length in intact headers with the capabilities (usb-protocol 10.11).
 
-        Raises
-        ------
-        ProtocolError
-            Images of another length came in this run; one by one they are taken for noise.
+        Raises ProtocolError: images of another length came in this run; one by one they are taken
+        for noise.
         """
         odd_bytes = self._decoder.odd_payload_bytes
         if odd_bytes is not None:

@@ -60,12 +60,8 @@ def pack_capabilities(capabilities: Capabilities) -> bytes:
 def unpack_capabilities(data: bytes) -> Capabilities:
     """Read the answer to GET_CAPS.
 
-    Raises
-    ------
-    FirmwareTooOld
-        The device has another version of the protocol.
-    ProtocolError
-        The block is damaged, or a field is out of range.
+    Raises FirmwareTooOld where the device has another version of the protocol; ProtocolError where
+    the block is damaged, or a field is out of range.
     """
     if len(data) < 8 or data[:4] != _CAPS_MAGIC:
         raise ProtocolError(f"{len(data)} bytes without the mark of capabilities")

@@ -59,12 +59,7 @@ class SequenceWords:
     def sequence(self, capabilities: Capabilities) -> Sequence:
         """Return the sequence that these integers stand for.
 
-        Raises
-        ------
-        ProtocolError
-            An unknown code.
-        SequenceError
-            A field out of every range.
+        Raises ProtocolError: an unknown code; SequenceError: a field out of every range.
         """
         codes = (
             ("zeroth moment", self.zeroth, ZEROTHS),

@@ -30,10 +30,8 @@ def pack_status(status: Status) -> bytes:
 def unpack_status(data: bytes) -> Status:
     """Read the answer to GET_STATUS.
 
-    Raises
-    ------
-    ProtocolError
-        It has another length or version, or a state that the protocol does not know.
+    Raises ProtocolError where it has another length or version, or a state that the protocol does
+    not know.
     """
     if len(data) != STATUS_BYTES or data[0] != VERSION:
         raise ProtocolError(f"status of {len(data)} bytes, {STATUS_BYTES} needed")

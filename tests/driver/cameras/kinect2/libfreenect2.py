@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.kinect2.vectors import MULTIPLES, Array, Scene
+from tests.driver.cameras.kinect2.vectors import MULTIPLES, Array, Scene
 from transientcam_driver.cameras.kinect2._parameters import LIGHT_X_M
 
 SPEED_OF_LIGHT_M_S: Final = 3e8

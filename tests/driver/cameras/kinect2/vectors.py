@@ -42,28 +42,19 @@ def folder() -> Path:
 
 @dataclass(frozen=True)
 class Scene:
-    """One scene in the rows that the outputs of libfreenect2 are stored of, without the border.
-
-    Attributes
-    ----------
-    moments
-        complex (3, N, 510), at 16, 80 and 120 MHz in counts, decoded and computed here.
-    saturated
-        bool (3, N, 510): which of them have a saturated sample.
-    path_m
-        (N, 510): the true path of the first return, from the light to the camera.
-    stored
-        What libfreenect2 made of it, by name.
-    rows
-        Which rows these are.
-    """
+    """One scene in the rows that the outputs of libfreenect2 are stored of, without the border."""
 
     name: str
     moments: Array
+    """complex (3, N, 510), at 16, 80 and 120 MHz in counts, decoded and computed here."""
     saturated: Array
+    """bool (3, N, 510): which of them have a saturated sample."""
     path_m: Array
+    """(N, 510): the true path of the first return, from the light to the camera."""
     stored: dict[str, Array]
+    """What libfreenect2 made of it, by name."""
     rows: Array
+    """Which rows these are."""
     parameters: DepthParameters
 
     def of_blocks(self, every: Array) -> Array:
