@@ -31,7 +31,7 @@ nothing shows."""
 SPREAD: Final = 0.5
 """Times how much nearer the first light may be by how light is seen to be spread."""
 LEAST_LOSS: Final = 0.002
-NOISE_IN_LOSS: Final = 0.25
+NOISE_IN_LOSS: Final = 0.1
 """Twice the lost modulation that shows half of that, without noise; how much noise adds to it."""
 FAR_FROM_CALIBRATION_M: Final = 0.015
 """A camera whose temperature may move ranges by more is not the one that was calibrated."""
@@ -129,7 +129,7 @@ def _spread_m(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Arr
         after = np.angle(lowest * np.exp(-1j * first))
     near = median_around(lost)
     noise = median_around(np.abs(lost - near))
-    near = np.clip(median_around(near, 2), 0.0, 1.0)
+    near = np.clip(median_around(median_around(near, 2), 5), 0.0, 1.0)  # of 33 x 33 pixels
     known = near / (near + NOISE_IN_LOSS * noise + LEAST_LOSS / m**2)
     spread_m = np.maximum(np.sqrt(near) - median_around(after), 0.0) * known * radian_m
     return np.asarray(spread_m)
