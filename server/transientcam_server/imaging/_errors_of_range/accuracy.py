@@ -1,10 +1,10 @@
 """Noise and bias of a frame's range, pixel by pixel, as far as the frame itself shows them.
 
 Noise is that of the sensor, drawn and put through the estimator. Bias is known by disagreement
-(decision 8): the frame's own estimator without its highest harmonic, the likelihood and
-Pisarenko's resolve returns differently, and where nothing is left to resolve they agree. Noise
-makes them disagree, too, but in neighbouring pixels independently, so that the median over these
-is taken. It is a figure of the frame alone; a plan rests on a look at more frequencies.
+(decision 8): the frame's own estimator without its highest harmonic and the likelihood resolve
+returns differently, and where nothing is left to resolve they agree. Noise makes them disagree,
+too, but in neighbouring pixels independently, so that the median over these is taken. It is a
+figure of the frame alone; a plan rests on a look at more frequencies.
 """
 
 from collections.abc import Callable
@@ -36,7 +36,6 @@ DRAWS, QUICK_DRAWS = 4, 16
 """Noisy copies of a frame; where the estimator is the phase of one moment."""
 SPARSE_PX: Final = 4
 """Rows and columns between pixels, where there is no time for all of them."""
-_OTHERS: Final = ("likelihood", "pisarenko")
 _QUICK: Final = ("likelihood", "pisarenko", "single-frequency")
 """Estimators that compiled kernels make quick."""
 _UNMOVED: Final = ("likelihood", "single-frequency")
@@ -179,9 +178,10 @@ class _Frame:
             return []
         own = self.recipe.technique
         fewer = own if m > least_harmonics(own) and m > 2 else "single-frequency"
-        ways = [(self.b[:m], self.variance[:m], fewer)]
-        ways += [(self.b, self.variance, other) for other in _OTHERS if other != own]
-        return [self._ranges_m(*each) for each in ways]
+        found = [self._ranges_m(self.b[:m], self.variance[:m], fewer)]
+        if own != "likelihood":
+            found.append(self._ranges_m(self.b, self.variance, "likelihood"))
+        return found
 
     def _ranges_m(self, b: _Array, variance: _Array, estimator: str) -> _Array:
         sequence = self.recipe.applied.sequence

@@ -36,16 +36,21 @@ _STEPS: Final = 32
 """Points on the way to the lamp at which the range map is asked."""
 
 
-def around(plane: _Array, side_px: int = NEIGHBOURS_PX) -> _Array:
-    """Return the values (H, W, side^2) around each pixel and its own; NaN where none is finite."""
+def around(plane: _Array, side_px: int = NEIGHBOURS_PX, step_px: int = 1) -> _Array:
+    """Return the values (H, W, side^2) around each pixel and its own; NaN where none is finite.
+
+    They are of pixels that are so many steps apart.
+    """
     known = np.where(np.isfinite(plane), plane, np.nan).astype(np.float32)
-    padded = np.pad(known, side_px // 2, constant_values=np.nan)
-    return sliding_window_view(padded, (side_px, side_px)).reshape((*plane.shape, -1))
+    padded = np.pad(known, side_px // 2 * step_px, constant_values=np.nan)
+    reach_px = (side_px - 1) * step_px + 1
+    found = sliding_window_view(padded, (reach_px, reach_px))[..., ::step_px, ::step_px]
+    return found.reshape((*plane.shape, -1))
 
 
-def median_around(plane: _Array) -> _Array:
+def median_around(plane: _Array, step_px: int = 1) -> _Array:
     """Return the median (H, W) of the finite values around each pixel; 0 where there is none."""
-    ranked = np.sort(around(plane), axis=-1)  # what is not known comes last
+    ranked = np.sort(around(plane, step_px=step_px), axis=-1)  # what is not known comes last
     count = np.isfinite(ranked).sum(axis=-1)
     middle = np.maximum(count - 1, 0) // 2
     found: _Array = np.take_along_axis(ranked, middle[..., None], axis=-1)[..., 0]

@@ -9,7 +9,6 @@ import transientcam_moments as tm
 from transientcam.wire import Trust
 from transientcam_driver import RawFrame
 from transientcam_driver.calibration import TemperatureDrift
-from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_server.imaging._errors_of_range.evidence import (
     SHADOW,
     brighter_than_white,
@@ -23,14 +22,17 @@ from transientcam_server.imaging._recipe.recipe import Recipe
 _Array = NDArray[Any]
 NOISE: Final = 1.645
 """Half width of the interval that holds 90 % of a normal variable, in standard deviations."""
-BIAS: Final = 3.0
+BIAS: Final = 2.0
 NOISE_IN_BIAS: Final = 0.5
 """Times the estimators' disagreement that later light moves a range; what of that is noise."""
 LEAST_BIAS: Final = 0.02
-LATER_BIAS: Final = 0.12
-HALF_LOSS: Final = 0.02
 """Of the range of a radian at the highest frequency, by which later light may move a range that
-nothing shows, and such as is seen to be spread; the lost modulation that shows half of that."""
+nothing shows."""
+SPREAD: Final = 0.5
+"""Times how much nearer the first light may be by how light is seen to be spread."""
+LEAST_LOSS: Final = 0.002
+NOISE_IN_LOSS: Final = 0.1
+"""Twice the lost modulation that shows half of that, without noise; how much noise adds to it."""
 FAR_FROM_CALIBRATION_M: Final = 0.015
 """A camera whose temperature may move ranges by more is not the one that was calibrated."""
 _UNRESOLVED: Final = 0.5
@@ -46,7 +48,7 @@ def judged(
 ) -> tuple[_Array, _Array]:
     """Return the half width of each pixel's 90 % interval in m, and its `Trust`, (H, W).
 
-    The factors from `BIAS` to `HALF_LOSS` were chosen on random scenes of one seed so that
+    The factors from `BIAS` to `NOISE_IN_LOSS` were chosen on random scenes of one seed so that
     nine tenths of trusted pixels are within; ``python -m benchmarks trust`` measures others.
     """
     sequence = recipe.applied.sequence
@@ -54,15 +56,17 @@ def judged(
     brightness_dn = np.asarray(found.brightness, dtype=np.float64)
     known = np.isfinite(range_m)
     length_m = float(tm.range_m(1.0, recipe.base_frequency_hz * sequence.multiples[-1]))
-    loss = _loss(recipe, found, range_m)
+    noise_m = std_m
+    if recipe.technique == "likelihood":  # which knows how far other models are from its range
+        noise_m = np.fmax(std_m, found.range_std_m)
     then_c = None if recipe.gains is None else recipe.gains.temperature_c
     drift = TemperatureDrift.between(then_c, None if raw is None else raw.temperature_c)
     drift_m = 0.0 if drift is None else drift.range_m
     parts_m = (
-        NOISE * std_m,
-        BIAS * np.sqrt(np.maximum(bias_m**2 - (NOISE_IN_BIAS * std_m) ** 2, 0.0)),
+        NOISE * noise_m,
+        BIAS * np.sqrt(np.maximum(bias_m**2 - (NOISE_IN_BIAS * noise_m) ** 2, 0.0)),
         LEAST_BIAS * length_m,
-        LATER_BIAS * loss / (loss + HALF_LOSS) * length_m,
+        SPREAD * _spread_m(recipe, found, range_m),
         drift_m,
     )
     error_m = np.sqrt(sum(np.square(part) for part in parts_m))
@@ -97,22 +101,35 @@ def judged(
     return np.where(known, error_m, np.nan).astype(np.float32), trust
 
 
-def _loss(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Array:
-    """Return which part (H, W) of its modulation light near the first return has lost.
+def _spread_m(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Array:
+    """Return how much nearer (H, W) than its range a pixel's first light may be, by its spread.
 
-    Returns whose phase at the highest frequency is over half a turn away are taken out.
+    Light whose times of flight spread by s loses (j s)^2 / 2 of its modulation at the harmonic j,
+    and the first of it comes before the mean: by s, of light that a material sends back with
+    exponential delay and of two equal returns; by less, of a return with fainter light behind.
+    Returns whose phase at the highest frequency is over half a turn away are taken out, but for
+    such as noise makes.
     """
     m = recipe.applied.sequence.multiples[-1]
     if m == 1:
         return np.zeros_like(range_m)
-    phase, weight = np.asarray(found.returns.phase_rad), np.asarray(found.returns.weight)
-    first = 4.0 * np.pi * recipe.base_frequency_hz / SPEED_OF_LIGHT_M_S * range_m
+    of = found.likelihood if recipe.technique == "likelihood" else found.returns
+    phase, weight = np.asarray(of.phase_rad), np.asarray(of.weight)
+    radian_m = float(tm.range_m(1.0, recipe.base_frequency_hz))
+    first = range_m / radian_m
     apart = np.abs(np.remainder(phase - first + np.pi, 2.0 * np.pi) - np.pi)
-    far = np.where((m * apart > np.pi) & (weight > 0), weight, 0.0)
+    strong = weight >= found.settings.threshold * weight.max(axis=0)
+    far = np.where((m * apart > np.pi) & (weight > 0) & strong, weight, 0.0)
     turn = np.exp(1j * np.nan_to_num(phase))
     lowest, highest = (
-        np.abs(found.smoothed[at] - (far * turn**k).sum(axis=0)) for at, k in ((1, 1), (-1, m))
+        found.smoothed[at] - (far * turn**k).sum(axis=0) for at, k in ((1, 1), (-1, m))
     )
     with np.errstate(all="ignore"):
-        lost = (1.0 - highest / lowest) * m**2 / (m**2 - 1)
-    return np.clip(median_around(np.where(lowest > 0, lost, np.nan)), 0.0, 1.0)
+        lost = (1.0 - np.abs(highest) / np.abs(lowest)) * 2.0 / (m**2 - 1)
+        after = np.angle(lowest * np.exp(-1j * first))
+    near = median_around(lost)
+    noise = median_around(np.abs(lost - near))
+    near = np.clip(median_around(median_around(near, 2), 5), 0.0, 1.0)  # of 33 x 33 pixels
+    known = near / (near + NOISE_IN_LOSS * noise + LEAST_LOSS / m**2)
+    spread_m = np.maximum(np.sqrt(near) - median_around(after), 0.0) * known * radian_m
+    return np.asarray(spread_m)

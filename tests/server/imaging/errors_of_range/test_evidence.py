@@ -154,17 +154,22 @@ def test_values_that_are_not_known_spread_nothing() -> None:
     np.testing.assert_array_equal(found, [[0, 3, 0], [0, 3, 0], [np.nan, np.nan, np.nan]])
 
 
-def test_the_median_around_a_pixel_is_that_of_its_finite_neighbours() -> None:
+@pytest.mark.parametrize("step", [1, 2])
+def test_the_median_around_a_pixel_is_that_of_its_finite_neighbours(step: int) -> None:
     random = np.random.default_rng(1)
     plane = random.normal(size=(9, 11)).astype(np.float32)
     plane[random.random(plane.shape) < 0.4] = np.nan
     plane[:, 8:] = np.nan
 
-    found = median_around(plane)
+    found = median_around(plane, step)
 
     for y in range(9):
         for x in range(11):
-            window = plane[max(0, y - 2) : y + 3, max(0, x - 2) : x + 3]
+            rows, columns = (
+                [p for p in range(at - 2 * step, at + 2 * step + 1, step) if 0 <= p < size]
+                for at, size in ((y, 9), (x, 11))
+            )
+            window = plane[np.ix_(rows, columns)]
             ranked = np.sort(window[np.isfinite(window)])
             expected = ranked[(ranked.size - 1) // 2] if ranked.size else 0.0
             assert found[y, x] == expected
