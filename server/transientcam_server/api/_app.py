@@ -42,6 +42,7 @@ from transientcam_server.api._routes import (
     recordings,
     sequence,
     simulation,
+    stability,
     tradeoff,
 )
 from transientcam_server.api._stream import websocket
@@ -67,6 +68,7 @@ _RESOURCES = (
     simulation,
     plan,
     tradeoff,
+    stability,
     parameters,
     jobs,
 )

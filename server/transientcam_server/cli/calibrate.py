@@ -28,7 +28,12 @@ def calibrate(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="The .npz to write; a daemon also keeps a copy."),
+        typer.Option(
+            "--output",
+            "-o",
+            help="The .npz to write; a daemon also keeps a copy. With --noise a .toml of settings, "
+            "a .json, or a .png of the curve.",
+        ),
     ] = None,
     camera: Annotated[
         str | None,
@@ -68,6 +73,12 @@ def calibrate(
             "--undo", help="Measure nothing; the daemon returns to the previous calibration."
         ),
     ] = False,
+    noise: Annotated[
+        bool,
+        typer.Option(
+            "--noise", help="Without a daemon: measure the noise of the sensor before a still scene."
+        ),
+    ] = False,
     token: TokenOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -76,7 +87,16 @@ def calibrate(
     Put filter and diffuser before the lens first. A daemon measures with its present sequence and
     stores the result; without one, the file is meant for `serve --calibration FILE`. What does not
     look like a diffuser is kept, but not used, and the exit code is 1; --force uses it anyway.
+
+    With --noise it is gain, read noise, dark level and full well of the sensor, by photon transfer
+    (EMVA 1288): no filter and no diffuser then, but a still scene with dark and bright parts.
     """
+    if noise:
+        from transientcam_server.cli.calibrate_noise import measure_noise
+
+        _refuse({"URL": url}, "--noise needs the camera itself: end the daemon first")
+        measure_noise(camera or "usb", takes, output, as_json=as_json)
+        return
     require_suffix(output, ".npz")
     if undo:
         _undo(url, token, as_json=as_json)
