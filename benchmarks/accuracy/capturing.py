@@ -76,6 +76,9 @@ class Way(NamedTuple):
             yield camera, gains, then_c if self.device else None
 
 
+IDEAL = Way()
+
+
 def calibrated(camera: Camera, sequence: Sequence) -> Gains:
     """Return the gains of a simulated camera for a sequence, through its diffuser."""
     there, highest_dn = camera.simulation, 2.0**camera.capabilities.bits
@@ -90,7 +93,7 @@ def calibrated(camera: Camera, sequence: Sequence) -> Gains:
     return found.gains
 
 
-def looked(scene: str, way: Way = Way()) -> tuple[Planner, SceneStatistics]:
+def looked(scene: str, way: Way = IDEAL) -> tuple[Planner, SceneStatistics]:
     """Look at a scene, or at one frame of the default sequence."""
     default = Sequence() if way.one_frame else None
     with way.camera_before(scene, seed=LOOK_SEED, sequence=default) as (camera, gains, then_c):
@@ -115,7 +118,7 @@ def measured(
     estimator: str,
     captures: int,
     dimmest: float = 0.0,
-    way: Way = Way(),
+    way: Way = IDEAL,
     tolerance_m: float = 0.0,
 ) -> tuple[dict[str, float], float, float]:
     """Capture, and return noise, bias, error and outliers, the device's time, and saturation.

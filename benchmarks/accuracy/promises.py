@@ -13,7 +13,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Final
 
-from benchmarks.accuracy.capturing import Way, dimmest_dn_per_s, looked, measured
+from benchmarks.accuracy.capturing import IDEAL, Way, dimmest_dn_per_s, looked, measured
 from benchmarks.accuracy.kept import OF_WAYS, PlanOutcome, Refused, of_way, table
 from benchmarks.accuracy.prices import SCENES as BUILT_IN
 from benchmarks.common.measured_scenes import data_folder
@@ -31,7 +31,7 @@ GOALS: Final = {
     "0.2 s": Goal(capture_s=0.2),
 }
 WAYS: Final = {
-    "ideal": Way(),
+    "ideal": IDEAL,
     "prototype": Way("prototype"),
     "prototype, 10 °C warmer": Way("prototype", warmer_c=10.0),
     "ideal, by one frame": Way(one_frame=True),
@@ -126,7 +126,7 @@ def all_kept(
     captures: int,
     *,
     processes: int,
-    way: Way = Way(),
+    way: Way = IDEAL,
 ) -> tuple[list[PlanOutcome], list[Refused]]:
     """Measure scenes, several at once, and print each plan as soon as its scene is done."""
     rows: list[PlanOutcome] = []

@@ -55,8 +55,10 @@ class PhotonTransfer:
     points: _Array
 
     @classmethod
-    def of(cls, points: _Array, dark_dn: float, bits: int) -> "PhotonTransfer":
-        """Fit points; full pixels scatter less than the line.
+    def of(
+        cls, points: _Array, dark_dn: float, bits: int, full_dn: float | None = None
+    ) -> "PhotonTransfer":
+        """Fit points; full pixels scatter less than the line, or are known to hold so much.
 
         Raises
         ------
@@ -73,10 +75,12 @@ class PhotonTransfer:
         if not error <= _MOST_UNCERTAIN * growth:
             raise _untold("the noise hardly grows with the light")
         full = signal[~used & (signal > signal[used].max() / 2)]
-        saturation_dn = float(np.median(full)) if full.size else (1 << bits) - 1 - dark_dn
+        if full.size:
+            full_dn = float(np.median(full))
+        saturation_dn = (1 << bits) - 1 - dark_dn if full_dn is None else full_dn
         gain, read_dn = 1 / growth, math.sqrt(max(dark - ROUNDING_VARIANCE, 0.0))
         sensor = tm.noise.Sensor(gain, gain * saturation_dn, gain * read_dn, dark_dn, bits)
-        return cls(sensor, error / growth, bool(full.size), points)
+        return cls(sensor, error / growth, full_dn is not None, points)
 
     def to_document(self) -> dict[str, Any]:
         """Return it as JSON, with the figures that EMVA 1288 (release 4) states."""
@@ -145,11 +149,19 @@ def measure_photon_transfer(
     dark_dn = about.dark_dn
     if dark_dn is None:  # where no light is left, exposed for no time
         low = np.array(levels_dn) <= max(highest_dn / 2, min(levels_dn))
-        line = np.polyfit(np.array(exposures_s)[low], np.array(levels_dn)[low], min(1, low.sum() - 1))
+        line = np.polyfit(
+            np.array(exposures_s)[low], np.array(levels_dn)[low], min(1, low.sum() - 1)
+        )
         dark_dn = max(float(line[-1]), 0.0)
         found = [[signal - dark_dn, *rest] for signal, *rest in found]
-    points = np.concatenate([_points(*planes) for planes in found], axis=1)
-    return PhotonTransfer.of(points, dark_dn, about.bits)
+    points = [_points(*planes) for planes in found]
+    whole = [k for k, each in enumerate(points) if each.shape[1] == _GROUPS]
+    full_dn = None
+    if len(whole) > 1:  # where more light gives no more signal, and no value is clipped
+        before_s, last_s = (exposures_s[k] for k in whole[-2:])
+        before_dn, last_dn = (float(points[k][0].max()) for k in whole[-2:])
+        full_dn = last_dn if last_dn < _BENT * before_dn * last_s / before_s else None
+    return PhotonTransfer.of(np.concatenate(points, axis=1), dark_dn, about.bits, full_dn)
 
 
 def _captured(

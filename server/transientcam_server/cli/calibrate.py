@@ -76,7 +76,8 @@ def calibrate(
     noise: Annotated[
         bool,
         typer.Option(
-            "--noise", help="Without a daemon: measure the noise of the sensor before a still scene."
+            "--noise",
+            help="Without a daemon: measure the noise of the sensor before a still scene.",
         ),
     ] = False,
     token: TokenOption = None,
@@ -169,26 +170,12 @@ def _measured_by_daemon(
     url: str, options: dict[str, Any], output: Path | None, token: str | None, *, diffuser: bool
 ) -> dict[str, Any]:
     """Measure in a daemon and return its result; Ctrl-C cancels the job there, too."""
-    from rich.progress import Progress
-
     from transientcam import Camera
+    from transientcam_server.cli.progress import followed
 
-    with Camera(url, token=token) as camera, Progress(console=Terminal(stderr=True)) as shown:
-        task = shown.add_task("waiting", total=1.0)
-
-        def show(job: Mapping[str, Any]) -> None:
-            shown.update(task, description=job["step"], completed=job["progress"])
-
+    with Camera(url, token=token) as camera:
         with _before_lens(camera.simulate) if diffuser else nullcontext():
-            job = camera.calibrations.measure(**options)
-            try:
-                job = camera.wait_for(job["id"], on_progress=show)
-            except KeyboardInterrupt:
-                camera.jobs.cancel(job["id"])
-                raise
-        show(job)
-        if job["state"] == "cancelled":
-            raise typer.Exit(code=1)
+            job = followed(camera, lambda: camera.calibrations.measure(**options))
         identity = job["result"]["calibration"]
         if output is not None:
             output.write_bytes(camera.calibrations.export(identity))

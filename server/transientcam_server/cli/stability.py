@@ -7,8 +7,7 @@ import typer
 
 from transientcam.cli.options import JsonOption, TokenOption
 from transientcam.cli.terminal import echo
-from transientcam_server.cli.calibrate import followed
-from transientcam_server.cli.progress import progress_bar
+from transientcam_server.cli.progress import followed, progress_bar
 from transientcam_server.cli.reconstruct_recordings import ReconstructionChoices
 
 
@@ -21,7 +20,7 @@ def stability(
             "its address (http://HOST:8000/api/v1/recordings/ID).",
         ),
     ],
-    frames: Annotated[int, typer.Option(min=8, max=4096, help="How many, at most.")] = 256,
+    frames: Annotated[int, typer.Option(min=16, max=4096, help="How many, at most.")] = 256,
     region: Annotated[
         str | None,
         typer.Option(help="Whose pixels count: X,Y,WIDTH,HEIGHT or corners X,Y/X,Y/X,Y."),
@@ -40,8 +39,9 @@ def stability(
         from transientcam import Camera
 
         with Camera(place, token=token) as camera:
-            asked = {"region": None if chosen is None else chosen.to_document()}
-            found = followed(camera, camera.start_stability(frames, **asked))["result"]
+            wanted = None if chosen is None else chosen.to_document()
+            job = followed(camera, lambda: camera.start_stability(frames, region=wanted))
+            found = job["result"]
     else:
         found = _of_recording(place, frames, chosen, token)
     echo(json.dumps(found) if as_json else "\n".join(_in_words(found)))

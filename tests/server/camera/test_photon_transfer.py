@@ -29,9 +29,7 @@ def scene(folder: Path, **sensor: float) -> str:
 def test_a_hidden_sensor_is_found(
     tmp_path: Path, gain: float, read_noise_e: float, full_well_e: float
 ) -> None:
-    spec = scene(
-        tmp_path, gain_e_per_dn=gain, read_noise_e=read_noise_e, full_well_e=full_well_e
-    )
+    spec = scene(tmp_path, gain_e_per_dn=gain, read_noise_e=read_noise_e, full_well_e=full_well_e)
     with open_camera(spec, clock=VirtualClock()) as camera:
         before = camera.configure(Sequence(harmonics=2, exposure_s=1e-3)).sequence
 

@@ -13,19 +13,19 @@ from transientcam.cli import run
 def test_a_recording_tells_its_best_averaging_time(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    source = str(record(tmp_path / "a.h5", 12))
+    source = str(record(tmp_path / "a.h5", 20))
 
     assert run(["stability", source, "--json", "--region", "2,2,8,8"]) == 0
     found = json.loads(capfd.readouterr().out)
-    assert run(["stability", source, "--frames", "9"]) == 0
+    assert run(["stability", source, "--frames", "17"]) == 0
 
-    assert (found["frames"], found["every_s"]) == (12, pytest.approx(0.1))
+    assert (found["frames"], found["every_s"]) == (20, pytest.approx(0.1))
     assert 0 < found["pixels"] <= 64
     assert "The best averaging time is" in capfd.readouterr().out
 
 
 def test_so_does_a_daemons_camera(capfd: pytest.CaptureFixture[str]) -> None:
     with serving("sim:wall?seed=2") as daemon:
-        assert run(["stability", daemon.url, "--frames", "8"]) == 0
+        assert run(["stability", daemon.url, "--frames", "16"]) == 0
 
-    assert "8 frames" in capfd.readouterr().out
+    assert "16 frames" in capfd.readouterr().out

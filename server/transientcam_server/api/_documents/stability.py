@@ -11,8 +11,8 @@ class StabilityRequest(
 ):
     """Frames whose averages are held against each other."""
 
-    frames: JsonInteger = Field(default=256, ge=8, le=4096)
-    """The longest averaging time is that of a quarter of them."""
+    frames: JsonInteger = Field(default=256, ge=16, le=4096)
+    """The longest averaging time is that of an eighth of them."""
     region: RegionOfPixels | None = None
     recording: str | None = Field(default=None, max_length=200)
     """Its id; null for the running camera."""

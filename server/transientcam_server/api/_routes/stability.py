@@ -50,7 +50,7 @@ async def _found(
     times_s: list[float] = []
     async for frame, pipeline in _frames(service, request):
         progress.at(len(ranges) / request.frames, "frames")
-        range_m = (await frame.product(pipeline.product("range"))).array
+        range_m = await frame.product(pipeline.product("range"))
         seen = range_m.ravel() if region is None else range_m[region.mask(*range_m.shape)]
         ranges.append(seen[:: -(-seen.size // PIXELS)])
         times_s.append(frame.raw.device_time_s)

@@ -10,7 +10,7 @@ from transientcam_server.errors import Problem, kinds
 
 PIXELS: Final = 4096
 """Of a picture, spread evenly, at most."""
-_FEWEST: Final = 4
+_FEWEST: Final = 8
 """Averages that fit into the frames, at least."""
 
 
@@ -30,7 +30,7 @@ def stability(ranges_m: Sequence[NDArray[Any]], times_s: Sequence[float]) -> dic
     Raises
     ------
     Problem
-        ``invalid-request`` for less than eight frames, or where no pixel is left.
+        ``invalid-request`` for less than 16 frames, or where no pixel is left.
     """
     seen = np.array(ranges_m).reshape((len(times_s), -1))
     seen = seen[:, np.isfinite(seen).all(axis=0)]
