@@ -148,13 +148,6 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         """Begin what `tradeoff` returns as a job, for a ``share`` and a ``region``, too."""
         return self._ask(planning.start_tradeoff(by=by, **more))
 
-    def start_stability(self, frames: int = 256, **more: Any) -> _Document:
-        """Begin to find the best averaging time as a job: the Allan deviation of the range.
-
-        Of the frames that come, or of a ``recording`` by its id; of a ``region``, too.
-        """
-        return self._ask(planning.start_stability(frames=frames, **more))
-
     @property
     def calibrations(self) -> Calibrations[_Document, _Bytes]:
         """The calibrations that the daemon keeps: to measure, use, export and import."""

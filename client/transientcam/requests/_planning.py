@@ -38,11 +38,6 @@ def start_tradeoff(**parts: Any) -> Request[dict[str, Any]]:
     return document("tradeoff/jobs", method="POST", body=_body(parts))
 
 
-def start_stability(**parts: Any) -> Request[dict[str, Any]]:
-    """Build the request for the job that finds the best averaging time; parts as in `plan`."""
-    return document("stability/jobs", method="POST", body=_body(parts))
-
-
 def _body(parts: Mapping[str, Any]) -> dict[str, Any]:
     return {
         name: dict(part) if isinstance(part, Mapping) else part

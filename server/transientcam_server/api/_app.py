@@ -42,7 +42,6 @@ from transientcam_server.api._routes import (
     recordings,
     sequence,
     simulation,
-    stability,
     tradeoff,
 )
 from transientcam_server.api._stream import websocket
@@ -68,7 +67,6 @@ _RESOURCES = (
     simulation,
     plan,
     tradeoff,
-    stability,
     parameters,
     jobs,
 )

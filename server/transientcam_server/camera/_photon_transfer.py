@@ -1,55 +1,38 @@
 """Photon transfer: the noise of a sensor over its signal, from static frames (EMVA 1288)."""
 
 import math
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-import transientcam_moments as tm
-from transientcam_driver import Camera, RawFrame, Sequence, capture_calibration
-from transientcam_moments.noise import ROUNDING_VARIANCE
+from transientcam_driver import Camera, Sequence, capture_calibration
+from transientcam_moments.noise import ROUNDING_VARIANCE, Sensor
 from transientcam_server.errors import Problem, kinds
-from transientcam_server.imaging import Recipe, factory_gains
-from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]
-EXPOSURES: Final = 8
-LONGEST_S: Final = 0.05
-_FIRST_S: Final = 5e-4
-_SPAN: Final = 128.0
-"""Of the exposures; the longest one fills a tenth of the pixels twice."""
+EXPOSURES_S: Final = tuple(5e-5 * 2**k for k in range(10))
 _GROUPS: Final = 8
 """Points of one exposure: as many pixels each, from the darkest to the brightest."""
 _CLIPPED: Final = 0.01
 """Share of a group's values that may lie at an end of the converter."""
-_STILL, _SAME = 1.5, 5.0
+_STILL, _SAME = 1.5, 10.0
 """Squares of differences over the usual ones: of images out of step, and of pixels that move."""
 _BENT: Final = 0.7
-"""Variance over that of the line, below which a pixel is full."""
-_LEAST_POINTS: Final = 8
-_MOST_UNCERTAIN: Final = 0.1
+"""Variance, and signal, over that of a straight line, below which a pixel is full."""
+_LEAST_POINTS, _MOST_UNCERTAIN = 8, 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class PhotonTransfer:
-    """A sensor, and the points that it was fitted to.
+    """A sensor, and the points (2, K) it was fitted to: signal in DN, variance of images in DN^2.
 
-    Attributes
-    ----------
-    sensor
-        Of the straight line through them.
-    gain_uncertainty
-        Standard error of the gain, over it.
-    saturates
-        Whether pixels were full; else the end of the converter stands for that.
-    points
-        (2, K) mean of images above the dark level in DN, and variance of one image in DN^2.
+    ``gain_uncertainty`` is the standard error over the gain; ``saturates`` says whether pixels were
+    full: else the end of the converter stands for that.
     """
 
-    sensor: tm.noise.Sensor
+    sensor: Sensor
     gain_uncertainty: float
     saturates: bool
     points: _Array
@@ -58,7 +41,7 @@ class PhotonTransfer:
     def of(
         cls, points: _Array, dark_dn: float, bits: int, full_dn: float | None = None
     ) -> "PhotonTransfer":
-        """Fit points; full pixels scatter less than the line, or are known to hold so much.
+        """Fit points; full pixels scatter less than the line, and hold so much, if they were seen.
 
         Raises
         ------
@@ -74,12 +57,9 @@ class PhotonTransfer:
             used = variance >= _BENT * (dark + growth * signal)
         if not error <= _MOST_UNCERTAIN * growth:
             raise _untold("the noise hardly grows with the light")
-        full = signal[~used & (signal > signal[used].max() / 2)]
-        if full.size:
-            full_dn = float(np.median(full))
-        saturation_dn = (1 << bits) - 1 - dark_dn if full_dn is None else full_dn
+        holds_dn = (1 << bits) - 1 - dark_dn if full_dn is None else full_dn
         gain, read_dn = 1 / growth, math.sqrt(max(dark - ROUNDING_VARIANCE, 0.0))
-        sensor = tm.noise.Sensor(gain, gain * saturation_dn, gain * read_dn, dark_dn, bits)
+        sensor = Sensor(gain, gain * holds_dn, gain * read_dn, dark_dn, bits)
         return cls(sensor, error / growth, full_dn is not None, points)
 
     def to_document(self) -> dict[str, Any]:
@@ -104,75 +84,55 @@ class PhotonTransfer:
         }
 
 
-def measure_photon_transfer(
-    camera: Camera, *, frames: int, go_on: Callable[[float], None] = lambda share: None
-) -> PhotonTransfer:
+def measure_photon_transfer(camera: Camera, *, frames: int) -> PhotonTransfer:
     """Measure the noise of a camera before a scene that stands still, at rising exposures.
 
     Differences of successive images tell it, so that neither pixels nor slow drift add to it;
-    images out of step and pixels that move are left out. Of a camera whose images are differences
-    the signal is half of b_0, since their mean is no light.
-
-    Parameters
-    ----------
-    camera
-        Idle; has the sequence of before afterwards.
-    frames
-        Of each exposure.
-    go_on
-        Called several times a second with the share that is done; what it raises ends this.
+    images out of step and pixels that move are left out. The camera is idle, and has its sequence
+    of before afterwards. ``frames`` are those of each exposure.
 
     Raises
     ------
     Problem
-        ``invalid-request`` where its frames do not tell the gain.
+        ``invalid-request`` where its frames do not tell the gain, or are differences of two taps.
     CameraError
         As the camera does.
     """
     before, about = camera.applied.sequence, camera.capabilities
-    highest_dn = (1 << about.bits) - 1
+    if about.dark_dn is not None:
+        raise _untold("images that are differences do not show their light")
     zeroth = "on-off" if "on-off" in about.zeroths else about.zeroths[0]
-    base = about.nearest(Sequence(harmonics=1, zeroth=zeroth, exposure_s=_FIRST_S))
-    exposures_s, levels_dn, found = _exposures(camera, base, highest_dn), [], []
+    any_s = (Sequence(harmonics=1, zeroth=zeroth, exposure_s=each_s) for each_s in EXPOSURES_S)
+    base = dict.fromkeys(map(about.nearest, any_s))  # in rising order
+    highest_dn, found, levels_dn, exposures_s = (1 << about.bits) - 1, [], [], list[float]()
     try:
-        for done, exposure_s in enumerate(exposures_s):
-            camera.configure(replace(base, exposure_s=exposure_s))
-            *planes, level_dn = _captured(
-                camera,
-                frames,
-                lambda part, of, done=done: go_on((done + part / of) / len(exposures_s)),
-            )
+        for sequence in base:
+            exposures_s.append(camera.configure(sequence).sequence.exposure_s)
+            *planes, level_dn = _captured(camera, frames, highest_dn)
             levels_dn.append(level_dn)
             found.append(planes)
     finally:
         camera.configure(before)
-    dark_dn = about.dark_dn
-    if dark_dn is None:  # where no light is left, exposed for no time
-        low = np.array(levels_dn) <= max(highest_dn / 2, min(levels_dn))
-        line = np.polyfit(
-            np.array(exposures_s)[low], np.array(levels_dn)[low], min(1, low.sum() - 1)
-        )
-        dark_dn = max(float(line[-1]), 0.0)
-        found = [[signal - dark_dn, *rest] for signal, *rest in found]
-    points = [_points(*planes) for planes in found]
-    whole = [k for k, each in enumerate(points) if each.shape[1] == _GROUPS]
-    full_dn = None
-    if len(whole) > 1:  # where more light gives no more signal, and no value is clipped
-        before_s, last_s = (exposures_s[k] for k in whole[-2:])
-        before_dn, last_dn = (float(points[k][0].max()) for k in whole[-2:])
-        full_dn = last_dn if last_dn < _BENT * before_dn * last_s / before_s else None
+    low = np.array(levels_dn) <= max(highest_dn / 2, min(levels_dn))
+    degree = min(1, np.count_nonzero(low) - 1)
+    # where no light is left, exposed for no time
+    line = np.polyfit(np.array(exposures_s)[low], np.array(levels_dn)[low], degree)
+    dark_dn = max(float(line[-1]), 0.0)
+    points = [_points(mean - dark_dn, *others) for mean, *others in found]
+    tops = [
+        (each_s, float(each[0].max()))
+        for each_s, each in zip(exposures_s, points, strict=True)
+        if each.shape[1] == _GROUPS  # none is clipped
+    ]
+    (before_s, before_dn), (last_s, last_dn) = tops[-2:] if len(tops) > 1 else [(1.0, 0.0)] * 2
+    # more light gives no more signal
+    full_dn = last_dn if last_dn < _BENT * before_dn * last_s / before_s else None
     return PhotonTransfer.of(np.concatenate(points, axis=1), dark_dn, about.bits, full_dn)
 
 
-def _captured(
-    camera: Camera, frames: int, go_on: Callable[[int, int], None]
-) -> tuple[_Array, _Array, _Array, float]:
-    """Return signal, variance and share of clipped values of pixels, and the level without light.
-
-    The signal begins at the level, but of images that are differences.
-    """
-    about, applied, found = camera.capabilities, camera.applied, []
-    highest_dn = (1 << about.bits) - 1
+def _captured(camera: Camera, frames: int, highest_dn: int) -> tuple[_Array, _Array, _Array, float]:
+    """Return mean, variance and share of clipped values (N, H, W), and the level without light."""
+    found = []
 
     def average(takes: NDArray[np.uint16]) -> tuple[_Array, NDArray[np.bool_]]:
         images = takes[:, 0].astype(np.float32)
@@ -183,24 +143,14 @@ def _captured(
         found.append((mean, squares[kept].mean(axis=0) / 2, ends.mean(axis=0)))
         return mean[None], np.ones((len(takes), 1), dtype=bool)
 
-    capture = capture_calibration(camera, takes=frames, average=average, progress=go_on)
+    capture = capture_calibration(camera, takes=frames, average=average)
     mean, variance, clipped = (np.stack(each) for each in zip(*found, strict=True))
-    level_dn = float(np.median(mean if capture.dark is None else capture.dark))
-    if about.dark_dn is None:
-        return mean, variance, clipped, level_dn
-    gains = factory_gains(camera.factory)
-    recipe = Recipe(applied, ReconstructionSettings(), float(highest_dn), gains)
-    images = np.rint(mean).astype(np.uint16)
-    measured = recipe.reconstruct(
-        RawFrame(0, 0, images, applied.labels, 0.0, 0.0, 0.0, 0.0, 0)
-    ).measured
-    half = np.abs(measured[-len(applied.sequence.multiples)]) / 2
-    return half, variance.mean(axis=0), clipped.max(axis=0), level_dn
+    return mean, variance, clipped, float(np.median(mean if capture.dark is None else capture.dark))
 
 
-def _points(signal: _Array, variance: _Array, clipped: _Array) -> _Array:
+def _points(*planes: _Array) -> _Array:
     """Return signal and variance (2, K) of groups of pixels alike, none of them clipped."""
-    signal, variance, clipped = (each.ravel() for each in (signal, variance, clipped))
+    signal, variance, clipped = (each.ravel() for each in planes)
     found = []
     for group in np.array_split(np.argsort(signal), _GROUPS):
         if clipped[group].mean() <= _CLIPPED:
@@ -211,21 +161,6 @@ def _points(signal: _Array, variance: _Array, clipped: _Array) -> _Array:
             kept = values <= most
             found.append((signal[group][kept].mean(), values[kept].mean()))
     return np.array(found).reshape((-1, 2)).T
-
-
-def _exposures(camera: Camera, base: Sequence, highest_dn: int) -> list[float]:
-    """Return rising exposures: at the longest one the brighter pixels are full, if they can be."""
-    about, exposure_s = camera.capabilities, base.exposure_s
-    while True:
-        camera.configure(replace(base, exposure_s=exposure_s))
-        bright, dark = np.quantile(capture_calibration(camera, takes=2).images, (0.9, 0.01))
-        if bright < highest_dn or exposure_s <= about.min_exposure_s:
-            break
-        exposure_s = max(exposure_s / 8, about.min_exposure_s)
-    fills_s = 2 * exposure_s * highest_dn / max(bright - dark, 1.0)
-    longest_s = max(min(fills_s, LONGEST_S, about.max_exposure_s), about.min_exposure_s)
-    series = np.geomspace(max(longest_s / _SPAN, about.min_exposure_s), longest_s, EXPOSURES)
-    return sorted({about.exposure_grid_s(float(each)) for each in series})
 
 
 def _line(signal: _Array, variance: _Array) -> tuple[float, float, float]:
@@ -240,5 +175,4 @@ def _line(signal: _Array, variance: _Array) -> tuple[float, float, float]:
 
 def _untold(why: str) -> Problem:
     detail = f"These frames do not tell the noise of the sensor: {why}."
-    limit = "a still scene of dark and bright parts"
-    return Problem(kinds.INVALID_REQUEST, detail, field="scene", value=None, limit=limit)
+    return Problem(kinds.INVALID_REQUEST, detail, field="camera", value=None, limit=None)

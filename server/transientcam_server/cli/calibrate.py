@@ -31,8 +31,7 @@ def calibrate(
         typer.Option(
             "--output",
             "-o",
-            help="The .npz to write; a daemon also keeps a copy. With --noise a .toml of settings, "
-            "a .json, or a .png of the curve.",
+            help="The .npz to write; a daemon also keeps a copy. With --noise settings as .toml.",
         ),
     ] = None,
     camera: Annotated[

@@ -1,13 +1,15 @@
 """The verb ``stability`` of the ``transientcam`` command: what averaging over time is worth."""
 
 import json
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 import typer
+from numpy.typing import NDArray
 
 from transientcam.cli.options import JsonOption, TokenOption
 from transientcam.cli.terminal import echo
-from transientcam_server.cli.progress import followed, progress_bar
+from transientcam_server.cli.progress import progress_bar
 from transientcam_server.cli.reconstruct_recordings import ReconstructionChoices
 
 
@@ -21,10 +23,6 @@ def stability(
         ),
     ],
     frames: Annotated[int, typer.Option(min=16, max=4096, help="How many, at most.")] = 256,
-    region: Annotated[
-        str | None,
-        typer.Option(help="Whose pixels count: X,Y,WIDTH,HEIGHT or corners X,Y/X,Y/X,Y."),
-    ] = None,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -32,47 +30,40 @@ def stability(
 
     It falls as long as noise rules, and rises where drift or motion does.
     """
-    from transientcam_server.planning import Region
+    from transientcam_server.offline import stability as of_frames
 
-    chosen = Region.of(region)
-    if "://" in place and "/recordings/" not in place:
-        from transientcam import Camera
-
-        with Camera(place, token=token) as camera:
-            wanted = None if chosen is None else chosen.to_document()
-            job = followed(camera, lambda: camera.start_stability(frames, region=wanted))
-            found = job["result"]
-    else:
-        found = _of_recording(place, frames, chosen, token)
-    echo(json.dumps(found) if as_json else "\n".join(_in_words(found)))
-
-
-def _of_recording(place: str, most: int, region: Any, token: str | None) -> dict[str, Any]:
-    from transientcam_server.imaging import PIXELS, stability
-    from transientcam_server.offline import BatchReconstructor, recording_at
-
-    ranges, times_s = [], []
-    with recording_at(place, token=token) as opened, progress_bar("reconstructing") as advance:
-        options = ReconstructionChoices(("range",), {}, bins=1).options(opened.header)
-        reconstructor = BatchReconstructor(opened, options)
-        count = min(most, opened.frames)
-        for index in range(count):
-            raw = opened.frame(index)
-            range_m = reconstructor.compute(raw)["range"]
-            seen = range_m.ravel() if region is None else range_m[region.mask(*range_m.shape)]
-            ranges.append(seen[:: -(-seen.size // PIXELS)])
-            times_s.append(raw.device_time_s)
-            advance(index + 1, count)
-    return stability(ranges, times_s)
-
-
-def _in_words(found: dict[str, Any]) -> list[str]:
-    lines = [f"{found['frames']} frames, {found['pixels']} pixels; mm", "    s  median  p90  noise"]
+    live = "://" in place and "/recordings/" not in place
+    found = of_frames((_seen if live else _recorded)(place, frames, token))
+    lines = ["    s  median  p90  noise alone, mm"]
     columns = (found[name] for name in ("averaging_s", "median_m", "p90_m", "noise_alone_m"))
-    lines += [
-        f"{each_s:7.3g} " + " ".join(f"{1e3 * each:7.3g}" for each in rest)
-        for each_s, *rest in zip(*columns, strict=True)
-    ]
+    for each_s, *rest in zip(*columns, strict=True):
+        lines.append(f"{each_s:7.3g} " + " ".join(f"{1e3 * each:7.3g}" for each in rest))
     more = "; longer may be better still" if found["longer_may_help"] else ""
     best = f"{found['best_averaging_s']:.3g} s ({found['best_frames']} frames){more}"
-    return [*lines, f"The best averaging time is {best}."]
+    lines.append(f"The best averaging time is {best}.")
+    echo(json.dumps(found) if as_json else "\n".join(lines))
+
+
+def _seen(url: str, most: int, token: str | None) -> Iterator[tuple[float, NDArray[Any]]]:
+    from transientcam import Camera
+
+    with (
+        Camera(url, token=token) as camera,
+        camera.stream("range") as stream,
+        progress_bar("frames") as advance,
+    ):
+        for done, frame in zip(range(1, most + 1), stream, strict=False):
+            yield frame.meta["device_time_s"], frame.array
+            advance(done, most)
+
+
+def _recorded(place: str, most: int, token: str | None) -> Iterator[tuple[float, NDArray[Any]]]:
+    from transientcam_server.offline import BatchReconstructor, recording_at
+
+    with recording_at(place, token=token) as opened, progress_bar("reconstructing") as advance:
+        options = ReconstructionChoices(("range",), {}, bins=1).options(opened.header)
+        reconstructor, count = BatchReconstructor(opened, options), min(most, opened.frames)
+        for index in range(count):
+            raw = opened.frame(index)
+            yield raw.device_time_s, reconstructor.compute(raw)["range"]
+            advance(index + 1, count)

@@ -22,7 +22,6 @@ from transientcam_server.imaging._errors_of_range.deviation import (
 )
 from transientcam_server.imaging._errors_of_range.noise import contradictory_share
 from transientcam_server.imaging._errors_of_range.ranging import ranges_m
-from transientcam_server.imaging._errors_of_range.stability import PIXELS, stability
 from transientcam_server.imaging._frames.bands import BAND_BYTES, STREAMED_BYTES, banded, size_of
 from transientcam_server.imaging._frames.frame import Frame
 from transientcam_server.imaging._frames.history import History
@@ -79,7 +78,6 @@ __all__ = [
     "MSGPACK",
     "NOMINAL_ID",
     "OF_IMAGES",
-    "PIXELS",
     "PNG",
     "PRODUCTS",
     "STREAMED_BYTES",
@@ -127,7 +125,6 @@ __all__ = [
     "ranges_m",
     "require_estimator",
     "size_of",
-    "stability",
     "stream_encoding",
     "suited",
     "to_document",

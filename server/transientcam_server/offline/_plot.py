@@ -6,7 +6,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_moments.noise import Sensor
 from transientcam_server.errors import MissingExtra
 from transientcam_server.offline._measurement import TransientCube
 
@@ -38,25 +37,6 @@ def save_picture(path: Path, cube: TransientCube) -> None:
         _draw_pixel(figure, cube)
     else:
         _draw_images(figure, cube)
-    figure.savefig(path, dpi=120, format="png")
-
-
-def save_photon_transfer(path: Path, result: dict[str, Any]) -> None:
-    """Draw the variance of images over their signal, and the line of the sensor."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.0, 4.5), layout="constrained")
-    FigureCanvasAgg(figure)  # draws without a display
-    axes, signal = figure.subplots(), np.maximum(result["signal_dn"], 0.1)
-    sensor = Sensor(**result["sensor"])
-    axes.loglog(signal, result["variance_dn2"], "o", markersize=4, label="measured")
-    label = f"{sensor.gain_e_per_dn:.3g} e/DN, read noise {sensor.read_noise_e:.3g} e"
-    axes.loglog(signal, sensor.image_variance(signal), label=label)
-    axes.axvline(sensor.full_well_e / sensor.gain_e_per_dn, linestyle="--", color="gray")
-    axes.set(xlabel="signal above the dark level / DN", ylabel="variance of an image / DN$^2$")
-    axes.set_title("Photon transfer (EMVA 1288)")
-    axes.legend()
     figure.savefig(path, dpi=120, format="png")
 
 

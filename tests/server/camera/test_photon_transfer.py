@@ -56,7 +56,7 @@ def points(gain: float, dark: float, *, full: float = np.inf, seed: int = 0) -> 
 
 
 def test_the_figures_are_those_of_the_standard() -> None:
-    found = PhotonTransfer.of(points(4.0, 9.0, full=2000.0), 64.0, 12)
+    found = PhotonTransfer.of(points(4.0, 9.0, full=2000.0), 64.0, 12, full_dn=2000.0)
     told = found.to_document()["emva1288"]
 
     assert found.saturates

@@ -12,8 +12,7 @@ class JobDocument(Document):
 
     id: str
     kind: str
-    """What it does: `calibration` measures one, `plan` makes one, `tradeoff` finds the front,
-    `stability` the best averaging time."""
+    """What it does: `calibration` measures one, `plan` makes one, `tradeoff` finds the front."""
     state: Literal["queued", "running", "done", "failed", "cancelled"]
     progress: float = Field(ge=0.0, le=1.0)
     step: str

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from transientcam_server.errors import Problem
-from transientcam_server.imaging import stability
+from transientcam_server.errors import InputError
+from transientcam_server.offline import stability
 
 TIMES_S = [0.05 * k for k in range(256)]
 
@@ -12,7 +12,7 @@ TIMES_S = [0.05 * k for k in range(256)]
 def test_noise_falls_with_the_root_of_the_averaging_time() -> None:
     ranges_m = 2.0 + np.random.default_rng(0).normal(0.0, 0.01, (256, 4000))
 
-    found = stability(list(ranges_m), TIMES_S)
+    found = stability(zip(TIMES_S, ranges_m, strict=True))
 
     counts = np.array(found["averaging_s"]) / 0.05
     np.testing.assert_allclose(found["median_m"], 0.01 / np.sqrt(counts), rtol=0.1)
@@ -26,7 +26,7 @@ def test_drift_bends_it_up_and_the_best_time_is_where_both_meet() -> None:
     random = np.random.default_rng(1)
     ranges_m = random.normal(0.0, noise_m, (256, 4000)) + drift_m * np.arange(256)[:, None]
 
-    found = stability(list(ranges_m), TIMES_S)
+    found = stability(zip(TIMES_S, ranges_m, strict=True))
 
     # the deviation of noise, and that of a straight line, n d / sqrt 2
     counts = np.round(np.array(found["averaging_s"]) / 0.05)
@@ -41,7 +41,7 @@ def test_it_is_the_sum_of_its_definition_over_pixels_that_have_a_range() -> None
     ranges_m = np.random.default_rng(2).normal(size=(32, 3))
     ranges_m[5, 1] = np.nan
 
-    found = stability(list(ranges_m), TIMES_S[:32])
+    found = stability(zip(TIMES_S[:32], ranges_m, strict=True))
 
     for n, median_m in zip((1, 2, 3, 4), found["median_m"], strict=True):
         each = []
@@ -56,5 +56,5 @@ def test_it_is_the_sum_of_its_definition_over_pixels_that_have_a_range() -> None
 
 @pytest.mark.parametrize("ranges_m", [np.ones((15, 5)), np.full((17, 5), np.nan)])
 def test_what_tells_nothing_is_refused(ranges_m: np.ndarray) -> None:
-    with pytest.raises(Problem, match="too few frames, or no pixel"):
-        stability(list(ranges_m), TIMES_S[: len(ranges_m)])
+    with pytest.raises(InputError, match="16 frames, and a pixel"):
+        stability(zip(TIMES_S[: len(ranges_m)], ranges_m, strict=True))
