@@ -18,8 +18,6 @@ MEMORY_BYTES: Final = 3 << 29
 NICE: Final = 10
 """A tenth of the processor time beside others that need all of it, all that is left else."""
 _ASK_EVERY_S: Final = 0.25
-_ONE_THREAD: Final = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-"""Matrices of plans are small: threads of their own would spend half of a plan waiting busily."""
 Tell = Callable[[object], None]
 """Takes what a function says while it is called; the last argument of each."""
 
@@ -85,8 +83,9 @@ class ChildProcess:
                 self._process = subprocess.Popen(  # noqa: S603 - this program
                     # -P: nothing of the directory that the program happens to run in
                     [program, "-P", "-m", "transientcam_compiled", *map(str, numbers)],
+                    # threads of BLAS would wait busily for each other: matrices are small
                     env=os.environ
-                    | _ONE_THREAD
+                    | {"OPENBLAS_NUM_THREADS": "1"}
                     | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
                     pass_fds=(theirs.fileno(),),
                     stdin=subprocess.DEVNULL,

@@ -1,5 +1,6 @@
 """The verb ``stability`` of the ``transientcam`` command: what averaging over time is worth."""
 
+import itertools
 import json
 from collections.abc import Iterator
 from typing import Annotated, Any
@@ -9,7 +10,6 @@ from numpy.typing import NDArray
 
 from transientcam.cli.options import JsonOption, TokenOption
 from transientcam.cli.terminal import echo
-from transientcam_server.cli.progress import progress_bar
 from transientcam_server.cli.reconstruct_recordings import ReconstructionChoices
 
 
@@ -26,10 +26,7 @@ def stability(
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Find the best averaging time: the Allan deviation of the range over that time.
-
-    It falls as long as noise rules, and rises where drift or motion does.
-    """
+    """Find the best averaging time: the least of the Allan deviation of the range."""
     from transientcam_server.offline import stability as of_frames
 
     live = "://" in place and "/recordings/" not in place
@@ -50,20 +47,17 @@ def _seen(url: str, most: int, token: str | None) -> Iterator[tuple[float, NDArr
     with (
         Camera(url, token=token) as camera,
         camera.stream("range") as stream,
-        progress_bar("frames") as advance,
     ):
-        for done, frame in zip(range(1, most + 1), stream, strict=False):
+        for frame in itertools.islice(stream, most):
             yield frame.meta["device_time_s"], frame.array
-            advance(done, most)
 
 
 def _recorded(place: str, most: int, token: str | None) -> Iterator[tuple[float, NDArray[Any]]]:
     from transientcam_server.offline import BatchReconstructor, recording_at
 
-    with recording_at(place, token=token) as opened, progress_bar("reconstructing") as advance:
+    with recording_at(place, token=token) as opened:
         options = ReconstructionChoices(("range",), {}, bins=1).options(opened.header)
-        reconstructor, count = BatchReconstructor(opened, options), min(most, opened.frames)
-        for index in range(count):
+        reconstructor = BatchReconstructor(opened, options)
+        for index in range(min(most, opened.frames)):
             raw = opened.frame(index)
             yield raw.device_time_s, reconstructor.compute(raw)["range"]
-            advance(index + 1, count)
