@@ -51,7 +51,7 @@ def tables(
     for kind in worlds.KINDS:
         own = [row for row in rows if row.scene.rpartition("-")[0] == kind]
         if own:
-            ratios = np.quantile([row.ratios["within"] for row in own], [0.1, 0.5, 0.9])
+            ratios = np.quantile([row.ratios["error"] for row in own], [0.1, 0.5, 0.9])
             said = ", ".join(f"{each:.2f}" for each in ratios)
             sides = (sum(getattr(row, side) for row in own) for side in ("below", "above"))
             unknown = sum(not row.bias_known for row in own)
