@@ -114,7 +114,7 @@ def measure_photon_transfer(camera: Camera, *, frames: int) -> PhotonTransfer:
     finally:
         camera.configure(before)
     low = np.array(levels_dn) <= max(highest_dn / 2, min(levels_dn))
-    degree = min(1, np.count_nonzero(low) - 1)
+    degree = 1 if low.sum() > 1 else 0
     # where no light is left, exposed for no time
     line = np.polyfit(np.array(exposures_s)[low], np.array(levels_dn)[low], degree)
     dark_dn = max(float(line[-1]), 0.0)

@@ -63,13 +63,6 @@ def reconstruct(
             "[default: 4e-3; of a recording, as recorded]"
         ),
     ] = None,
-    estimator: Annotated[
-        str | None,
-        typer.Option(
-            help="What finds the range, by the names of docs/estimators.md.  "
-            "[default: automatic; of a recording, as recorded]"
-        ),
-    ] = None,
     neighbours: Annotated[
         Neighbours | None,
         typer.Option(
@@ -118,7 +111,7 @@ def reconstruct(
         require_suffix(plot, ".png", hint="--plot")
         pictures.require("--plot")
     options: dict[str, float | str | None] = {"smoothing_px": smoothing_px, "bias": bias}
-    options |= {"return_threshold": threshold, "estimator": estimator}
+    options["return_threshold"] = threshold
     options["neighbours"] = neighbours or (None if smoothing_px is None else "gaussian")
     given = {name: value for name, value in options.items() if value is not None}
     clustered = workers is not None or dask is not None
