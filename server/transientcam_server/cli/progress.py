@@ -46,10 +46,7 @@ def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
 
 
 def followed(camera: "Camera", start: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """Start a job of a daemon, show it until it is done, and return it.
-
-    Ctrl-C, SIGTERM and SIGHUP cancel the job there, too. The exit code is 1 where it is cancelled.
-    """
+    """Start a job of a daemon and show it until it is done; signals that end this cancel it."""
     with progress_bars() as shown:
         task = shown.add_task("waiting", total=1.0)
 

@@ -126,10 +126,7 @@ class PlanningProcess:
 
 @contextmanager
 def _planning() -> Iterator[None]:
-    """Use one thread inside, and only note which kernels calls want, but for the likelihood's.
-
-    Loading that takes a quarter of the time that it saves, and is done before a plan is wanted.
-    """
+    """Use one thread inside, and only note which kernels calls want, but for the likelihood's."""
     tm.kernels.use_one_thread()
     tm.kernels.load(("likelihood",), 1)
     with tm.kernels.only_note():
