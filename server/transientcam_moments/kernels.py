@@ -196,7 +196,7 @@ def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the buil
 
 
 def load(names: Sequence[str], harmonics: int) -> None:
-    """Load kernels that are in the cache, before returning; nothing is compiled. As of `settled`."""
+    """Load kernels that are in the cache, before returning; none is compiled. As of `settled`."""
     for key in _named(names, harmonics) if KERNELS.automatic else ():
         KERNELS.make_kept_ready(key)
 
