@@ -49,7 +49,7 @@ class PhotonTransfer:
             ``invalid-request`` where they do not tell the gain to 10 %.
         """
         signal, variance = points = points[:, np.argsort(points[0])]
-        used = signal <= signal.max(initial=0.0) / 2
+        growth, dark, error, used = 0.0, 0.0, 0.0, signal <= signal.max(initial=0.0) / 2
         for _ in range(3):
             if np.count_nonzero(used) < _LEAST_POINTS:
                 raise _untold(f"{np.count_nonzero(used)} points are between dark and full")
@@ -95,8 +95,6 @@ def measure_photon_transfer(camera: Camera, *, frames: int) -> PhotonTransfer:
     ------
     Problem
         ``invalid-request`` where its frames do not tell the gain, or are differences of two taps.
-    CameraError
-        As the camera does.
     """
     before, about = camera.applied.sequence, camera.capabilities
     if about.dark_dn is not None:
@@ -165,6 +163,7 @@ def _points(*planes: _Array) -> _Array:
 
 def _line(signal: _Array, variance: _Array) -> tuple[float, float, float]:
     """Return growth, beginning and standard error of the growth; errors are shares of it."""
+    growth, dark, covariance = 0.0, 0.0, np.zeros((2, 2))
     weight = 1 / np.maximum(variance, ROUNDING_VARIANCE)
     for _ in range(3):
         (growth, dark), covariance = np.polyfit(signal, variance, 1, w=weight, cov=True)
