@@ -250,6 +250,14 @@ class Kernels(Generic[Key]):
             finally:
                 self.compiling = None
 
+    def make_kept_ready(self, key: Key) -> None:
+        """Load a kernel, unless the cache does not have it; nothing is compiled."""
+        if self.enabled:
+            with suppress(NotKept), self._making, only_from_cache():
+                if key not in self.compiled and key not in self.failed:
+                    self.compiled[key] = kernel = self.load(key)
+                    self._added(key, kernel)
+
     def _made_elsewhere(self, key: Key) -> Any:
         if self._child is not None and self._cache.directory() is not None:
             with suppress(NotKept), only_from_cache():

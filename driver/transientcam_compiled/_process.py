@@ -76,7 +76,10 @@ class ChildProcess:
                 self._process = subprocess.Popen(  # noqa: S603 - this program
                     # -P: nothing of the directory that the program happens to run in
                     [program, "-P", "-m", "transientcam_compiled", *map(str, numbers)],
-                    env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+                    # threads of BLAS would wait busily for each other: matrices are small
+                    env=os.environ
+                    | {"OPENBLAS_NUM_THREADS": "1"}
+                    | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
                     pass_fds=(theirs.fileno(),),
                     stdin=subprocess.DEVNULL,
                 )

@@ -56,6 +56,7 @@ __all__ = [
     "at_once",
     "cache_directory",
     "compile",
+    "load",
     "make_ready",
     "only_note",
     "over",
@@ -192,6 +193,12 @@ def compile(  # noqa: A001  # tm.kernels.compile is the plain name, and the buil
         report(done, len(keys), str(key))
         KERNELS.make_ready(key)
     report(len(keys), len(keys), "")
+
+
+def load(names: Sequence[str], harmonics: int) -> None:
+    """Load kernels that are in the cache, before returning; none is compiled. As of `settled`."""
+    for key in _named(names, harmonics) if KERNELS.automatic else ():
+        KERNELS.make_kept_ready(key)
 
 
 def prepare(names: Sequence[str], harmonics: int) -> threading.Thread | None:

@@ -149,9 +149,14 @@ def test_a_target_is_planned_for_refused_in_words_or_given_up(
     panel.get_by_text("Plan for a target").click()
     plan = page.get_by_role("button", name="Plan", exact=True)
     expect(plan).to_be_disabled()
+    page.evaluate(
+        "() => { transientcam.store.measures.region.value = { x0: 40, y0: 30, x1: 99, y1: 79 }; }"
+    )
     page.get_by_label("Error at most").fill("20")
     plan.click()
     panel.locator("[data-field=choice_range_error_m]").wait_for()
+    outline = panel.locator("[data-field=planned_region]")
+    expect(outline).to_have_attribute("points", "40.5,30.5 99.5,30.5 99.5,79.5 40.5,79.5")
     assert number(text(page, PANEL, "choice_range_error_m")) <= 20e-3
     page.get_by_label("Error at most").fill("1e-9")
     plan.click()

@@ -35,12 +35,13 @@ from transientcam_moments.noise._neighbours import Averaged, average_neighbours
 from transientcam_moments.noise._of_images import CapturedImages, image_noise
 from transientcam_moments.noise._returns import ReturnNoise, direct_phase_noise, return_noise
 from transientcam_moments.noise._scatter import scatter
-from transientcam_moments.noise._sensor import ImageNoise, Sensor
+from transientcam_moments.noise._sensor import ROUNDING_VARIANCE, ImageNoise, Sensor
 from transientcam_moments.noise._still import MOST_FRAMES, Still, average_frames
 
 __all__ = [
     "ASSUMED_NOISE",
     "MOST_FRAMES",
+    "ROUNDING_VARIANCE",
     "Averaged",
     "CapturedImages",
     "CramerRao",

@@ -6,7 +6,7 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -28,7 +28,11 @@ def calibrate(
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="The .npz to write; a daemon also keeps a copy."),
+        typer.Option(
+            "--output",
+            "-o",
+            help="The .npz to write; a daemon also keeps a copy. With --noise settings as .toml.",
+        ),
     ] = None,
     camera: Annotated[
         str | None,
@@ -68,6 +72,13 @@ def calibrate(
             "--undo", help="Measure nothing; the daemon returns to the previous calibration."
         ),
     ] = False,
+    noise: Annotated[
+        bool,
+        typer.Option(
+            "--noise",
+            help="Without a daemon: measure the noise of the sensor before a still scene.",
+        ),
+    ] = False,
     token: TokenOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -76,7 +87,14 @@ def calibrate(
     Put filter and diffuser before the lens first. A daemon measures with its present sequence and
     stores the result; without one, the file is meant for `serve --calibration FILE`. What does not
     look like a diffuser is kept, but not used, and the exit code is 1; --force uses it anyway.
+    With --noise it is the noise of the sensor, before a still scene with dark and bright parts.
     """
+    if noise:
+        from transientcam_server.cli.calibrate_noise import measure_noise
+
+        _refuse({"URL": url}, "--noise needs the camera itself: end the daemon first")
+        measure_noise(camera or "usb", takes, output, as_json=as_json)
+        return
     require_suffix(output, ".npz")
     if undo:
         _undo(url, token, as_json=as_json)
@@ -89,16 +107,15 @@ def calibrate(
             raise typer.BadParameter("is for simulated cameras", param_hint="--diffuser")
         if output is None:
             raise typer.BadParameter("names the file to write", param_hint="--output")
-        order = _Order(
+        result = _measured_here(
             camera or "usb",
             takes,
             sequence,
             output,
             force=force,
             diffuser=diffuser,
-            harmonics=harmonics,
+            sweep=harmonics,
         )
-        result = _measured_here(order)
     else:
         _refuse({"--camera": camera, "--sequence": sequence}, "is the daemon's, if there is one")
         options = {"name": name, "frames": takes, "activate": activate, "force": force}
@@ -113,19 +130,6 @@ def calibrate(
     verdict = result["verdict"] if url is None else result["measured"]["verdict"]
     if verdict["reason"] is not None and not force:
         raise typer.Exit(code=1)
-
-
-@dataclass(frozen=True, slots=True)
-class _Order:
-    """What to measure without a daemon."""
-
-    camera: str
-    takes: int
-    sequence: str | None
-    output: Path
-    force: bool
-    diffuser: bool
-    harmonics: bool
 
 
 def _undo(url: str | None, token: str | None, *, as_json: bool) -> None:
@@ -149,26 +153,12 @@ def _measured_by_daemon(
     url: str, options: dict[str, Any], output: Path | None, token: str | None, *, diffuser: bool
 ) -> dict[str, Any]:
     """Measure in a daemon and return its result; Ctrl-C cancels the job there, too."""
-    from rich.progress import Progress
-
     from transientcam import Camera
+    from transientcam_server.cli.progress import followed
 
-    with Camera(url, token=token) as camera, Progress(console=Terminal(stderr=True)) as shown:
-        task = shown.add_task("waiting", total=1.0)
-
-        def show(job: Mapping[str, Any]) -> None:
-            shown.update(task, description=job["step"], completed=job["progress"])
-
+    with Camera(url, token=token) as camera:
         with _before_lens(camera.simulate) if diffuser else nullcontext():
-            job = camera.calibrations.measure(**options)
-            try:
-                job = camera.wait_for(job["id"], on_progress=show)
-            except KeyboardInterrupt:
-                camera.jobs.cancel(job["id"])
-                raise
-        show(job)
-        if job["state"] == "cancelled":
-            raise typer.Exit(code=1)
+            job = followed(camera, lambda: camera.calibrations.measure(**options))
         identity = job["result"]["calibration"]
         if output is not None:
             output.write_bytes(camera.calibrations.export(identity))
@@ -189,39 +179,48 @@ def _before_lens(change: Callable[..., object]) -> Iterator[None]:
         change(diffuser=False)
 
 
-def _measured_here(order: _Order) -> dict[str, Any]:
+def _measured_here(
+    spec: str,
+    takes: int,
+    sequence: str | None,
+    output: Path,
+    *,
+    force: bool,
+    diffuser: bool,
+    sweep: bool,
+) -> dict[str, Any]:
     from transientcam_driver import Sequence, open_camera
     from transientcam_server.camera import start_with
     from transientcam_server.imaging import SWEEP_ON_A_SCENE, judge, to_document
     from transientcam_server.settings import SequenceSettings
 
     requested = None
-    if order.sequence is not None:
-        requested = Sequence.from_document(_document(order.sequence))
-    with open_camera(order.camera) as opened:
+    if sequence is not None:
+        requested = Sequence.from_document(_document(sequence))
+    with open_camera(spec) as opened:
         if requested is None:
             start_with(opened, SequenceSettings())
         else:
             opened.configure(requested)
-        simulation = opened.simulation if order.diffuser else None
+        simulation = opened.simulation if diffuser else None
         with nullcontext() if simulation is None else _before_lens(simulation.change):
-            measured, why_not = _measure(opened, order)
+            measured, why_not = _measure(opened, takes, sweep=sweep)
         full_scale = 2.0**opened.capabilities.bits - 1.0
     verdict = judge(measured.capture, measured.gains.bad, full_scale=full_scale).to_document()
-    notes = {"verdict": verdict, "forced": order.force}
+    notes = {"verdict": verdict, "forced": force}
     capture = replace(measured.capture, notes=notes)
     if verdict["verdict"] == "scene" and capture.waveform is not None:
         capture, why_not = replace(capture, waveform=None), SWEEP_ON_A_SCENE
-    capture.save(order.output)
-    return _result(replace(measured, capture=capture), order.output) | {
+    capture.save(output)
+    return _result(replace(measured, capture=capture), output) | {
         "verdict": verdict,
-        "forced": order.force,
+        "forced": force,
         "harmonics": to_document(capture.waveform),
         "no_harmonics": why_not,
     }
 
 
-def _measure(camera: "Camera", order: _Order) -> "tuple[Calibration, str | None]":
+def _measure(camera: "Camera", takes: int, *, sweep: bool) -> "tuple[Calibration, str | None]":
     """Measure with a camera; also return why there are no harmonics."""
     from rich.progress import Progress
 
@@ -229,18 +228,18 @@ def _measure(camera: "Camera", order: _Order) -> "tuple[Calibration, str | None]
     from transientcam_driver import capture_calibration
     from transientcam_server.imaging import SweepEvaluation, evaluate
 
-    sweep = SweepEvaluation(camera.capabilities, takes=order.takes)
+    swept = SweepEvaluation(camera.capabilities, takes=takes)
     with Progress(console=Terminal(stderr=True)) as shown:
         task = shown.add_task("capturing", total=None)
         capture = capture_calibration(
             camera,
-            takes=order.takes,
+            takes=takes,
             average=tm.average_takes,
-            waveform=sweep if order.harmonics else None,
+            waveform=swept if sweep else None,
             progress=lambda done, total: shown.update(task, completed=done, total=total),
         )
         shown.update(task, description="evaluating")
-        return evaluate(capture), sweep.reason if order.harmonics else None
+        return evaluate(capture), swept.reason if sweep else None
 
 
 def _document(text: str) -> dict[str, Any]:

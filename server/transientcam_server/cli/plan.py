@@ -156,9 +156,7 @@ def plan(
             target |= {"separation_share": separation_share} if separation_m else {}
             wanted |= {"target": _given(target), "budget": _given(budget), "fixed": stays}
             wanted |= {"estimator": estimator, "map": map_file is not None}
-        from transientcam_server.cli.plan_daemon import by_daemon
-
-        make = partial(by_daemon, daemon, token, wanted, console, map_file)
+        make = partial(_by_daemon, daemon, token, wanted, map_file)
     else:
         from transientcam_server.cli.plan_here import View, by_camera
         from transientcam_server.planning import SHARE
@@ -187,6 +185,20 @@ def plan(
         print_front(document)
     else:
         print_plan(document, computing=computing_share is not None)
+
+
+def _by_daemon(
+    url: str, token: str | None, wanted: dict[str, Any], map_file: Path | None
+) -> tuple[dict[str, Any], bytes]:
+    """Let a daemon plan for the scene before its camera, and return the plan and its map."""
+    from transientcam import Camera
+    from transientcam_server.cli.progress import followed
+
+    with Camera(url, token=token) as camera:
+        start = camera.start_plan if "target" in wanted else camera.start_tradeoff
+        job = followed(camera, partial(start, **wanted))
+        made = b"" if map_file is None else camera.plan_map(job["id"], map_file.suffix[1:])
+        return job["result"], made
 
 
 def _goal(asked: dict[str, Any], fixed: dict[str, Any]) -> "Goal":

@@ -58,7 +58,8 @@ def by_camera(
         goal.require_sensible()
     virtual = view.camera.startswith("sim:") and not view.real_time
     clock = VirtualClock() if virtual else RealClock()
-    # to load kernels takes as long as they would save
+    tm.kernels.load(("likelihood",), 1)
+    # to load the others takes as long as they would save
     with tm.kernels.only_note(), open_camera(view.camera, clock=clock) as camera:
         sensor = sensor_of(camera, SensorSettings())
         try:

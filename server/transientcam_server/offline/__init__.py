@@ -27,3 +27,4 @@ from transientcam_server.offline._recording import (
     default_products,
     reconstruct_recording,
 )
+from transientcam_server.offline._stability import stability

@@ -9,6 +9,7 @@ import pytest
 from tests.serving import serving
 from transientcam.cli import run
 from transientcam_driver import CalibrationCapture
+from transientcam_server.daemon._configuration import load_settings
 
 CAMERA = ["--camera", "sim:calibration?device=prototype"]
 QUICK = '{"harmonics": 2, "zeroth": "estimated", "exposure_s": 0.0005}'
@@ -94,6 +95,19 @@ def test_the_diffuser_is_put_before_a_simulated_lens(
     assert run(["calibrate", "--camera", "sim:mirrors", *out]) == 0
     assert "measured on a diffuser" in capfd.readouterr().out
     assert run(["calibrate", "--camera", "usb", *out]) == 2
+
+
+def test_the_noise_of_the_sensor_becomes_settings(tmp_path: Path) -> None:
+    settings = tmp_path / "transientcam.toml"
+    noise = ["calibrate", "--noise", "--camera", "sim:wall", "--takes", "4"]
+
+    assert run([*noise, "-o", str(settings)]) == 0
+
+    assert "# system_gain_dn_per_e = 0.1" in settings.read_text()  # 9 e/DN
+    sensor = load_settings({}, file=settings, environment={}).sensor
+    assert sensor.gain_e_per_dn == pytest.approx(9.0, rel=0.05)
+    assert sensor.model_fields_set == {"gain_e_per_dn", "full_well_e", "read_noise_e", "dark_dn"}
+    assert run(["calibrate", "--noise", "http://127.0.0.1:1"]) == 2
 
 
 # -- where a daemon has the camera -----------------------------------------------------------------

@@ -111,8 +111,9 @@ class PlanningProcess:
 
 @contextmanager
 def _planning() -> Iterator[None]:
-    """Use one thread inside, and only note which kernels calls want."""
+    """Use one thread inside, and only note which kernels calls want, but for the likelihood's."""
     tm.kernels.use_one_thread()
+    tm.kernels.load(("likelihood",), 1)
     with tm.kernels.only_note():
         yield
 

@@ -17,6 +17,7 @@ frequencies.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -72,12 +73,13 @@ class _RotatedMoments:
         q
             (m) moments of the tail at phase 0; None for a sharp return alone.
         """
-        conjugate = phasors.conj().T
-        sharp = np.maximum(np.real(conjugate @ self.weighted), 0.0)
+        # by `einsum`: threads of BLAS would wait busily for each other
+        turned = partial(np.einsum, "mt,mp->tp", phasors.conj())
+        sharp = np.maximum(np.real(turned(self.weighted)), 0.0)
         ww = self.weight.sum(axis=0)
         if q is None:
             return np.asarray(sharp**2 / ww)
-        late = np.maximum(np.real(conjugate @ (q.conj()[:, None] * self.weighted)), 0.0)
+        late = np.maximum(np.real(turned(q.conj()[:, None] * self.weighted)), 0.0)
         wv = np.real(q) @ self.weight
         vv = np.abs(q) ** 2 @ self.weight
         w = vv * sharp - wv * late

@@ -106,13 +106,11 @@ class Choice:
 
         Targets are reached where the latter is 1 at most.
         """
-        return (
-            max((self.error(name) / limit for name, limit in targets.items()), default=0.0),
-            max(
-                (self.error_with_margin(name) / limit for name, limit in targets.items()),
-                default=0.0,
-            ),
+        error, with_margin = (
+            max((of(name) / limit for name, limit in targets.items()), default=0.0)
+            for of in (self.error, self.error_with_margin)
         )
+        return error, with_margin
 
     def to_document(self) -> dict[str, Any]:
         """Return the choice as JSON; ``sequence`` is the body of a PUT."""

@@ -182,5 +182,8 @@ def test_nothing_but_the_gate_lights() -> None:
         "camera/_acquisition.py: self._camera.start()",
         "camera/_acquisition.py: self._camera.reconnect()",
         "camera/_calibrator.py: return capture_calibration(",  # within `Acquisition.occupy`
+        # of a camera that no daemon has
+        "camera/_photon_transfer.py: capture = capture_calibration("
+        "camera, takes=frames, average=average)",
         "camera/_shared.py: if not self._origin.start_unless(offs):",  # of a relay: at its origin
     }
