@@ -15,8 +15,9 @@ from transientcam_simulation.scene._geometry import (
     Rectangle,
     Shape,
     blocked_by_mask,
+    evenly,
 )
-from transientcam_simulation.scene._limits import patch_edges_m
+from transientcam_simulation.scene._limits import most_patches, patch_edges_m, patches_of
 from transientcam_simulation.scene._motion import Motion
 from transientcam_simulation.scene._scene import (
     Background,
@@ -48,8 +49,11 @@ __all__ = [
     "TimeZero",
     "Viewpoint",
     "blocked_by_mask",
+    "evenly",
     "list_scenes",
     "load_scene",
+    "most_patches",
     "parse_scene",
     "patch_edges_m",
+    "patches_of",
 ]

@@ -3,6 +3,7 @@
 It is counted as the light is built, by the same functions (`patch_edges_m`, `Shape.grid`).
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -15,7 +16,10 @@ MOST_SURFACES: Final = 32
 MOST_MIRROR_PATHS: Final = 64
 """Chains of mirrors that light may take, each of which is followed."""
 MOST_PATCHES: Final = 4096
-"""Between scattering surfaces: their matrices take 128 MiB, and 0.5 GiB while they are made."""
+"""Between scattering surfaces: their matrices take 128 MiB, and 0.5 GiB while they are made.
+
+Fewer where mirrors show them to each other.
+"""
 _LEAST_PER_SIDE: Final = 4
 """Patches along the longest side of a surface, however small it is beside others."""
 
@@ -61,17 +65,23 @@ def patches_of(scene: Scene, per_side: int) -> int:
     return sum(rows * columns for rows, columns in grids)
 
 
+def mirror_paths_of(scene: Scene) -> int:
+    """Return how many chains of mirrors light may take: none goes from one to itself."""
+    mirrors = sum(each.kind == "mirror" for each in scene.surfaces)
+    bounces = range(1, scene.mirror_bounces + 1)
+    return sum(mirrors * (mirrors - 1) ** (each - 1) for each in bounces)
+
+
+def most_patches(scene: Scene) -> int:
+    """Return into how many patches surfaces may be cut: they see each other over mirrors, too."""
+    return int(MOST_PATCHES / math.sqrt(1 + mirror_paths_of(scene)))
+
+
 def cost_of(scene: Scene) -> Cost:
     """Return what the light of a scene needs, without computing any of it."""
     transport = scene.transport
-    mirrors = sum(each.kind == "mirror" for each in scene.surfaces)
-    # no light goes from a plane mirror to itself
-    paths = sum(
-        mirrors * (mirrors - 1) ** (bounces - 1)
-        for bounces in range(1, transport.mirror_bounces + 1)
-    )
     followed = transport.diffuse_bounces != 0
-    return Cost(paths, patches_of(scene, transport.patches) if followed else 0)
+    return Cost(mirror_paths_of(scene), patches_of(scene, transport.patches) if followed else 0)
 
 
 def require_modest(scene: Scene) -> None:
@@ -89,10 +99,12 @@ def require_modest(scene: Scene) -> None:
     if cost.mirror_paths > MOST_MIRROR_PATHS:
         limit = f"fewer: {cost.mirror_paths} chains of mirrors are more than {MOST_MIRROR_PATHS}"
         raise SceneError("the scene", "transport.mirror_bounces", transport.mirror_bounces, limit)
-    if cost.patches > MOST_PATCHES:
-        most = max(n for n in range(2, transport.patches) if patches_of(scene, n) <= MOST_PATCHES)
+    limit_of = most_patches(scene)
+    if cost.patches > limit_of:
+        fewer = (n for n in range(2, transport.patches) if patches_of(scene, n) <= limit_of)
+        most = max(fewer, default=0)
         limit = (
-            f"at most {most} with these surfaces, or diffuse_bounces = 0: {cost.patches} patches "
-            f"are more than {MOST_PATCHES}"
+            f"{f'at most {most} with these surfaces, or ' if most else ''}diffuse_bounces = 0: "
+            f"{cost.patches} patches are more than {limit_of}"
         )
         raise SceneError("the scene", "transport.patches", transport.patches, limit)
