@@ -4,12 +4,14 @@ As in a crease, or in the shadow at the foot of something. Where a row or a colu
 off the straight line through its neighbours, which is what pixels take between them, it is halved.
 """
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._over_mirrors import OverMirrors
 from transientcam_simulation.light._patches import Cuts, Patches
 from transientcam_simulation.scene import Scene, evenly, most_patches, patches_of
 
@@ -18,57 +20,83 @@ _OFF: Final = 1e-3
 _FIRST_PER_SIDE: Final = 12  # patches along the longest side, at first
 _FEWEST: Final = 3  # rows and columns, to see a bend
 _ROUNDS: Final = 4
-_MOST_TIMES: Final = 2.0  # as many patches as the scene says
-_AFFORDED: Final = 1600  # patches, in any scene
+_BOUNCES: Final = 2  # judged
+_AFFORDED: Final = 1500  # patches, in any scene
 _HIGHEST_HZ: Final = 150e6
-_HIGHER: Final = 1.5  # limit, where there would be too many patches
+_LEAST: Final = 1e-5  # sr, of patches that are halved, where there would be too many, ...
+_HIGHER: Final = 1.25  # and a higher limit than that
 
 
 def graded(scene: Scene, per_side: int) -> Exchange:
     """Find the light between patches of a scene that stands still, over mirrors, too.
 
-    Of at most twice as many patches as if its longest side were cut into ``per_side`` equal ones.
+    Of no more patches than if its longest side were cut into ``per_side`` equal ones, or than can
+    be afforded in any scene.
     """
-    most = min(max(_MOST_TIMES * patches_of(scene, per_side), _AFFORDED), most_patches(scene))
+    most = min(max(patches_of(scene, per_side), _AFFORDED), most_patches(scene))
     patches = Patches.of(scene, min(per_side, max(_FIRST_PER_SIDE, per_side // 2)))
-    cuts: dict[int, Cuts] | None = {
+    cuts = {
         k: (evenly(max(_FEWEST, cells.rows)), evenly(max(_FEWEST, cells.columns)))
         for k, cells in patches.cells.items()
     }
-    for _round in range(_ROUNDS):
-        if cuts is None:
-            break
-        exchange = Exchange.between(scene, Patches.cut(scene, cuts), mirrors=True)
-        cuts = _finer(exchange, most)
-    return exchange
+    first = _count(cuts)
+    exchange = Exchange.between(scene, Patches.cut(scene, cuts))
+    for step in range(1, _ROUNDS + 1):
+        # the same share more in each round, so that what is off most is halved most often
+        finer = _finer(exchange, first * (most / first) ** (step / _ROUNDS))
+        if _count(finer) > len(exchange.patches):
+            exchange = Exchange.between(scene, Patches.cut(scene, finer))
+    return replace(exchange, over_mirrors=OverMirrors.of(scene, exchange.patches))
 
 
-def _finer(exchange: Exchange, most: float) -> dict[int, Cuts] | None:
-    """Return where to cut more finely, within so many patches; None if nowhere."""
+def _count(cuts: dict[int, Cuts]) -> int:
+    """Return how many patches there are in all."""
+    return sum((len(up) - 1) * (len(along) - 1) for up, along in cuts.values())
+
+
+def _finer(exchange: Exchange, most: float) -> dict[int, Cuts]:
+    """Return where to cut, more finely but into no more than so many patches."""
     patches = exchange.patches
     direct = exchange.radiosity.sum(axis=(0, 2))
-    bounces = exchange.bounces(_OFF * float(direct.max()))
+    bounces = min(_BOUNCES, exchange.bounces(_OFF * float(direct.max())))
     got = np.stack([exchange.irradiance(f, bounces) for f in (0.0, _HIGHEST_HZ)])
     light = patches.albedo * got
-    limit = _OFF * float((direct + light[0].real).max())
-    off = {}
+    limit, seen = _OFF * float((direct + light[0].real).max()), _solid_angles(exchange)
+    worth = {}
     for k, cells in patches.cells.items():
-        mine = light[:, patches.first[k] :][:, : len(cells.area)]
-        rows = mine.reshape(-1, cells.rows, cells.columns)
-        off[k] = _off(rows, cells.up), _off(rows.swapaxes(1, 2), cells.along)
+        mine = slice(patches.first[k], patches.first[k] + len(cells.area))
+        rows, shown = (
+            each[..., mine].reshape(-1, cells.rows, cells.columns) for each in (light, seen)
+        )
+        up = (_off(rows, cells.up) > limit) * shown[0]
+        along = (_off(rows.swapaxes(1, 2), cells.along) > limit) * shown[0].T
+        worth[k] = up.max(axis=1), along.max(axis=1)
+    least = 0.0
     while True:
         cuts = {
-            k: (_halved(each.up, off[k][0] > limit), _halved(each.along, off[k][1] > limit))
+            k: (_halved(each.up, worth[k][0] > least), _halved(each.along, worth[k][1] > least))
             for k, each in patches.cells.items()
         }
-        count = sum((len(up) - 1) * (len(along) - 1) for up, along in cuts.values())
-        if count <= max(most, len(patches)):
-            return cuts if count > len(patches) else None
-        limit *= _HIGHER
+        if _count(cuts) <= max(most, len(patches)):
+            return cuts
+        least = max(_HIGHER * least, _LEAST)
+
+
+def _solid_angles(exchange: Exchange) -> NDArray[np.float64]:
+    """Return how large patches are to the camera (N), as far as they face it or mirrors."""
+    scene, patches = exchange.scene, exchange.patches
+    assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
+    way = scene.camera.position_m - patches.centre
+    far_m = np.linalg.norm(way, axis=1)
+    cosine = np.einsum("nc,nc->n", way, patches.normal) / far_m
+    if any(each.kind == "mirror" for each in scene.surfaces):
+        cosine = np.abs(cosine)
+    angles: NDArray[np.float64] = patches.area * cosine.clip(0) / far_m**2
+    return angles
 
 
 def _off(light: NDArray[np.complex128], cuts: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how far light (F, R, C) between rows' middles may be off a straight line, at most.
+    """Return how far light (F, R, C) between rows' middles may be off a straight line, (R, C).
 
     A parabola is off the line from neighbour to neighbour by four times as much as within a row,
     and off the line that two rows go on in by 8 / 3 times.
@@ -79,7 +107,7 @@ def _off(light: NDArray[np.complex128], cuts: NDArray[np.float64]) -> NDArray[np
     lower[[0, last]], upper[[0, last]] = (1, last - 2), (2, last - 1)
     share = (middles - middles[lower]) / (middles[upper] - middles[lower])
     line = light[:, lower] + share[:, None] * (light[:, upper] - light[:, lower])
-    off: NDArray[np.float64] = np.abs(light - line).max(axis=(0, 2)) / 4
+    off: NDArray[np.float64] = np.abs(light - line).max(axis=0) / 4
     off[[0, last]] *= 1.5
     return off
 
