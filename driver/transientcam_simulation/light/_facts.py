@@ -321,7 +321,9 @@ class SceneFacts:
             seen = self._seen[when]
             around_s = (self._times_s[when] + by * light.step_s for by in (-0.5, 0.5))
             one, other = (light.solution(time_s, 0.0) for time_s in around_s)
-            late = light.held_steps / 4  # of a step, that light which stands is off, on average
+            late = (
+                light.held_s / light.step_s / 4
+            )  # of a step, that light which stands is off, on average
             ends = Gathering(seen.scene, light.patches, seen.lits[0])
             coarse = ends.moments((0.5 - late) * one + (0.5 + late) * other, 0.0)
             if when not in self._in_full:

@@ -34,8 +34,7 @@ class FurtherLight:
     ) -> None:
         self._scene, self._per_side, self._tolerance = scene, per_side, tolerance
         self._reach_m = reach * max(patch_edges_m(scene, per_side).values())
-        self.held_steps = _HELD_PATCHES / reach
-        """Steps for which what patches give the pixels stands."""
+        self._held_steps = _HELD_PATCHES / reach
         self._exchanges: Recent[float, tuple[Exchange, int]] = Recent(_EXCHANGES)
         self._solved: Recent[tuple[float, float], NDArray[np.complex128]] = Recent(_SOLVED)
 
@@ -54,7 +53,7 @@ class FurtherLight:
     @property
     def held_s(self) -> float:
         """Time for which what patches give the pixels stands."""
-        return self.held_steps * self.step_s
+        return self._held_steps * self.step_s
 
     def irradiance(self, time_s: float, frequency_hz: float) -> NDArray[np.complex128]:
         """Moments (N) of the light that patches get from each other."""

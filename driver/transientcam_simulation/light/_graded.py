@@ -21,7 +21,8 @@ _FIRST_PER_SIDE: Final = 12  # patches along the longest side, at first
 _FEWEST: Final = 3  # rows and columns, to see a bend
 _ROUNDS: Final = 4
 _BOUNCES: Final = 2  # judged
-_AFFORDED: Final = 1500  # patches, in any scene
+_AFFORDED: Final = 1500  # patches, at most so many times as many as the scene says
+_TIMES: Final = 8
 _HIGHEST_HZ: Final = 150e6
 _LEAST: Final = 1e-5  # sr, of patches that are halved, where there would be too many, ...
 _HIGHER: Final = 1.25  # and a higher limit than that
@@ -31,9 +32,10 @@ def graded(scene: Scene, per_side: int) -> Exchange:
     """Find the light between patches of a scene that stands still, over mirrors, too.
 
     Of no more patches than if its longest side were cut into ``per_side`` equal ones, or than can
-    be afforded in any scene.
+    be afforded.
     """
-    most = min(max(patches_of(scene, per_side), _AFFORDED), most_patches(scene))
+    equal = patches_of(scene, per_side)
+    most = min(max(equal, min(_AFFORDED, _TIMES * equal)), most_patches(scene))
     patches = Patches.of(scene, min(per_side, max(_FIRST_PER_SIDE, per_side // 2)))
     cuts = {
         k: (evenly(max(_FEWEST, cells.rows)), evenly(max(_FEWEST, cells.columns)))
@@ -64,7 +66,7 @@ def _finer(exchange: Exchange, most: float) -> dict[int, Cuts]:
     limit, seen = _OFF * float((direct + light[0].real).max()), _solid_angles(exchange)
     worth = {}
     for k, cells in patches.cells.items():
-        mine = slice(patches.first[k], patches.first[k] + len(cells.area))
+        mine = slice(patches.first[k], patches.first[k] + len(cells.centre))
         rows, shown = (
             each[..., mine].reshape(-1, cells.rows, cells.columns) for each in (light, seen)
         )
@@ -87,12 +89,11 @@ def _solid_angles(exchange: Exchange) -> NDArray[np.float64]:
     scene, patches = exchange.scene, exchange.patches
     assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
     way = scene.camera.position_m - patches.centre
-    far_m = np.linalg.norm(way, axis=1)
-    cosine = np.einsum("nc,nc->n", way, patches.normal) / far_m
-    if any(each.kind == "mirror" for each in scene.surfaces):
-        cosine = np.abs(cosine)
-    angles: NDArray[np.float64] = patches.area * cosine.clip(0) / far_m**2
-    return angles
+    one, other = patches.corners[:, 2:].swapaxes(0, 1) - patches.corners[:, :2].swapaxes(0, 1)
+    area = np.linalg.norm(np.cross(one, other), axis=1) / 2
+    angles = np.einsum("nc,nc->n", way, patches.normal) / np.linalg.norm(way, axis=1) ** 3 * area
+    mirrors = any(each.kind == "mirror" for each in scene.surfaces)
+    return np.abs(angles) if mirrors else angles.clip(0)
 
 
 def _off(light: NDArray[np.complex128], cuts: NDArray[np.float64]) -> NDArray[np.float64]:

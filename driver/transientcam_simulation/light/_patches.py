@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from transientcam_simulation.base import ask
 from transientcam_simulation.light._paths import blocked
-from transientcam_simulation.scene import Cells, Points, Scene, evenly, patch_edges_m
+from transientcam_simulation.scene import Cells, Points, Scene, cells_of, evenly, patch_edges_m
 
 Cuts = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Where a surface is cut over its height, and over its width or longitude."""
@@ -29,7 +29,6 @@ class Patches:
     surface: NDArray[np.intp]
     centre: Points
     normal: Points
-    area: NDArray[np.float64]
     corners: Points
     albedo: NDArray[np.float64]
     cells: dict[int, Cells]
@@ -37,7 +36,7 @@ class Patches:
 
     def __len__(self) -> int:
         """Patches in all."""
-        return len(self.area)
+        return len(self.centre)
 
     @classmethod
     def of(cls, scene: Scene, per_side: int, *, moving: int = 0) -> "Patches":
@@ -49,13 +48,12 @@ class Patches:
     @classmethod
     def cut(cls, scene: Scene, cuts: dict[int, Cuts]) -> "Patches":
         """Cut the scattering surfaces, by their index, at places from -1 to 1."""
-        cells = {index: scene.surfaces[index].shape.cells(*at) for index, at in cuts.items()}
-        grids, counts = list(cells.values()), [len(grid.area) for grid in cells.values()]
+        cells = {index: cells_of(scene.surfaces[index].shape, *at) for index, at in cuts.items()}
+        grids, counts = list(cells.values()), [len(grid.centre) for grid in cells.values()]
         return cls(
             np.repeat(list(cells), counts),
             np.concatenate([grid.centre for grid in grids]),
             np.concatenate([grid.normal for grid in grids]),
-            np.concatenate([grid.area for grid in grids]),
             np.concatenate([grid.corners for grid in grids]),
             np.repeat([scene.surfaces[index].reflectivity for index in cells], counts),
             cells,

@@ -15,6 +15,7 @@ from transientcam_simulation.scene._geometry import (
     Rectangle,
     Shape,
     blocked_by_mask,
+    cells_of,
     evenly,
 )
 from transientcam_simulation.scene._limits import most_patches, patch_edges_m, patches_of
@@ -49,6 +50,7 @@ __all__ = [
     "TimeZero",
     "Viewpoint",
     "blocked_by_mask",
+    "cells_of",
     "evenly",
     "list_scenes",
     "load_scene",

@@ -30,7 +30,6 @@ class Cells:
     along: Values
     centre: Points
     normal: Points
-    area: NDArray[np.float64]
     corners: Points
 
     @property
@@ -118,22 +117,10 @@ class Rectangle:
         """Return how many rows and columns of such patches it has."""
         return _counts(self.height, edge_m), _counts(self.width, edge_m)
 
-    def cells(self, up: Values, along: Values) -> Cells:
-        """Cut it over height and width, both from -1 to 1."""
-        y, x = np.meshgrid(_middles(up), _middles(along), indexing="ij")
-        half_y, half_x = np.meshgrid(np.diff(up) / 2, np.diff(along) / 2, indexing="ij")
+    def at(self, x: Values, y: Values) -> Points:
+        """Points at places over width and height, from -1 to 1."""
         across, upwards = self.right * self.width / 2, self.up * self.height / 2
-        centre = self.centre + x.reshape(-1, 1) * across + y.reshape(-1, 1) * upwards
-        corners = _SIGNS[:, :1] * half_x.reshape(-1, 1, 1) * across
-        corners = corners + _SIGNS[:, 1:] * half_y.reshape(-1, 1, 1) * upwards
-        return Cells(
-            up,
-            along,
-            centre,
-            np.broadcast_to(self.normal, centre.shape),
-            self.width * self.height * (half_x * half_y).ravel(),
-            centre[:, None, :] + corners,
-        )
+        return self.centre + x[..., None] * across + y[..., None] * upwards
 
     def between_cells(self, points: Points, cells: Cells) -> Bilinear:
         """Interpolate between the cells' centres, and go on in a straight line beyond them."""
@@ -237,23 +224,11 @@ class Ellipsoid:
         rows = max(2, _counts(np.pi * float(self.radii[2]), edge_m))
         return rows, max(4, _counts(2 * np.pi * float(self.radii[:2].max()), edge_m))
 
-    def cells(self, up: Values, along: Values) -> Cells:
-        """Cut it over height and longitude, both from -1 to 1."""
-        z, turn = (
-            each.ravel() for each in np.meshgrid(_middles(up), _middles(along), indexing="ij")
-        )
-        half_z, half_turn = np.meshgrid(np.diff(up) / 2, np.diff(along) / 2, indexing="ij")
-        on_unit = _on_unit_sphere(z, np.pi * turn)
-        centre = self.centre + on_unit * self.radii
-        corners = _on_unit_sphere(
-            np.clip(z[:, None] + _SIGNS[:, 1] * half_z.reshape(-1, 1), -1, 1),
-            np.pi * (turn[:, None] + _SIGNS[:, 0] * half_turn.reshape(-1, 1)),
-        )
-        # a linear map stretches each cell of the unit sphere by this factor
-        stretch = np.prod(self.radii) * np.linalg.norm(on_unit / self.radii, axis=-1)
-        area = 4 * np.pi * (half_z * half_turn).ravel() * stretch
-        corners = self.centre + corners * self.radii
-        return Cells(up, along, centre, self.normals(centre), area, corners)
+    def at(self, x: Values, y: Values) -> Points:
+        """Points at places over longitude, which starts at -x, and height, from -1 to 1."""
+        across = np.sqrt(np.maximum(0.0, 1 - y * y))
+        on_unit = np.stack([across * np.cos(np.pi * x), across * np.sin(np.pi * x), y], axis=-1)
+        return self.centre + on_unit * self.radii
 
     def between_cells(self, points: Points, cells: Cells) -> Bilinear:
         """Interpolate between the cells' centres, around and up to the poles."""
@@ -272,10 +247,15 @@ class Ellipsoid:
 Shape = Rectangle | Ellipsoid
 
 
-def _on_unit_sphere(z: NDArray[np.float64], angle: NDArray[np.float64]) -> Points:
-    """Points by height and longitude, which starts at -x."""
-    across = np.sqrt(np.maximum(0.0, 1 - z * z))
-    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=-1)
+def cells_of(shape: Shape, up: Values, along: Values) -> Cells:
+    """Cut a shape into patches: see `Cells`."""
+    (y, x), (high, wide) = (
+        [each.ravel() for each in np.meshgrid(*pair, indexing="ij")]
+        for pair in ((_middles(up), _middles(along)), (np.diff(up) / 2, np.diff(along) / 2))
+    )
+    around = x[:, None] + _SIGNS[:, 0] * wide[:, None], y[:, None] + _SIGNS[:, 1] * high[:, None]
+    centre = shape.at(x, y)
+    return Cells(up, along, centre, shape.normals(centre), shape.at(*around))
 
 
 def _counts(length_m: float, edge_m: float) -> int:

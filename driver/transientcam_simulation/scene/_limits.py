@@ -4,7 +4,6 @@ It is counted as the light is built, by the same functions (`patch_edges_m`, `Sh
 """
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -22,22 +21,6 @@ Fewer where mirrors show them to each other.
 """
 _LEAST_PER_SIDE: Final = 4
 """Patches along the longest side of a surface, however small it is beside others."""
-
-
-@dataclass(frozen=True, slots=True)
-class Cost:
-    """What the light of a scene needs.
-
-    Attributes
-    ----------
-    mirror_paths
-        Chains of mirrors that are followed at most.
-    patches
-        Of scattering surfaces, between which light is followed; 0 where none is.
-    """
-
-    mirror_paths: int
-    patches: int
 
 
 def patch_edges_m(scene: Scene, per_side: int, *, moving: int = 0) -> dict[int, float]:
@@ -77,13 +60,6 @@ def most_patches(scene: Scene) -> int:
     return int(MOST_PATCHES / math.sqrt(1 + mirror_paths_of(scene)))
 
 
-def cost_of(scene: Scene) -> Cost:
-    """Return what the light of a scene needs, without computing any of it."""
-    transport = scene.transport
-    followed = transport.diffuse_bounces != 0
-    return Cost(mirror_paths_of(scene), patches_of(scene, transport.patches) if followed else 0)
-
-
 def require_modest(scene: Scene) -> None:
     """Refuse a scene that would take much memory or time to prepare.
 
@@ -95,16 +71,16 @@ def require_modest(scene: Scene) -> None:
     surfaces, transport = scene.surfaces, scene.transport
     if len(surfaces) > MOST_SURFACES:
         raise SceneError("the scene", "surface", len(surfaces), f"at most {MOST_SURFACES} tables")
-    cost = cost_of(scene)
-    if cost.mirror_paths > MOST_MIRROR_PATHS:
-        limit = f"fewer: {cost.mirror_paths} chains of mirrors are more than {MOST_MIRROR_PATHS}"
+    paths = mirror_paths_of(scene)
+    if paths > MOST_MIRROR_PATHS:
+        limit = f"fewer: {paths} chains of mirrors are more than {MOST_MIRROR_PATHS}"
         raise SceneError("the scene", "transport.mirror_bounces", transport.mirror_bounces, limit)
-    limit_of = most_patches(scene)
-    if cost.patches > limit_of:
+    limit_of, patches = most_patches(scene), patches_of(scene, transport.patches)
+    if transport.diffuse_bounces != 0 and patches > limit_of:
         fewer = (n for n in range(2, transport.patches) if patches_of(scene, n) <= limit_of)
         most = max(fewer, default=0)
         limit = (
             f"{f'at most {most} with these surfaces, or ' if most else ''}diffuse_bounces = 0: "
-            f"{cost.patches} patches are more than {limit_of}"
+            f"{patches} patches are more than {limit_of}"
         )
         raise SceneError("the scene", "transport.patches", transport.patches, limit)

@@ -47,7 +47,7 @@ def test_light_in_a_crease_is_that_of_a_path_tracer() -> None:
     """Near the crease, where so many equal patches are far off."""
     scene = stair(patches=12)
     assert scene.camera is not None
-    rows = np.arange(60, 84, 2)  # down the riser and over the tread, in the middle
+    rows = np.arange(65, 94, 2)  # down the riser and over the tread, in the middle
     pixel = rows * SIZE[0] + 80
     rays = rays_through(scene.camera, np.full(len(rows), 80), rows, width=SIZE[0], height=SIZE[1])
     lit = light_rays(scene, rays)
@@ -68,11 +68,11 @@ def test_light_in_a_crease_is_that_of_a_path_tracer() -> None:
 
 
 @pytest.mark.parametrize("patches", [6, 24])
-def test_there_are_at_most_twice_as_many_patches_as_the_scene_says(patches: int) -> None:
+def test_there_are_at_most_eight_times_as_many_patches_as_the_scene_says(patches: int) -> None:
     scene = stair(patches=patches)
 
     count = len(graded(scene, patches).patches)
-    assert count <= max(2 * len(Exchange.of(scene, patches).patches), 2 * 6 * 3)
+    assert count <= 8 * len(Exchange.of(scene, patches).patches)
 
 
 def test_where_light_changes_evenly_patches_stay_as_they_are() -> None:

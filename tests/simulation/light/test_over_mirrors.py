@@ -42,7 +42,7 @@ def room(*mirrors: tuple[int, int, int]) -> Scene:
         {MIRROR if way in mirrors else MATT}"""
         for way in ways
     )
-    return parse_scene(HEAD + walls)
+    return parse_scene(f"{HEAD}[transport]\npatches = 8\n{walls}")
 
 
 def straight_and_over(exchange: Exchange) -> list[NDArray[np.float64]]:
