@@ -27,13 +27,10 @@ _HISTOGRAM_PATCHES = 12  # a side, for the impulse response of a pixel
 class Gathering:
     """Light of patches, at any places, where rays end on the same surfaces, between their centres.
 
-    ``places``: patches around the end of each ray, and weights of the interpolation. ``see``: which
-    patches see any other; those that do not are behind something, and no pixel is beside them.
+    ``places``: patches around the end of each ray, and weights of the interpolation.
     """
 
-    def __init__(
-        self, scene: Scene, patches: Patches, lit: Lit, see: NDArray[np.bool_] | None = None
-    ) -> None:
+    def __init__(self, scene: Scene, patches: Patches, lit: Lit) -> None:
         self._lit, self._scatter = lit, lit.scatter(scene)
         count = len(lit.surface)
         index, weights = np.zeros((count, 4), dtype=np.intp), np.zeros((count, 4))
@@ -44,11 +41,6 @@ class Gathering:
                     lit.point[mine], cells
                 )
                 index[mine] += patches.first[surface]
-        if see is not None and not see.all():
-            seen = see[index]
-            beside = ~seen.all(axis=1) & (seen * weights > 0).any(axis=1)
-            some = (seen * weights)[beside].clip(0)
-            weights[beside] = some / some.sum(axis=1, keepdims=True)
         self.places: Bilinear = index, weights
 
     def moments(
@@ -99,10 +91,9 @@ class Interreflection:
         self._fine = fine
         self._exchange = exchange or Exchange.of(scene, scene.transport.patches)
         self._bounces = self._exchange.bounces(tolerance)
-        of = self._exchange.patches, self._exchange.factors.any(axis=1)
-        self._ends, *self._ends_of_fine = (
-            Gathering(scene, of[0], each, of[1]) for each in (lit, *(each.rays for each in fine))
-        )
+        patches = self._exchange.patches
+        self._ends = Gathering(scene, patches, lit)
+        self._ends_of_fine = [Gathering(scene, patches, each.rays) for each in fine]
 
     def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
         """``int g(tau) exp(2 pi i f tau) dtau`` of this light, (H, W)."""
