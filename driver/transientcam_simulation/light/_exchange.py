@@ -122,9 +122,11 @@ class Exchange:
         Of the first bounces only; the caller scales it to the light of all. Light is moved by
         whole bins, so that each bounce is off by half a bin at most.
         """
-        bin_m, over = SPEED_OF_LIGHT_M_S * BIN_S, self.over_mirrors
-        shift = np.rint(self.distance_m / bin_m).astype(np.intp)
-        later = np.rint(over.distance_m / bin_m).astype(np.intp)
+        straight, over = np.nonzero(self.factors), self.over_mirrors
+        to, by = np.append(straight[0], over.to), np.append(straight[1], over.by)
+        factors = np.append(self.factors[straight], over.factors)
+        far_m = np.append(self.distance_m[straight], over.distance_m)
+        shift = np.rint(far_m / (SPEED_OF_LIGHT_M_S * BIN_S)).astype(np.intp)
         scatter = scatter_of(self.scene, self.patches.surface)
         first_s = float(self.delay_s[self.radiosity > 0].min(initial=1.0))
         placed = np.rint((self.delay_s - first_s) / BIN_S).astype(np.intp)
@@ -136,8 +138,7 @@ class Exchange:
         tail = 0
         if scatter is not None:
             tail = int((8 * scatter.width_s.max() + 12 * scatter.decay_s.max()) / BIN_S) + 1
-        longest = max(int(shift.max()), int(later.max(initial=0)))
-        count = int(placed.max()) + bounces * (longest + tail) + 1
+        count = int(placed.max()) + bounces * (int(shift.max(initial=0)) + tail) + 1
         patches = len(self.patches)
         light = np.zeros((patches, count))
         index = np.broadcast_to(np.arange(patches)[None, :, None], placed.shape)
@@ -152,13 +153,9 @@ class Exchange:
                     continue
                 if scatter is not None:
                     given = _spread(given, scatter.width_s[q], scatter.decay_s[q], tail)
-                for p in np.flatnonzero(self.factors[:, q]):
-                    at = shift[p, q]
-                    got[p, at : at + len(given)] += (self.factors[p, q] * given)[: count - at]
-                for k in np.flatnonzero(over.by == q):
-                    at = later[k]
-                    part = (over.factors[k] * given)[: count - at]
-                    got[over.to[k], at : at + len(given)] += part
+                for k in np.flatnonzero(by == q):
+                    at = shift[k]
+                    got[to[k], at : at + len(given)] += (factors[k] * given)[: count - at]
             total += got
             light = self.patches.albedo[:, None] * got
         return first_s - BIN_S / 2, total

@@ -288,9 +288,8 @@ class SceneFacts:
         solved = min(2.0, image_period_s / light.step_s)
         moves = np.array([bool(each.motions) for each in self._scene.surfaces] + [False])
         shown = np.mean([moves[each.lits[0].surface].mean() for each in self._seen])
-        of_pixel_s = (
-            min(1.0, image_period_s / light.held_s) * moments * STILL_S + 2 * shown * MOVING_S
-        )
+        gathered = moments * min(1.0, image_period_s / light.held_s)
+        of_pixel_s = gathered * STILL_S + 2 * shown * MOVING_S
         of_pair_s = solved * (PAIR_S + moments * TURNED_S)
         width, height = self._size
         return len(light.patches) ** 2 * of_pair_s + width * height * float(of_pixel_s)
@@ -317,13 +316,12 @@ class SceneFacts:
         """Return how far coarser patches put off the brightness, in the middle of a step."""
         key = per_side, reach
         if key not in self._errors:
-            light = FurtherLight(self._scene, per_side=per_side, reach=reach)
             seen = self._seen[when]
+            light = FurtherLight(self._scene, per_side=per_side, reach=reach)
             around_s = (self._times_s[when] + by * light.step_s for by in (-0.5, 0.5))
             one, other = (light.solution(time_s, 0.0) for time_s in around_s)
-            late = (
-                light.held_s / light.step_s / 4
-            )  # of a step, that light which stands is off, on average
+            # of a step, that light which stands is off, on average
+            late = light.held_s / light.step_s / 4
             ends = Gathering(seen.scene, light.patches, seen.lits[0])
             coarse = ends.moments((0.5 - late) * one + (0.5 + late) * other, 0.0)
             if when not in self._in_full:

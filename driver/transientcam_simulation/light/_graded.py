@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._over_mirrors import OverMirrors
-from transientcam_simulation.light._patches import Cuts, Patches
+from transientcam_simulation.light._patches import Cuts, Patches, contour
 from transientcam_simulation.scene import Scene, evenly, most_patches, patches_of
 
 _OFF: Final = 1e-3
@@ -24,15 +24,14 @@ _BOUNCES: Final = 2  # judged
 _AFFORDED: Final = 1500  # patches, at most so many times as many as the scene says
 _TIMES: Final = 8
 _HIGHEST_HZ: Final = 150e6
-_LEAST: Final = 1e-5  # sr, of patches that are halved, where there would be too many, ...
-_HIGHER: Final = 1.25  # and a higher limit than that
+_LEAST: Final = 1e-6  # share of the view, of patches that are halved where not all can be, ...
+_HIGHER: Final = 1.25  # and how much larger they are next
 
 
 def graded(scene: Scene, per_side: int) -> Exchange:
     """Find the light between patches of a scene that stands still, over mirrors, too.
 
-    Of no more patches than if its longest side were cut into ``per_side`` equal ones, or than can
-    be afforded.
+    Of as many as if its longest side were cut into ``per_side`` equal ones, or can be afforded.
     """
     equal = patches_of(scene, per_side)
     most = min(max(equal, min(_AFFORDED, _TIMES * equal)), most_patches(scene))
@@ -52,7 +51,6 @@ def graded(scene: Scene, per_side: int) -> Exchange:
 
 
 def _count(cuts: dict[int, Cuts]) -> int:
-    """Return how many patches there are in all."""
     return sum((len(up) - 1) * (len(along) - 1) for up, along in cuts.values())
 
 
@@ -63,7 +61,7 @@ def _finer(exchange: Exchange, most: float) -> dict[int, Cuts]:
     bounces = min(_BOUNCES, exchange.bounces(_OFF * float(direct.max())))
     got = np.stack([exchange.irradiance(f, bounces) for f in (0.0, _HIGHEST_HZ)])
     light = patches.albedo * got
-    limit, seen = _OFF * float((direct + light[0].real).max()), _solid_angles(exchange)
+    limit, seen = _OFF * float((direct + light[0].real).max()), _shown(exchange)
     worth = {}
     for k, cells in patches.cells.items():
         mine = slice(patches.first[k], patches.first[k] + len(cells.centre))
@@ -84,16 +82,14 @@ def _finer(exchange: Exchange, most: float) -> dict[int, Cuts]:
         least = max(_HIGHER * least, _LEAST)
 
 
-def _solid_angles(exchange: Exchange) -> NDArray[np.float64]:
-    """Return how large patches are to the camera (N), as far as they face it or mirrors."""
-    scene, patches = exchange.scene, exchange.patches
-    assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
-    way = scene.camera.position_m - patches.centre
-    one, other = patches.corners[:, 2:].swapaxes(0, 1) - patches.corners[:, :2].swapaxes(0, 1)
-    area = np.linalg.norm(np.cross(one, other), axis=1) / 2
-    angles = np.einsum("nc,nc->n", way, patches.normal) / np.linalg.norm(way, axis=1) ** 3 * area
+def _shown(exchange: Exchange) -> NDArray[np.float64]:
+    """Return how large each patch (N) is to the camera, at least an average one behind mirrors."""
+    scene, camera = exchange.scene, exchange.scene.camera
+    assert camera is not None  # noqa: S101  (a scene of surfaces has one)
+    corners, axis = exchange.patches.corners, camera.look_at_m - camera.position_m
+    shown = contour(corners - camera.position_m, np.broadcast_to(axis, (len(corners), 3)))
     mirrors = any(each.kind == "mirror" for each in scene.surfaces)
-    return np.abs(angles) if mirrors else angles.clip(0)
+    return np.maximum(shown, shown.mean()) if mirrors else shown
 
 
 def _off(light: NDArray[np.complex128], cuts: NDArray[np.float64]) -> NDArray[np.float64]:

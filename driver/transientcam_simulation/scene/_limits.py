@@ -56,8 +56,11 @@ def mirror_paths_of(scene: Scene) -> int:
 
 
 def most_patches(scene: Scene) -> int:
-    """Return into how many patches surfaces may be cut: they see each other over mirrors, too."""
-    return int(MOST_PATCHES / math.sqrt(1 + mirror_paths_of(scene)))
+    """Return into how many patches surfaces may be cut: they see each other over mirrors, too.
+
+    But for scenes that move.
+    """
+    return int(MOST_PATCHES / math.sqrt(1 + (0 if scene.moves else mirror_paths_of(scene))))
 
 
 def require_modest(scene: Scene) -> None:
