@@ -33,7 +33,7 @@ _RESOLUTIONS = tuple((per_side, reach) for per_side in (6, 9, 13, 18) for reach 
 """Patches a side, and their edges that anything moves in a step, where these are fine enough."""
 _BEYOND = 0.01  # of the pixels, which coarser patches may put off by more
 PAIR_S, TURNED_S = 3e-7, 3e-8  # processor time: of two patches, and of a moment between them, ...
-STILL_S, MOVING_S = 1.5e-7, 3e-8  # and of a moment on a pixel of what stands still, and moves
+STILL_S, MOVING_S = 2e-8, 3e-8  # and of a moment on a pixel of what stands still, and moves
 _ROUGH_PATCHES = 6  # a side, to estimate interreflection
 _ROUGH_ERROR = 1.5  # by which that may be too low
 

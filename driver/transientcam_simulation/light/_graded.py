@@ -65,11 +65,10 @@ def _finer(exchange: Exchange, most: float) -> dict[int, Cuts]:
     worth = {}
     for k, cells in patches.cells.items():
         mine = slice(patches.first[k], patches.first[k] + len(cells.centre))
-        rows, shown = (
-            each[..., mine].reshape(-1, cells.rows, cells.columns) for each in (light, seen)
-        )
-        up = (_off(rows, cells.up) > limit) * shown[0]
-        along = (_off(rows.swapaxes(1, 2), cells.along) > limit) * shown[0].T
+        rows = light[:, mine].reshape(-1, cells.rows, cells.columns)
+        shown = seen[mine].reshape(cells.rows, cells.columns)
+        up = (_off(rows, cells.up) > limit) * shown
+        along = (_off(rows.swapaxes(1, 2), cells.along) > limit) * shown.T
         worth[k] = up.max(axis=1), along.max(axis=1)
     least = 0.0
     while True:

@@ -276,8 +276,8 @@ class SurfaceScenery:
         held: Callable[[float], HeldLight | None] = nothing
         if further:
             per_side, reach = self.facts.resolution(wanted.noise)
-            light = FurtherLight(scene, per_side=per_side, reach=reach, tolerance=tolerance)
-            held = held_light(light, still)
+            of = FurtherLight(scene, per_side=per_side, reach=reach, tolerance=tolerance)
+            held = held_light(of, still)
 
         far = {"pixel_rad": still.pixel_rad, "every_s": wanted.image_period_s}
         steps = Steps(scene, lambda time_s: moving.at(time_s, held(time_s)), **far)
