@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._graded import graded
 from transientcam_simulation.light._paths import Lit, light_rays
 from transientcam_simulation.light._radiosity import Interreflection
 from transientcam_simulation.light._rays import rays_through
@@ -55,7 +56,7 @@ def _followed_further(scene: Scene) -> tuple[Scene, Exchange] | None:
     if scene.transport.diffuse_bounces == 0 or sum(each.scatters for each in scene.surfaces) < 2:
         return None
     every = replace(scene, transport=replace(scene.transport, diffuse_bounces=BOUNCES))
-    return every, Exchange.of(every, every.transport.patches)
+    return every, graded(every, every.transport.patches)
 
 
 def _rays(scene: Scene, pixel: Pixels, size: tuple[int, int], places: Places) -> Lit:

@@ -18,7 +18,7 @@ class Missing(NamedTuple):
 MISSING = [
     Missing(*each.split(" | "))
     for each in (
-        "mirrors-between | light over a mirror from one scattering surface to another | "
+        "mirrors-between | light over a mirror from one surface to another where some move | "
         "mirrors show {share} of the pixels' surfaces other lit ones",
         "gloss-of-surroundings | gloss that reflects more than the lamp, or shines on surfaces | "
         "gloss sends on light of surfaces, or to surfaces, in {share} of the pixels",

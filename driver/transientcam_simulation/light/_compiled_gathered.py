@@ -3,13 +3,24 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_simulation.compiled import LINE, NUMBERS, WHOLE, kernel
+from transientcam_simulation.compiled import AROUND, LINE, NUMBERS, WHOLE, kernel
 from transientcam_simulation.light._coverage import LEAST, ONE, ZERO, Plane
 
 _HALF, _QUARTER, _TURN = np.float32(0.5), np.float32(0.25), np.float32(2 * np.pi)
 _FIRST, _THIRD = np.float32(-0.327622764), np.float32(0.15931422)
 _FIFTH = np.float32(-0.0464964749)
 """Of the arc tangent of what is between 0 and 1, which they give within 0.002."""
+
+
+@kernel(AROUND, WHOLE, WHOLE, WHOLE)
+def on_ends(places: NDArray[np.int32], shares: Plane, light: Plane, on: Plane) -> None:
+    """Put moments (P, 2) on points, given those of patches (M, 2) and shares (P, 4) of four."""
+    for i in range(len(places)):
+        for part in range(2):
+            total = ZERO
+            for k in range(4):
+                total += shares[i, k] * light[places[i, k], part]
+            on[i, part] = total
 
 
 @kernel(LINE, LINE, LINE, WHOLE, NUMBERS, WHOLE, WHOLE)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import BIN_S, Scatter, ask
+from transientcam_simulation.light._over_mirrors import NOTHING, OverMirrors
 from transientcam_simulation.light._patches import Patches, form_factors
 from transientcam_simulation.light._paths import image_lights, light_on, normals_at, scatter_of
 from transientcam_simulation.scene import Points, Scene
@@ -29,6 +30,8 @@ class Exchange:
     delay_s, radiosity
         (K, N, S) direct light on S samples of each patch by each chain of mirrors, and what it
         gives on.
+    over_mirrors
+        What mirrors show patches of each other.
     """
 
     scene: Scene
@@ -37,15 +40,19 @@ class Exchange:
     distance_m: NDArray[np.float32]
     delay_s: NDArray[np.float64]
     radiosity: NDArray[np.float64]
+    over_mirrors: OverMirrors
 
     @classmethod
-    def of(cls, scene: Scene, per_side: int) -> "Exchange":
-        """Cut surfaces into patches, and find the light between them."""
-        return cls.between(scene, Patches.of(scene, per_side))
+    def of(cls, scene: Scene, per_side: int, *, mirrors: bool = False) -> "Exchange":
+        """Cut surfaces into patches, and find the light between them: see `between`."""
+        return cls.between(scene, Patches.of(scene, per_side), mirrors=mirrors)
 
     @classmethod
-    def between(cls, scene: Scene, patches: Patches) -> "Exchange":
-        """Compute form factors and distances between patches, and the direct light on each."""
+    def between(cls, scene: Scene, patches: Patches, *, mirrors: bool = False) -> "Exchange":
+        """Compute form factors and distances between patches, and the direct light on each.
+
+        ``mirrors``: also of what patches see of each other in mirrors.
+        """
         factors = form_factors(scene, patches, patches.centre, patches.normal)
         squared = np.maximum(
             np.sum(patches.centre**2, 1)[:, None]
@@ -61,6 +68,7 @@ class Exchange:
             np.sqrt(squared).astype(np.float32),
             delay_s,
             radiosity,
+            OverMirrors.of(scene, patches) if mirrors else NOTHING,
         )
 
     def bounces(self, tolerance: float) -> int:
@@ -76,7 +84,9 @@ class Exchange:
         highest = [float(light.max(initial=0.0))]
         for bounce in range(_MOST_BOUNCES):
             ask()
-            light = self.patches.albedo * (self.factors @ light)
+            got = self.factors @ light.astype(np.float32)
+            got = got + self.over_mirrors.irradiance(light, 0.0).real
+            light = self.patches.albedo * got
             highest.append(float(light.max(initial=0.0)))
             share = min(highest[-1] / highest[-2], 0.999) if highest[-2] else 0.0
             if highest[-1] / (1 - share) <= tolerance:
@@ -100,6 +110,7 @@ class Exchange:
             got = (in_phase @ of_real - quadrature @ of_imag) + 1j * (
                 in_phase @ of_imag + quadrature @ of_real
             )
+            got = got + self.over_mirrors.irradiance(given, frequency_hz)
             total += got
             light = self.patches.albedo * got
         return total
@@ -111,7 +122,11 @@ class Exchange:
         Of the first bounces only; the caller scales it to the light of all. Light is moved by
         whole bins, so that each bounce is off by half a bin at most.
         """
-        shift = np.rint(self.distance_m / (SPEED_OF_LIGHT_M_S * BIN_S)).astype(np.intp)
+        straight, over = np.nonzero(self.factors), self.over_mirrors
+        to, by = np.append(straight[0], over.to), np.append(straight[1], over.by)
+        factors = np.append(self.factors[straight], over.factors)
+        far_m = np.append(self.distance_m[straight], over.distance_m)
+        shift = np.rint(far_m / (SPEED_OF_LIGHT_M_S * BIN_S)).astype(np.intp)
         scatter = scatter_of(self.scene, self.patches.surface)
         first_s = float(self.delay_s[self.radiosity > 0].min(initial=1.0))
         placed = np.rint((self.delay_s - first_s) / BIN_S).astype(np.intp)
@@ -123,7 +138,7 @@ class Exchange:
         tail = 0
         if scatter is not None:
             tail = int((8 * scatter.width_s.max() + 12 * scatter.decay_s.max()) / BIN_S) + 1
-        count = int(placed.max()) + bounces * (int(shift.max()) + tail) + 1
+        count = int(placed.max()) + bounces * (int(shift.max(initial=0)) + tail) + 1
         patches = len(self.patches)
         light = np.zeros((patches, count))
         index = np.broadcast_to(np.arange(patches)[None, :, None], placed.shape)
@@ -138,9 +153,9 @@ class Exchange:
                     continue
                 if scatter is not None:
                     given = _spread(given, scatter.width_s[q], scatter.decay_s[q], tail)
-                for p in np.flatnonzero(self.factors[:, q]):
-                    at = shift[p, q]
-                    got[p, at : at + len(given)] += (self.factors[p, q] * given)[: count - at]
+                for k in np.flatnonzero(by == q):
+                    at = shift[k]
+                    got[to[k], at : at + len(given)] += (factors[k] * given)[: count - at]
             total += got
             light = self.patches.albedo[:, None] * got
         return first_s - BIN_S / 2, total

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from transientcam_simulation.base import PINHOLE
 from transientcam_simulation.effects import WORST_ABOVE, Glimpse, Noise, Values
 from transientcam_simulation.light._exchange import Exchange
-from transientcam_simulation.light._further_light import HELD_STEPS, FurtherLight
+from transientcam_simulation.light._further_light import FurtherLight
 from transientcam_simulation.light._missing import SampledWays, sampled_glimpses
 from transientcam_simulation.light._paths import Lit, light_rays
 from transientcam_simulation.light._radiosity import Gathering, Interreflection
@@ -29,10 +29,11 @@ _WITHIN_AT_THIN = 16  # places, where something may be so thin that these four m
 _FREQUENCIES = 8  # judged at most; the highest one always
 _ROUNDING = 1e-9
 _KEPT = 32  # changes by effects, for the last few sequences
-_PATCHES = (6, 9, 13, 18)  # a side, where something moves, if they are fine enough
+_RESOLUTIONS = tuple((per_side, reach) for per_side in (6, 9, 13, 18) for reach in (1.0, 0.5))
+"""Patches a side, and their edges that anything moves in a step, where these are fine enough."""
 _BEYOND = 0.01  # of the pixels, which coarser patches may put off by more
 PAIR_S, TURNED_S = 3e-7, 3e-8  # processor time: of two patches, and of a moment between them, ...
-STILL_S, MOVING_S = 1.5e-7, 3e-8  # and of a moment on a pixel of what stands still, and moves
+STILL_S, MOVING_S = 2e-8, 3e-8  # and of a moment on a pixel of what stands still, and moves
 _ROUGH_PATCHES = 6  # a side, to estimate interreflection
 _ROUGH_ERROR = 1.5  # by which that may be too low
 
@@ -81,7 +82,8 @@ class SceneFacts:
         self._found = Recent(_KEPT)
         self._left_out: dict[str, list[list[_SampledView]]] = {}
         self._rough = min(_ROUGH_PATCHES, scene.transport.patches)
-        self._errors: dict[int, Values] = {}  # by patches a side; 0: the light itself
+        self._errors: dict[tuple[int, float], Values] = {}
+        self._in_full: dict[int, Values] = {}  # light over several surfaces, by time
 
     @property
     def glimpses(self) -> tuple[Glimpse, ...]:
@@ -126,7 +128,8 @@ class SceneFacts:
     @cached_property
     def _sampled(self) -> tuple[tuple[SampledWays, ...], tuple[Glimpse, ...]]:
         scenes = tuple(each.scene for each in self._seen)
-        return sampled_glimpses(scenes, self._rays(self._camera), self.glimpses)
+        rays, moves = self._rays(self._camera), self._scene.moves
+        return sampled_glimpses(scenes, rays, self.glimpses, moves=moves)
 
     def further_bounces(self, tolerance: float) -> int:
         """Return how often light goes from surface to surface until less than this is left."""
@@ -134,7 +137,11 @@ class SceneFacts:
 
     @cached_property
     def _rough_exchange(self) -> Exchange:
-        return Exchange.of(self._scene.at(self._times_s[0]), self._rough)
+        return self._exchange(self._scene.at(self._times_s[0]), self._rough)
+
+    def _exchange(self, scene: Scene, per_side: int) -> Exchange:
+        """Find light between surfaces, over mirrors only where nothing moves."""
+        return Exchange.of(scene, per_side, mirrors=not self._scene.moves)
 
     def _changes(
         self, effect: str, frequencies_hz: tuple[float, ...], during_s: float
@@ -276,52 +283,58 @@ class SceneFacts:
         """Return what light over several surfaces costs in each image where they move."""
         if not self._scene.moves:
             return 0.0
-        light = FurtherLight(self._scene, per_side=self.patches_a_side(noise))
+        per_side, reach = self.resolution(noise)
+        light = FurtherLight(self._scene, per_side=per_side, reach=reach)
         solved = min(2.0, image_period_s / light.step_s)
         moves = np.array([bool(each.motions) for each in self._scene.surfaces] + [False])
         shown = np.mean([moves[each.lits[0].surface].mean() for each in self._seen])
-        of_pixel_s = min(1.0, solved / HELD_STEPS) * moments * STILL_S + 2 * shown * MOVING_S
+        gathered = moments * min(1.0, image_period_s / light.held_s)
+        of_pixel_s = gathered * STILL_S + 2 * shown * MOVING_S
         of_pair_s = solved * (PAIR_S + moments * TURNED_S)
         width, height = self._size
         return len(light.patches) ** 2 * of_pair_s + width * height * float(of_pixel_s)
 
-    def patches_a_side(self, noise: Noise) -> int:
+    def resolution(self, noise: Noise) -> tuple[int, float]:
         """Return how finely surfaces must be cut for few pixels to be off where some move.
 
-        Coarser patches have longer steps of time (`FurtherLight`), whose errors count, too.
+        Patches a side, and how many of their edges anything may move from one solution to the next.
         """
         light, most = self._further_light, self._scene.transport.patches
         if not light:
-            return most
+            return most, _RESOLUTIONS[-1][1]
         when = int(np.argmax([each.sum() for each in light]))
         glimpse = self.glimpses[when]
         limit = WORST_ABOVE * noise.deviation(glimpse.brightness, glimpse.reflectance)
         if np.mean(light[when] > limit) < _BEYOND:  # whatever its error
-            return min(_PATCHES[0], most)
-        for per_side in (each for each in _PATCHES if each < most):
-            if np.mean(self._error(per_side, when) > limit) < _BEYOND:
-                return per_side
-        return most
+            return min(_RESOLUTIONS[0][0], most), _RESOLUTIONS[0][1]
+        for per_side, reach in (each for each in _RESOLUTIONS if each[0] < most):
+            if np.mean(self._error(per_side, reach, when) > limit) < _BEYOND:
+                return per_side, reach
+        return most, _RESOLUTIONS[-1][1]
 
-    def _error(self, per_side: int, when: int) -> Values:
+    def _error(self, per_side: int, reach: float, when: int) -> Values:
         """Return how far coarser patches put off the brightness, in the middle of a step."""
-        if per_side not in self._errors:
-            seen, light = self._seen[when], FurtherLight(self._scene, per_side=per_side)
+        key = per_side, reach
+        if key not in self._errors:
+            seen = self._seen[when]
+            light = FurtherLight(self._scene, per_side=per_side, reach=reach)
             around_s = (self._times_s[when] + by * light.step_s for by in (-0.5, 0.5))
             one, other = (light.solution(time_s, 0.0) for time_s in around_s)
-            late = HELD_STEPS / 4  # of a step, that light which stands is off, on average
+            # of a step, that light which stands is off, on average
+            late = light.held_s / light.step_s / 4
             ends = Gathering(seen.scene, light.patches, seen.lits[0])
             coarse = ends.moments((0.5 - late) * one + (0.5 + late) * other, 0.0)
-            if 0 not in self._errors:
-                self._errors[0] = self._further(seen, self._scene.transport.patches)
-            self._errors[per_side] = np.abs(coarse - self._errors[0])
-        return self._errors[per_side]
+            if when not in self._in_full:
+                self._in_full[when] = self._further(seen, self._scene.transport.patches)
+            self._errors[key] = np.abs(coarse - self._in_full[when])
+        return self._errors[key]
 
     def _further(self, seen: _SampledView, per_side: int) -> Values:
         """Return the brightness of light over several surfaces."""
-        transport = replace(self._scene.transport, patches=per_side)
-        scene, (height, width) = replace(seen.scene, transport=transport), self._shape
-        light = Interreflection(scene, seen.lits[0], width=width, height=height)
+        exchange, (height, width) = self._exchange(seen.scene, per_side), self._shape
+        light = Interreflection(
+            seen.scene, seen.lits[0], width=width, height=height, exchange=exchange
+        )
         brightness: Values = light.moments(0.0).real.ravel()
         return brightness
 
@@ -331,6 +344,7 @@ class SceneFacts:
         transport = self._scene.transport
         scattering = [each for each in self._scene.surfaces if each.scatters]
         flat = len(scattering) == 1 and isinstance(scattering[0].shape, Rectangle)
+        flat = flat and not any(each.kind == "mirror" for each in self._scene.surfaces)
         if flat or not scattering or transport.diffuse_bounces == 0:
             return ()
         return tuple(_ROUGH_ERROR * self._further(each, self._rough) for each in self._seen)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._graded import graded
 from transientcam_simulation.light._paths import Lit, light_rays
 from transientcam_simulation.light._rays import RAYS, camera_rays, rays_within
 from transientcam_simulation.scene import Scene
@@ -59,7 +60,7 @@ class FollowedRays:
     @cached_property
     def exchange(self) -> Exchange:
         """Light that surfaces give each other."""
-        return Exchange.of(self.scene, self.scene.transport.patches)
+        return graded(self.scene, self.scene.transport.patches)
 
     def within(self, pixel: NDArray[np.intp], count: int = RAYS) -> Within:
         """Return the light of several rays in each pixel.

@@ -1,7 +1,7 @@
 """Light that surfaces give each other where some move, as a function of the time alone.
 
 It is solved at steps of time, and interpolated in the patches' own places: what moves takes its
-light with it. `SceneFacts.patches_a_side` says how fine patches, and with them steps, must be.
+light with it. `SceneFacts.resolution` says how fine patches and steps must be.
 """
 
 import math
@@ -16,8 +16,8 @@ from transientcam_simulation.light._patches import Patches
 from transientcam_simulation.light._recent import Recent
 from transientcam_simulation.scene import Points, Scene, patch_edges_m
 
-HELD_STEPS: Final = 0.5  # of a step, for which what patches give the pixels stands
-_STEP_PATCHES = 0.5  # of the largest patches' edges, that anything moves in a step at most
+_HELD_PATCHES: Final = 0.25
+"""Of the largest patches' edges: that anything moves while what patches give the pixels stands."""
 _LONGEST_S = 3600.0  # of a step
 _EXCHANGES, _SOLVED = 3, 128  # kept
 
@@ -26,12 +26,15 @@ class FurtherLight:
     """Light over several surfaces, on patches, at any time, but for what is below a tolerance.
 
     ``per_side``: patches along the longest side of what stands still; the rest is cut as the scene
-    says.
+    says. ``reach``: how many edges of the largest patches anything moves in a step at most.
     """
 
-    def __init__(self, scene: Scene, *, per_side: int, tolerance: float = 1e-4) -> None:
+    def __init__(
+        self, scene: Scene, *, per_side: int, reach: float = 0.5, tolerance: float = 1e-4
+    ) -> None:
         self._scene, self._per_side, self._tolerance = scene, per_side, tolerance
-        self._reach_m = _STEP_PATCHES * max(patch_edges_m(scene, per_side).values())
+        self._reach_m = reach * max(patch_edges_m(scene, per_side).values())
+        self._held_steps = _HELD_PATCHES / reach
         self._exchanges: Recent[float, tuple[Exchange, int]] = Recent(_EXCHANGES)
         self._solved: Recent[tuple[float, float], NDArray[np.complex128]] = Recent(_SOLVED)
 
@@ -46,6 +49,11 @@ class FurtherLight:
         """Time between solutions."""
         speeds_m_s = (sum(each.speed_m_s for each in of.motions) for of in self._scene.surfaces)
         return self._reach_m / max(*speeds_m_s, self._reach_m / _LONGEST_S)
+
+    @property
+    def held_s(self) -> float:
+        """Time for which what patches give the pixels stands."""
+        return self._held_steps * self.step_s
 
     def irradiance(self, time_s: float, frequency_hz: float) -> NDArray[np.complex128]:
         """Moments (N) of the light that patches get from each other."""

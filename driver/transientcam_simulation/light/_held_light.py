@@ -13,7 +13,7 @@ from transientcam_simulation.light import (
     _compiled_gathered as compiled_gathered,
     _compiled_light as compiled_light,
 )
-from transientcam_simulation.light._further_light import HELD_STEPS, FurtherLight
+from transientcam_simulation.light._further_light import FurtherLight
 from transientcam_simulation.light._hit_points import LitEnds
 from transientcam_simulation.light._paths import scatter_of
 from transientcam_simulation.light._radiosity import Gathering
@@ -22,13 +22,37 @@ from transientcam_simulation.light._still import StillLight
 from transientcam_simulation.scene import Ellipsoid
 
 _FREQUENCIES = 32  # kept
+_WAYS = 8  # kept
+
+
+class StillEnds:
+    """Places on what stands still where rays end, and their ways to the camera."""
+
+    def __init__(self, light: FurtherLight, still: StillLight) -> None:
+        lit = replace(still.lit, reflectance=still.reflectance.astype(np.float64))
+        self._ends = Gathering(still.scene, light.patches, lit)
+        index, shares = self._ends.places
+        self.places = index.astype(np.int32), shares.astype(np.float32)
+        self._ways: Recent[float, NDArray[np.complex64]] = Recent(_WAYS)
+
+    def moments(self, light: NDArray[np.complex64], frequency_hz: float) -> Moments:
+        """Return the moments (P) that the camera sees, given those on the patches."""
+
+        def way() -> NDArray[np.complex64]:
+            return self._ends.way(frequency_hz).astype(np.complex64)
+
+        moments = np.empty(len(self.places[0]), dtype=np.complex64)
+        pairs = (each.view(np.float32).reshape(-1, 2) for each in (light, moments))
+        compiled_gathered.on_ends(*self.places, *pairs)
+        moments *= self._ways.get(frequency_hz, way)
+        return moments if frequency_hz else moments.real
 
 
 class HeldLight:
     """The light of patches at a time, on ``ends`` of rays on what stands still, and on the rest."""
 
     def __init__(
-        self, light: FurtherLight, still: StillLight, ends: Gathering, time_s: float
+        self, light: FurtherLight, still: StillLight, ends: StillEnds, time_s: float
     ) -> None:
         self._patches, self._still, self._ends = light.patches, still, ends
         self._moments: Recent[float, Moments] = Recent(_FREQUENCIES)
@@ -42,9 +66,8 @@ class HeldLight:
 
         def found() -> Moments:
             direct = self._still.moments(frequency_hz)
-            gathered = self._ends.moments(self._of_patches(frequency_hz), frequency_hz)
-            more = gathered if frequency_hz else gathered.real
-            return direct + more.reshape(direct.shape).astype(direct.dtype)
+            more = self._ends.moments(self._of_patches(frequency_hz), frequency_hz)
+            return direct + more.reshape(direct.shape)
 
         return self._moments.get(frequency_hz, found)
 
@@ -65,7 +88,7 @@ class HeldLight:
                 spans.append((part.start, part.stop, first, grid.rows, grid.columns))
             else:
                 point = np.stack([each[part] for each in ends.point], axis=-1, dtype=np.float64)
-                cells, shares = shape.between_cells(point, grid.rows, grid.columns)
+                cells, shares = shape.between_cells(point, grid)
                 moments[part] = np.einsum("pk,pk->p", shares, light[cells + first])
         of = np.array(balls, np.float32).reshape(-1, 6), np.array(spans, np.int64).reshape(-1, 5)
         pairs = (each.view(np.float32).reshape(-1, 2) for each in (light, moments))
@@ -88,9 +111,7 @@ class HeldLight:
 
 def held_light(light: FurtherLight, still: StillLight) -> Callable[[float], HeldLight]:
     """Return the light that stands at any time: that of the middle of its part of a step."""
-    lit = replace(still.lit, reflectance=still.reflectance.astype(np.float64))
-    ends = Gathering(still.scene, light.patches, lit)
-    held_s = HELD_STEPS * light.step_s
+    ends, held_s = StillEnds(light, still), light.held_s
     kept: Recent[int, HeldLight] = Recent(3)
 
     def at(time_s: float) -> HeldLight:

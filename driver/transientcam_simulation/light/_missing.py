@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import ask
 from transientcam_simulation.effects import Glimpse, Values
+from transientcam_simulation.light._graded import graded
 from transientcam_simulation.light._paths import (
     RayEnds,
     first_scattering,
@@ -53,8 +54,13 @@ class SampledWays:
     kind: NDArray[np.intp]
 
     @classmethod
-    def of(cls, scene: Scene, rays: Points, *, paths: int = _PATHS) -> "SampledWays":
-        """Follow so many random paths from where each ray of the camera ends, twice."""
+    def of(
+        cls, scene: Scene, rays: Points, *, paths: int = _PATHS, moves: bool = False
+    ) -> "SampledWays":
+        """Follow so many random paths from where each ray of the camera ends, twice.
+
+        ``moves``: surfaces of which some move give each other no light over mirrors.
+        """
         assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
         pixels, random = len(rays), np.random.default_rng(0)
         ends = first_scattering(scene, scene.camera.position_m, rays)
@@ -80,7 +86,7 @@ class SampledWays:
             normal = normals_at(scene, ends.point, ends.surface)
             albedo = ends.throughput * _of(scene, "reflectivity")[ends.surface]
             cut = _BOUNCES if most is not None and further > most else min(further - 1, _FOLLOWED)
-            kind = np.where(glossy, _GLOSS, np.where(over, _MIRRORS, cut))
+            kind = np.where(glossy, _GLOSS, np.where(over & moves, _MIRRORS, cut))
             for light in lights:
                 far_m, irradiance = light_on(scene, light, ends.point, normal)
                 gloss = highlight(scene, light, ends, normal)
@@ -125,7 +131,8 @@ class SampledWays:
         once = replace(self.scene.transport, diffuse_bounces=1)
         scene = without_scattering(replace(self.scene, transport=once))
         lit = light_rays(scene, self.rays)
-        patches = Interreflection(scene, lit, width=len(self.rays), height=1)
+        exchange = graded(scene, scene.transport.patches)
+        patches = Interreflection(scene, lit, width=len(lit.surface), height=1, exchange=exchange)
         seen = patches.moments(frequency_hz)[0]
         one, other = self._moments(_FIRST, frequency_hz)
         power = _power(one - seen, other - seen)
@@ -135,12 +142,12 @@ class SampledWays:
 
 
 def sampled_glimpses(
-    scenes: tuple[Scene, ...], rays: Points, seen: tuple[Glimpse, ...]
+    scenes: tuple[Scene, ...], rays: Points, seen: tuple[Glimpse, ...], *, moves: bool
 ) -> tuple[tuple[SampledWays, ...], tuple[Glimpse, ...]]:
     """Sample scenes at some times: of the pixels judged then, by their rays, a few drawn once."""
     count = min(len(rays), PIXELS // len(seen))
     some = np.sort(np.random.default_rng(1).choice(len(rays), count, replace=False))
-    ways = tuple(SampledWays.of(scene, rays[some]) for scene in scenes)
+    ways = tuple(SampledWays.of(scene, rays[some], moves=moves) for scene in scenes)
     parts = zip((each.brightness[some] for each in seen), ways, strict=True)
     bright = [direct + each.followed for direct, each in parts]
     return ways, tuple(

@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from transientcam_simulation.base import ask
 from transientcam_simulation.light._paths import blocked
-from transientcam_simulation.scene import Cells, Points, Scene, patch_edges_m
+from transientcam_simulation.scene import Cells, Points, Scene, cells_of, evenly, patch_edges_m
 
+Cuts = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Where a surface is cut over its height, and over its width or longitude."""
 _BLOCK = 1 << 18  # segments at a time
 
 
@@ -27,7 +29,6 @@ class Patches:
     surface: NDArray[np.intp]
     centre: Points
     normal: Points
-    area: NDArray[np.float64]
     corners: Points
     albedo: NDArray[np.float64]
     cells: dict[int, Cells]
@@ -35,28 +36,28 @@ class Patches:
 
     def __len__(self) -> int:
         """Patches in all."""
-        return len(self.area)
+        return len(self.centre)
 
     @classmethod
     def of(cls, scene: Scene, per_side: int, *, moving: int = 0) -> "Patches":
         """Cut the longest side of all surfaces into so many patches: see `patch_edges_m`."""
-        scattering = {k: each for k, each in enumerate(scene.surfaces) if each.scatters}
-        cells = {
-            index: scattering[index].shape.cells(edge_m)
-            for index, edge_m in patch_edges_m(scene, per_side, moving=moving).items()
-        }
-        counts = {index: len(grid.area) for index, grid in cells.items()}
-        first = dict(zip(counts, np.cumsum([0, *counts.values()]).tolist(), strict=False))
-        grids = list(cells.values())
+        edges_m = patch_edges_m(scene, per_side, moving=moving).items()
+        counts = {k: scene.surfaces[k].shape.grid(edge_m) for k, edge_m in edges_m}
+        return cls.cut(scene, {k: (evenly(up), evenly(along)) for k, (up, along) in counts.items()})
+
+    @classmethod
+    def cut(cls, scene: Scene, cuts: dict[int, Cuts]) -> "Patches":
+        """Cut the scattering surfaces, by their index, at places from -1 to 1."""
+        cells = {index: cells_of(scene.surfaces[index].shape, *at) for index, at in cuts.items()}
+        grids, counts = list(cells.values()), [len(grid.centre) for grid in cells.values()]
         return cls(
-            np.repeat(list(counts), list(counts.values())),
+            np.repeat(list(cells), counts),
             np.concatenate([grid.centre for grid in grids]),
             np.concatenate([grid.normal for grid in grids]),
-            np.concatenate([grid.area for grid in grids]),
             np.concatenate([grid.corners for grid in grids]),
-            np.repeat([s.reflectivity for s in scattering.values()], list(counts.values())),
+            np.repeat([scene.surfaces[index].reflectivity for index in cells], counts),
             cells,
-            first,
+            dict(zip(cells, np.cumsum([0, *counts]).tolist(), strict=False)),
         )
 
     def moved(self, by_m: Points) -> "Patches":
@@ -85,7 +86,7 @@ def form_factors(scene: Scene, patches: Patches, at: Points, normal: Points) -> 
         if hides:
             clear = ~_blocked(scene, patches, at[block][p], n)
             p, n = p[clear], n[clear]
-        factors[block][p, n] = _contour(
+        factors[block][p, n] = contour(
             patches.corners[n] - at[block][p][:, None, :], normal[block][p]
         )
     return factors
@@ -105,7 +106,7 @@ def _convex(scene: Scene) -> bool:
     return all(hasattr(surface.shape, "right") for surface in scene.surfaces)
 
 
-def _contour(corners: Points, normal: Points) -> NDArray[np.float64]:
+def contour(corners: Points, normal: Points) -> NDArray[np.float64]:
     """Form factor of polygons (P, 4, 3), relative to points with normals (P, 3)."""
     unit = np.ascontiguousarray(corners.transpose(1, 2, 0))  # long rows, along the polygons
     unit /= np.sqrt(np.einsum("kcp,kcp->kp", unit, unit))[:, None]

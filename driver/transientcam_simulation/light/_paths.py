@@ -338,7 +338,7 @@ def light_on(
     for mirror in light.mirrors:
         received *= mirror.reflectivity
     shone_at = np.flatnonzero(received)
-    reached = shone_at[_unobstructed(scene, light, point[shone_at])]
+    reached = shone_at[unobstructed(scene, light.mirrors, light.positions_m, point[shone_at])]
     length_m[near] = distance_m
     irradiance[near[reached]] = received[reached]
     return length_m, irradiance
@@ -362,19 +362,28 @@ def beam(light: Light, cosine: NDArray[np.floating]) -> NDArray[np.floating]:
     return intensity
 
 
-def _unobstructed(scene: Scene, light: ImageLight, point: Points) -> NDArray[np.intp]:
-    """Return the points, by index, whose path over the chain of mirrors to the light is free."""
-    left = np.arange(len(point))
-    stops = [point]
+def unobstructed(
+    scene: Scene, mirrors: tuple[Surface, ...], images_m: tuple[Points, ...], point: Points
+) -> NDArray[np.intp]:
+    """Return the points, by index, to which the way of light over a chain of mirrors is free.
+
+    ``images_m``: where it seems to start, in all mirrors, all but the first, ..., and in none;
+    the same for all points, or of each.
+    """
+    left, stops = np.arange(len(point)), [point]
+
+    def start_of(image_m: Points) -> Points:
+        of = image_m if image_m.ndim == 1 else image_m[left]
+        return np.broadcast_to(of, stops[-1].shape)
+
     # first whether all mirrors are hit, which few paths do; then what is in between
-    for mirror, image_m in zip(light.mirrors, light.positions_m, strict=False):
-        start = stops[-1]
-        fraction = mirror.shape.hit(start, np.broadcast_to(image_m, start.shape))
+    for mirror, image_m in zip(mirrors, images_m, strict=False):
+        start, end = stops[-1], start_of(image_m)
+        fraction = mirror.shape.hit(start, end)
         on = (fraction < 1) & mirror.shape.in_front(start)
-        stops = [stop[on] for stop in stops]
-        stops.append(stops[-1] + fraction[on][:, None] * (image_m - stops[-1]))
-        left = left[on]
-    stops.append(np.broadcast_to(light.positions_m[-1], stops[-1].shape))
+        left, stops = left[on], [stop[on] for stop in stops]
+        stops.append(stops[-1] + fraction[on][:, None] * (end[on] - stops[-1]))
+    stops.append(start_of(images_m[-1]))
     clear = np.ones(len(left), dtype=bool)
     for start, end in pairwise(stops):
         still = np.flatnonzero(clear)

@@ -38,7 +38,7 @@ class Gathering:
             mine = lit.surface == surface
             if mine.any():
                 index[mine], weights[mine] = scene.surfaces[surface].shape.between_cells(
-                    lit.point[mine], cells.rows, cells.columns
+                    lit.point[mine], cells
                 )
                 index[mine] += patches.first[surface]
         self.places: Bilinear = index, weights
@@ -48,11 +48,16 @@ class Gathering:
     ) -> NDArray[np.complex128]:
         """Return the moments that the camera sees, given those on the patches."""
         on_pixel = np.einsum("pk,pk->p", self.places[1], irradiance[self.places[0]])
-        way = np.exp(2j * np.pi * frequency_hz / SPEED_OF_LIGHT_M_S * self._lit.distance_m)
-        moments: NDArray[np.complex128] = self._lit.reflectance * on_pixel * way
-        if self._scatter is not None:
-            moments *= self._scatter.transfer(frequency_hz)
+        moments: NDArray[np.complex128] = on_pixel * self.way(frequency_hz)
         return moments
+
+    def way(self, frequency_hz: float) -> NDArray[np.complex128]:
+        """Return what the way to the camera makes of moments at the rays' ends."""
+        turn = np.exp(2j * np.pi * frequency_hz / SPEED_OF_LIGHT_M_S * self._lit.distance_m)
+        way: NDArray[np.complex128] = self._lit.reflectance * turn
+        if self._scatter is not None:
+            way *= self._scatter.transfer(frequency_hz)
+        return way
 
 
 class Interreflection:
@@ -129,7 +134,8 @@ class Interreflection:
     @cached_property
     def _histogram(self) -> Exchange:
         few = min(_HISTOGRAM_PATCHES, self._scene.transport.patches)
-        return Exchange.of(self._scene, few)
+        mirrors = self._exchange.over_mirrors.to.size > 0
+        return Exchange.of(self._scene, few, mirrors=mirrors)
 
     @cached_property
     def _between_few(self) -> Bilinear:

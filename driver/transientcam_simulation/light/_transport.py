@@ -275,8 +275,9 @@ class SurfaceScenery:
 
         held: Callable[[float], HeldLight | None] = nothing
         if further:
-            patches = self.facts.patches_a_side(wanted.noise)
-            held = held_light(FurtherLight(scene, per_side=patches, tolerance=tolerance), still)
+            per_side, reach = self.facts.resolution(wanted.noise)
+            of = FurtherLight(scene, per_side=per_side, reach=reach, tolerance=tolerance)
+            held = held_light(of, still)
 
         far = {"pixel_rad": still.pixel_rad, "every_s": wanted.image_period_s}
         steps = Steps(scene, lambda time_s: moving.at(time_s, held(time_s)), **far)

@@ -15,8 +15,10 @@ from transientcam_simulation.scene._geometry import (
     Rectangle,
     Shape,
     blocked_by_mask,
+    cells_of,
+    evenly,
 )
-from transientcam_simulation.scene._limits import patch_edges_m
+from transientcam_simulation.scene._limits import most_patches, patch_edges_m, patches_of
 from transientcam_simulation.scene._motion import Motion
 from transientcam_simulation.scene._scene import (
     Background,

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Points = NDArray[np.float64]  # (..., 3)
+Values = NDArray[np.float64]
 Bilinear = tuple[NDArray[np.intp], NDArray[np.float64]]  # (P, 4) cells, (P, 4) their weights
+_SIGNS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])  # of corners, around a front
 _CLEAR = 1e-9  # fraction of a segment that counts as its end
 _CLEAR_OF_CURVED = 1e-6  # the same where a root of a quadratic says where the segment starts
 
@@ -19,15 +21,26 @@ _CLEAR_OF_CURVED = 1e-6  # the same where a root of a quadratic says where the s
 class Cells:
     """A shape cut into a grid of flat patches, row by row.
 
-    ``corners`` (N, 4, 3) run counter-clockwise as seen from the front.
+    ``up`` (rows + 1) and ``along`` (columns + 1) are where it is cut, rising from -1 to 1: over
+    height and width, or height and longitude. ``corners`` (N, 4, 3) run counter-clockwise as seen
+    from the front.
     """
 
-    rows: int
-    columns: int
+    up: Values
+    along: Values
     centre: Points
     normal: Points
-    area: NDArray[np.float64]
     corners: Points
+
+    @property
+    def rows(self) -> int:
+        """From the lowest one."""
+        return len(self.up) - 1
+
+    @property
+    def columns(self) -> int:
+        """From the left."""
+        return len(self.along) - 1
 
 
 @dataclass(frozen=True)
@@ -101,43 +114,23 @@ class Rectangle:
         return float(tangents.min()), float(tangents.max())
 
     def grid(self, edge_m: float) -> tuple[int, int]:
-        """Return how many rows and columns `cells` cuts it into."""
+        """Return how many rows and columns of such patches it has."""
         return _counts(self.height, edge_m), _counts(self.width, edge_m)
 
-    def cells(self, edge_m: float) -> Cells:
-        """Cut it into equal cells of about the edge given."""
-        rows, columns = self.grid(edge_m)
-        y, x = np.meshgrid(_middles(rows), _middles(columns), indexing="ij")
-        across, along = self.right * self.width / 2, self.up * self.height / 2
-        centre = self.centre + x.reshape(-1, 1) * across + y.reshape(-1, 1) * along
-        signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        corners = signs[:, :1] * across / columns + signs[:, 1:] * along / rows
-        count = rows * columns
-        return Cells(
-            rows,
-            columns,
-            centre,
-            np.broadcast_to(self.normal, (count, 3)),
-            np.full(count, self.width * self.height / count),
-            centre[:, None, :] + corners,
-        )
+    def at(self, x: Values, y: Values) -> Points:
+        """Points at places over width and height, from -1 to 1."""
+        across, upwards = self.right * self.width / 2, self.up * self.height / 2
+        return self.centre + x[..., None] * across + y[..., None] * upwards
 
-    def between_cells(self, points: Points, rows: int, columns: int) -> Bilinear:
+    def between_cells(self, points: Points, cells: Cells) -> Bilinear:
         """Interpolate between the cells' centres, and go on in a straight line beyond them."""
         offset = points - self.centre
-        x = offset @ self.right / (self.width / 2)
-        y = offset @ self.up / (self.height / 2)
-        row, below = _place(y, rows)
-        column, left = _place(x, columns)
-        return _bilinear(
-            row,
-            below,
-            np.minimum(row + 1, rows - 1),
-            column,
-            left,
-            np.minimum(column + 1, columns - 1),
-            columns,
-        )
+        columns = cells.columns
+        row, below = _place(offset @ self.up / (self.height / 2), _middles(cells.up))
+        column, left = _place(offset @ self.right / (self.width / 2), _middles(cells.along))
+        next_row = np.minimum(row + 1, cells.rows - 1)
+        next_column = np.minimum(column + 1, columns - 1)
+        return _bilinear(row, below, next_row, column, left, next_column, columns)
 
     def in_front(self, points: Points) -> NDArray[np.bool_]:
         """Which points lie on the side the rectangle faces."""
@@ -227,71 +220,65 @@ class Ellipsoid:
         return at
 
     def grid(self, edge_m: float) -> tuple[int, int]:
-        """Return how many rows and columns `cells` cuts it into."""
+        """Return how many rows and columns of such patches it has."""
         rows = max(2, _counts(np.pi * float(self.radii[2]), edge_m))
         return rows, max(4, _counts(2 * np.pi * float(self.radii[:2].max()), edge_m))
 
-    def cells(self, edge_m: float) -> Cells:
-        """Cut it along equal steps of height and of longitude."""
-        rows, columns = self.grid(edge_m)
-        z, angle = np.meshgrid(_middles(rows), np.pi * _middles(columns), indexing="ij")
-        on_unit = _on_unit_sphere(z.ravel(), angle.ravel())
-        centre = self.centre + on_unit * self.radii
-        steps = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        corners = _on_unit_sphere(
-            np.clip(z.reshape(-1, 1) + steps[:, 1] / rows, -1, 1),
-            angle.reshape(-1, 1) + np.pi * steps[:, 0] / columns,
-        )
-        # the unit sphere's cells have equal areas; a linear map stretches each by this factor
-        stretch = np.prod(self.radii) * np.linalg.norm(on_unit / self.radii, axis=-1)
-        area = 4 * np.pi / (rows * columns) * stretch
-        return Cells(
-            rows, columns, centre, self.normals(centre), area, self.centre + corners * self.radii
-        )
+    def at(self, x: Values, y: Values) -> Points:
+        """Points at places over longitude, which starts at -x, and height, from -1 to 1."""
+        across = np.sqrt(np.maximum(0.0, 1 - y * y))
+        on_unit = np.stack([across * np.cos(np.pi * x), across * np.sin(np.pi * x), y], axis=-1)
+        return self.centre + on_unit * self.radii
 
-    def between_cells(self, points: Points, rows: int, columns: int) -> Bilinear:
+    def between_cells(self, points: Points, cells: Cells) -> Bilinear:
         """Interpolate between the cells' centres, around and up to the poles."""
         on_unit = (points - self.centre) / self.radii
-        row, below = _place(np.clip(on_unit[..., 2], -1, 1), rows)
+        row, below = _place(np.clip(on_unit[..., 2], -1, 1), _middles(cells.up))
         below = np.clip(below, 0, 1)
-        turn = (np.arctan2(on_unit[..., 1], on_unit[..., 0]) / (2 * np.pi) + 0.5) * columns - 0.5
-        column = np.floor(turn).astype(np.intp)
+        turn = np.arctan2(on_unit[..., 1], on_unit[..., 0]) / np.pi
+        middles = _middles(cells.along)
+        around, right = _place(turn, np.concatenate([middles[-1:] - 2, middles, middles[:1] + 2]))
+        columns, next_row = cells.columns, np.minimum(row + 1, cells.rows - 1)
         return _bilinear(
-            row,
-            below,
-            np.minimum(row + 1, rows - 1),
-            column % columns,
-            turn - column,
-            (column + 1) % columns,
-            columns,
+            row, below, next_row, (around - 1) % columns, right, around % columns, columns
         )
 
 
 Shape = Rectangle | Ellipsoid
 
 
-def _on_unit_sphere(z: NDArray[np.float64], angle: NDArray[np.float64]) -> Points:
-    """Points by height and longitude, which starts at -x."""
-    across = np.sqrt(np.maximum(0.0, 1 - z * z))
-    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=-1)
+def cells_of(shape: Shape, up: Values, along: Values) -> Cells:
+    """Cut a shape into patches: see `Cells`."""
+    (y, x), (high, wide) = (
+        [each.ravel() for each in np.meshgrid(*pair, indexing="ij")]
+        for pair in ((_middles(up), _middles(along)), (np.diff(up) / 2, np.diff(along) / 2))
+    )
+    around = x[:, None] + _SIGNS[:, 0] * wide[:, None], y[:, None] + _SIGNS[:, 1] * high[:, None]
+    centre = shape.at(x, y)
+    return Cells(up, along, centre, shape.normals(centre), shape.at(*around))
 
 
 def _counts(length_m: float, edge_m: float) -> int:
     return max(1, round(length_m / edge_m))
 
 
-def _middles(count: int) -> NDArray[np.float64]:
-    """Middles of equal cells over -1 to 1."""
-    return (2 * np.arange(count) + 1) / count - 1
+def evenly(count: int) -> Values:
+    """Cuts from -1 to 1 into so many equal parts."""
+    return np.linspace(-1.0, 1.0, count + 1)
 
 
-def _place(
-    coordinate: NDArray[np.float64], count: int
-) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Find the cell below a coordinate from -1 to 1, and how far on the way to the next."""
-    place = (coordinate + 1) / 2 * count - 0.5
-    cell = np.clip(np.floor(place), 0, max(0, count - 2)).astype(np.intp)
-    return cell, place - cell if count > 1 else np.zeros_like(place)
+def _middles(cuts: Values) -> Values:
+    middles: Values = (cuts[1:] + cuts[:-1]) / 2
+    return middles
+
+
+def _place(coordinate: Values, middles: Values) -> tuple[NDArray[np.intp], Values]:
+    """Find the middle below a coordinate, and how far on the way to the next."""
+    last = len(middles) - 2
+    if last < 0:
+        return np.zeros(coordinate.shape, dtype=np.intp), np.zeros_like(coordinate)
+    cell = np.clip(np.searchsorted(middles, coordinate, "right") - 1, 0, last)
+    return cell, (coordinate - middles[cell]) / (middles[cell + 1] - middles[cell])
 
 
 def _bilinear(

@@ -3,7 +3,7 @@
 It is counted as the light is built, by the same functions (`patch_edges_m`, `Shape.grid`).
 """
 
-from dataclasses import dataclass
+import math
 from typing import Final
 
 import numpy as np
@@ -15,25 +15,12 @@ MOST_SURFACES: Final = 32
 MOST_MIRROR_PATHS: Final = 64
 """Chains of mirrors that light may take, each of which is followed."""
 MOST_PATCHES: Final = 4096
-"""Between scattering surfaces: their matrices take 128 MiB, and 0.5 GiB while they are made."""
+"""Between scattering surfaces: their matrices take 128 MiB, and 0.5 GiB while they are made.
+
+Fewer where mirrors show them to each other.
+"""
 _LEAST_PER_SIDE: Final = 4
 """Patches along the longest side of a surface, however small it is beside others."""
-
-
-@dataclass(frozen=True, slots=True)
-class Cost:
-    """What the light of a scene needs.
-
-    Attributes
-    ----------
-    mirror_paths
-        Chains of mirrors that are followed at most.
-    patches
-        Of scattering surfaces, between which light is followed; 0 where none is.
-    """
-
-    mirror_paths: int
-    patches: int
 
 
 def patch_edges_m(scene: Scene, per_side: int, *, moving: int = 0) -> dict[int, float]:
@@ -61,17 +48,19 @@ def patches_of(scene: Scene, per_side: int) -> int:
     return sum(rows * columns for rows, columns in grids)
 
 
-def cost_of(scene: Scene) -> Cost:
-    """Return what the light of a scene needs, without computing any of it."""
-    transport = scene.transport
+def mirror_paths_of(scene: Scene) -> int:
+    """Return how many chains of mirrors light may take: none goes from one to itself."""
     mirrors = sum(each.kind == "mirror" for each in scene.surfaces)
-    # no light goes from a plane mirror to itself
-    paths = sum(
-        mirrors * (mirrors - 1) ** (bounces - 1)
-        for bounces in range(1, transport.mirror_bounces + 1)
-    )
-    followed = transport.diffuse_bounces != 0
-    return Cost(paths, patches_of(scene, transport.patches) if followed else 0)
+    bounces = range(1, scene.mirror_bounces + 1)
+    return sum(mirrors * (mirrors - 1) ** (each - 1) for each in bounces)
+
+
+def most_patches(scene: Scene) -> int:
+    """Return into how many patches surfaces may be cut: they see each other over mirrors, too.
+
+    But for scenes that move.
+    """
+    return int(MOST_PATCHES / math.sqrt(1 + (0 if scene.moves else mirror_paths_of(scene))))
 
 
 def require_modest(scene: Scene) -> None:
@@ -85,14 +74,16 @@ def require_modest(scene: Scene) -> None:
     surfaces, transport = scene.surfaces, scene.transport
     if len(surfaces) > MOST_SURFACES:
         raise SceneError("the scene", "surface", len(surfaces), f"at most {MOST_SURFACES} tables")
-    cost = cost_of(scene)
-    if cost.mirror_paths > MOST_MIRROR_PATHS:
-        limit = f"fewer: {cost.mirror_paths} chains of mirrors are more than {MOST_MIRROR_PATHS}"
+    paths = mirror_paths_of(scene)
+    if paths > MOST_MIRROR_PATHS:
+        limit = f"fewer: {paths} chains of mirrors are more than {MOST_MIRROR_PATHS}"
         raise SceneError("the scene", "transport.mirror_bounces", transport.mirror_bounces, limit)
-    if cost.patches > MOST_PATCHES:
-        most = max(n for n in range(2, transport.patches) if patches_of(scene, n) <= MOST_PATCHES)
+    limit_of, patches = most_patches(scene), patches_of(scene, transport.patches)
+    if transport.diffuse_bounces != 0 and patches > limit_of:
+        fewer = (n for n in range(2, transport.patches) if patches_of(scene, n) <= limit_of)
+        most = max(fewer, default=0)
         limit = (
-            f"at most {most} with these surfaces, or diffuse_bounces = 0: {cost.patches} patches "
-            f"are more than {MOST_PATCHES}"
+            f"{f'at most {most} with these surfaces, or ' if most else ''}diffuse_bounces = 0: "
+            f"{patches} patches are more than {limit_of}"
         )
         raise SceneError("the scene", "transport.patches", transport.patches, limit)

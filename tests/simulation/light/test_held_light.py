@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from transientcam_driver.sequence import Sequence
+from transientcam_simulation.base import Moments
 from transientcam_simulation.effects import Noise
 from transientcam_simulation.emulated import world_of
 from transientcam_simulation.imaging import World
@@ -20,10 +21,10 @@ from transientcam_simulation.light._facts import (
     SceneFacts,
 )
 from transientcam_simulation.light._further_light import FurtherLight
-from transientcam_simulation.light._held_light import HeldLight, held_light
+from transientcam_simulation.light._held_light import HeldLight, StillEnds, held_light
 from transientcam_simulation.light._patches import Patches
 from transientcam_simulation.light._paths import light_rays
-from transientcam_simulation.light._radiosity import Gathering, Interreflection
+from transientcam_simulation.light._radiosity import Interreflection
 from transientcam_simulation.light._rays import camera_rays
 from transientcam_simulation.light._still import StillLight
 from transientcam_simulation.light._variants import still_scene
@@ -169,16 +170,18 @@ def test_a_scene_that_hardly_moves_is_hardly_ever_solved() -> None:
 def test_patches_are_as_fine_as_the_noise_calls_for() -> None:
     facts = SceneFacts(scene(), width=WIDTH, height=HEIGHT)
 
-    sides = [facts.patches_a_side(Noise(3e4, 0.0, 900.0, takes)) for takes in (1, 100, 1_000_000)]
+    found = [facts.resolution(Noise(3e4, 0.0, 900.0, takes)) for takes in (1, 100, 1_000_000)]
 
+    sides, reaches = zip(*found, strict=True)
     assert sides[0] < sides[1] <= sides[2] == scene().transport.patches
+    assert reaches[2] == min(reaches)
 
 
 def test_the_cost_that_is_stated_is_that_of_the_work_that_is_done(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     pairs = solved = gathered = 0
-    between, irradiance, moments = Exchange.between, Exchange.irradiance, Gathering.moments
+    between, irradiance, moments = Exchange.between, Exchange.irradiance, StillEnds.moments
 
     def counted(of: Scene, patches: Patches) -> Exchange:
         nonlocal pairs
@@ -190,9 +193,7 @@ def test_the_cost_that_is_stated_is_that_of_the_work_that_is_done(
         solved += len(self.patches) ** 2
         return irradiance(self, frequency_hz, bounces)
 
-    def on_still(
-        self: Gathering, light: NDArray[np.complexfloating], frequency_hz: float
-    ) -> NDArray[np.complex128]:
+    def on_still(self: StillEnds, light: NDArray[np.complex64], frequency_hz: float) -> Moments:
         nonlocal gathered
         gathered += len(self.places[0])
         return moments(self, light, frequency_hz)
@@ -202,7 +203,7 @@ def test_the_cost_that_is_stated_is_that_of_the_work_that_is_done(
     built.prepare()
     monkeypatch.setattr(Exchange, "between", counted)
     monkeypatch.setattr(Exchange, "irradiance", turned)
-    monkeypatch.setattr(Gathering, "moments", on_still)
+    monkeypatch.setattr(StillEnds, "moments", on_still)
     images = 40 * len(VIDEO.labels)
     for k in range(images):
         label = VIDEO.labels[k % len(VIDEO.labels)]

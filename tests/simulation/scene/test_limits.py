@@ -17,7 +17,7 @@ from transientcam_simulation.emulated._build import world_of
 from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._patches import Patches
 from transientcam_simulation.scene import Scene, parse_scene
-from transientcam_simulation.scene._limits import MOST_PATCHES, cost_of, patches_of
+from transientcam_simulation.scene._limits import MOST_PATCHES, patches_of
 
 EVERYTHING = """
 seed = 3
@@ -221,7 +221,7 @@ def test_as_many_patches_are_built_as_were_counted(surfaces: str, per_side: int)
 
     built = Exchange.of(scene, per_side)
 
-    assert len(built.patches) == patches_of(scene, per_side) == cost_of(scene).patches
+    assert len(built.patches) == patches_of(scene, per_side)
     assert built.factors.shape == built.distance_m.shape == (len(built.patches),) * 2
 
 
@@ -245,7 +245,7 @@ def test_no_shape_has_more_patches_than_were_counted_nor_more_than_may_be(
     if isinstance(found, SceneError):
         assert found.key == "transport.patches"
     else:
-        assert len(Patches.of(found, per_side)) == cost_of(found).patches <= MOST_PATCHES
+        assert len(Patches.of(found, per_side)) == patches_of(found, per_side) <= MOST_PATCHES
 
 
 def test_two_spheres_that_would_take_gigabytes_are_refused_by_key_and_limit() -> None:
