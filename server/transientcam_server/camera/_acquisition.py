@@ -397,6 +397,8 @@ class Acquisition:
         return now_s - read_s >= heartbeat_s > 0.0
 
     def _report_frame(self, raw: RawFrame) -> None:
+        if self._camera.capabilities.clock == "ptp":
+            raw = replace(raw, captured_unix_s=raw.device_time_s)
         if raw.captured_unix_s is None:
             captured_s = self._capture_clock.unix_s(
                 device_time_s=raw.device_time_s,

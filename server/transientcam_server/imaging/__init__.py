@@ -34,6 +34,7 @@ from transientcam_server.imaging._products.labelling import (
     image_columns,
     in_words,
     moment_columns,
+    parts_of,
 )
 from transientcam_server.imaging._products.pixel import pixel_csv, pixel_json
 from transientcam_server.imaging._products.products import PRODUCTS, Product
@@ -120,6 +121,7 @@ __all__ = [
     "load_calibration",
     "moment_columns",
     "nominal_gains",
+    "parts_of",
     "pixel_csv",
     "pixel_json",
     "ranges_m",

@@ -5,13 +5,13 @@
 - What mitransient renders: ``transient`` (H, W, T, channels), with ``start_opl`` and
   ``bin_width_opl`` as its film calls them.
 - An HDF5 file of tal: ``H`` (T, x, y) with ``t_start`` and ``delta_t``.
-- The arrays of the first three in a file of MATLAB (-v7.3).
+- The arrays of the first three, or moments, in a file of MATLAB, of any version since 5.
 
-The time axis of the last three is an optical path length in m.
+The time axis of ``h``, ``transient`` and ``H`` is an optical path length in m.
 """
 
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +19,7 @@ import h5py
 import numpy as np
 from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
+from scipy.io import loadmat, whosmat
 
 import transientcam_moments as tm
 from transientcam_server.errors import InputError
@@ -31,10 +32,21 @@ KEYS: Final = ("counts", "meas", "h", "transient", "H")
 _OF_TAL: Final = ("H", "H_format", "t_start", "delta_t")
 _OF_MATLAB: Final = (
     *("counts", "meas", "bin_s", "h", "start_opl_m", "bin_opl_m"),
-    *("transient", "start_opl", "bin_width_opl"),
+    *("transient", "start_opl", "bin_width_opl", "moments", "base_frequency_hz"),
 )
-_MATLAB: Final = b"MATLAB 7.3 MAT-file"
+_MATLAB_7: Final = b"MATLAB 7.3 MAT-file"
 """What a file begins with that MATLAB wrote with -v7.3: HDF5 with the axes turned round."""
+_MATLAB_5: Final = b"MATLAB 5.0 MAT-file"
+"""The same of all other options of `save`, and of Octave's -v6 and -v7."""
+_OCTAVE: Final = (b"# Created by Octave", b"Octave-1")
+_COMPLEX: Final = ("real", "imag")
+"""The fields of a complex number of MATLAB in HDF5."""
+LEAST_BIN_S: Final = 1e-15
+LONGEST_S: Final = 1e-3
+"""A response ends before: light goes 150 km there and back. Bins are longer than a femtosecond, and
+no longer than half a period of the highest frequency that is asked of them."""
+_SHORT: Final = 16
+"""A response of less than one part in so many of the unambiguous time is suspicious."""
 _CHANNELS: Final = 3
 _DEFLATE_AT_MOST: Final = 1032
 """How many times its size what deflate has packed can be (the zlib home page)."""
@@ -62,8 +74,14 @@ def arrays_of(path: Path) -> dict[str, _Array]:
     OSError
         If it cannot be read.
     """
+    begin = _begin(path)
+    if begin.startswith(_OCTAVE):
+        found = "in a format of Octave alone"
+        raise InputError(str(path), "content", found, "an .npz, or what `save -v7` writes")
+    if begin.startswith(_MATLAB_5):
+        return _of_matlab_5(path)
     if h5py.is_hdf5(path):
-        return _of_hdf5(path)
+        return _of_hdf5(path, matlab=begin.startswith(_MATLAB_7))
     try:
         # no pickle: a measurement from elsewhere must not be able to run anything
         with path.open("rb") as opened:
@@ -71,6 +89,7 @@ def arrays_of(path: Path) -> dict[str, _Array]:
             if not isinstance(file, NpzFile):
                 raise InputError(str(path), "content", "a single array", "an .npz of named arrays")
             with file:
+                _require_known(path, file)
                 return {name: file[name] for name in file}
     except (zipfile.BadZipFile, ValueError, EOFError) as error:
         raise InputError(str(path), "content", f"unreadable ({error})", "an .npz of arrays") from (
@@ -79,9 +98,16 @@ def arrays_of(path: Path) -> dict[str, _Array]:
 
 
 def impulse_response(
-    path: Path, arrays: Mapping[str, _Array], *, background: str
+    path: Path,
+    arrays: Mapping[str, _Array],
+    *,
+    background: str,
+    frequency_hz: float,
+    harmonics: int,
 ) -> tuple[_Array, _Array]:
     """Return the times of the bins (T,) in s, and the responses (H, W, T).
+
+    ``frequency_hz`` and ``harmonics`` are those to be measured.
 
     Raises
     ------
@@ -89,15 +115,47 @@ def impulse_response(
         Naming the file, the key, what it is and what it must be.
     """
     if "counts" in arrays or "meas" in arrays:
-        return _of_counts(path, arrays, background=background)
-    if "h" in arrays:
-        return _of_lengths(path, arrays, "h", arrays["h"], "start_opl_m", "bin_opl_m")
-    if "transient" in arrays:
-        # bin k of the film collects lengths from start + k width on: half a bin later on average
-        response = _grey(path, arrays["transient"])
-        keys = "start_opl", "bin_width_opl"
-        return _of_lengths(path, arrays, "transient", response, *keys, offset_bins=0.5)
-    return _of_lengths(path, arrays, "H", _image(path, arrays), "t_start", "delta_t")
+        key, width, unit_s = "counts" if "counts" in arrays else "meas", "bin_s", 1.0
+        response = _counts(path, key, arrays[key], background=background)
+        first = 0.5 * scalar(path, arrays, width)  # photons lie anywhere in their bin
+    else:
+        unit_s, offset_bins = 1.0 / tm.SPEED_OF_LIGHT_M_S, 0.0
+        if "h" in arrays:
+            key, start, width, response = "h", "start_opl_m", "bin_opl_m", arrays["h"]
+        elif "transient" in arrays:
+            # bin k of the film collects lengths from start + k width on
+            key, start, width, offset_bins = "transient", "start_opl", "bin_width_opl", 0.5
+            response = _grey(path, arrays[key])
+        else:
+            key, start, width, response = "H", "t_start", "delta_t", _image(path, arrays)
+        if response.ndim != 3 or not response.size or response.dtype.kind not in "fiu":
+            found = f"{response.dtype} of shape {response.shape}"
+            raise InputError(str(path), key, found, "numbers of shape (H, W, T)")
+        first = scalar(path, arrays, start, positive=False)
+        first += offset_bins * scalar(path, arrays, width)
+        require_some_finite(path, key, response.sum(axis=-1, dtype=np.float64)[np.newaxis])
+    step = scalar(path, arrays, width)
+    time_s = (first + np.arange(response.shape[-1]) * step) * unit_s
+    _require_times_of_flight(path, width, step, time_s, unit_s, frequency_hz * harmonics)
+    height, wide, bins = response.shape
+    if bins * step * unit_s * frequency_hz * _SHORT < 1.0 and max(height, wide) >= 4 * bins:
+        found = f"of shape {arrays[key].shape}: {bins} bins, {bins * step * unit_s:.3g} s in all"
+        raise InputError(str(path), key, found, "with time on the last axis: (H, W, n_bins)")
+    return time_s, response
+
+
+def _require_times_of_flight(
+    path: Path, key: str, step: float, time_s: _Array, unit_s: float, highest_hz: float
+) -> None:
+    """Refuse times in another unit than theirs, and bins too long for a frequency."""
+    least, most = LEAST_BIN_S / unit_s, 0.5 / (highest_hz * unit_s)
+    unit = "s" if unit_s == 1.0 else "m"
+    if not least <= step <= most:
+        expected = f"from {least:.3g} to {most:.3g} {unit}, half a period of {highest_hz:g} Hz"
+        raise InputError(str(path), key, f"{step:g} {unit}", expected)
+    if np.abs(time_s).max() > LONGEST_S:
+        found = f"{step:g} {unit}, and times from {time_s[0]:.3g} to {time_s[-1]:.3g} s"
+        raise InputError(str(path), key, found, f"of times of flight, within {LONGEST_S:g} s")
 
 
 def scalar(path: Path, arrays: Mapping[str, _Array], key: str, *, positive: bool = True) -> float:
@@ -120,13 +178,26 @@ def require_some_finite(path: Path, key: str, planes: _Array) -> None:
         raise InputError(str(path), key, "NaN or infinite in every pixel", "finite somewhere")
 
 
-def _of_hdf5(path: Path) -> dict[str, _Array]:
+def _begin(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(32)
+
+
+def _require_known(path: Path, names: Iterable[str]) -> None:
+    """Refuse a file of other arrays, and say which."""
+    held = set(names)
+    if not held & {"moments", *KEYS}:
+        found = ", ".join(sorted(held)) or "nothing"
+        raise InputError(str(path), "content", found, f"moments, {', '.join(KEYS[:-1])} or H")
+
+
+def _of_hdf5(path: Path, *, matlab: bool) -> dict[str, _Array]:
     try:
         with open_unknown(path) as file:
             storage = Storage(file, path.stat().st_size * _DEFLATE_AT_MOST)
-            matlab = _is_matlab(path)
+            _require_known(path, file)
             return {
-                name: storage.values(name).T if matlab else storage.values(name)
+                name: _of_matlab_7(storage.values(name)) if matlab else storage.values(name)
                 for name in (_OF_MATLAB if matlab else _OF_TAL)
                 # tal writes an empty value for what it does not know
                 if name in storage and storage.dataset(name).shape is not None
@@ -136,52 +207,39 @@ def _of_hdf5(path: Path) -> dict[str, _Array]:
         raise InputError(str(path), "content", found, "an HDF5 file of tal with H") from error
 
 
-def _is_matlab(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(len(_MATLAB)) == _MATLAB
+def _of_matlab_7(values: _Array) -> _Array:
+    if values.dtype.names == _COMPLEX:
+        values = values["real"] + 1j * values["imag"]
+    return values.T
 
 
-def _of_counts(
-    path: Path, arrays: Mapping[str, _Array], *, background: str
-) -> tuple[_Array, _Array]:
-    key = "counts" if "counts" in arrays else "meas"
-    counts = arrays[key]
+def _of_matlab_5(path: Path) -> dict[str, _Array]:
+    try:
+        _require_known(path, (name for name, _, _ in whosmat(path)))
+        return {
+            name: values.toarray() if hasattr(values, "toarray") else values
+            for name, values in loadmat(path, variable_names=_OF_MATLAB).items()
+            if name in _OF_MATLAB
+        }
+    except InputError:
+        raise
+    except Exception as error:  # SciPy raises anything of a damaged file
+        raise InputError(str(path), "content", f"unreadable ({error})", "a MATLAB file") from error
+
+
+def _counts(path: Path, key: str, counts: _Array, *, background: str) -> _Array:
     if counts.ndim == _MATRIX and 1 in counts.shape:  # MATLAB has no vectors
         counts = counts.reshape(-1)
     if counts.ndim not in (1, 3) or counts.shape[-1] < 2 or not counts.size:
         raise InputError(str(path), key, f"of shape {counts.shape}", "(n_bins,) or (H, W, n_bins)")
     if counts.dtype.kind not in "fiu":
         raise InputError(str(path), key, f"{counts.dtype}", "numbers")
-    if counts.ndim == 1:
-        counts = counts[np.newaxis, np.newaxis]
-    counts = counts.astype(np.float64)
-    bin_s = scalar(path, arrays, "bin_s")
+    counts = (counts if counts.ndim > 1 else counts[np.newaxis, np.newaxis]).astype(np.float64)
     require_some_finite(path, key, counts.sum(axis=-1)[np.newaxis])
     if background == "median":
         # fewer photons than the background are noise of it, not negative light
         counts = np.maximum(counts - np.median(counts, axis=-1, keepdims=True), 0.0)
-    return (np.arange(counts.shape[-1]) + 0.5) * bin_s, counts  # photons lie anywhere in their bin
-
-
-def _of_lengths(
-    path: Path,
-    arrays: Mapping[str, _Array],
-    key: str,
-    response: _Array,
-    start: str,
-    width: str,
-    *,
-    offset_bins: float = 0.0,
-) -> tuple[_Array, _Array]:
-    """Return times and responses (H, W, T) of a time axis that is an optical path length."""
-    if response.ndim != 3 or not response.size or response.dtype.kind not in "fiu":
-        found = f"{response.dtype} of shape {response.shape}"
-        raise InputError(str(path), key, found, "numbers of shape (H, W, T)")
-    start_m = scalar(path, arrays, start, positive=False)
-    bin_m = scalar(path, arrays, width)
-    require_some_finite(path, key, response.sum(axis=-1, dtype=np.float64)[np.newaxis])
-    bins = np.arange(response.shape[-1]) + offset_bins
-    return (start_m + bins * bin_m) / tm.SPEED_OF_LIGHT_M_S, response
+    return counts
 
 
 def _grey(path: Path, transient: _Array) -> _Array:
