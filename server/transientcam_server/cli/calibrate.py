@@ -68,6 +68,25 @@ def calibrate(
             "--undo", help="Measure nothing; the daemon returns to the previous calibration."
         ),
     ] = False,
+    lens: Annotated[
+        str | None,
+        typer.Option(
+            help="Measure the lens instead: `wall`, or a printed chessboard by its inner corners, "
+            "`9x6`. Prints [lens] of the settings, and writes it to --output, a .toml."
+        ),
+    ] = None,
+    square_m: Annotated[
+        float, typer.Option(min=1e-4, help="Side of a square of the board.")
+    ] = 0.03,
+    views: Annotated[
+        int, typer.Option(min=2, max=100, help="How often wall or board are seen.")
+    ] = 5,
+    second: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL", help="Also measure where this daemon's camera stands, by a board."
+        ),
+    ] = None,
     token: TokenOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -77,7 +96,24 @@ def calibrate(
     stores the result; without one, the file is meant for `serve --calibration FILE`. What does not
     look like a diffuser is kept, but not used, and the exit code is 1; --force uses it anyway.
     """
-    require_suffix(output, ".npz")
+    require_suffix(output, ".npz" if lens is None else ".toml")
+    if lens is not None:
+        from transientcam_server.cli.calibrate_lens import measure_lens
+
+        if url is None:
+            raise typer.BadParameter("needs the URL of a daemon", param_hint="--lens")
+        urls = [url] if second is None else [url, second]
+        measure_lens(
+            urls,
+            lens,
+            square_m=square_m,
+            views=views,
+            takes=takes,
+            output=output,
+            token=token,
+            as_json=as_json,
+        )
+        return
     if undo:
         _undo(url, token, as_json=as_json)
         return

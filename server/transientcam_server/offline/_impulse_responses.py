@@ -19,7 +19,6 @@ import h5py
 import numpy as np
 from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
-from scipy.io import loadmat, whosmat
 
 import transientcam_moments as tm
 from transientcam_server.errors import InputError
@@ -214,6 +213,8 @@ def _of_matlab_7(values: _Array) -> _Array:
 
 
 def _of_matlab_5(path: Path) -> dict[str, _Array]:
+    from scipy.io import loadmat, whosmat  # of few files
+
     try:
         _require_known(path, (name for name, _, _ in whosmat(path)))
         return {

@@ -94,14 +94,18 @@ class Intrinsics(Pinhole):
         pinhole = lens.fx, lens.fy, lens.cx, lens.cy
         return cls(*pinhole, width, height, source, lens.distortion, *lens.light_m)
 
+    @property
+    def lens(self) -> Lens:
+        """The lens and where the light is, as a camera reports them."""
+        light_m = self.light_x_m, self.light_y_m, self.light_z_m
+        return Lens(self.fx, self.fy, self.cx, self.cy, self.distortion, *light_m)
+
     def points(self, range_m: NDArray[Any]) -> NDArray[np.float32]:
         """Return the points (3, H, W) in m of a range (H, W): half of the path of the light."""
-        pinhole = self.fx, self.fy, self.cx, self.cy
-        lens = Lens(*pinhole, self.distortion, self.light_x_m, self.light_y_m, self.light_z_m)
-        x, y, z = _rays(lens, *range_m.shape)
-        if any(lens.light_m):
+        x, y, z = _rays(self.lens, *range_m.shape)
+        if any(self.lens.light_m):
             # |p| + |p - light| is the path: intersect the ray with that ellipsoid
-            light_x, light_y, light_z = lens.light_m
+            light_x, light_y, light_z = self.lens.light_m
             path_m = 2.0 * range_m
             along = z * (light_x * x + light_y * y + light_z)
             with np.errstate(all="ignore"):  # a path shorter than the way to the light
