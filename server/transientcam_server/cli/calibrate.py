@@ -102,6 +102,8 @@ def calibrate(
 
         if url is None:
             raise typer.BadParameter("needs the URL of a daemon", param_hint="--lens")
+        others = {"--camera": camera, "--sequence": sequence, "--name": name, "--undo": undo}
+        _refuse(others | {"--activate": activate, "--force": force}, "is not for --lens")
         urls = [url] if second is None else [url, second]
         measure_lens(
             urls,

@@ -15,7 +15,7 @@ from transientcam_server.errors import InputError, MissingExtra
 from transientcam_server.imaging._recipe.lens import Intrinsics
 
 _Array = NDArray[Any]
-_PIXELS: Final = 48
+_PIXELS: Final = 32
 """Along the shorter side, by which a wall is judged."""
 _WALL_M: Final = 0.01
 """What deviates by more counts less: it may be no wall."""
@@ -61,7 +61,9 @@ def lens_of_walls(ranges: Sequence[_Array], start: Intrinsics) -> tuple[Lens, fl
     bent = (*start.distortion, 0.0, 0.0, 0.0, 0.0)[:4]
     first = np.concatenate([[start.fx, start.fy, start.cx, start.cy, *bent], *planes])
     scale = np.concatenate([[start.fx] * 4, [1.0] * (first.size - 4)])
-    fit = least_squares(off_m, first, x_scale=scale, loss="soft_l1", f_scale=_WALL_M)
+    # what is no wall counts little, and once the wall is found nearly nothing
+    rough = least_squares(off_m, first, x_scale=scale, loss="soft_l1", f_scale=_WALL_M)
+    fit = least_squares(off_m, rough.x, x_scale=scale, loss="cauchy", f_scale=_WALL_M)
     return lens_of(fit.x), float(np.median(np.abs(off_m(fit.x))))
 
 
@@ -101,7 +103,10 @@ def lens_of_boards(
         raise InputError("--lens", "board", found, least)
     flat = np.mgrid[: corners[0], : corners[1], :1].T.reshape(-1, 3).astype(np.float32) * square_m
     size = pictures[0].shape[::-1]
-    rms_px, k, bent, *poses = cv2.calibrateCamera([flat] * len(shown), shown, size, None, None)
+    # of k3 the corners of few pixels say nothing, and where no board was it folds the image
+    rms_px, k, bent, *poses = cv2.calibrateCamera(
+        [flat] * len(shown), shown, size, None, None, flags=cv2.CALIB_FIX_K3
+    )
     pinhole = k[0, 0], k[1, 1], k[0, 2], k[1, 2]
     lens = Lens(*map(float, pinhole), tuple(bent.ravel().tolist()), *known.lens.light_m)
     each = (_pose(cv2, *pose) for pose in zip(*poses, strict=True))
