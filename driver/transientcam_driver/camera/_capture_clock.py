@@ -14,44 +14,31 @@ STEP_S: Final = 1.0
 """By how much the delay of frames may differ; more is a step of the host's clock."""
 SETTLED_S: Final = 10.0
 """For so long from the first frame on, one that came sooner sets the clock at once."""
-MOST_DRIFT: Final = 2e-4
-"""By which the clock then follows the host's, at most: a quartz is off by no more."""
-_GAIN_HZ: Final = 0.25 / SETTLED_S
+LATER: Final = 2e-4
+SOONER: Final = 2e-3
+"""How fast the clock then follows the host's, as both run apart, by seconds in a week."""
 _AFTER_S: Final = 1e-5
 
 
 class CaptureClock:
-    """Times of a running capture; the first frames may still correct the clock.
-
-    Later ones correct its rate: both clocks run apart, by seconds in a week.
-    """
+    """Times of a running capture; the first frames may still correct the clock."""
 
     def __init__(self) -> None:
         self._offset_s: float | None = None
-        self._device_time_s, self._unix_s = 0.0, float("-inf")
-        self._until_s, self._rate, self._least_s = 0.0, 0.0, STEP_S
-        self._settled = False
+        self._device_s = self._settled_s = 0.0
+        self._unix_s = float("-inf")
 
     def unix_s(self, *, device_time_s: float, capture_s: float, host_time_s: float) -> float:
         """Return when the first exposure of the next frame began; times as in `RawFrame`."""
-        offset_s = host_time_s - capture_s - device_time_s
-        if self._offset_s is None or device_time_s <= self._device_time_s:
-            self._offset_s, self._rate, self._settled = offset_s, 0.0, False
-            self._until_s = device_time_s + SETTLED_S
-        else:
-            self._offset_s += self._rate * (device_time_s - self._device_time_s)
-        late_s = offset_s - self._offset_s
-        if abs(late_s) < STEP_S:
-            self._least_s = min(self._least_s, late_s)
-            if not self._settled:
-                self._offset_s = min(self._offset_s, offset_s)
-        if device_time_s >= self._until_s:
-            if self._settled and self._least_s < STEP_S:
-                self._rate = max(-MOST_DRIFT, min(MOST_DRIFT, _GAIN_HZ * self._least_s))
-            self._until_s, self._least_s = device_time_s + SETTLED_S, STEP_S
-            self._settled = True
+        offset_s, passed_s = host_time_s - capture_s - device_time_s, device_time_s - self._device_s
+        if self._offset_s is None or passed_s <= 0.0:
+            self._offset_s, self._settled_s = offset_s, device_time_s + SETTLED_S
+        elif abs(late_s := offset_s - self._offset_s) < STEP_S:
+            settled = device_time_s > self._settled_s
+            least_s, most_s = (-SOONER * passed_s, LATER * passed_s) if settled else (late_s, 0.0)
+            self._offset_s += max(least_s, min(most_s, late_s))
         self._offset_s = max(self._offset_s, self._unix_s + _AFTER_S - device_time_s)
-        self._device_time_s, self._unix_s = device_time_s, device_time_s + self._offset_s
+        self._device_s, self._unix_s = device_time_s, device_time_s + self._offset_s
         return self._unix_s
 
 

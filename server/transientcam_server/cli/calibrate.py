@@ -4,11 +4,11 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 """
 
 import json
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -17,8 +17,12 @@ from transientcam.cli.terminal import Terminal, echo
 from transientcam_driver.texts import in_celsius, read_text
 
 if TYPE_CHECKING:
+    from transientcam import Camera as Client
     from transientcam_driver import Camera
     from transientcam_server.imaging import Calibration
+
+_UNDER_WAY: Final = 3
+"""Frames that may have begun before one asks."""
 
 
 def calibrate(
@@ -69,23 +73,17 @@ def calibrate(
         ),
     ] = False,
     lens: Annotated[
-        str | None,
+        bool,
         typer.Option(
-            help="Measure the lens instead: `wall`, or a printed chessboard by its inner corners, "
-            "`9x6`. Prints [lens] of the settings, and writes it to --output, a .toml."
+            "--lens",
+            help="Measure the lens instead, by a flat wall from several sides: prints [lens] of "
+            "the settings.",
         ),
-    ] = None,
-    square_m: Annotated[
-        float, typer.Option(min=1e-4, help="Side of a square of the board.")
-    ] = 0.03,
-    views: Annotated[
-        int, typer.Option(min=2, max=100, help="How often wall or board are seen.")
-    ] = 5,
+    ] = False,
+    views: Annotated[int, typer.Option(min=2, max=100, help="From how many sides.")] = 5,
     second: Annotated[
         str | None,
-        typer.Option(
-            metavar="URL", help="Also measure where this daemon's camera stands, by a board."
-        ),
+        typer.Option(metavar="URL", help="Daemon of a camera that sees the same walls: its pose."),
     ] = None,
     token: TokenOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
@@ -96,25 +94,15 @@ def calibrate(
     stores the result; without one, the file is meant for `serve --calibration FILE`. What does not
     look like a diffuser is kept, but not used, and the exit code is 1; --force uses it anyway.
     """
-    require_suffix(output, ".npz" if lens is None else ".toml")
-    if lens is not None:
-        from transientcam_server.cli.calibrate_lens import measure_lens
-
+    require_suffix(output, ".npz")
+    if lens:
+        others = {"--camera": camera, "--sequence": sequence, "--name": name, "--output": output}
+        others |= {"--undo": undo, "--activate": activate, "--force": force}
+        _refuse(others, "is not for --lens")
         if url is None:
             raise typer.BadParameter("needs the URL of a daemon", param_hint="--lens")
-        others = {"--camera": camera, "--sequence": sequence, "--name": name, "--undo": undo}
-        _refuse(others | {"--activate": activate, "--force": force}, "is not for --lens")
         urls = [url] if second is None else [url, second]
-        measure_lens(
-            urls,
-            lens,
-            square_m=square_m,
-            views=views,
-            takes=takes,
-            output=output,
-            token=token,
-            as_json=as_json,
-        )
+        _measure_lens(urls, views=views, takes=takes, token=token, as_json=as_json)
         return
     if undo:
         _undo(url, token, as_json=as_json)
@@ -127,16 +115,15 @@ def calibrate(
             raise typer.BadParameter("is for simulated cameras", param_hint="--diffuser")
         if output is None:
             raise typer.BadParameter("names the file to write", param_hint="--output")
-        order = _Order(
+        result = _measured_here(
             camera or "usb",
-            takes,
-            sequence,
+            None if sequence is None else _document(sequence),
             output,
+            takes=takes,
             force=force,
             diffuser=diffuser,
             harmonics=harmonics,
         )
-        result = _measured_here(order)
     else:
         _refuse({"--camera": camera, "--sequence": sequence}, "is the daemon's, if there is one")
         options = {"name": name, "frames": takes, "activate": activate, "force": force}
@@ -153,17 +140,39 @@ def calibrate(
         raise typer.Exit(code=1)
 
 
-@dataclass(frozen=True, slots=True)
-class _Order:
-    """What to measure without a daemon."""
+def _measure_lens(
+    urls: Sequence[str], *, views: int, takes: int, token: str | None, as_json: bool
+) -> None:
+    from transientcam import Camera
+    from transientcam_server.imaging import Intrinsics, lens_of_walls, second_in_first
 
-    camera: str
-    takes: int
-    sequence: str | None
-    output: Path
-    force: bool
-    diffuser: bool
-    harmonics: bool
+    with ExitStack() as opened:
+        cameras = [opened.enter_context(Camera(url, token=token)) for url in urls]
+        known = [Intrinsics.of_document(each.camera["intrinsics"]) for each in cameras]
+        ranges: list[list[Any]] = [[] for _ in cameras]
+        for view in range(views):
+            asked = f"the wall from side {view + 1} of {views}, then Enter"
+            typer.prompt(asked, default="", show_default=False, err=True)
+            for each, own in zip(cameras, ranges, strict=True):
+                own.append(_mean_range(each, takes))
+    lenses, off_m, walls = zip(*map(lens_of_walls, ranges, known), strict=True)
+    lens = {f"{name}_px": round(getattr(lenses[0], name), 3) for name in ("fx", "fy", "cx", "cy")}
+    lens["distortion"] = [round(each, 5) for each in lenses[0].distortion]
+    beside = {"deviation_m": off_m[0], "walls": walls[0].tolist()}
+    if len(urls) > 1:
+        beside["second_in_first"] = second_in_first(*walls).tolist()
+    lines = [f"{name} = {value}" for name, value in lens.items()]
+    lines += [f"# {name} = {value}" for name, value in beside.items()]
+    echo(json.dumps({"lens": lens} | beside) if as_json else "\n".join(["[lens]", *lines]))
+
+
+def _mean_range(camera: "Client", takes: int) -> Any:
+    import numpy as np
+
+    begun = camera.latest()["frame"] + _UNDER_WAY
+    with camera.stream("range") as stream:
+        new = (frame.array for frame in iter(stream.receive, None) if frame.frame > begun)
+        return np.mean([next(new) for _ in range(takes)], axis=0, dtype=np.float64)
 
 
 def _undo(url: str | None, token: str | None, *, as_json: bool) -> None:
@@ -227,39 +236,46 @@ def _before_lens(change: Callable[..., object]) -> Iterator[None]:
         change(diffuser=False)
 
 
-def _measured_here(order: _Order) -> dict[str, Any]:
-    from transientcam_driver import Sequence, open_camera
+def _measured_here(
+    name: str,
+    sequence: Mapping[str, Any] | None,
+    output: Path,
+    *,
+    takes: int,
+    force: bool,
+    diffuser: bool,
+    harmonics: bool,
+) -> dict[str, Any]:
+    from transientcam_driver import Sequence as Captured, open_camera
     from transientcam_server.camera import start_with
     from transientcam_server.imaging import SWEEP_ON_A_SCENE, judge, to_document
     from transientcam_server.settings import SequenceSettings
 
-    requested = None
-    if order.sequence is not None:
-        requested = Sequence.from_document(_document(order.sequence))
-    with open_camera(order.camera) as opened:
+    requested = None if sequence is None else Captured.from_document(sequence)
+    with open_camera(name) as opened:
         if requested is None:
             start_with(opened, SequenceSettings())
         else:
             opened.configure(requested)
-        simulation = opened.simulation if order.diffuser else None
+        simulation = opened.simulation if diffuser else None
         with nullcontext() if simulation is None else _before_lens(simulation.change):
-            measured, why_not = _measure(opened, order)
+            measured, why_not = _measure(opened, takes, harmonics=harmonics)
         full_scale = 2.0**opened.capabilities.bits - 1.0
     verdict = judge(measured.capture, measured.gains.bad, full_scale=full_scale).to_document()
-    notes = {"verdict": verdict, "forced": order.force}
+    notes = {"verdict": verdict, "forced": force}
     capture = replace(measured.capture, notes=notes)
     if verdict["verdict"] == "scene" and capture.waveform is not None:
         capture, why_not = replace(capture, waveform=None), SWEEP_ON_A_SCENE
-    capture.save(order.output)
-    return _result(replace(measured, capture=capture), order.output) | {
+    capture.save(output)
+    return _result(replace(measured, capture=capture), output) | {
         "verdict": verdict,
-        "forced": order.force,
+        "forced": force,
         "harmonics": to_document(capture.waveform),
         "no_harmonics": why_not,
     }
 
 
-def _measure(camera: "Camera", order: _Order) -> "tuple[Calibration, str | None]":
+def _measure(camera: "Camera", takes: int, *, harmonics: bool) -> "tuple[Calibration, str | None]":
     """Measure with a camera; also return why there are no harmonics."""
     from rich.progress import Progress
 
@@ -267,18 +283,18 @@ def _measure(camera: "Camera", order: _Order) -> "tuple[Calibration, str | None]
     from transientcam_driver import capture_calibration
     from transientcam_server.imaging import SweepEvaluation, evaluate
 
-    sweep = SweepEvaluation(camera.capabilities, takes=order.takes)
+    sweep = SweepEvaluation(camera.capabilities, takes=takes)
     with Progress(console=Terminal(stderr=True)) as shown:
         task = shown.add_task("capturing", total=None)
         capture = capture_calibration(
             camera,
-            takes=order.takes,
+            takes=takes,
             average=tm.average_takes,
-            waveform=sweep if order.harmonics else None,
+            waveform=sweep if harmonics else None,
             progress=lambda done, total: shown.update(task, completed=done, total=total),
         )
         shown.update(task, description="evaluating")
-        return evaluate(capture), sweep.reason if order.harmonics else None
+        return evaluate(capture), sweep.reason if harmonics else None
 
 
 def _document(text: str) -> dict[str, Any]:

@@ -1,11 +1,7 @@
 """From captures to products: frames, what is computed of them, and their encodings."""
 
 from transientcam_server.imaging._calibrations.diffuser import judge
-from transientcam_server.imaging._calibrations.lens import (
-    lens_of_boards,
-    lens_of_walls,
-    second_in_first,
-)
+from transientcam_server.imaging._calibrations.lens import lens_of_walls, second_in_first
 from transientcam_server.imaging._calibrations.verdict import Verdict
 from transientcam_server.imaging._encodings.compact import (
     encoding_name,
@@ -122,7 +118,6 @@ __all__ = [
     "in_words",
     "judge",
     "known_intrinsics",
-    "lens_of_boards",
     "lens_of_walls",
     "listed",
     "load_calibration",

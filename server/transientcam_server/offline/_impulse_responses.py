@@ -26,12 +26,21 @@ from transientcam_server.recording import Storage, open_unknown, swmr
 
 _Array = NDArray[Any]
 
-KEYS: Final = ("counts", "meas", "h", "transient", "H")
+_TIMES: Final = {
+    # photons lie anywhere in their bin, and bin k of a film collects lengths from k width on
+    "counts": ("", "bin_s", 0.5),
+    "meas": ("", "bin_s", 0.5),
+    "h": ("start_opl_m", "bin_opl_m", 0.0),
+    "transient": ("start_opl", "bin_width_opl", 0.5),
+    "H": ("t_start", "delta_t", 0.0),
+}
+"""Begin and step of the time axis of each response, in m or without a begin in s, and the place in
+a bin."""
+KEYS: Final = tuple(_TIMES)
 """Any of them makes a file one of impulse responses."""
 _OF_TAL: Final = ("H", "H_format", "t_start", "delta_t")
-_OF_MATLAB: Final = (
-    *("counts", "meas", "bin_s", "h", "start_opl_m", "bin_opl_m"),
-    *("transient", "start_opl", "bin_width_opl", "moments", "base_frequency_hz"),
+_OF_MATLAB: Final = {"moments", "base_frequency_hz", *KEYS[:-1]}.union(
+    *(each[:2] for each in _TIMES.values())
 )
 _MATLAB_7: Final = b"MATLAB 7.3 MAT-file"
 """What a file begins with that MATLAB wrote with -v7.3: HDF5 with the axes turned round."""
@@ -44,8 +53,8 @@ LEAST_BIN_S: Final = 1e-15
 LONGEST_S: Final = 1e-3
 """A response ends before: light goes 150 km there and back. Bins are longer than a femtosecond, and
 no longer than half a period of the highest frequency that is asked of them."""
-_SHORT: Final = 16
-"""A response of less than one part in so many of the unambiguous time is suspicious."""
+_FEW_PERIODS: Final = 0.25
+"""Of the highest frequency: in a shorter response time may be another axis, one that is longer."""
 _CHANNELS: Final = 3
 _DEFLATE_AT_MOST: Final = 1032
 """How many times its size what deflate has packed can be (the zlib home page)."""
@@ -97,64 +106,45 @@ def arrays_of(path: Path) -> dict[str, _Array]:
 
 
 def impulse_response(
-    path: Path,
-    arrays: Mapping[str, _Array],
-    *,
-    background: str,
-    frequency_hz: float,
-    harmonics: int,
+    path: Path, arrays: Mapping[str, _Array], *, background: str, highest_hz: float
 ) -> tuple[_Array, _Array]:
     """Return the times of the bins (T,) in s, and the responses (H, W, T).
 
-    ``frequency_hz`` and ``harmonics`` are those to be measured.
+    ``highest_hz`` is the highest frequency that is to be measured.
 
     Raises
     ------
     InputError
         Naming the file, the key, what it is and what it must be.
     """
-    if "counts" in arrays or "meas" in arrays:
-        key, width, unit_s = "counts" if "counts" in arrays else "meas", "bin_s", 1.0
-        response = _counts(path, key, arrays[key], background=background)
-        first = 0.5 * scalar(path, arrays, width)  # photons lie anywhere in their bin
-    else:
-        unit_s, offset_bins = 1.0 / tm.SPEED_OF_LIGHT_M_S, 0.0
-        if "h" in arrays:
-            key, start, width, response = "h", "start_opl_m", "bin_opl_m", arrays["h"]
-        elif "transient" in arrays:
-            # bin k of the film collects lengths from start + k width on
-            key, start, width, offset_bins = "transient", "start_opl", "bin_width_opl", 0.5
-            response = _grey(path, arrays[key])
-        else:
-            key, start, width, response = "H", "t_start", "delta_t", _image(path, arrays)
-        if response.ndim != 3 or not response.size or response.dtype.kind not in "fiu":
-            found = f"{response.dtype} of shape {response.shape}"
-            raise InputError(str(path), key, found, "numbers of shape (H, W, T)")
-        first = scalar(path, arrays, start, positive=False)
-        first += offset_bins * scalar(path, arrays, width)
-        require_some_finite(path, key, response.sum(axis=-1, dtype=np.float64)[np.newaxis])
-    step = scalar(path, arrays, width)
-    time_s = (first + np.arange(response.shape[-1]) * step) * unit_s
-    _require_times_of_flight(path, width, step, time_s, unit_s, frequency_hz * harmonics)
-    height, wide, bins = response.shape
-    if bins * step * unit_s * frequency_hz * _SHORT < 1.0 and max(height, wide) >= 4 * bins:
+    key = next(each for each in KEYS if each in arrays)
+    start, width, offset_bins = _TIMES[key]
+    unit, unit_s = ("m", 1.0 / tm.SPEED_OF_LIGHT_M_S) if start else ("s", 1.0)
+    response = arrays[key]
+    if not start:
+        response = _counts(path, key, response, background=background)
+    elif key == "transient":
+        response = _grey(path, response)
+    elif key == "H":
+        response = _image(path, arrays)
+    if response.ndim != 3 or not response.size or response.dtype.kind not in "fiu":
+        found = f"{response.dtype} of shape {response.shape}"
+        raise InputError(str(path), key, found, "numbers of shape (H, W, T)")
+    first = scalar(path, arrays, start, positive=False) if start else 0.0
+    step, bins = scalar(path, arrays, width), response.shape[-1]
+    require_some_finite(path, key, response.sum(axis=-1, dtype=np.float64)[np.newaxis])
+    time_s = (first + (np.arange(bins) + offset_bins) * step) * unit_s
+    least, most = LEAST_BIN_S / unit_s, 0.5 / (highest_hz * unit_s)
+    if not least <= step <= most:
+        expected = f"from {least:.3g} to {most:.3g} {unit}, half a period of {highest_hz:g} Hz"
+        raise InputError(str(path), width, f"{step:g} {unit}", expected)
+    if (last_s := np.abs(time_s).max()) > LONGEST_S:
+        expected = f"of times of flight, within {LONGEST_S:g} s"
+        raise InputError(str(path), start or width, f"of times of {last_s:g} s", expected)
+    if bins * step * unit_s * highest_hz < _FEW_PERIODS and max(response.shape) >= 4 * bins:
         found = f"of shape {arrays[key].shape}: {bins} bins, {bins * step * unit_s:.3g} s in all"
         raise InputError(str(path), key, found, "with time on the last axis: (H, W, n_bins)")
     return time_s, response
-
-
-def _require_times_of_flight(
-    path: Path, key: str, step: float, time_s: _Array, unit_s: float, highest_hz: float
-) -> None:
-    """Refuse times in another unit than theirs, and bins too long for a frequency."""
-    least, most = LEAST_BIN_S / unit_s, 0.5 / (highest_hz * unit_s)
-    unit = "s" if unit_s == 1.0 else "m"
-    if not least <= step <= most:
-        expected = f"from {least:.3g} to {most:.3g} {unit}, half a period of {highest_hz:g} Hz"
-        raise InputError(str(path), key, f"{step:g} {unit}", expected)
-    if np.abs(time_s).max() > LONGEST_S:
-        found = f"{step:g} {unit}, and times from {time_s[0]:.3g} to {time_s[-1]:.3g} s"
-        raise InputError(str(path), key, found, f"of times of flight, within {LONGEST_S:g} s")
 
 
 def scalar(path: Path, arrays: Mapping[str, _Array], key: str, *, positive: bool = True) -> float:
@@ -233,11 +223,8 @@ def _counts(path: Path, key: str, counts: _Array, *, background: str) -> _Array:
         counts = counts.reshape(-1)
     if counts.ndim not in (1, 3) or counts.shape[-1] < 2 or not counts.size:
         raise InputError(str(path), key, f"of shape {counts.shape}", "(n_bins,) or (H, W, n_bins)")
-    if counts.dtype.kind not in "fiu":
-        raise InputError(str(path), key, f"{counts.dtype}", "numbers")
-    counts = (counts if counts.ndim > 1 else counts[np.newaxis, np.newaxis]).astype(np.float64)
-    require_some_finite(path, key, counts.sum(axis=-1)[np.newaxis])
-    if background == "median":
+    counts = counts if counts.ndim > 1 else counts[np.newaxis, np.newaxis]
+    if background == "median" and counts.dtype.kind in "fiu":
         # fewer photons than the background are noise of it, not negative light
         counts = np.maximum(counts - np.median(counts, axis=-1, keepdims=True), 0.0)
     return counts

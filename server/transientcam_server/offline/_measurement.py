@@ -111,9 +111,7 @@ def load_measurement(
     if harmonics is not None and not 1 <= harmonics <= MAX_HARMONICS:
         raise InputError("--harmonics", "value", f"{harmonics}", f"from 1 to {MAX_HARMONICS}")
     f_hz, m = frequency_hz or DEFAULT_FREQUENCY_HZ, harmonics or DEFAULT_HARMONICS
-    time_s, response = impulse_response(
-        path, arrays, background=background, frequency_hz=f_hz, harmonics=m
-    )
+    time_s, response = impulse_response(path, arrays, background=background, highest_hz=f_hz * m)
     return Measurement(moments_of(response, time_s, frequency_hz=f_hz, harmonics=m), f_hz)
 
 

@@ -110,13 +110,12 @@ class Header:
         """The measured gains; None for the nominal ones."""
         if self.calibration_planes is None:
             return None
-        return Gains(
-            str(self.calibration.get("id", "recorded")),
-            self.calibration_planes,
-            self.calibration_bad,
-            self.calibration_waveform,
-            _number(self.calibration.get("temperature_c")),
+        name, known_c = (
+            self.calibration.get("id", "recorded"),
+            self.calibration.get("temperature_c"),
         )
+        gains = self.calibration_planes, self.calibration_bad, self.calibration_waveform
+        return Gains(str(name), *gains, known_c if isinstance(known_c, float) else None)
 
 
 def utc(unix_s: float) -> datetime:
@@ -404,12 +403,6 @@ def require_plain(document: Mapping[str, Any]) -> None:
         if not level:
             return
     raise ValueError(f"it has more than {MAX_DEPTH} levels")
-
-
-def _number(value: object) -> float | None:
-    """Return a finite number of a document; None for anything else."""
-    number = type(value) in (int, float) and abs(value) < _LONGEST_S
-    return float(value) if number else None
 
 
 def _finite(name: str, *values: float) -> float:
