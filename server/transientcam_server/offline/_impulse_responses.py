@@ -39,8 +39,8 @@ a bin."""
 KEYS: Final = tuple(_TIMES)
 """Any of them makes a file one of impulse responses."""
 _OF_TAL: Final = ("H", "H_format", "t_start", "delta_t")
-_OF_MATLAB: Final = {"moments", "base_frequency_hz", *KEYS[:-1]}.union(
-    *(each[:2] for each in _TIMES.values())
+_OF_MATLAB: Final = {"moments", "base_frequency_hz", *KEYS}.union(
+    filter(None, (name for begin, step, _ in _TIMES.values() for name in (begin, step)))
 )
 _MATLAB_7: Final = b"MATLAB 7.3 MAT-file"
 """What a file begins with that MATLAB wrote with -v7.3: HDF5 with the axes turned round."""
@@ -86,10 +86,10 @@ def arrays_of(path: Path) -> dict[str, _Array]:
     if begin.startswith(_OCTAVE):
         found = "in a format of Octave alone"
         raise InputError(str(path), "content", found, "an .npz, or what `save -v7` writes")
-    if begin.startswith(_MATLAB_5):
-        return _of_matlab_5(path)
     if h5py.is_hdf5(path):
         return _of_hdf5(path, matlab=begin.startswith(_MATLAB_7))
+    if begin.startswith(_MATLAB_5) or path.suffix == ".mat":
+        return _of_matlab_5(path)
     try:
         # no pickle: a measurement from elsewhere must not be able to run anything
         with path.open("rb") as opened:
@@ -186,7 +186,7 @@ def _of_hdf5(path: Path, *, matlab: bool) -> dict[str, _Array]:
             storage = Storage(file, path.stat().st_size * _DEFLATE_AT_MOST)
             _require_known(path, file)
             return {
-                name: _of_matlab_7(storage.values(name)) if matlab else storage.values(name)
+                name: _of_matlab(storage.values(name).T) if matlab else storage.values(name)
                 for name in (_OF_MATLAB if matlab else _OF_TAL)
                 # tal writes an empty value for what it does not know
                 if name in storage and storage.dataset(name).shape is not None
@@ -196,10 +196,11 @@ def _of_hdf5(path: Path, *, matlab: bool) -> dict[str, _Array]:
         raise InputError(str(path), "content", found, "an HDF5 file of tal with H") from error
 
 
-def _of_matlab_7(values: _Array) -> _Array:
+def _of_matlab(values: Any) -> _Array:
     if values.dtype.names == _COMPLEX:
         values = values["real"] + 1j * values["imag"]
-    return values.T
+    whole: _Array = values.toarray() if hasattr(values, "toarray") else values  # sparse
+    return whole.reshape(-1) if whole.ndim == _MATRIX and 1 in whole.shape else whole  # a vector
 
 
 def _of_matlab_5(path: Path) -> dict[str, _Array]:
@@ -208,7 +209,7 @@ def _of_matlab_5(path: Path) -> dict[str, _Array]:
     try:
         _require_known(path, (name for name, _, _ in whosmat(path)))
         return {
-            name: values.toarray() if hasattr(values, "toarray") else values
+            name: _of_matlab(values)
             for name, values in loadmat(path, variable_names=_OF_MATLAB).items()
             if name in _OF_MATLAB
         }
@@ -219,8 +220,6 @@ def _of_matlab_5(path: Path) -> dict[str, _Array]:
 
 
 def _counts(path: Path, key: str, counts: _Array, *, background: str) -> _Array:
-    if counts.ndim == _MATRIX and 1 in counts.shape:  # MATLAB has no vectors
-        counts = counts.reshape(-1)
     if counts.ndim not in (1, 3) or counts.shape[-1] < 2 or not counts.size:
         raise InputError(str(path), key, f"of shape {counts.shape}", "(n_bins,) or (H, W, n_bins)")
     counts = counts if counts.ndim > 1 else counts[np.newaxis, np.newaxis]
