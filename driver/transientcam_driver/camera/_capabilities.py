@@ -90,7 +90,7 @@ class Capabilities:
         Room for images in the camera; 0 where that is not known.
     clock
         Whose times the frames have: ``device``, of the camera's own clock, which begins anywhere;
-        or ``ptp``, Unix time of a clock in the camera that PTP (IEEE 1588) disciplines.
+        or ``ptp``, Unix time (no TAI) of a clock in it that PTP (IEEE 1588) disciplines.
     heartbeat_s
         The camera switches its light off by itself when it was not asked for anything for so long;
         0 where it does not.

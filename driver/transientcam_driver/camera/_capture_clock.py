@@ -1,8 +1,8 @@
 """When frames were captured, in Unix time, whatever happens to the clock of the host.
 
 The device's clock is set by the host's once: by the frame that came with the least delay. A step
-of the host's clock moves nothing, and intervals are the device's. Where the device's clock begins
-anew it is set once more; times go on growing all the same.
+of the host's clock moves nothing, and intervals are the device's, live within 0.2 %. Where the
+device's clock begins anew it is set once more; times go on growing all the same.
 """
 
 from typing import Any, Final

@@ -96,13 +96,14 @@ def calibrate(
     """
     require_suffix(output, ".npz")
     if lens:
-        others = {"--camera": camera, "--sequence": sequence, "--name": name, "--output": output}
-        others |= {"--undo": undo, "--activate": activate, "--force": force}
-        _refuse(others, "is not for --lens")
+        kept = {"--name": name, "--output": output, "--activate": activate, "--force": force}
+        others = {"--camera": camera, "--sequence": sequence, "--undo": undo}
+        _refuse(kept | others, "is not for --lens")
         if url is None:
             raise typer.BadParameter("needs the URL of a daemon", param_hint="--lens")
-        urls = [url] if second is None else [url, second]
-        _measure_lens(urls, views=views, takes=takes, token=token, as_json=as_json)
+        _measure_lens(
+            [url, *filter(None, [second])], views=views, takes=takes, token=token, as_json=as_json
+        )
         return
     if undo:
         _undo(url, token, as_json=as_json)
@@ -327,17 +328,25 @@ def _result(measured: "Calibration", output: Path) -> dict[str, Any]:
 
 
 def _print_capture(result: dict[str, Any]) -> None:
-    captured = result["images"] * result["takes"]
-    lines = (
-        f"{result['file']}: {result['calibration_id']}",
-        f"  {result['width']} x {result['height']} pixels of {result['serial']} "
-        f"at {in_celsius(result['temperature_c'])}, {result['bad_pixels']} of them bad",
-        f"  {result['rejected_images']} of {captured} images left out as outliers",
-        *_harmonics_lines(result),
-        *_verdict_lines(result["verdict"]),
-    )
-    for line in lines:
-        echo(line)
+    head, captured = f"{result['file']}: {result['calibration_id']}", result["takes"]
+    echo("\n".join(_lines(head, result, result, result, captured * result["images"])))
+
+
+def _lines(
+    head: str,
+    of: Mapping[str, Any],
+    device: Mapping[str, Any],
+    found: Mapping[str, Any],
+    count: int,
+) -> list[str]:
+    return [
+        head,
+        f"  {device['width']} x {device['height']} pixels of {device['serial']} "
+        f"at {in_celsius(of['temperature_c'])}, {found['bad_pixels']} of them bad",
+        f"  {found['rejected_images']} of {count} images left out as outliers",
+        *_harmonics_lines(found),
+        *_verdict_lines(found["verdict"]),
+    ]
 
 
 def _harmonics_lines(result: Mapping[str, Any]) -> list[str]:
@@ -363,20 +372,12 @@ def _verdict_lines(verdict: Mapping[str, Any]) -> list[str]:
 
 def _print_measured(result: dict[str, Any]) -> None:
     calibration, measured = result["calibration"], result["measured"]
-    device, name = calibration["device"], calibration["name"]
-    lines = [
-        calibration["id"] + (f" ({name})" if name else ""),
-        f"  {device['width']} x {device['height']} pixels of {device['serial']} "
-        f"at {in_celsius(calibration['temperature_c'])}, {measured['bad_pixels']} of them bad",
-        f"  {measured['rejected_images']} of {measured['images']} images left out as outliers",
-    ]
-    lines += _harmonics_lines(measured)
-    lines += _verdict_lines(measured["verdict"])
+    head = calibration["id"] + (f" ({calibration['name']})" if calibration["name"] else "")
+    lines = _lines(head, calibration, calibration["device"], measured, measured["images"])
     if calibration["active"]:
         lines.append("  in use")
         if measured["former"] is not None:
             lines.append(f"  before it {measured['former']} was; --undo returns to it")
     if result["file"] is not None:
         lines.append(f"  downloaded into {result['file']}")
-    for line in lines:
-        echo(line)
+    echo("\n".join(lines))

@@ -45,10 +45,8 @@ _OF_MATLAB: Final = {"moments", "base_frequency_hz", *KEYS}.union(
 _MATLAB_7: Final = b"MATLAB 7.3 MAT-file"
 """What a file begins with that MATLAB wrote with -v7.3: HDF5 with the axes turned round."""
 _MATLAB_5: Final = b"MATLAB 5.0 MAT-file"
-"""The same of all other options of `save`, and of Octave's -v6 and -v7."""
+"""The same of its other options but -v4, and of Octave's -v6 and -v7."""
 _OCTAVE: Final = (b"# Created by Octave", b"Octave-1")
-_COMPLEX: Final = ("real", "imag")
-"""The fields of a complex number of MATLAB in HDF5."""
 LEAST_BIN_S: Final = 1e-15
 LONGEST_S: Final = 1e-3
 """A response ends before: light goes 150 km there and back. Bins are longer than a femtosecond, and
@@ -82,7 +80,8 @@ def arrays_of(path: Path) -> dict[str, _Array]:
     OSError
         If it cannot be read.
     """
-    begin = _begin(path)
+    with path.open("rb") as opened:
+        begin = opened.read(32)
     if begin.startswith(_OCTAVE):
         found = "in a format of Octave alone"
         raise InputError(str(path), "content", found, "an .npz, or what `save -v7` writes")
@@ -167,11 +166,6 @@ def require_some_finite(path: Path, key: str, planes: _Array) -> None:
         raise InputError(str(path), key, "NaN or infinite in every pixel", "finite somewhere")
 
 
-def _begin(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(32)
-
-
 def _require_known(path: Path, names: Iterable[str]) -> None:
     """Refuse a file of other arrays, and say which."""
     held = set(names)
@@ -197,7 +191,7 @@ def _of_hdf5(path: Path, *, matlab: bool) -> dict[str, _Array]:
 
 
 def _of_matlab(values: Any) -> _Array:
-    if values.dtype.names == _COMPLEX:
+    if values.dtype.names == ("real", "imag"):  # as HDF5 has complex numbers of MATLAB
         values = values["real"] + 1j * values["imag"]
     whole: _Array = values.toarray() if hasattr(values, "toarray") else values  # sparse
     return whole.reshape(-1) if whole.ndim == _MATRIX and 1 in whole.shape else whole  # a vector

@@ -30,9 +30,7 @@ DEFAULT_HARMONICS: Final = 4
 MAX_HARMONICS: Final = 32
 BLOCK_PIXELS: Final = 8192
 _TIMES_B_0: Final = 1.5
-"""What other moments may exceed b_0 by, with noise."""
-_STRANGE_SHARE: Final = 0.5
-"""Of the pixels that may do more."""
+"""What other moments may exceed b_0 by, with noise, in half of the pixels."""
 _IMAGES: Final = ("range_m", "direct", "indirect", "uniform")
 
 
@@ -211,7 +209,7 @@ def _of_moments(
     light, largest = np.abs(moments[0]), np.abs(moments[1:]).max(axis=0)
     lit = np.isfinite(moments).all(axis=0) & (largest > 0.0)
     strange = (moments[0].real < light / _TIMES_B_0) | (largest > light * _TIMES_B_0)
-    if lit.any() and (share := strange[lit].mean()) > _STRANGE_SHARE:
+    if lit.any() and (share := strange[lit].mean()) > 0.5:
         found = f"without a b_0 in {share:.0%} of the pixels"
         expected = "(m+1, H, W), b_0 first, which is real and no smaller than the others"
         raise InputError(str(path), "moments", found, expected)

@@ -231,7 +231,7 @@ def _lay_out(file: swmr.File, content: Content, parts: Mapping[str, NDArray[Any]
         else:
             file.create_dataset(name, data=column.values).make_scale(name)
     each_part = {name: replace(content.blocks[name[:-3]], dtype="<f4") for name in parts}
-    for name, block in (content.blocks | each_part).items():
+    for name, block in (dict(content.blocks) | each_part).items():
         blocks = swmr.create_blocks(file, name, block.shape[1:], block.dtype, **block.attributes)
         for axis, along in enumerate(block.axes):
             blocks.dims[axis].attach_scale(file[along])

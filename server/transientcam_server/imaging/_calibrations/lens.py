@@ -11,10 +11,9 @@ from transientcam_server.errors import InputError
 from transientcam_server.imaging._recipe.lens import Intrinsics
 
 _Array = NDArray[Any]
-_PIXELS: Final = 24
-"""Along the shorter side, by which a wall is judged."""
+_PIXELS: Final = 32
+"""Along the shorter side, by which a wall is judged; what is off by `_WALL_M` may be none."""
 _WALL_M: Final = 0.01
-"""What deviates by more counts less: it may be no wall."""
 _APART: Final = 0.1
 """Least singular value of the walls' normals that tell a place."""
 
@@ -22,16 +21,8 @@ _APART: Final = 0.1
 def lens_of_walls(ranges: Sequence[_Array], start: Intrinsics) -> tuple[Lens, float, _Array]:
     """Return the lens through which walls are flattest, the median deviation in m, and the walls.
 
-    Parameters
-    ----------
-    ranges
-        (H, W) in m, each of a flat wall from another side, NaN without a return.
-    start
-        The lens as far as it is known, and where the light is, which stays.
-
-    Returns
-    -------
-    The walls are planes (V, 3) in 1/m, whose points p have plane . p = 1.
+    ``ranges`` (H, W) in m are each of a flat wall from another side, NaN without a return. The lens
+    begins with ``start``, and keeps its light. Walls are planes (V, 3) in 1/m: plane . point = 1.
 
     Raises
     ------
@@ -46,8 +37,8 @@ def lens_of_walls(ranges: Sequence[_Array], start: Intrinsics) -> tuple[Lens, fl
         raise InputError("--lens", "wall", f"seen by {share:.0%} of the pixels", "seen by half")
 
     def lens_of(found: _Array, step: int = 1) -> Lens:
-        pinhole, bent = (found[:4] / step).tolist(), (*found[4:8].tolist(), 0.0)
-        return Lens(*pinhole, bent, *start.lens.light_m)
+        fx, fy, cx, cy, *bent = (found[:8] / [*[step] * 4, 1, 1, 1, 1]).tolist()
+        return Lens(fx, fy, cx, cy, (*bent, 0.0), *start.lens.light_m)
 
     def off_m(found: _Array) -> _Array:
         x, y = lens_of(found, step).slopes(*seen.shape[:0:-1])
@@ -61,14 +52,10 @@ def lens_of_walls(ranges: Sequence[_Array], start: Intrinsics) -> tuple[Lens, fl
     planes = [[0.0, 0.0, 1.0 / np.nanmedian(each)] for each in seen]
     bent = (*start.distortion, 0.0, 0.0, 0.0, 0.0)[:4]
     first = np.concatenate([[start.fx, start.fy, start.cx, start.cy, *bent], *planes])
-    how = {
-        "x_scale": np.repeat([start.fx, 1.0], [4, first.size - 4]),
-        "f_scale": _WALL_M,
-        "ftol": 1e-5,
-    }
-    # what is no wall counts little, and once the wall is found nearly nothing
-    rough = least_squares(off_m, first, loss="soft_l1", **how)
-    found = least_squares(off_m, rough.x, loss="cauchy", **how).x
+    scale, found = np.repeat([start.fx, 1.0], [4, first.size - 4]), first
+    for loss in ("soft_l1", "cauchy"):  # what is no wall counts little, then nearly nothing
+        how: Any = {"x_scale": scale, "loss": loss, "f_scale": _WALL_M, "ftol": 1e-5}
+        found = least_squares(off_m, found, **how).x
     return lens_of(found), float(np.median(np.abs(off_m(found)))), found[8:].reshape(-1, 3)
 
 
