@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from transientcam import Camera as Client
     from transientcam_driver import Camera
     from transientcam_server.imaging import Calibration
-
-_UNDER_WAY: Final = 3
-"""Frames that may have begun before one asks."""
 
 
 def calibrate(
@@ -170,7 +167,7 @@ def _measure_lens(
 def _mean_range(camera: "Client", takes: int) -> Any:
     import numpy as np
 
-    begun = camera.latest()["frame"] + _UNDER_WAY
+    begun = camera.latest()["frame"] + 3  # some are under way
     with camera.stream("range") as stream:
         new = (frame.array for frame in iter(stream.receive, None) if frame.frame > begun)
         return np.mean([next(new) for _ in range(takes)], axis=0, dtype=np.float64)

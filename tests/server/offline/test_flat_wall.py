@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import h5netcdf
 import numpy as np
 import pytest
 import rerun
+import xarray
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory as ProtobufDecoders
 from mcap_ros2.decoder import DecoderFactory as CdrDecoders
@@ -117,12 +117,12 @@ def test_a_flat_wall_is_flat_in_every_format(wall: Wall) -> None:
     assert_flat(np.stack([ply[axis] for axis in "xyz"], -1))
     with Recording(wall.path) as recording:
         reconstruct_recording(recording, folder / "p.nc", BatchOptions(("pointcloud",), PLAIN))
-        for schemas, decoders in (("ros2", CdrDecoders()), ("foxglove", ProtobufDecoders())):
-            output = folder / f"{schemas}.mcap"
-            convert_recording(recording, output, products=["pointcloud"], schemas=schemas)
-            assert_robots_agree(through_mcap(output, decoders))
-    with h5netcdf.File(folder / "p.nc") as file:
-        assert_flat(np.moveaxis(file["pointcloud"][0], 0, -1))
+        convert_recording(recording, folder / "r.mcap", products=["pointcloud"], schemas="ros2")
+        convert_recording(recording, folder / "f.mcap", products=["pointcloud"])
+    assert_robots_agree(through_mcap(folder / "r.mcap", CdrDecoders()))
+    assert_robots_agree(through_mcap(folder / "f.mcap", ProtobufDecoders()))
+    with xarray.open_dataset(folder / "p.nc", engine="h5netcdf") as dataset:
+        assert_flat(np.moveaxis(dataset["pointcloud"][0].values, 0, -1))
     logged = through_rerun(folder / "wall.rrd", cloud.array, wall.lens)
     assert_flat(logged[POINTS, "Points3D:positions"][0])
 

@@ -20,7 +20,7 @@ from transientcam_server.settings import ReconstructionSettings
 
 F_HZ = 23e6
 LIGHT_M_S = 299_792_458.0
-GOOD = {"moments": np.ones((4, 2, 2), dtype=complex), "base_frequency_hz": F_HZ}
+GOOD: dict[str, Any] = {"moments": np.ones((4, 2, 2), dtype=complex), "base_frequency_hz": F_HZ}
 PLAIN = ReconstructionSettings(smoothing_px=0.0, estimator="pisarenko")
 
 
