@@ -389,7 +389,10 @@ class Service:
                 "intrinsics": asdict(self.intrinsics),
                 "sensor": None if self.sensor is None else asdict(self.sensor),
             },
-            calibration={"id": calibration_id(gains)},
+            calibration={
+                "id": calibration_id(gains),
+                "temperature_c": None if gains is None else gains.temperature_c,
+            },
             calibration_planes=None if gains is None else gains.planes,
             calibration_bad=None if gains is None else gains.bad,
             calibration_waveform=None if gains is None else gains.waveform,

@@ -21,6 +21,8 @@ DEPTH: Final = "/depth"
 """Topic of the depth image of REP 118: z of the points. Product ``range`` is along the ray."""
 RECTIFIED: Final = "/depth_rect"
 """Topic of the same through the lens without its distortion, for programs that know no other."""
+_ONE_SURFACE: Final = 0.02
+"""By so much of it depth may change from pixel to pixel of one surface."""
 _ENCODINGS: Final = {"<f4": "32FC1", "<u2": "16UC1", "|u1": "mono8"}
 
 
@@ -77,7 +79,8 @@ class Pinhole:
     def rectified(self, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return a depth image (H, W) as the same lens without its distortion sees it.
 
-        Each pixel has the depth of the nearest one that looks its way, NaN where there is none.
+        Each pixel has the depth between the four that look its way where these see one surface,
+        else that of the nearest; NaN where there is none.
         """
         if not any(self.distortion):
             return depth_m
@@ -90,12 +93,23 @@ class Pinhole:
         radial = 1.0 + square * (k1 + square * (k2 + square * k3))
         bent_x = x * radial + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x)
         bent_y = y * radial + p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y
-        column = np.rint(self.fx * bent_x + self.cx)
-        row = np.rint(self.fy * bent_y + self.cy)
-        seen = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        found = np.full_like(depth_m, np.nan)
-        found[seen] = depth_m[row[seen].astype(np.intp), column[seen].astype(np.intp)]
-        return found
+        column, row = self.fx * bent_x + self.cx, self.fy * bent_y + self.cy
+        nearest = np.rint(column).clip(0, width - 1), np.rint(row).clip(0, height - 1)
+        seen = np.maximum(np.abs(nearest[0] - column), np.abs(nearest[1] - row)) <= 0.5
+        left, top = (
+            at.clip(0, size - 2).astype(np.intp)
+            for at, size in ((np.floor(column), width), (np.floor(row), height))
+        )
+        right, below = column - left, row - top
+        with np.errstate(all="ignore"):  # where nothing is seen
+            # 1 / z of a plane is even in the image
+            around = [1.0 / depth_m[top + k, left + j] for k in (0, 1) for j in (0, 1)]
+            even = np.ptp(around, axis=0) < _ONE_SURFACE * np.max(around, axis=0)
+            above = (1.0 - right) * around[0] + right * around[1]
+            under = (1.0 - right) * around[2] + right * around[3]
+            between = 1.0 / ((1.0 - below) * above + below * under)
+        depth = depth_m[nearest[1].astype(np.intp), nearest[0].astype(np.intp)]
+        return np.where(seen, np.where(even, between, depth), np.nan).astype(np.float32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

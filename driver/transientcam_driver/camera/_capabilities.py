@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import Any, Literal
 
 from transientcam_driver.errors import SequenceError
 from transientcam_driver.sequence import (
@@ -88,6 +88,9 @@ class Capabilities:
         sensor.
     fifo_bytes
         Room for images in the camera; 0 where that is not known.
+    clock
+        Whose times the frames have: ``device``, of the camera's own clock, which begins anywhere;
+        or ``ptp``, Unix time (no TAI) of a clock in it that PTP (IEEE 1588) disciplines.
     heartbeat_s
         The camera switches its light off by itself when it was not asked for anything for so long;
         0 where it does not.
@@ -123,6 +126,7 @@ class Capabilities:
     fifo_bytes: int = 0
     heartbeat_s: float = 0.0
     dark_dn: float | None = None
+    clock: Literal["device", "ptp"] = "device"
 
     @property
     def image_bytes(self) -> int:

@@ -54,6 +54,8 @@ def frames_are_whole_labelled_and_in_order(bench: Bench) -> None:
         require(frame.labels == applied.labels, "labels are not the sequence's")
         require(frame.epoch == applied.epoch, f"epoch {frame.epoch}, not {applied.epoch}")
         require(frame.capture_s > 0, f"capture_s is {frame.capture_s}")
+        late_s = frame.host_time_s - frame.device_time_s if capabilities.clock == "ptp" else 0.0
+        require(abs(late_s) < 30.0, f"PTP's time is {late_s:.0f} s behind the host's")
     for before, after in pairwise(frames):
         require(after.number > before.number, f"number {after.number} after {before.number}")
         require(after.device_time_s > before.device_time_s, "device_time_s does not grow")

@@ -398,11 +398,13 @@ class Acquisition:
 
     def _report_frame(self, raw: RawFrame) -> None:
         if raw.captured_unix_s is None:
-            captured_s = self._capture_clock.unix_s(
-                device_time_s=raw.device_time_s,
-                capture_s=raw.capture_s,
-                host_time_s=raw.host_time_s,
-            )
+            captured_s = raw.device_time_s
+            if self._camera.capabilities.clock != "ptp":
+                captured_s = self._capture_clock.unix_s(
+                    device_time_s=raw.device_time_s,
+                    capture_s=raw.capture_s,
+                    host_time_s=raw.host_time_s,
+                )
             raw = replace(raw, captured_unix_s=captured_s)
         self._report(Captured(raw, self._applied[raw.epoch]))
 

@@ -4,8 +4,8 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 """
 
 import json
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +17,7 @@ from transientcam.cli.terminal import Terminal, echo
 from transientcam_driver.texts import in_celsius, read_text
 
 if TYPE_CHECKING:
+    from transientcam import Camera as Client
     from transientcam_driver import Camera
     from transientcam_server.imaging import Calibration
 
@@ -79,6 +80,19 @@ def calibrate(
             help="Without a daemon: measure the noise of the sensor before a still scene.",
         ),
     ] = False,
+    lens: Annotated[
+        bool,
+        typer.Option(
+            "--lens",
+            help="Measure the lens instead, by a flat wall from several sides: prints [lens] of "
+            "the settings.",
+        ),
+    ] = False,
+    views: Annotated[int, typer.Option(min=2, max=100, help="From how many sides.")] = 5,
+    second: Annotated[
+        str | None,
+        typer.Option(metavar="URL", help="Daemon of a camera that sees the same walls: its pose."),
+    ] = None,
     token: TokenOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -96,6 +110,16 @@ def calibrate(
         measure_noise(camera or "usb", takes, output, as_json=as_json)
         return
     require_suffix(output, ".npz")
+    if lens:
+        kept = {"--name": name, "--output": output, "--activate": activate, "--force": force}
+        others = {"--camera": camera, "--sequence": sequence, "--undo": undo}
+        _refuse(kept | others, "is not for --lens")
+        if url is None:
+            raise typer.BadParameter("needs the URL of a daemon", param_hint="--lens")
+        _measure_lens(
+            [url, *filter(None, [second])], views=views, takes=takes, token=token, as_json=as_json
+        )
+        return
     if undo:
         _undo(url, token, as_json=as_json)
         return
@@ -109,9 +133,9 @@ def calibrate(
             raise typer.BadParameter("names the file to write", param_hint="--output")
         result = _measured_here(
             camera or "usb",
-            takes,
-            sequence,
+            None if sequence is None else _document(sequence),
             output,
+            takes=takes,
             force=force,
             diffuser=diffuser,
             sweep=harmonics,
@@ -130,6 +154,41 @@ def calibrate(
     verdict = result["verdict"] if url is None else result["measured"]["verdict"]
     if verdict["reason"] is not None and not force:
         raise typer.Exit(code=1)
+
+
+def _measure_lens(
+    urls: Sequence[str], *, views: int, takes: int, token: str | None, as_json: bool
+) -> None:
+    from transientcam import Camera
+    from transientcam_server.imaging import Intrinsics, lens_of_walls, second_in_first
+
+    with ExitStack() as opened:
+        cameras = [opened.enter_context(Camera(url, token=token)) for url in urls]
+        known = [Intrinsics.of_document(each.camera["intrinsics"]) for each in cameras]
+        ranges: list[list[Any]] = [[] for _ in cameras]
+        for view in range(views):
+            asked = f"the wall from side {view + 1} of {views}, then Enter"
+            typer.prompt(asked, default="", show_default=False, err=True)
+            for each, own in zip(cameras, ranges, strict=True):
+                own.append(_mean_range(each, takes))
+    lenses, off_m, walls = zip(*map(lens_of_walls, ranges, known), strict=True)
+    lens = {f"{name}_px": round(getattr(lenses[0], name), 3) for name in ("fx", "fy", "cx", "cy")}
+    lens["distortion"] = [round(each, 5) for each in lenses[0].distortion]
+    beside = {"deviation_m": off_m[0], "walls": walls[0].tolist()}
+    if len(urls) > 1:
+        beside["second_in_first"] = second_in_first(*walls).tolist()
+    lines = [f"{name} = {value}" for name, value in lens.items()]
+    lines += [f"# {name} = {value}" for name, value in beside.items()]
+    echo(json.dumps({"lens": lens} | beside) if as_json else "\n".join(["[lens]", *lines]))
+
+
+def _mean_range(camera: "Client", takes: int) -> Any:
+    import numpy as np
+
+    begun = camera.latest()["frame"] + 3  # some are under way
+    with camera.stream("range") as stream:
+        new = (frame.array for frame in iter(stream.receive, None) if frame.frame > begun)
+        return np.mean([next(new) for _ in range(takes)], axis=0, dtype=np.float64)
 
 
 def _undo(url: str | None, token: str | None, *, as_json: bool) -> None:
@@ -180,24 +239,22 @@ def _before_lens(change: Callable[..., object]) -> Iterator[None]:
 
 
 def _measured_here(
-    spec: str,
-    takes: int,
-    sequence: str | None,
+    name: str,
+    sequence: Mapping[str, Any] | None,
     output: Path,
     *,
+    takes: int,
     force: bool,
     diffuser: bool,
     sweep: bool,
 ) -> dict[str, Any]:
-    from transientcam_driver import Sequence, open_camera
+    from transientcam_driver import Sequence as Captured, open_camera
     from transientcam_server.camera import start_with
     from transientcam_server.imaging import SWEEP_ON_A_SCENE, judge, to_document
     from transientcam_server.settings import SequenceSettings
 
-    requested = None
-    if sequence is not None:
-        requested = Sequence.from_document(_document(sequence))
-    with open_camera(spec) as opened:
+    requested = None if sequence is None else Captured.from_document(sequence)
+    with open_camera(name) as opened:
         if requested is None:
             start_with(opened, SequenceSettings())
         else:
@@ -272,17 +329,25 @@ def _result(measured: "Calibration", output: Path) -> dict[str, Any]:
 
 
 def _print_capture(result: dict[str, Any]) -> None:
-    captured = result["images"] * result["takes"]
-    lines = (
-        f"{result['file']}: {result['calibration_id']}",
-        f"  {result['width']} x {result['height']} pixels of {result['serial']} "
-        f"at {in_celsius(result['temperature_c'])}, {result['bad_pixels']} of them bad",
-        f"  {result['rejected_images']} of {captured} images left out as outliers",
-        *_harmonics_lines(result),
-        *_verdict_lines(result["verdict"]),
-    )
-    for line in lines:
-        echo(line)
+    head, captured = f"{result['file']}: {result['calibration_id']}", result["takes"]
+    echo("\n".join(_lines(head, result, result, result, captured * result["images"])))
+
+
+def _lines(
+    head: str,
+    of: Mapping[str, Any],
+    device: Mapping[str, Any],
+    found: Mapping[str, Any],
+    count: int,
+) -> list[str]:
+    return [
+        head,
+        f"  {device['width']} x {device['height']} pixels of {device['serial']} "
+        f"at {in_celsius(of['temperature_c'])}, {found['bad_pixels']} of them bad",
+        f"  {found['rejected_images']} of {count} images left out as outliers",
+        *_harmonics_lines(found),
+        *_verdict_lines(found["verdict"]),
+    ]
 
 
 def _harmonics_lines(result: Mapping[str, Any]) -> list[str]:
@@ -308,20 +373,12 @@ def _verdict_lines(verdict: Mapping[str, Any]) -> list[str]:
 
 def _print_measured(result: dict[str, Any]) -> None:
     calibration, measured = result["calibration"], result["measured"]
-    device, name = calibration["device"], calibration["name"]
-    lines = [
-        calibration["id"] + (f" ({name})" if name else ""),
-        f"  {device['width']} x {device['height']} pixels of {device['serial']} "
-        f"at {in_celsius(calibration['temperature_c'])}, {measured['bad_pixels']} of them bad",
-        f"  {measured['rejected_images']} of {measured['images']} images left out as outliers",
-    ]
-    lines += _harmonics_lines(measured)
-    lines += _verdict_lines(measured["verdict"])
+    head = calibration["id"] + (f" ({calibration['name']})" if calibration["name"] else "")
+    lines = _lines(head, calibration, calibration["device"], measured, measured["images"])
     if calibration["active"]:
         lines.append("  in use")
         if measured["former"] is not None:
             lines.append(f"  before it {measured['former']} was; --undo returns to it")
     if result["file"] is not None:
         lines.append(f"  downloaded into {result['file']}")
-    for line in lines:
-        echo(line)
+    echo("\n".join(lines))

@@ -1,6 +1,7 @@
 """From captures to products: frames, what is computed of them, and their encodings."""
 
 from transientcam_server.imaging._calibrations.diffuser import judge
+from transientcam_server.imaging._calibrations.lens import lens_of_walls, second_in_first
 from transientcam_server.imaging._calibrations.verdict import Verdict
 from transientcam_server.imaging._encodings.compact import (
     encoding_name,
@@ -34,6 +35,7 @@ from transientcam_server.imaging._products.labelling import (
     image_columns,
     in_words,
     moment_columns,
+    parts_of,
 )
 from transientcam_server.imaging._products.pixel import pixel_csv, pixel_json
 from transientcam_server.imaging._products.products import PRODUCTS, Product

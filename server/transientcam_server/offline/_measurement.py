@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_server.errors import InputError
 from transientcam_server.offline._impulse_responses import (
-    KEYS,
+    LONGEST_S,
     arrays_of,
     impulse_response,
     require_some_finite,
@@ -29,6 +29,8 @@ DEFAULT_FREQUENCY_HZ: Final = 23e6
 DEFAULT_HARMONICS: Final = 4
 MAX_HARMONICS: Final = 32
 BLOCK_PIXELS: Final = 8192
+_TIMES_B_0: Final = 1.5
+"""What other moments may exceed b_0 by, with noise, in half of the pixels."""
 _IMAGES: Final = ("range_m", "direct", "indirect", "uniform")
 
 
@@ -90,10 +92,7 @@ def load_measurement(
     if harmonics is not None and not 1 <= harmonics <= MAX_HARMONICS:
         raise InputError("--harmonics", "value", f"{harmonics}", f"from 1 to {MAX_HARMONICS}")
     f_hz, m = frequency_hz or DEFAULT_FREQUENCY_HZ, harmonics or DEFAULT_HARMONICS
-    if not any(key in arrays for key in KEYS):
-        found = ", ".join(sorted(arrays)) or "nothing"
-        raise InputError(str(path), "content", found, f"moments, {', '.join(KEYS[:-1])} or H")
-    time_s, response = impulse_response(path, arrays, background=background)
+    time_s, response = impulse_response(path, arrays, background=background, highest_hz=f_hz * m)
     return Measurement(moments_of(response, time_s, frequency_hz=f_hz, harmonics=m), f_hz)
 
 
@@ -176,6 +175,9 @@ def _of_moments(
     if moments.dtype.kind not in "cfiu":
         raise InputError(str(path), "moments", f"{moments.dtype}", "complex numbers")
     f_hz = scalar(path, arrays, "base_frequency_hz")
+    if f_hz * LONGEST_S < 1.0:
+        least = f"at least {1.0 / LONGEST_S:g} Hz"
+        raise InputError(str(path), "base_frequency_hz", f"{f_hz:g} Hz", least)
     if frequency_hz is not None and frequency_hz != f_hz:
         raise InputError(
             "--frequency-hz", "value", f"{frequency_hz:g}", f"the {f_hz:g} of these moments"
@@ -187,4 +189,11 @@ def _of_moments(
     dtype = np.complex64 if moments.dtype == np.complex64 else np.complex128
     moments = np.ascontiguousarray(moments, dtype=dtype)
     require_some_finite(path, "moments", moments)
+    light, largest = np.abs(moments[0]), np.abs(moments[1:]).max(axis=0)
+    lit = np.isfinite(moments).all(axis=0) & (largest > 0.0)
+    strange = (moments[0].real < light / _TIMES_B_0) | (largest > light * _TIMES_B_0)
+    if lit.any() and (share := strange[lit].mean()) > 0.5:
+        found = f"without a b_0 in {share:.0%} of the pixels"
+        expected = "(m+1, H, W), b_0 first, which is real and no smaller than the others"
+        raise InputError(str(path), "moments", found, expected)
     return Measurement(moments, f_hz)

@@ -5,7 +5,7 @@ A second run goes on after the last frame that is in the file.
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 
 from transientcam_driver import AppliedSequence, RawFrame
 from transientcam_server.errors import InputError
-from transientcam_server.imaging import PRODUCTS, Column, Product, SettingsVersion, unmet
+from transientcam_server.imaging import (
+    PRODUCTS,
+    Column,
+    Product,
+    SettingsVersion,
+    parts_of,
+    unmet,
+)
 from transientcam_server.offline._computing import KNOWN, ComputedFrame
 from transientcam_server.offline._formats import SINKS, Block, Content, Row, sink_of, write
 from transientcam_server.recording import (
@@ -112,16 +119,19 @@ def reconstruct_recording(
     reconstructor = BatchReconstructor(recording, options)
     part = output.with_name(output.name + ".part")
     document = document_of(recording, options)
+    content = content_of(recording, reconstructor, document)
+    empty = {name: np.empty(0, block.dtype) for name, block in content.blocks.items()}
+    names = [*content.blocks, *(parts := parts_of(empty))]
     if part.exists():
-        _repair(part, document)
+        _repair(part, document, [*names, *_SERIES])
     else:
         try:
             with open_to_write(part, "x") as (file, _):
-                _lay_out(file, content_of(recording, reconstructor, document))
+                _lay_out(file, content, parts)
         except BaseException:
             part.unlink(missing_ok=True)  # nothing is in it that could be gone on with
             raise
-    rows = swmr.Appender(part, list(options.products), list(_SERIES))
+    rows = swmr.Appender(part, names, list(_SERIES))
     done = rows.rows
     previous = recording.frame(done - 1) if 0 < done < recording.frames else None
     try:
@@ -133,7 +143,8 @@ def reconstruct_recording(
                 "host_time_s": raw.host_time_s,
                 "frame": raw.number,
             }
-            rows.append(reconstructor.compute(raw, previous), series)
+            found = reconstructor.compute(raw, previous)
+            rows.append(found | parts_of(found), series)
             previous = raw
         progress(recording.frames, recording.frames)
     finally:
@@ -208,7 +219,7 @@ def content_of(
     return Content(columns, blocks, {**document, "versions": versions})
 
 
-def _lay_out(file: swmr.File, content: Content) -> None:
+def _lay_out(file: swmr.File, content: Content, parts: Mapping[str, NDArray[Any]]) -> None:
     """Create everything that a file of products holds, of no frame yet."""
     file.attrs.update(content.attributes)
     swmr.create_series(file, "frame", "<u8")
@@ -219,13 +230,14 @@ def _lay_out(file: swmr.File, content: Content) -> None:
             file[name].dims[0].attach_scale(file["frame"])
         else:
             file.create_dataset(name, data=column.values).make_scale(name)
-    for name, block in content.blocks.items():
+    each_part = {name: replace(content.blocks[name[:-3]], dtype="<f4") for name in parts}
+    for name, block in (dict(content.blocks) | each_part).items():
         blocks = swmr.create_blocks(file, name, block.shape[1:], block.dtype, **block.attributes)
         for axis, along in enumerate(block.axes):
             blocks.dims[axis].attach_scale(file[along])
 
 
-def _repair(part: Path, document: Mapping[str, str]) -> None:
+def _repair(part: Path, document: Mapping[str, str], names: Sequence[str]) -> None:
     """Repair an unfinished file, to append to it."""
     scratch = part.with_name(part.name + ".resuming")
     try:
@@ -233,8 +245,7 @@ def _repair(part: Path, document: Mapping[str, str]) -> None:
             require_sound_heaps(stream)
         with swmr.open_unfinished(part) as begun:
             require_same(part, begun.attrs, document)
-            products: Sequence[str] = json.loads(document["products"])[:-1]
-            rows = min(len(begun[name]) for name in (*products, *_SERIES))
+            rows = min(len(begun[name]) for name in names)
             salvage(begun, scratch, rows, row_axis="frame")
         scratch.rename(part)
     except (KeyError, RuntimeError, ValueError) as error:

@@ -95,8 +95,12 @@ class Header:
         """The measured gains; None for the nominal ones."""
         if self.calibration_planes is None:
             return None
-        name = str(self.calibration.get("id", "recorded"))
-        return Gains(name, self.calibration_planes, self.calibration_bad, self.calibration_waveform)
+        name, known_c = (
+            self.calibration.get("id", "recorded"),
+            self.calibration.get("temperature_c"),
+        )
+        gains = self.calibration_planes, self.calibration_bad, self.calibration_waveform
+        return Gains(str(name), *gains, known_c if isinstance(known_c, float) else None)
 
 
 def utc(unix_s: float) -> datetime:

@@ -98,6 +98,8 @@ class Recording:
     @cached_property
     def captured_unix_s(self) -> NDArray[np.float64]:
         """When the first exposure of each frame began, in Unix time."""
+        if self.header.capabilities.clock == "ptp":
+            return self.series("device_time_s")
         return capture_times(*map(self.series, ("device_time_s", "capture_s", "host_time_s")))
 
     def frame(self, index: int) -> RawFrame:

@@ -15,8 +15,8 @@ STEPPED_S = np.repeat([0.0, 7200.0, -7200.0], 4)
 
 def live(device_s: np.ndarray, host_s: np.ndarray) -> np.ndarray:
     clock = CaptureClock()
-    rows = zip(device_s.tolist(), CAPTURE_S.tolist(), host_s.tolist(), strict=True)
-    return np.array([clock.unix_s(device_time_s=d, capture_s=c, host_time_s=h) for d, c, h in rows])
+    rows = zip(device_s.tolist(), host_s.tolist(), strict=True)
+    return np.array([clock.unix_s(device_time_s=d, capture_s=0.09, host_time_s=h) for d, h in rows])
 
 
 def test_recorded_times_keep_the_devices_intervals_under_any_step_of_the_hosts_clock() -> None:
@@ -40,3 +40,16 @@ def test_times_go_on_growing_where_the_device_begins_anew(step_s: float) -> None
     for found in (live(device_s, host_s), capture_times(device_s, CAPTURE_S, host_s)):
         assert (np.diff(found) > 0).all()
         np.testing.assert_allclose(np.diff(found)[6:], 0.1, atol=1e-6)
+
+
+@pytest.mark.parametrize("drift", [-1e-4, 1e-4])
+def test_live_times_follow_a_device_whose_clock_runs_apart_from_the_hosts(drift: float) -> None:
+    true_s = 0.5 * np.arange(7200)  # an hour
+    device_s = 5.0 + true_s * (1.0 + drift)
+    delay_s = np.random.default_rng(1).exponential(0.01, len(true_s))
+
+    found = live(np.array(device_s), 1.8e9 + true_s + 0.09 + delay_s)
+
+    late_s = found - 1.8e9 - true_s
+    assert abs(late_s[-600:]).max() < 0.01
+    np.testing.assert_allclose(np.diff(found)[30:], np.diff(device_s)[30:], rtol=3e-3)

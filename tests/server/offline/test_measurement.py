@@ -4,6 +4,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import scipy.io
 from numpy.typing import NDArray
 
 from transientcam_server.errors import InputError
@@ -19,6 +20,7 @@ from transientcam_server.settings import ReconstructionSettings
 
 F_HZ = 23e6
 LIGHT_M_S = 299_792_458.0
+GOOD: dict[str, Any] = {"moments": np.ones((4, 2, 2), dtype=complex), "base_frequency_hz": F_HZ}
 PLAIN = ReconstructionSettings(smoothing_px=0.0, estimator="pisarenko")
 
 
@@ -186,6 +188,82 @@ def test_arrays_of_matlab_are_turned_back(tmp_path: Path, vector: bool) -> None:
     np.testing.assert_array_equal(load_measurement(file).moments, load_measurement(plain).moments)
 
 
+@pytest.mark.parametrize("form", ["5", "4", "7.3"])
+def test_moments_and_counts_of_any_matlab_are_read(tmp_path: Path, form: str) -> None:
+    b = np.tile(moments_of_returns([8e-9], [2.0], uniform=0.2, harmonics=3), (1, 2, 3))
+    b[:, 1, 2] *= 3.0
+    file, plain = tmp_path / "a.mat", b
+    if form == "7.3":
+        with h5py.File(file, "w", userblock_size=512) as opened:
+            pairs = np.empty(b.T.shape, [("real", "<f8"), ("imag", "<f8")])
+            pairs["real"], pairs["imag"] = b.T.real, b.T.imag
+            opened["moments"], opened["base_frequency_hz"] = pairs, np.array([[F_HZ]])
+        with file.open("r+b") as opened:
+            opened.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64")
+    elif form == "5":
+        scipy.io.savemat(file, {"moments": b, "base_frequency_hz": F_HZ, "note": "of us"})
+    else:  # what has no header, has no name of its version
+        plain = b[:, :1, :1]
+        scipy.io.savemat(file, {"moments": plain[:, 0, 0], "base_frequency_hz": F_HZ}, format="4")
+
+    measurement = load_measurement(file)
+
+    np.testing.assert_array_equal(measurement.moments, plain)
+    assert measurement.base_frequency_hz == F_HZ
+
+
+@pytest.mark.parametrize(
+    "content", [b"# Created by Octave 7.3.0, Mon", b"Octave-1-L\0", b"MATLAB 5.0 MAT-file, cut"]
+)
+def test_files_of_octave_alone_and_cut_ones_are_named(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "a.mat"
+    file.write_bytes(content)
+
+    with pytest.raises(InputError, match=r"a\.mat: content is (in a format of Octave|unreadable)"):
+        load_measurement(file)
+
+
+def test_a_file_of_other_arrays_says_which(tmp_path: Path) -> None:
+    file = tmp_path / "a.mat"
+    scipy.io.savemat(file, {"data": np.ones(3), "t": 1.0})
+
+    with pytest.raises(InputError, match="content is data, t, but must be moments, counts"):
+        load_measurement(file)
+
+
+COUNTS = np.ones((4, 5, 900))
+
+
+@pytest.mark.parametrize(
+    ("arrays", "key", "said"),
+    [
+        ({"meas": COUNTS, "bin_s": 16.0}, "bin_s", "16 s, but must be from 1e-15 to 5.43e-09 s"),
+        ({"meas": COUNTS, "bin_s": 16e-18}, "bin_s", "1.6e-17 s"),
+        ({"h": COUNTS, "start_opl_m": 0.0, "bin_opl_m": 3.0}, "bin_opl_m", "3 m, but .* 1.63 m"),
+        ({"h": COUNTS, "start_opl_m": 1e6, "bin_opl_m": 0.003}, "start_opl_m", "within 0.001 s"),
+        ({"meas": COUNTS.T, "bin_s": 16e-12}, "meas", r"4 bins, 6.4e-11 s .* \(H, W, n_bins\)"),
+        (GOOD | {"base_frequency_hz": 23.0}, "base_frequency_hz", "23 Hz, but .* 1000 Hz"),
+        (GOOD | {"moments": 1j * GOOD["moments"]}, "moments", "without a b_0 in 100%"),
+        (GOOD | {"moments": np.arange(4.0)[:, None, None] + GOOD["moments"]}, "moments", "b_0"),
+    ],
+)
+def test_what_physics_excludes_is_refused_with_its_numbers(
+    tmp_path: Path, arrays: dict[str, Any], key: str, said: str
+) -> None:
+    file = written(tmp_path / "a.npz", **arrays)
+
+    with pytest.raises(InputError, match=said) as caught:
+        load_measurement(file)
+
+    assert caught.value.key == key
+
+
+def test_coarse_bins_of_a_flash_lidar_are_read(tmp_path: Path) -> None:
+    file = written(tmp_path / "a.npz", meas=np.ones((480, 64, 16)), bin_s=2e-9)
+
+    assert load_measurement(file).moments.shape == (5, 480, 64)
+
+
 def test_the_background_of_photon_counts_is_removed_where_that_is_wanted(tmp_path: Path) -> None:
     counts = np.full(1000, 7, dtype=np.uint32)
     counts[100] = 107
@@ -196,9 +274,6 @@ def test_the_background_of_photon_counts_is_removed_where_that_is_wanted(tmp_pat
 
     assert without == pytest.approx(100.0)
     assert with_ == pytest.approx(7100.0)
-
-
-GOOD = {"moments": np.ones((4, 2, 2), dtype=complex), "base_frequency_hz": F_HZ}
 
 
 @pytest.mark.parametrize(

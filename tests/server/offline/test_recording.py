@@ -35,6 +35,23 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+def test_complex_products_also_lie_in_parts_that_octave_reads(path: Path, tmp_path: Path) -> None:
+    options = BatchOptions(("moments", "range"))
+    with Recording(path) as recording:
+        reconstruct_recording(recording, tmp_path / "p.h5", options)
+        reconstruct_recording(recording, tmp_path / "p.npz", options)
+
+    with h5py.File(tmp_path / "p.h5") as file, np.load(tmp_path / "p.npz") as archive:
+        for found in (file, archive):
+            assert {name for name in found if name.endswith(("_re", "_im"))} == {
+                "moments_re",
+                "moments_im",
+            }
+            whole = found["moments_re"][()] + 1j * found["moments_im"][()]
+            np.testing.assert_array_equal(whole, found["moments"][()])
+        assert file["moments_re"].shape[0] == FRAMES
+
+
 def test_products_are_those_the_service_computes(path: Path, tmp_path: Path) -> None:
     output = tmp_path / "products.h5"
     with Recording(path) as recording:

@@ -2,6 +2,7 @@ import json
 import threading
 import tracemalloc
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,16 @@ from hypothesis import given, settings, strategies as st
 from hypothesis.extra import numpy as of_numpy
 from isal import isal_zlib
 
-from tests.server.recording.made import APPLIED, HEIGHT, WIDTH, assert_same, frame, header, record
+from tests.server.recording.made import (
+    APPLIED,
+    CAPABILITIES,
+    HEIGHT,
+    WIDTH,
+    assert_same,
+    frame,
+    header,
+    record,
+)
 from transientcam_driver import RawFrame
 from transientcam_server.errors import DamagedFrame, NotARecording
 from transientcam_server.recording import (
@@ -55,13 +65,31 @@ def test_what_is_written_in_place_has_the_same_room_in_every_file(tmp_path: Path
 
 def test_a_calibration_of_every_pixel_travels_along(tmp_path: Path) -> None:
     planes = np.exp(1j * np.arange(3 * HEIGHT * WIDTH)).reshape(3, HEIGHT, WIDTH)
-    path = record(tmp_path / "a.h5", 1, calibration_planes=planes.astype(np.complex64))
+    about = {"id": "c", "temperature_c": 31.25}
+    path = record(
+        tmp_path / "a.h5", 1, calibration_planes=planes.astype(np.complex64), calibration=about
+    )
 
     with Recording(path) as recording:
-        found = recording.header.calibration_planes
+        found = recording.header.gains
 
     assert found is not None
-    np.testing.assert_array_equal(found, planes.astype(np.complex64))
+    np.testing.assert_array_equal(found.planes, planes.astype(np.complex64))
+    assert (found.id, found.temperature_c) == ("c", 31.25)
+    with h5py.File(path) as file:
+        for name in ("gain", "weight"):
+            parts = file[f"{name}_re"][()], file[f"{name}_im"][()]
+            assert parts[0].dtype.kind == "f"
+            np.testing.assert_array_equal(parts[0] + 1j * parts[1], file[name][()])
+        assert file["gain_im"].dims[1].keys() == ["y"]
+
+
+def test_times_of_a_clock_that_ptp_disciplines_are_those_of_captures(tmp_path: Path) -> None:
+    disciplined = replace(CAPABILITIES, clock="ptp")
+
+    with Recording(record(tmp_path / "a.h5", 3, capabilities=disciplined)) as recording:
+        np.testing.assert_array_equal(recording.captured_unix_s, recording.series("device_time_s"))
+        assert recording.frame(1).captured_unix_s == frame(1).device_time_s
 
 
 @settings(max_examples=25, deadline=None)

@@ -7,7 +7,7 @@ export class Reconstruction extends Known<Tagged<ReconstructionDocument> & { rea
   constructor(private readonly api: Api) {
     super(async () => {
       const [current, { parameters }] = await Promise.all([api.reconstruction(), api.ask("GET /parameters")]);
-      const ours = parameters.filter(({ resource, access }) => resource === "/api/v1/reconstruction" && access === "read-write");
+      const ours = parameters.filter(({ resource, access }) => resource.endsWith("/reconstruction") && access === "read-write");
       // By their names in that document.
       return { ...current, parameters: ours.map((parameter) => ({ ...parameter, name: parameter.pointer.slice(1) })) };
     });

@@ -5,7 +5,7 @@ to compute it without this software.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final
 
 import numpy as np
@@ -54,7 +54,8 @@ def moment_columns(
 
     ``gain`` is nominal, (moment), where no ``gains`` were measured, else theirs, (moment, y, x),
     and then ``bad`` (y, x) says which pixels to replace by the mean of their neighbours, and
-    ``waveform`` (modulated, odd) which harmonics of the modulation are known.
+    ``waveform`` (modulated, odd) which harmonics of the modulation are known. Complex columns have
+    twins of real numbers, ``weight_re`` and ``weight_im`` for one: Octave reads others as 0.
     """
     sequence = applied.sequence
     how = moment_labels(labels)
@@ -91,7 +92,20 @@ def moment_columns(
         columns["bad"] = Column(("y", "x"), gains.bad.astype(np.uint8), says)
     if gains is not None and gains.waveform is not None:
         columns |= _waveform_columns(gains.waveform)
-    return columns
+    parts = parts_of({name: column.values for name, column in columns.items()})
+    return columns | {
+        name: replace(columns[name[:-3]], values=values) for name, values in parts.items()
+    }
+
+
+def parts_of(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return the parts of the complex ones among arrays, under their names with _re and _im."""
+    return {
+        name + suffix: part(values)
+        for name, values in arrays.items()
+        if np.iscomplexobj(values)
+        for suffix, part in (("_re", np.real), ("_im", np.imag))
+    }
 
 
 def _waveform_columns(waveform: NDArray[Any]) -> dict[str, Column]:

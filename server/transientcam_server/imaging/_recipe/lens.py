@@ -57,20 +57,16 @@ class Intrinsics(Pinhole):
         A focal length or field of view takes the place of the whole lens, since principal point
         and distortion belong to it; a light's place that of the light alone.
         """
-        width, height, known = self.width, self.height, self
-        if settings.field_of_view_deg is not None:
-            field_deg = settings.field_of_view_deg
-            known = self.of_field(field_deg, width=width, height=height, source="settings")
-        elif settings.fx_px is not None:
-            fy_px = settings.fx_px if settings.fy_px is None else settings.fy_px
-            cx_px = (width - 1) / 2 if settings.cx_px is None else settings.cx_px
-            cy_px = (height - 1) / 2 if settings.cy_px is None else settings.cy_px
-            known = type(self)(settings.fx_px, fy_px, cx_px, cy_px, width, height, "settings")
-        if known is not self:
-            known = replace(known, distortion=settings.distortion)
-        given = {name: getattr(settings, name) for name in _LIGHT}
-        light = {name: getattr(self, name) if v is None else v for name, v in given.items()}
-        return replace(known, **light)
+        known = self
+        if settings.field_of_view_deg or settings.fx_px:
+            field_deg = settings.field_of_view_deg or ASSUMED_FIELD_OF_VIEW_DEG
+            known = self.of_field(field_deg, width=self.width, height=self.height)
+            known = replace(known, source="settings", distortion=settings.distortion)
+        kept = {name: getattr(self, name) for name in _LIGHT}
+        given = {name: getattr(settings, f"{name}_px") for name in ("fx", "cx", "cy")}
+        given |= {"fy": settings.fy_px or settings.fx_px}
+        given |= {name: getattr(settings, name) for name in _LIGHT}
+        return replace(known, **kept | {name: v for name, v in given.items() if v is not None})
 
     @classmethod
     def of_document(cls, document: Mapping[str, Any], *, source: Source = "recording") -> Self:
@@ -94,14 +90,18 @@ class Intrinsics(Pinhole):
         pinhole = lens.fx, lens.fy, lens.cx, lens.cy
         return cls(*pinhole, width, height, source, lens.distortion, *lens.light_m)
 
+    @property
+    def lens(self) -> Lens:
+        """The lens and where the light is, as a camera reports them."""
+        light_m = self.light_x_m, self.light_y_m, self.light_z_m
+        return Lens(self.fx, self.fy, self.cx, self.cy, self.distortion, *light_m)
+
     def points(self, range_m: NDArray[Any]) -> NDArray[np.float32]:
         """Return the points (3, H, W) in m of a range (H, W): half of the path of the light."""
-        pinhole = self.fx, self.fy, self.cx, self.cy
-        lens = Lens(*pinhole, self.distortion, self.light_x_m, self.light_y_m, self.light_z_m)
-        x, y, z = _rays(lens, *range_m.shape)
-        if any(lens.light_m):
+        x, y, z = _rays(self.lens, *range_m.shape)
+        if any(self.lens.light_m):
             # |p| + |p - light| is the path: intersect the ray with that ellipsoid
-            light_x, light_y, light_z = lens.light_m
+            light_x, light_y, light_z = self.lens.light_m
             path_m = 2.0 * range_m
             along = z * (light_x * x + light_y * y + light_z)
             with np.errstate(all="ignore"):  # a path shorter than the way to the light

@@ -1,0 +1,79 @@
+"""A lens, and where a second camera stands, measured by flat walls: these are flat in ranges."""
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver import Lens
+from transientcam_server.errors import InputError
+from transientcam_server.imaging._recipe.lens import Intrinsics
+
+_Array = NDArray[Any]
+_PIXELS: Final = 32
+"""Along the shorter side, by which a wall is judged; what is off by `_WALL_M` may be none."""
+_WALL_M: Final = 0.01
+_APART: Final = 0.1
+"""Least singular value of the walls' normals that tell a place."""
+
+
+def lens_of_walls(ranges: Sequence[_Array], start: Intrinsics) -> tuple[Lens, float, _Array]:
+    """Return the lens through which walls are flattest, the median deviation in m, and the walls.
+
+    ``ranges`` (H, W) in m are each of a flat wall from another side, NaN without a return. The lens
+    begins with ``start``, and keeps its light. Walls are planes (V, 3) in 1/m: plane . point = 1.
+
+    Raises
+    ------
+    InputError
+        If less than half of the pixels have a range.
+    """
+    from scipy.optimize import least_squares  # which a daemon need not load
+
+    step = max(1, min(ranges[0].shape) // _PIXELS)
+    seen = np.stack([each[::step, ::step] for each in ranges])
+    if (share := np.isfinite(seen).mean()) < 0.5:
+        raise InputError("--lens", "wall", f"seen by {share:.0%} of the pixels", "seen by half")
+
+    def lens_of(found: _Array, step: int = 1) -> Lens:
+        fx, fy, cx, cy, *bent = (found[:8] / [*[step] * 4, 1, 1, 1, 1]).tolist()
+        return Lens(fx, fy, cx, cy, (*bent, 0.0), *start.lens.light_m)
+
+    def off_m(found: _Array) -> _Array:
+        x, y = lens_of(found, step).slopes(*seen.shape[:0:-1])
+        rays = np.stack([x, y, np.ones_like(x)])
+        points = rays / np.tensordot(found[8:].reshape(-1, 3), rays, 1)[:, np.newaxis]
+        light = np.reshape(start.lens.light_m, (3, 1, 1))
+        path_m = np.linalg.norm(points, axis=1) + np.linalg.norm(points - light, axis=1)
+        off = np.nan_to_num(path_m / 2.0 - seen, nan=1.0)  # a lens without a ray there is wrong
+        return np.where(np.isfinite(seen), off, 0.0).ravel()
+
+    planes = [[0.0, 0.0, 1.0 / np.nanmedian(each)] for each in seen]
+    bent = (*start.distortion, 0.0, 0.0, 0.0, 0.0)[:4]
+    first = np.concatenate([[start.fx, start.fy, start.cx, start.cy, *bent], *planes])
+    scale, found = np.repeat([start.fx, 1.0], [4, first.size - 4]), first
+    for loss in ("soft_l1", "cauchy"):  # what is no wall counts little, then nearly nothing
+        how: Any = {"x_scale": scale, "loss": loss, "f_scale": _WALL_M, "ftol": 1e-5}
+        found = least_squares(off_m, found, **how).x
+    return lens_of(found), float(np.median(np.abs(off_m(found)))), found[8:].reshape(-1, 3)
+
+
+def second_in_first(first: _Array, second: _Array) -> _Array:
+    """Return the pose (4, 4) in m of a second camera in the first, by walls (V, 3) that both see.
+
+    Raises
+    ------
+    InputError
+        If the walls do not stand in three directions.
+    """
+    from scipy.spatial.transform import Rotation  # likewise
+
+    far_m, far2_m = (1.0 / np.linalg.norm(each, axis=1) for each in (first, second))
+    normals = first * far_m[:, np.newaxis]
+    if len(first) < 3 or np.linalg.svd(normals)[1][-1] < _APART:
+        raise InputError("--second", "wall", "seen from too few sides", "seen from three or more")
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.align_vectors(first, second)[0].as_matrix()
+    pose[:3, 3] = np.linalg.lstsq(normals, far_m - far2_m)[0]
+    return pose
