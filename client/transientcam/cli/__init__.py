@@ -4,6 +4,7 @@ Exit codes: 0 done, 1 failed (with one sentence on standard error), 2 wrong usag
 130 interrupted.
 """
 
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -23,6 +24,9 @@ _EPILOG = "Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted."
 
 def main() -> None:
     """Run the command line of this process."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # what its encoding lacks is escaped
+            stream.reconfigure(errors="backslashreplace")
     sys.exit(run(sys.argv[1:]))
 
 

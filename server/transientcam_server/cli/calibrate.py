@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from transientcam.cli.options import TokenOption, require_suffix
-from transientcam.cli.terminal import Terminal, echo
+from transientcam.cli.terminal import echo, progress_bars
 from transientcam_driver.texts import in_celsius, read_text
 
 if TYPE_CHECKING:
@@ -149,11 +149,9 @@ def _measured_by_daemon(
     url: str, options: dict[str, Any], output: Path | None, token: str | None, *, diffuser: bool
 ) -> dict[str, Any]:
     """Measure in a daemon and return its result; Ctrl-C cancels the job there, too."""
-    from rich.progress import Progress
-
     from transientcam import Camera
 
-    with Camera(url, token=token) as camera, Progress(console=Terminal(stderr=True)) as shown:
+    with Camera(url, token=token) as camera, progress_bars() as shown:
         task = shown.add_task("waiting", total=1.0)
 
         def show(job: Mapping[str, Any]) -> None:
@@ -223,14 +221,12 @@ def _measured_here(order: _Order) -> dict[str, Any]:
 
 def _measure(camera: "Camera", order: _Order) -> "tuple[Calibration, str | None]":
     """Measure with a camera; also return why there are no harmonics."""
-    from rich.progress import Progress
-
     import transientcam_moments as tm
     from transientcam_driver import capture_calibration
     from transientcam_server.imaging import SweepEvaluation, evaluate
 
     sweep = SweepEvaluation(camera.capabilities, takes=order.takes)
-    with Progress(console=Terminal(stderr=True)) as shown:
+    with progress_bars() as shown:
         task = shown.add_task("capturing", total=None)
         capture = capture_calibration(
             camera,
