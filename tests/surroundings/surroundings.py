@@ -13,15 +13,10 @@ from unittest import mock
 from tests.surroundings.verbs import SECRET
 
 TEXTS: Final = {
-    "blanks, quotes, umlauts": "Größe 'a' \"b\" c",
-    "brackets": "Größe [/b] [bold]x[/] [link=y] [fe80::1]",
-    "signs of addresses": "Größe?a=b&c#d%20e%zz",
-    "controls": "Größe\x1b[2J\x9b\u202e\x07\nx",
-    "no UTF-8": "Größe\udcff",
+    "blanks, quotes, brackets, per cent": "Größe 'a' \"b\" [/b] [link=y] [fe80::1] %20%zz",
+    "controls, line ends, no UTF-8": "Größe\x1b[2J\x9b\u202e\nx\udcff",
+    "an IPv6 address": "[::1]:1",
     "nothing": "",
-    "an IPv6 address": "[fe80::1%eth0]:80",
-    "a number that is none": "nan",
-    "half a kilobyte": "Größe" * 100,
 }
 """What a user may give as a name, a path or an address."""
 
@@ -100,7 +95,7 @@ class Surrounding:
     streams: dict[str, Any] = field(default_factory=dict)
 
 
-NUMBERS: Final = ("nan", "inf", "-inf", "-1", "0", "1e308", "99999999999999999999999", "ü")
+NUMBERS: Final = ("nan", "inf", "-1", "1e308")
 """What a user may give as a number."""
 _FULL: Final = Path("/dev/full").open("w", encoding="utf-8") if Path("/dev/full").exists() else None  # noqa: SIM115 - for as long as the process
 _TOML: Final = 'camera = "sim:wall"  # Größe\n'

@@ -16,7 +16,7 @@ from transientcam.cli import record
 from transientcam_server.api import Role, TokenFile, utc_now
 
 ADDRESSES = ("127.0.0.1", "[::1]", "below a path", "below a path that is not taken off")
-NAME = "Größe [/b] 'a' #1"
+NAME = "Größe [b] [link=x] 'a' #1"
 ON_DAEMON: dict[str, Callable[[str], list[str]]] = {
     "calibrate": lambda url: [url, "--undo"],
     "capture": lambda url: [url, "range", "-o", f"{NAME}.npy"],

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, Final, Literal
+from typing import IO, Any, Final, Literal, get_args
 
 import typer
 
@@ -78,8 +78,8 @@ def _leaves(name: str, command: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _verb(name: str, command: Any) -> Verb:
-    texts = [each for each in command.params if each.type.name in ("text", "path", "file")]
-    numbers = [each for each in command.params if each.type.name.startswith(("float", "integer"))]
+    texts = [each for each in command.params if _kind(each) in (str, Path)]
+    numbers = [each for each in command.params if _kind(each) in (int, float)]
     required = [each for each in command.params if each.required]
     usual: list[str] = []
     for each in required:
@@ -91,6 +91,12 @@ def _verb(name: str, command: Any) -> Verb:
     positions = sum(each.param_type_name == "argument" for each in texts)
     first = next((k for k, word in enumerate(chosen) if word.startswith("-")), len(chosen))
     return Verb(name, tuple(chosen), _options(texts), _options(numbers), min(positions, first))
+
+
+def _kind(parameter: Any) -> object:
+    """Return what a parameter, or each item of it, is read as."""
+    annotation = parameter.type_descriptor.annotation
+    return next(iter(get_args(annotation)), annotation)
 
 
 def _options(params: list[Any]) -> tuple[str, ...]:
@@ -127,10 +133,10 @@ _WORD: Final = re.compile(r"Gr[^ ]{1,6}e")
 
 def _mangled(text: str, said: str) -> str | None:
     """Say whether a text is shown otherwise than it is; ``Größe`` stands in each."""
-    if "Größe" not in text or not _WORD.search(said):
+    if "Größe" not in text or not _WORD.search(said) or "…" in said:
         return None
     seen = re.sub(r"[\s│]+", "", said)
-    forms = (text, plain(text), repr(text)[1:-1], text.replace('"', '\\"'))
+    forms = (text, plain(text), plain(text, lines=True), repr(text)[1:-1], text.replace('"', '\\"'))
     if any(re.sub(r"\s+", "", each) in seen for each in forms):
         return None
     return f"shows {text!r} as {said[-400:]!r}"

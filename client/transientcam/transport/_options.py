@@ -20,6 +20,7 @@ QUIET: Final = logging.getLogger("transientcam.websockets")
 QUIET.setLevel(logging.CRITICAL)
 _Client = TypeVar("_Client", httpx.Client, httpx.AsyncClient)
 _CLOSE_WITHIN_S = 1.0
+_LONGEST_S: Final = 366 * 86400.0
 _QUEUED_MESSAGES = 256
 
 
@@ -31,7 +32,7 @@ def http_client(
     Raises
     ------
     ParameterError
-        If the token is none, or the environment has proxies or authorities that cannot be used; no
+        If the token is none, nothing can wait for so long, or the environment has proxies or authorities that cannot be used; no
         secret is shown.
     """
     # what is unpacked here has no bound: the bytes of an answer count as they travel
@@ -42,7 +43,7 @@ def http_client(
             raise ParameterError("token", "…", "printable ASCII without spaces")
         headers["authorization"] = f"Bearer {token}"
     try:
-        return kind(headers=headers, timeout=timeout_s, **options)
+        return kind(headers=headers, timeout=_allowed_s(timeout_s), **options)
     except OSError as error:
         raise ParameterError("SSL_CERT_FILE or SSL_CERT_DIR", "…", f"read ({error})") from error
     except (ImportError, ValueError, httpx.InvalidURL) as error:
@@ -51,13 +52,25 @@ def http_client(
 
 
 def request_options(request: Request[Any], *, timeout_s: float) -> dict[str, Any]:
-    """Return the options of one request, besides its method and address."""
+    """Return the options of one request, besides its method and address.
+
+    Raises
+    ------
+    ParameterError
+        If nothing can wait for so long.
+    """
     return {
         "params": list(request.params),
         "content": request.body,
         "headers": request.headers,
-        "timeout": timeout_s + request.extra_timeout_s,
+        "timeout": _allowed_s(timeout_s + request.extra_timeout_s),
     }
+
+
+def _allowed_s(timeout_s: float) -> float:
+    if not 0.0 <= timeout_s <= _LONGEST_S:
+        raise ParameterError("timeout", timeout_s, f"a time of at most {_LONGEST_S:.0f} s")
+    return timeout_s
 
 
 def set_lease(headers: httpx.Headers, lease_id: str | None) -> None:
