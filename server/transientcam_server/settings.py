@@ -47,13 +47,7 @@ def no_switch_for_a_number(model: type[BaseModel], value: object, info: Validati
 
 
 def dataclass_of(kind: type[_Read], document: object) -> _Read:
-    """Return the dataclass that a document of a file or of another service stands for.
-
-    Raises
-    ------
-    ValueError
-        If it stands for none: of pydantic, or naming the field that has a switch for a number.
-    """
+    """Return what a document of a file or of another service stands for, or raise a ValueError."""
     expected = get_type_hints(kind)
     if not isinstance(document, Mapping):
         raise ValueError(f"{document!r} is no object")

@@ -20,7 +20,6 @@ def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     for name in ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "STATE_DIRECTORY"):
         monkeypatch.setenv(name, str(tmp_path))
     monkeypatch.setenv("TRANSIENTCAM_TOKEN", SECRET)
-    monkeypatch.setenv("TRANSIENTCAM_KERNELS", "off")  # it would compile for minutes
     monkeypatch.setenv("COLUMNS", "2000")  # what is framed would be broken
     with standing_in(tmp_path):
         yield

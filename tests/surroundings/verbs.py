@@ -19,7 +19,7 @@ SECRET: Final = "tcam_5up3r-53cr3t-of-this-matrix"
 CLOSED: Final = "http://127.0.0.1:1"
 USUAL: Final[Mapping[str, Sequence[str]]] = {
     "calibrate": [CLOSED],
-    "compile": [],
+    "compile": ["--harmonics", "0"],
     "devices": ["--no-network"],
     "emulate": ["there-is-no-such-scene"],
     "explain": ["wall"],

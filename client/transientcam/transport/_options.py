@@ -32,8 +32,8 @@ def http_client(
     Raises
     ------
     ParameterError
-        If the token is none, nothing can wait for so long, or the environment has proxies or authorities that cannot be used; no
-        secret is shown.
+        If the token is none, nothing can wait for so long, or the environment has proxies or
+        authorities that cannot be used; no secret is shown.
     """
     # what is unpacked here has no bound: the bytes of an answer count as they travel
     headers = {"user-agent": USER_AGENT, "accept-encoding": "identity"}

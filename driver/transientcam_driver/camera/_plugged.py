@@ -12,22 +12,9 @@ Opened = TypeVar("Opened")
 
 @dataclass(frozen=True, slots=True)
 class Plugged:
-    """A device as it was found.
+    """A device as it was found: ``device`` of the library that found it, or why it is none to open.
 
-    Attributes
-    ----------
-    place
-        Where it is: bus and ports, as in ``@1-2.4``.
-    serial
-        Its serial number; empty where it has none, or none that can be read.
-    node
-        Its device node.
-    device
-        What opens it, of the library that found it.
-    product
-        What it calls itself.
-    problem
-        Why it cannot be opened.
+    ``place`` is bus and ports, as in ``@1-2.4``; ``serial`` is empty where none can be read.
     """
 
     place: str
@@ -68,17 +55,9 @@ class SameDevice(Generic[Opened]):
     One with a serial number may come back in another place; one without, or one whose twin is
     plugged in as it is lost, comes back where it was, since nothing else tells them apart.
 
-    Parameters
-    ----------
-    kind
-        What names of such cameras begin with.
-    name
-        Serial number or place; None for the first that can be opened.
-    look
-        Returns the devices that are plugged in.
-    claim
-        Opens one of them. It is also given what has to stand behind its serial number where that
-        alone does not tell it from another device: its place, or nothing.
+    ``name`` is a serial number, a place, or None for the first that can be opened; ``look`` returns
+    the devices of this ``kind`` that are plugged in. ``claim`` opens one of them, and is also given
+    what stands behind its serial number where that does not tell it from another one: its place.
     """
 
     def __init__(

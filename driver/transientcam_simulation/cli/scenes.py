@@ -2,8 +2,8 @@
 
 import json
 
+from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import Terminal, echo
-from transientcam_driver.cli.options import JsonOption
 from transientcam_simulation import list_scenes
 
 

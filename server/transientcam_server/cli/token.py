@@ -35,7 +35,8 @@ def create(
         typer.Option(help="viewer reads, operator controls, admin also takes over any lease."),
     ] = "viewer",
     days: Annotated[
-        float | None, typer.Option(min=0.0, max=36_500.0, help="How long it is valid.  [default: for ever]")
+        float | None,
+        typer.Option(min=0.0, max=36_500.0, help="How long it is valid.  [default: for ever]"),
     ] = None,
     may_light: Annotated[
         bool | None,
