@@ -26,6 +26,7 @@ def main() -> None:
     chosen = parser.parse_args()
     if chosen.user is not None:
         loaded = verbs()
+        os.environ["TRANSIENTCAM_KERNELS"] = "manual"
         os.setgid(chosen.user)
         os.setuid(chosen.user)
         done = {each.name: ran([*each.words, *each.usual]) for each in loaded}
@@ -34,7 +35,7 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory() as folder, standing_in(Path(folder)):
         os.environ.update(dict.fromkeys(_OURS, folder))
-        os.environ.update(TRANSIENTCAM_TOKEN=SECRET, TRANSIENTCAM_KERNELS="off", COLUMNS="2000")
+        os.environ.update(TRANSIENTCAM_TOKEN=SECRET, TRANSIENTCAM_KERNELS="manual", COLUMNS="2000")
         made = table(verbs())
     sys.stdout.write(f"{made}\n")
     if chosen.write:

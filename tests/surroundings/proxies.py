@@ -111,9 +111,9 @@ def by_program(name: str, url: str, folder: Path) -> Iterator[str]:
     file = folder / name
     file.write_text(text.format(folder=folder, port=port, prefix=PREFIX, target=url))
     command = {
-        "nginx": ["nginx", "-e", "stderr", "-p", folder, "-c", file],
-        "caddy": ["caddy", "run", "--adapter", "caddyfile", "--config", file],
-    }[name]
+        "nginx": f"nginx -e stderr -p {folder} -c {file}",
+        "caddy": f"caddy run --adapter caddyfile --config {file}",
+    }[name].split()
     with subprocess.Popen(command, executable=shutil.which(name), stderr=subprocess.DEVNULL) as run:
         try:
             yield f"http://127.0.0.1:{port}{PREFIX}"

@@ -3,15 +3,23 @@
 A new verb is in it by itself; `USUAL` is for one that would work for long otherwise.
 """
 
+import json
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.conftest import ROOT
+from tests.surroundings.__main__ import BEGIN, END, PAGE
 from tests.surroundings.matrix import cells
+from tests.surroundings.surroundings import ALL
 from tests.surroundings.verbs import SECRET, Verb, standing_in, verbs
 
 VERBS = verbs()
+NAMES = {each.name for each in ALL}
 
 
 @pytest.fixture(autouse=True)
@@ -30,3 +38,28 @@ def test_nothing_around_it_breaks_a_verb(verb: Verb) -> None:
     wrong = {(name, place): problem for name, place, _, problem in cells(verb) if problem}
 
     assert wrong == {}
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
+def test_another_user_whom_no_password_file_knows_and_whose_home_is_read_only(
+    tmp_path: Path,
+) -> None:
+    home = tmp_path / "home"
+    home.mkdir(mode=0o555)
+    command = [sys.executable, "-m", "tests.surroundings", "--user", "23456"]
+    place = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "TRANSIENTCAM_TOKEN": SECRET}
+    for variables in ({}, {"HOME": str(home)}):
+        done = subprocess.run(
+            command, env=place | variables, cwd="/", capture_output=True, text=True, check=True
+        )
+        assert json.loads(done.stdout) == {}
+
+
+def test_the_table_in_the_documentation_has_every_surrounding_and_no_fault() -> None:
+    text = PAGE.read_text(encoding="utf-8").partition(BEGIN)[2].partition(END)[0]
+    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+
+    shown = {name: (int(runs), int(faults)) for name, runs, *_, faults in rows[1:]}
+    assert shown.keys() >= NAMES
+    assert all(runs >= len(VERBS) for name, (runs, _) in shown.items() if name in NAMES)
+    assert all(faults == 0 for _, faults in shown.values())

@@ -9,10 +9,9 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
-from typer.rich_utils import rich_format_error
 
 from transientcam.cli.terminal import echo
 from transientcam.cli.verbs import extra_of, load_verbs, words_to_complete
@@ -20,7 +19,6 @@ from transientcam.errors import CommandUnavailable, TransientcamError
 from transientcam.text import plain
 
 FAILED: Final = 1
-BAD_USAGE: Final = 2
 INTERRUPTED: Final = 130
 _EPILOG = "Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted."
 
@@ -71,17 +69,24 @@ def run(arguments: Sequence[str]) -> int:
     except BrokenPipeError:
         return FAILED
     except Exception as error:
-        if hasattr(error, "format_message"):  # wrong usage: typer's own error, in its own frame
-            said = plain(error.format_message(), lines=True)
-            error.format_message = lambda: said
-            rich_format_error(error)
-            return BAD_USAGE
+        if hasattr(error, "format_message"):
+            return _wrong_usage(error)
         sentence = _sentence(error, arguments)
         if sentence is None:
             raise
         echo(f"transientcam: {sentence}", err=True)
         return FAILED
     return code if isinstance(code, int) else 0
+
+
+def _wrong_usage(error: Any) -> int:
+    """Print an error of typer's in its own frame, but for what a terminal would obey."""
+    from typer.rich_utils import rich_format_error
+
+    said = plain(error.format_message(), lines=True)
+    error.format_message = lambda: said
+    rich_format_error(error)
+    return int(error.exit_code)
 
 
 def _print_version(given: bool) -> None:
