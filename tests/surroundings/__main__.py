@@ -1,7 +1,7 @@
-"""Runs the matrix: ``python -m tests.surroundings [--write | --user UID]``.
+"""Runs the matrix: ``python -m tests.surroundings [--write | --as-usual]``.
 
-``--write`` puts the table into docs/platforms.md; ``--user`` runs the verbs as another user, whom
-no password file need know, with the home that it is given, and prints what is wrong as JSON.
+``--write`` puts the table into docs/platforms.md; ``--as-usual`` runs each verb once with what is
+around this process, whichever user and home it has, and prints what is wrong as JSON.
 """
 
 import argparse
@@ -22,14 +22,10 @@ _OURS = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "STATE_DI
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--write", action="store_true")
-    parser.add_argument("--user", type=int)
+    parser.add_argument("--as-usual", action="store_true")
     chosen = parser.parse_args()
-    if chosen.user is not None:
-        loaded = verbs()
-        os.environ["TRANSIENTCAM_KERNELS"] = "manual"
-        os.setgid(chosen.user)
-        os.setuid(chosen.user)
-        done = {each.name: ran([*each.words, *each.usual]) for each in loaded}
+    if chosen.as_usual:
+        done = {each.name: ran([*each.words, *each.usual]) for each in verbs()}
         wrong = {name: problem for name, each in done.items() if (problem := each.problem())}
         sys.stdout.write(json.dumps(wrong) + "\n")
         return

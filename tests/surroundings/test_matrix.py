@@ -5,6 +5,7 @@ A new verb is in it by itself; `USUAL` is for one that would work for long other
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -40,19 +41,33 @@ def test_nothing_around_it_breaks_a_verb(verb: Verb) -> None:
     assert wrong == {}
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become another user")
-def test_another_user_whom_no_password_file_knows_and_whose_home_is_read_only(
-    tmp_path: Path,
+_OTHER = ["setpriv", "--reuid", "23456", "--regid", "23456", "--clear-groups"]
+_WITHOUT_POWERS = ["setpriv", "--bounding-set=-all", "--inh-caps=-all"]  # else root may write it
+
+
+@pytest.mark.skipif(shutil.which("setpriv") is None, reason="setpriv is not installed")
+@pytest.mark.parametrize("user", [_OTHER, _WITHOUT_POWERS], ids=["unknown", "read-only home"])
+def test_another_user_or_a_home_that_may_not_be_written_breaks_no_verb(
+    user: list[str], tmp_path: Path
 ) -> None:
     home = tmp_path / "home"
     home.mkdir(mode=0o555)
-    command = [sys.executable, "-m", "tests.surroundings", "--user", "23456"]
-    place = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "TRANSIENTCAM_TOKEN": SECRET}
-    for variables in ({}, {"HOME": str(home)}):
-        done = subprocess.run(
-            command, env=place | variables, cwd="/", capture_output=True, text=True, check=True
+    around = {"PYTHONPATH": str(ROOT), "PATH": os.environ["PATH"], "TRANSIENTCAM_TOKEN": SECRET}
+    around["TRANSIENTCAM_KERNELS"] = "manual"
+    around |= {"HOME": str(home)} if user == _WITHOUT_POWERS else {}
+    python = [*user, sys.executable]
+
+    def run(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [*python, *words], env=around, cwd="/", capture_output=True, text=True, check=False
         )
-        assert json.loads(done.stdout) == {}
+
+    if run("-c", "import transientcam.cli, encodings.utf_8_sig").returncode:
+        pytest.skip("that user may not run this interpreter")
+    done = run("-m", "tests.surroundings", "--as-usual")
+
+    assert json.loads(done.stdout) == {}, done.stderr
+    assert not list(home.iterdir())
 
 
 def test_the_table_in_the_documentation_has_every_surrounding_and_no_fault() -> None:
