@@ -1,6 +1,7 @@
 """What each run of a verb would do anew, and takes two thirds of its time, is done once."""
 
 import functools
+import importlib.metadata
 import os
 import ssl
 from collections.abc import Iterator
@@ -25,7 +26,7 @@ def quick_context(*arguments: Any, **options: Any) -> ssl.SSLContext:
     return _context()
 
 
-quick_points = functools.cache(verbs.entry_points)
+quick_points = functools.cache(importlib.metadata.entry_points)
 
 
 @pytest.fixture(scope="module", autouse=True)

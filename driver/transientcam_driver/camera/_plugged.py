@@ -114,11 +114,11 @@ class SameDevice(Generic[Opened]):
                 if self._name in (None, each.serial, each.place) or unknown:
                     yield each
             return
-        had, same = self._had, self._places(found)
+        had, alike = self._had, self._places(found)
         if not self._lost:  # the first look after it was lost: what is elsewhere by now is not it
             self._lost = True
-            self._twins |= same - {had.place}
-        here = {had.place, *(same - self._twins)}
+            self._twins |= alike - {had.place}
+        here = {had.place, *(alike - self._twins)}
         for each in found:
             if each.place in here and (each.serial == had.serial or each.problem is not None):
                 yield each
