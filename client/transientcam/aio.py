@@ -40,7 +40,7 @@ from transientcam.transport import (
     DownloadProgress,
     Progress,
     exchange_async,
-    http_options,
+    http_client,
     read_async,
     require_direct,
     require_plain,
@@ -77,8 +77,8 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
         transport: httpx.AsyncBaseTransport | None = None,
     ) -> None:
         super().__init__(url, token=token, timeout_s=timeout_s)
-        self._http = httpx.AsyncClient(
-            **http_options(token=token, timeout_s=timeout_s), transport=transport
+        self._http = http_client(
+            httpx.AsyncClient, token=token, timeout_s=timeout_s, transport=transport
         )
         self._streams: list[AsyncStream] = []
 

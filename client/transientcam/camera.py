@@ -37,7 +37,7 @@ from transientcam.transport import (
     Progress,
     bounded,
     exchange,
-    http_options,
+    http_client,
     read,
     require_plain,
     set_lease,
@@ -83,7 +83,7 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
     ) -> None:
         super().__init__(url, token=token, timeout_s=timeout_s)
         self._http = bounded(
-            httpx.Client(**http_options(token=token, timeout_s=timeout_s), transport=transport)
+            http_client(httpx.Client, token=token, timeout_s=timeout_s, transport=transport)
         )
         self._streams: list[Stream] = []
 

@@ -8,7 +8,7 @@ import httpx
 
 from transientcam.errors import ProtocolError
 from transientcam.requests import MOST_DOCUMENT_BYTES, problem
-from transientcam.transport import bounded, http_options, read, translated, within, without_secrets
+from transientcam.transport import bounded, http_client, read, translated, within, without_secrets
 
 _BLOCK_BYTES: Final = 16 * 1024
 """What reads less than that gets a whole block; what reads more gets no byte beside."""
@@ -51,7 +51,7 @@ class RemoteFile(io.RawIOBase):
         """Of the file, as it may be shown."""
         self._timeout_s = timeout_s
         self._http = bounded(
-            httpx.Client(**http_options(token=token, timeout_s=timeout_s), transport=transport)
+            http_client(httpx.Client, token=token, timeout_s=timeout_s, transport=transport)
         )
         self._blocks: OrderedDict[int, bytes] = OrderedDict()
         self._place = 0

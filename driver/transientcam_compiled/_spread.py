@@ -15,7 +15,8 @@ from typing import Final, Protocol
 
 from transientcam_compiled._affinity import ThreadsApart
 
-_CONTROL_GROUP: Final = Path("/sys/fs/cgroup")
+_CONTROL_GROUPS: Final = Path("/sys/fs/cgroup")
+_MEMBERSHIP: Final = Path("/proc/self/cgroup")
 BLOCK = 1 << 15
 """Pixels that stay in the caches from one kernel to the next.
 
@@ -147,18 +148,32 @@ def cores() -> int:
     """Return how many cores this process may use, by its affinity and by a container's quota."""
     affinity = getattr(os, "sched_getaffinity", None)  # not every system can say
     allowed = (os.cpu_count() or 1) if affinity is None else len(affinity(0))
-    return max(1, min(allowed, quota_of(_CONTROL_GROUP)))
+    return max(1, min(allowed, quota_of(_CONTROL_GROUPS, _MEMBERSHIP)))
 
 
 @lru_cache(maxsize=1)
-def quota_of(control_group: Path) -> int:
-    """Return how many cores a quota leaves, rounded up; as many as there may be without one.
+def quota_of(root: Path, membership: Path) -> int:
+    """Return how many cores quotas leave, rounded up; as many as there may be without one.
 
-    ``control_group`` has ``cpu.max``: a quota, or "max", and the period it is for.
+    ``root`` is where control groups are mounted, of version 1 or 2; ``membership`` says which one
+    this process is in. Those above it count, too, and in a container the uppermost one alone.
     """
-    with suppress(OSError, ValueError):
-        quota, period = (control_group / "cpu.max").read_text().split()
-        return math.ceil(int(quota) / int(period))
+    groups = {root, root / "cpu"}
+    with suppress(OSError):
+        for line in membership.read_text().splitlines():
+            _, controllers, path = line.split(":", 2)
+            if not controllers or "cpu" in controllers.split(","):
+                own = root / ("cpu" if controllers else "") / path.lstrip("/")
+                groups.update((own, *own.parents))
+    return min(map(_quota, groups))
+
+
+def _quota(group: Path) -> int:
+    for texts in (("cpu.max",), ("cpu.cfs_quota_us", "cpu.cfs_period_us")):
+        with suppress(OSError, ValueError):  # a file is not there, or says "max"
+            quota, period = map(int, " ".join((group / each).read_text() for each in texts).split())
+            if quota > 0:  # -1: none
+                return math.ceil(quota / period)
     return sys.maxsize
 
 

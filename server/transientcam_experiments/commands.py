@@ -6,16 +6,13 @@ What is heavy is imported when a verb runs, so that ``transientcam --help`` stay
 import json
 from collections.abc import Generator, Mapping
 from contextlib import ExitStack, closing
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import Progress, TaskID
 
-from transientcam.cli.terminal import Terminal, echo
+from transientcam.cli.terminal import Terminal, echo, progress_bars
 from transientcam_server.cli.cluster import DaskOption, WorkersOption, cluster_client
-from transientcam_server.cli.progress import progress_bars
 
 if TYPE_CHECKING:
     from transientcam_experiments.tradeoff import Grid, Point, Records
@@ -85,7 +82,7 @@ def paper(
     else:
         for document in ordered:
             _print_statements(console, document)
-        console.print(f"See {page.path}", soft_wrap=True)
+        console.print(f"See {page.path}")
 
 
 def _made_on(
@@ -107,10 +104,10 @@ def _print_statements(console: Terminal, document: dict[str, Any]) -> None:
     statements = document["statements"]
     hold = sum(each["passes"] for each in statements)
     heading = f"Figure {document['figure']}, {document['title']}"
-    console.print(f"{heading}: {hold} of {len(statements)} statements hold", soft_wrap=True)
+    console.print(f"{heading}: {hold} of {len(statements)} statements hold")
     for each in statements:
         if not each["passes"]:
-            console.print(f"  differs: {each['says']} ({each['shown']})", soft_wrap=True)
+            console.print(f"  differs: {each['says']} ({each['shown']})")
 
 
 def tradeoff(
@@ -203,7 +200,7 @@ def _capture_on(
                 scene=name,
                 repetitions=repetitions,
                 seed=seed,
-                progress=partial(_advance, progress, task),
+                progress=lambda _, task=task: progress.advance(task),
             )
 
 
@@ -226,9 +223,10 @@ def _measure_here(
             progress.remove_task(compiling)
         for name, each in points.items():
             task = progress.add_task(name, total=len(each))
-            advance = partial(_advance, progress, task)
-            experiment.measure(each, records, scene=name, seed=seed, progress=advance)
-
-
-def _advance(progress: Progress, task: TaskID, kind: str) -> None:
-    progress.advance(task)
+            experiment.measure(
+                each,
+                records,
+                scene=name,
+                seed=seed,
+                progress=lambda _, task=task: progress.advance(task),
+            )

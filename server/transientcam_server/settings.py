@@ -1,16 +1,27 @@
 """The settings of the service; `transientcam_server.daemon._configuration` reads them."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from ipaddress import ip_address
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, get_args
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Final,
+    Literal,
+    Self,
+    TypeVar,
+    get_args,
+    get_type_hints,
+)
 
 from platformdirs import user_config_path, user_data_path
 from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    TypeAdapter,
     ValidationInfo,
     field_validator,
     model_validator,
@@ -25,14 +36,41 @@ from transientcam_moments.reconstruction import ESTIMATORS, least_harmonics
 
 _DEFAULTS = tm.Settings()
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
+_Read = TypeVar("_Read")
 
 
 def no_switch_for_a_number(model: type[BaseModel], value: object, info: ValidationInfo) -> object:
     """Refuse true and false where a number is due: pydantic takes them for 1 and 0."""
-    annotation = model.model_fields[str(info.field_name)].annotation
-    if isinstance(value, bool) and _holds(annotation, int, float) and not _holds(annotation, bool):
+    if _is_misread(model.model_fields[str(info.field_name)].annotation, value):
         raise PydanticCustomError("number", "Input should be a number, not true or false")
     return value
+
+
+def dataclass_of(kind: type[_Read], document: object) -> _Read:
+    """Return what a document of a file or of another service stands for, or raise a ValueError."""
+    expected = get_type_hints(kind)
+    if not isinstance(document, Mapping):
+        raise ValueError(f"{document!r} is no object")
+    for name, value in document.items():
+        if _is_misread(expected.get(name), value):
+            raise ValueError(f"{name} is {value!r}, but must be a number")
+    return TypeAdapter(kind).validate_python(document)
+
+
+def _is_misread(annotation: Any, value: object) -> bool:
+    return _holds(annotation, int, float) and not _holds(annotation, bool) and has_switch(value)
+
+
+def has_switch(value: object) -> bool:
+    """Return whether true or false stands anywhere in a value of JSON."""
+    left = [value]
+    while left:
+        each = left.pop()
+        if isinstance(each, bool):
+            return True
+        if isinstance(each, list | tuple | Mapping):
+            left += each.values() if isinstance(each, Mapping) else each
+    return False
 
 
 def _holds(annotation: Any, *wanted: type) -> bool:
@@ -374,6 +412,11 @@ class Settings(_Group):
     light: LightSettings = Field(default_factory=LightSettings)
     recordings: RecordingSettings = Field(default_factory=RecordingSettings)
     calibrations: CalibrationSettings = Field(default_factory=CalibrationSettings)
+
+    @field_validator("host")
+    @classmethod
+    def _without_brackets(cls, host: str) -> str:
+        return host.removeprefix("[").removesuffix("]")  # as addresses of IPv6 stand in URLs
 
     @property
     def needs_token(self) -> bool:

@@ -11,6 +11,7 @@ import usb.core
 
 from tests.opt8241.standing import camera_of, emulated
 from transientcam_driver import CameraNotFound, PermissionDenied, TriggeredCamera
+from transientcam_driver.cameras.open_usb import _transport
 from transientcam_driver.clock import VirtualClock
 from transientcam_opt8241 import Opt8241, Request, _usb_link as usb_link, plugin as opt8241
 from transientcam_opt8241.emulated import EmulatedOpt8241
@@ -20,7 +21,7 @@ class Device:
     """What pyusb finds at a port, with an emulated camera behind it."""
 
     bus, address, port_numbers = 1, 7, (2, 4)
-    iSerialNumber = 0  # noqa: N815 - as pyusb has it
+    iSerialNumber, iProduct = 0, 0  # noqa: N815 - as pyusb has it
 
     def __init__(self, camera: EmulatedOpt8241) -> None:
         self._link = camera.connect()
@@ -62,17 +63,17 @@ def clock() -> VirtualClock:
 @pytest.fixture
 def device(monkeypatch: pytest.MonkeyPatch, clock: VirtualClock) -> Device:
     found = Device(emulated(clock=clock))
-    monkeypatch.setattr(usb_link, "devices", lambda vendor, product: [found])
+    monkeypatch.setattr(_transport, "devices", lambda *_, **__: [found])
     return found
 
 
 def test_frames_are_those_of_the_emulation_without_usb(device: Device, clock: VirtualClock) -> None:
     other = VirtualClock()
     with (
-        TriggeredCamera(lambda: Opt8241(usb_link.open_link()), clock=clock) as camera,
+        TriggeredCamera(lambda: Opt8241(usb_link.SameCamera()()), clock=clock) as camera,
         camera_of(emulated(clock=other), clock=other) as direct,
     ):
-        assert camera.capabilities.serial == "1-2.4"
+        assert camera.capabilities.serial == "@1-2.4"
         assert device.claimed == [0]
         camera.start()
         direct.start()
@@ -85,12 +86,14 @@ def test_frames_are_those_of_the_emulation_without_usb(device: Device, clock: Vi
 def test_a_camera_is_listed_by_its_port_where_it_has_no_serial_number(device: Device) -> None:
     found = [each for each in opt8241.PLUGIN.find() if not each.simulated]
 
-    assert [(each.spec, each.node) for each in found] == [("opt8241:1-2.4", "/dev/bus/usb/001/007")]
+    assert [(each.spec, each.node) for each in found] == [
+        ("opt8241:@1-2.4", "/dev/bus/usb/001/007")
+    ]
 
 
 def test_another_serial_number_is_not_found(device: Device) -> None:
     with pytest.raises(CameraNotFound):
-        usb_link.open_link("1-2.5")
+        usb_link.SameCamera("@1-2.5")()
 
 
 def test_a_camera_that_may_not_be_opened_is_an_error_with_its_rule(
@@ -102,4 +105,4 @@ def test_a_camera_that_may_not_be_opened_is_an_error_with_its_rule(
     monkeypatch.setattr(device._ctx, "managed_claim_interface", refuse)
 
     with pytest.raises(PermissionDenied, match='idProduct}=="9105"'):
-        usb_link.open_link()
+        usb_link.SameCamera()()

@@ -4,17 +4,19 @@ Exit codes: 0 done, 1 failed (with one sentence on standard error), 2 wrong usag
 130 interrupted.
 """
 
+import io
 import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
 
 from transientcam.cli.terminal import echo
 from transientcam.cli.verbs import extra_of, load_verbs, words_to_complete
 from transientcam.errors import CommandUnavailable, TransientcamError
+from transientcam.text import plain
 
 FAILED: Final = 1
 INTERRUPTED: Final = 130
@@ -23,7 +25,19 @@ _EPILOG = "Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted."
 
 def main() -> None:
     """Run the command line of this process."""
-    sys.exit(run(sys.argv[1:]))
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # what its encoding lacks is escaped
+            stream.reconfigure(errors="backslashreplace")
+    code = run(sys.argv[1:])
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError as error:  # the disk is full, or nobody reads any more
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            echo(f"transientcam: {error.strerror}", err=True)
+        code = code or FAILED
+    sys.exit(code)
 
 
 def app_for(arguments: Sequence[str]) -> typer.Typer:
@@ -41,20 +55,38 @@ def app_for(arguments: Sequence[str]) -> typer.Typer:
 
 def run(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code."""
+    if os.environ.get("COLUMNS") == "0":  # as programs that know none set it: nothing would fit
+        del os.environ["COLUMNS"]
     app = app_for(arguments or words_to_complete(os.environ))
     try:
-        typer.main.get_command(app)(args=list(arguments), prog_name="transientcam")
+        code = typer.main.get_command(app)(
+            args=list(arguments), prog_name="transientcam", standalone_mode=False
+        )
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else FAILED
     except KeyboardInterrupt:
         return INTERRUPTED
+    except BrokenPipeError:
+        return FAILED
     except Exception as error:
+        if hasattr(error, "format_message"):
+            return _wrong_usage(error)
         sentence = _sentence(error, arguments)
         if sentence is None:
             raise
         echo(f"transientcam: {sentence}", err=True)
         return FAILED
-    return 0
+    return code if isinstance(code, int) else 0
+
+
+def _wrong_usage(error: Any) -> int:
+    """Print an error of typer's in its own frame, but for what a terminal would obey."""
+    from typer.rich_utils import rich_format_error
+
+    said = plain(error.format_message(), lines=True)
+    error.format_message = lambda: said
+    rich_format_error(error)
+    return int(error.exit_code)
 
 
 def _print_version(given: bool) -> None:

@@ -17,7 +17,7 @@ from transientcam.cli.findings import Finding, absent_in_words
 from transientcam.errors import FrameTimeout, ProblemError, TransientcamError
 from transientcam.requests import MOST_DOCUMENT_BYTES
 from transientcam.robotics import Pinhole
-from transientcam.transport import bounded, http_options, parse_address, read, translated, within
+from transientcam.transport import bounded, http_client, parse_address, read, translated, within
 
 CLOCKS_WITHIN_S: Final = 1.5
 """The daemon's ``Date`` has whole seconds, so that nothing finer can be measured."""
@@ -34,7 +34,7 @@ def of_daemon(
 ) -> Iterator[Finding]:
     """Check a daemon, and watch its stream for some seconds."""
     base = parse_address(url).url
-    with bounded(httpx.Client(**http_options(token=token, timeout_s=timeout_s))) as http:
+    with bounded(http_client(httpx.Client, token=token, timeout_s=timeout_s)) as http:
         try:
             with translated(base), within(timeout_s):
                 sent_s = time.time()

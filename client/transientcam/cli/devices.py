@@ -11,7 +11,6 @@ from itertools import chain
 from typing import Annotated, Any, Final
 
 import typer
-from rich.table import Table
 
 from transientcam.cli import presence
 from transientcam.cli.options import JsonOption
@@ -124,48 +123,32 @@ def _print(document: dict[str, Any], *, network: bool) -> None:
     console = Terminal()
     cameras, announced = document["cameras"], document["network"]
     if document["kinds"]:
-        console.print(_kinds_table(document["kinds"]))
+        kinds = ((kind["usage"], kind["summary"]) for kind in document["kinds"])
+        console.table("name of a camera", "what it opens", rows=kinds)
         console.print()
     if cameras:
-        console.print(_camera_table(cameras))
+        rows = _rows(cameras, "spec", "serial", "product", "node")
+        console.table("camera", "serial number", "product", "at", rows=rows)
     else:
         console.print("No camera was found.")
     for camera in cameras:
         if camera["problem"] is not None:
             where = camera["node"] or camera["spec"]
-            console.print(f"{where}: {camera['problem']}", soft_wrap=True)
+            console.print(f"{where}: {camera['problem']}")
     for kind, problem in document["problems"].items():
-        console.print(f"{kind}: {problem}", soft_wrap=True)
+        console.print(f"{kind}: {problem}")
     if announced:
-        console.print(_network_table(announced))
+        rows = _rows(announced, "url", "serial", "firmware", "state", "name")
+        console.table("address", "serial number", "firmware", "state", "name", rows=rows)
     elif network:
         message = document["network_problem"] or "No camera announces itself on the network."
-        console.print(message, soft_wrap=True)
+        console.print(message)
     if cameras or announced:
-        console.print(_PRODUCTS, soft_wrap=True)
+        console.print(_PRODUCTS)
     if document["simulated"]:
         simulated = ", ".join(document["simulated"])
-        console.print(f"Simulated ones: {simulated} (transientcam scenes)", soft_wrap=True)
+        console.print(f"Simulated ones: {simulated} (transientcam scenes)")
 
 
-def _kinds_table(kinds: list[dict[str, Any]]) -> Table:
-    table = Table("name of a camera", "what it opens", box=None)
-    for kind in kinds:
-        table.add_row(kind["usage"], kind["summary"])
-    return table
-
-
-def _camera_table(cameras: list[dict[str, Any]]) -> Table:
-    table = Table("camera", "serial number", "product", "at", box=None)
-    for camera in cameras:
-        fields = (camera[name] or "?" for name in ("spec", "serial", "product", "node"))
-        table.add_row(*fields)
-    return table
-
-
-def _network_table(cameras: list[dict[str, Any]]) -> Table:
-    table = Table("address", "serial number", "firmware", "state", "name", box=None)
-    for camera in cameras:
-        fields = (camera[name] or "?" for name in ("url", "serial", "firmware", "state", "name"))
-        table.add_row(*fields)
-    return table
+def _rows(cameras: list[dict[str, Any]], *names: str) -> list[list[str]]:
+    return [[camera[name] or "?" for name in names] for camera in cameras]

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Annotated, Final
 
 import typer
-from rich.text import Text
 
 from transientcam.cli import daemon_checks, findings
 from transientcam.cli.findings import Finding, Level
 from transientcam.cli.options import JsonOption, TokenOption
-from transientcam.cli.terminal import Terminal, echo
+from transientcam.cli.terminal import Terminal, Text, echo
 
 _STYLES: Final[dict[Level, str]] = {"ok": "green", "warning": "yellow", "fault": "bold red"}
 _WIDTH = 12
@@ -85,11 +84,11 @@ def _tell(found: Iterable[Finding]) -> list[Finding]:
     for each in found:
         seen.append(each)
         line = Text.assemble((f"{each.level:<8}", _STYLES[each.level]), f"{each.check:<{_WIDTH}} ")
-        console.print(line + Text(each.message), soft_wrap=True)
+        console.print(line + Text(each.message))
         if each.remedy is not None:
             indent = " " * (8 + _WIDTH + 1)
             for remedy in each.remedy.splitlines():
-                console.print(Text(f"{indent}{remedy}", style="dim"), soft_wrap=True)
+                console.print(Text(f"{indent}{remedy}", style="dim"))
     console.print(f"Faults: {_count(seen, 'fault')}, warnings: {_count(seen, 'warning')}.")
     return seen
 

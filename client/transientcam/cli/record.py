@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from transientcam.camera import Camera
 from transientcam.cli.options import JsonOption, TokenOption, UrlArgument, require_suffix
-from transientcam.cli.terminal import Terminal, echo
+from transientcam.cli.terminal import echo, progress_bars
 
 _LOOK_S = 0.5
 
@@ -37,7 +36,7 @@ def record(
     """Record raw frames where the daemon runs, until the time is over or Ctrl-C."""
     require_suffix(output, ".h5", ".hdf5")
     annotations = None if note is None else {"note": note}
-    with Camera(url, token=token) as camera, _bars() as bars:
+    with Camera(url, token=token) as camera, progress_bars(transient=True) as bars:
         running = camera.record(
             name=name,
             duration_s=duration_s,
@@ -69,11 +68,6 @@ def record(
     if running["problem"] is not None:
         echo(f"transientcam: {running['problem']}", err=True)
         raise typer.Exit(code=1)
-
-
-def _bars() -> Progress:
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
-    return Progress(*columns, console=Terminal(stderr=True), transient=True)
 
 
 def _line(recording: dict[str, Any]) -> str:

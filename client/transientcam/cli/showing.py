@@ -16,6 +16,6 @@ def shown_on(console: Terminal, *, as_json: bool) -> Callable[[Report], None]:
         if as_json:
             echo(json.dumps(report.to_document()))
         else:
-            console.print(report.text, style=_STYLES[report.level], soft_wrap=True)
+            console.print(report.text, style=_STYLES[report.level])
 
     return show

@@ -9,8 +9,8 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final
 
 import typer
-from rich.markup import escape
 
+from transientcam.cli.terminal import escape
 from transientcam.errors import CommandUnavailable
 
 GROUP: Final = "transientcam.commands"

@@ -7,13 +7,11 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Annotated, Any
 
 import typer
-from rich.live import Live
-from rich.text import Text
 
 from transientcam.camera import Camera
 from transientcam.cli.options import JsonOption, ProductsArgument, TokenOption, UrlArgument
 from transientcam.cli.statistics import Sample, Statistics
-from transientcam.cli.terminal import Terminal, echo
+from transientcam.cli.terminal import Live, Terminal, Text, echo
 from transientcam.wire import Notice
 
 
@@ -87,7 +85,7 @@ class Screen:
         """Show a frame."""
         self._rows[sample.product] = sample
         if self._live is None:
-            self._console.print(_line(sample), soft_wrap=True)
+            self._console.print(_line(sample))
         else:
             self._live.update(Text("\n".join(map(_line, self._rows.values()))))
 
@@ -99,7 +97,7 @@ class Screen:
             if name not in ("sequence", "channels")
         )
         text = Text(f"{notice.kind}  {details}".rstrip(), style="yellow")
-        self._console.print(text, soft_wrap=True)
+        self._console.print(text)
 
 
 def _line(sample: Sample) -> str:

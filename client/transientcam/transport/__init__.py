@@ -21,7 +21,7 @@ from transientcam.transport._options import (
     QUIET,
     DownloadProgress,
     Progress,
-    http_options,
+    http_client,
     require_direct,
     set_lease,
     stream_options,

@@ -27,8 +27,11 @@ FOREIGN = (
     httpx.StreamError,
     ws.WebSocketException,
     OSError,
+    ImportError,
+    UnicodeError,
 )
-"""Roots of everything that httpx, websockets and the operating system raise."""
+"""Roots of everything that httpx, websockets and the operating system raise; the last two of a
+proxy that needs another package, and of half a character in an address."""
 
 
 @contextmanager
@@ -61,7 +64,7 @@ def translate(error: Exception, url: str) -> TransientcamError:
             )
         case ws.PayloadTooBig():
             return StreamClosed(CloseCode.TOO_BIG, str(error))
-        case httpx.InvalidURL() | httpx.UnsupportedProtocol() | ws.InvalidURI():
+        case httpx.InvalidURL() | httpx.UnsupportedProtocol() | ws.InvalidURI() | UnicodeError():
             return ParameterError("url", url, f"an address of a camera ({type(error).__name__})")
         case httpx.RemoteProtocolError() | ws.InvalidMessage():
             return ServerUnreachable(url, f"what answers there does not speak HTTP ({error})")
@@ -69,7 +72,7 @@ def translate(error: Exception, url: str) -> TransientcamError:
             return ServerUnreachable(url, "no answer in time")
         case ws.InvalidProxy():  # its sentence has the proxy's address, maybe with a password
             return ServerUnreachable(url, f"the proxy failed ({error.msg})")
-        case ws.ProxyError():
+        case ws.ProxyError() | ImportError():
             return ServerUnreachable(url, f"the proxy failed ({error})")
         case httpx.TransportError() | OSError():
             return ServerUnreachable(url, _reason(error))

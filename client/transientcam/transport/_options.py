@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable
 from importlib.metadata import version
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import httpx
 from websockets.typing import Subprotocol
@@ -18,17 +18,22 @@ USER_AGENT: Final = f"transientcam/{version('transientcam')}"
 QUIET: Final = logging.getLogger("transientcam.websockets")
 """Of websockets, which would log every head and message: tokens and addresses with secrets."""
 QUIET.setLevel(logging.CRITICAL)
+_Client = TypeVar("_Client", httpx.Client, httpx.AsyncClient)
 _CLOSE_WITHIN_S = 1.0
+_LONGEST_S: Final = 366 * 86400.0
 _QUEUED_MESSAGES = 256
 
 
-def http_options(*, token: str | None, timeout_s: float) -> dict[str, Any]:
-    """Return the options of an httpx client.
+def http_client(
+    kind: type[_Client], *, token: str | None, timeout_s: float, **options: Any
+) -> _Client:
+    """Return a client of httpx.
 
     Raises
     ------
     ParameterError
-        If the token is none; it is not shown.
+        If the token is none, nothing can wait for so long, or the environment has proxies or
+        authorities that cannot be used; no secret is shown.
     """
     # what is unpacked here has no bound: the bytes of an answer count as they travel
     headers = {"user-agent": USER_AGENT, "accept-encoding": "identity"}
@@ -37,17 +42,35 @@ def http_options(*, token: str | None, timeout_s: float) -> dict[str, Any]:
         if not token or not token.isascii() or not token.isprintable() or " " in token:
             raise ParameterError("token", "…", "printable ASCII without spaces")
         headers["authorization"] = f"Bearer {token}"
-    return {"headers": headers, "timeout": timeout_s}
+    try:
+        return kind(headers=headers, timeout=_allowed_s(timeout_s), **options)
+    except OSError as error:
+        raise ParameterError("SSL_CERT_FILE or SSL_CERT_DIR", "…", f"read ({error})") from error
+    except (ImportError, ValueError, httpx.InvalidURL) as error:
+        limit = f"the address of an HTTP proxy ({error})"
+        raise ParameterError("HTTP_PROXY, HTTPS_PROXY or ALL_PROXY", "…", limit) from error
 
 
 def request_options(request: Request[Any], *, timeout_s: float) -> dict[str, Any]:
-    """Return the options of one request, besides its method and address."""
+    """Return the options of one request, besides its method and address.
+
+    Raises
+    ------
+    ParameterError
+        If nothing can wait for so long.
+    """
     return {
         "params": list(request.params),
         "content": request.body,
         "headers": request.headers,
-        "timeout": timeout_s + request.extra_timeout_s,
+        "timeout": _allowed_s(timeout_s + request.extra_timeout_s),
     }
+
+
+def _allowed_s(timeout_s: float) -> float:
+    if not 0.0 <= timeout_s <= _LONGEST_S:
+        raise ParameterError("timeout", timeout_s, f"a time of at most {_LONGEST_S:.0f} s")
+    return timeout_s
 
 
 def set_lease(headers: httpx.Headers, lease_id: str | None) -> None:

@@ -253,8 +253,8 @@ def _text(value: object) -> str:
 
 def _number(value: Any) -> float:
     number = float(value)
-    if not math.isfinite(number):
-        raise ValueError(f"no number: {number}")
+    if isinstance(value, bool) or not math.isfinite(number):
+        raise ValueError(f"no number: {value}")
     return number
 
 

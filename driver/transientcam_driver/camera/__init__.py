@@ -17,6 +17,7 @@ from transientcam_driver.camera._frame import Counters, Hop, RawFrame
 from transientcam_driver.camera._host_camera import HostCamera
 from transientcam_driver.camera._light import has_light, light_warning
 from transientcam_driver.camera._opening import check_camera, kinds, open_camera, plugin_of
+from transientcam_driver.camera._plugged import Plugged, SameDevice, listed, place_on
 from transientcam_driver.camera._plugin import CameraName, CameraPlugin, FoundCamera
 from transientcam_driver.camera._sensor import Sensor
 from transientcam_driver.camera._simulation import (

@@ -263,7 +263,7 @@ class Capabilities:
 
     def tuning_word(self, frequency_hz: float) -> int:
         """Nearest tuning word of a frequency; harmonics use multiples of the base's word."""
-        return round(frequency_hz / self.tuning_step_hz)
+        return round(min(frequency_hz / self.tuning_step_hz, 2.0**62))
 
     def exposure_grid_s(self, exposure_s: float) -> float:
         """Nearest exposure that the timer makes."""

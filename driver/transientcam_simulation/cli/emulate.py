@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
+from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import echo
 from transientcam_driver.camera import CameraName
 from transientcam_driver.cameras.tofcam660 import CONTROL_PORT, DATA_PORT
-from transientcam_driver.cli.options import JsonOption
 from transientcam_driver.clock import RealClock
 from transientcam_simulation.emulated import build_tofcam660
 from transientcam_simulation.entries.sim import scene_of

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
+from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import echo
 from transientcam_driver.camera import CameraName, ExplainedEffect, Explanation
-from transientcam_driver.cli.options import JsonOption
 from transientcam_driver.errors import DriverError, SpecError
 from transientcam_driver.sequence import Sequence
 from transientcam_driver.texts import read_text

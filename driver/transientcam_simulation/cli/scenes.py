@@ -2,10 +2,8 @@
 
 import json
 
-from rich.table import Table
-
+from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import Terminal, echo
-from transientcam_driver.cli.options import JsonOption
 from transientcam_simulation import list_scenes
 
 
@@ -19,7 +17,5 @@ def scenes(as_json: JsonOption = False) -> None:
         ]
         echo(json.dumps(fields, indent=2))
         return
-    table = Table("scene", "what it shows", box=None)
-    for info in infos:
-        table.add_row(f"sim:{info.name}", info.description)
-    Terminal().print(table)
+    rows = ((f"sim:{info.name}", info.description) for info in infos)
+    Terminal().table("scene", "what it shows", rows=rows)

@@ -14,9 +14,9 @@ from transientcam_driver.cameras.kinect2 import (
     Kinect2,
     Kinect2Camera,
     Rows,
+    SameKinect,
     facts,
     list_kinects,
-    open_kinect2,
 )
 from transientcam_driver.clock import Clock
 from transientcam_driver.errors import CameraError
@@ -47,7 +47,7 @@ def _rows(name: CameraName) -> Rows:
 def _open(name: CameraName, clock: Clock) -> Camera:
     rows = _rows(name)
     if name.address != EMULATED:
-        return Kinect2Camera(lambda serial: _real(name, serial), rows=rows, clock=clock)
+        return Kinect2Camera(_real(name), rows=rows, clock=clock)
     scene = simulated_scene(name, _SCENE)
     emulated, simulation = build_kinect2(scene.load(), seed=scene.seed, clock=clock)
     return Kinect2Camera(
@@ -59,11 +59,9 @@ def _open(name: CameraName, clock: Clock) -> Camera:
     )
 
 
-def _real(name: CameraName, serial: str | None) -> Kinect2:
+def _real(name: CameraName) -> SameKinect:
     require_no_emulation(name)
-    return open_kinect2(
-        serial or name.address or None, pause=time.sleep, transfers=_transfers(name)
-    )
+    return SameKinect(name.address or None, pause=time.sleep, transfers=_transfers(name))
 
 
 def _transfers(name: CameraName) -> int:
@@ -90,13 +88,13 @@ def _facts(name: CameraName) -> Iterator[tuple[str, str]]:
     rows = _rows(name)
     yield "rows", ROWS[rows]
     if name.address != EMULATED:
-        with closing(_real(name, None)) as kinect:
+        with closing(_real(name)()) as kinect:
             yield from facts(kinect)
 
 
 PLUGIN: Final = CameraPlugin(
     summary="a Microsoft Kinect v2 on USB 3, or its emulation (docs/cameras.md)",
-    usage=f"kinect2[:SERIAL] or kinect2:{EMULATED}",
+    usage=f"kinect2[:SERIAL], kinect2:@BUS-PORTS or kinect2:{EMULATED}",
     open=_open,
     find=_find,
     check=_check,

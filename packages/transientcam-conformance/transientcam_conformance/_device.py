@@ -13,7 +13,7 @@ from transientcam.errors import PromiseBroken, ProtocolError
 from transientcam.requests import problem
 from transientcam.transport import (
     answer_of,
-    http_options,
+    http_client,
     media_type,
     parse_address,
     set_lease,
@@ -42,8 +42,8 @@ class Device:
         self.address = parse_address(url)
         self.token = token
         self.timeout_s = timeout_s
-        self._http = httpx.Client(
-            base_url=self.address.url, **http_options(token=token, timeout_s=timeout_s)
+        self._http = http_client(
+            httpx.Client, base_url=self.address.url, token=token, timeout_s=timeout_s
         )
         self._lease_id: str | None = None
         self.answers: list[tuple[dict[str, Any], httpx.Response]] = []

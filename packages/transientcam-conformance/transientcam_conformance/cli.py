@@ -5,16 +5,15 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.markup import escape
 
 from transientcam.cli.options import TokenOption, UrlArgument
-from transientcam.cli.terminal import Terminal, echo
+from transientcam.cli.terminal import Terminal, Text, echo
 from transientcam_conformance import CHECKS, SLOW, Check, Device, Report, Result, chosen, run
 
 _MARKS = {
-    "passed": "[green]passed [/]",
-    "failed": "[bold red]FAILED [/]",
-    "skipped": "[dim]skipped[/]",
+    "passed": ("passed ", "green"),
+    "failed": ("FAILED ", "bold red"),
+    "skipped": ("skipped", "dim"),
 }
 
 
@@ -48,7 +47,7 @@ def conformance(
     """
     checks = chosen(only or (), quick=quick)
     to_standard_output = report is not None and str(report) == "-"
-    console = Terminal(stderr=to_standard_output, highlight=False, markup=True)
+    console = Terminal(stderr=to_standard_output, highlight=False)
     width = max(len(each.name) for each in CHECKS)
 
     with Device(url, token=token, timeout_s=timeout_s) as device, console.status("") as status:
@@ -58,15 +57,16 @@ def conformance(
 
         def end(result: Result) -> None:
             check = result.check
-            head = f"{_MARKS[result.outcome]} {check.group:<14} {check.name:<{width}}"
-            console.print(f"{head} [dim]{result.duration_s:6.2f} s[/]", soft_wrap=True)
+            name = f" {check.group:<14} {check.name:<{width}} "
+            took = f"{result.duration_s:6.2f} s", "dim"
+            console.print(Text.assemble(_MARKS[result.outcome], name, took))
             if result.reason is not None:
-                console.print(f"        {escape(result.reason)}", soft_wrap=True)
+                console.print(f"        {result.reason}")
             if result.outcome == "failed":
-                console.print(f"        [dim]{escape(check.promise)}[/]", soft_wrap=True)
+                console.print(f"        {check.promise}", style="dim")
 
         outcome = run(device, checks, begin=begin, end=end)
-    console.print(_summary(outcome), soft_wrap=True)
+    console.print(_summary(outcome))
     if report is not None:
         text = json.dumps(outcome.to_document(), indent=2)
         if to_standard_output:

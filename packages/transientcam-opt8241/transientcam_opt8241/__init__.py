@@ -19,4 +19,4 @@ from transientcam_opt8241._device import (
 from transientcam_opt8241._link import Link, Request
 from transientcam_opt8241._pll import CLOCK_HZ, PllSetting
 from transientcam_opt8241._registers import REGISTER_BYTES, Field
-from transientcam_opt8241._usb_link import list_cameras, open_link
+from transientcam_opt8241._usb_link import SameCamera, list_cameras

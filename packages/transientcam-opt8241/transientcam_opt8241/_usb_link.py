@@ -1,25 +1,21 @@
 """A link to an OPT8241-CDK on USB, by pyusb."""
 
 import array
-from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
-from transientcam_driver.camera import FoundCamera
+from transientcam_driver.camera import FoundCamera, Plugged, SameDevice, listed
 from transientcam_driver.cameras.open_usb import (
     VENDOR_IN,
     VENDOR_OUT,
     claim,
-    devices,
-    first_of,
-    forget,
     give_back,
     node_of,
+    plugged,
     read_bulk,
-    serial_of,
     translated,
     udev_rule,
 )
-from transientcam_driver.errors import CameraError
 from transientcam_opt8241._device import PRODUCT
 from transientcam_opt8241._link import (
     FRAME_ENDPOINT,
@@ -75,35 +71,27 @@ class UsbLink:
         give_back(self._device)
 
 
-def open_link(serial: str | None = None) -> UsbLink:
-    """Find and claim a camera, by serial number or the first that can be opened.
+class SameCamera(SameDevice[UsbLink]):
+    """Opens a camera by its name, and once that is lost no other."""
 
-    Raises
-    ------
-    CameraNotFound, PermissionDenied, CameraBusy, LibusbMissing
-    """
-    return first_of(devices(VENDOR_ID, PRODUCT_ID), serial, _serial, UsbLink)
+    def __init__(self, name: str | None = None) -> None:
+        super().__init__(
+            "opt8241",
+            name,
+            _plugged,
+            lambda each, suffix: UsbLink(each.device, each.serial + suffix),
+        )
 
 
-def list_cameras() -> Iterator[FoundCamera]:
+def list_cameras() -> tuple[FoundCamera, ...]:
     """List the cameras that are plugged in; none is claimed.
 
     Raises
     ------
     LibusbMissing
     """
-    for device in devices(VENDOR_ID, PRODUCT_ID):
-        try:
-            serial = _serial(device)
-            yield FoundCamera(f"opt8241:{serial}", serial, PRODUCT, node_of(device))
-        except CameraError as error:
-            yield FoundCamera("opt8241", None, PRODUCT, node_of(device), str(error))
-        finally:
-            forget(device)
+    return listed("opt8241", [replace(each, product=PRODUCT) for each in _plugged()])
 
 
-def _serial(device: Any) -> str:
-    """Return the serial number; without one, the bus and the ports to it."""
-    if device.iSerialNumber:
-        return serial_of(device, UDEV_RULE)
-    return f"{device.bus}-{'.'.join(map(str, device.port_numbers or (device.address,)))}"
+def _plugged() -> list[Plugged]:
+    return plugged(VENDOR_ID, PRODUCT_ID, rule=UDEV_RULE)

@@ -8,7 +8,7 @@ from transientcam_driver.camera import Camera, CameraName, CameraPlugin, FoundCa
 from transientcam_driver.cameras.triggered import TriggeredCamera
 from transientcam_driver.clock import Clock
 from transientcam_driver.errors import CameraError
-from transientcam_opt8241 import PRODUCT, QUADS, Opt8241, list_cameras, open_link
+from transientcam_opt8241 import PRODUCT, QUADS, Opt8241, SameCamera, list_cameras
 from transientcam_opt8241.emulated import build_opt8241
 from transientcam_simulation.entries.emulated import (
     EMULATED,
@@ -26,7 +26,9 @@ def _open(name: CameraName, clock: Clock) -> Camera:
     quads = _quads(name)
     if name.address != EMULATED:
         require_no_emulation(name)
-        return TriggeredCamera(_one_at_a_time(lambda: _real(name)), clock=clock)
+        link = SameCamera(name.address or None)
+        connect = _one_at_a_time(lambda: Opt8241(link(), quads=quads))
+        return TriggeredCamera(connect, clock=clock)
     scene = simulated_scene(name)
     emulated, simulation = build_opt8241(scene.load(), seed=scene.seed, clock=clock, quads=quads)
     connect = _one_at_a_time(lambda: Opt8241(emulated.connect(), quads=quads))
@@ -46,10 +48,6 @@ def _one_at_a_time(connect: Callable[[], Opt8241]) -> Callable[[], Opt8241]:
     return again
 
 
-def _real(name: CameraName) -> Opt8241:
-    return Opt8241(open_link(name.address or None), quads=_quads(name))
-
-
 def _check(name: CameraName) -> None:
     _quads(name)
     if name.address == EMULATED:
@@ -67,13 +65,14 @@ def _find() -> Iterator[FoundCamera]:
 def _facts(name: CameraName) -> Iterator[tuple[str, str]]:
     """Read what the maintainer of this driver needs to know of a real camera."""
     if name.address != EMULATED:
-        with closing(_real(name)) as device:
+        link = SameCamera(name.address or None)()
+        with closing(Opt8241(link, quads=_quads(name))) as device:
             yield from device.facts()
 
 
 PLUGIN: Final = CameraPlugin(
     summary="a Texas Instruments OPT8241-CDK on USB, or its emulation (docs/opt8241.md)",
-    usage=f"opt8241[:SERIAL] or opt8241:{EMULATED}",
+    usage=f"opt8241[:SERIAL], opt8241:@BUS-PORTS or opt8241:{EMULATED}",
     open=_open,
     find=_find,
     check=_check,

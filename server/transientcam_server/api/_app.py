@@ -98,7 +98,7 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
         docs_url=None,  # pages.router has one that needs no other host
         redoc_url=None,
         swagger_ui_oauth2_redirect_url=None,
-        servers=[{"url": settings.root_path}] if settings.root_path else None,
+        servers=[{"url": "."}],  # relative to the document: below the path of any proxy
     )
     app.state.service = service
     app.state.metrics = metrics
@@ -125,8 +125,7 @@ def build_app(camera: Camera, settings: Settings) -> FastAPI:
     app.add_middleware(OriginCheck, settings=settings)
     app.add_middleware(RequestLog, metrics=metrics)
     app.add_middleware(SecurityHeaders)
-    if settings.root_path:
-        app.add_middleware(RootPath, root_path=settings.root_path)
+    app.add_middleware(RootPath, root_path=settings.root_path)
     _analyse_routes(app)
     return app
 

@@ -12,7 +12,7 @@ ACCEPTED: Final[dict[int | str, dict[str, Any]]] = {
         "description": "It has begun, or waits for its turn",
         "headers": {
             "Location": {
-                "description": "where its progress is reported",
+                "description": "where its progress is reported, relative to this address",
                 "schema": {"type": "string"},
             }
         },

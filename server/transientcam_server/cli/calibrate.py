@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from transientcam.cli.options import TokenOption, require_suffix
-from transientcam.cli.terminal import Terminal, echo
+from transientcam.cli.terminal import echo, progress_bars
 from transientcam_driver.texts import in_celsius, read_text
 
 if TYPE_CHECKING:
@@ -279,14 +279,12 @@ def _measured_here(
 
 def _measure(camera: "Camera", takes: int, *, sweep: bool) -> "tuple[Calibration, str | None]":
     """Measure with a camera; also return why there are no harmonics."""
-    from rich.progress import Progress
-
     import transientcam_moments as tm
     from transientcam_driver import capture_calibration
     from transientcam_server.imaging import SweepEvaluation, evaluate
 
     swept = SweepEvaluation(camera.capabilities, takes=takes)
-    with Progress(console=Terminal(stderr=True)) as shown:
+    with progress_bars() as shown:
         task = shown.add_task("capturing", total=None)
         capture = capture_calibration(
             camera,

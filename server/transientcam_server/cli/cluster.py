@@ -60,4 +60,4 @@ def cluster_client(workers: int | None, address: str | None, console: Terminal) 
 
 def _say(console: Terminal, client: Any) -> None:
     workers = len(client.scheduler_info(n_workers=-1)["workers"])
-    console.print(f"{workers} workers, dashboard: {client.dashboard_link}", soft_wrap=True)
+    console.print(f"{workers} workers, dashboard: {client.dashboard_link}")

@@ -9,8 +9,7 @@ from typing import Annotated
 import typer
 
 from transientcam.cli.options import JsonOption
-from transientcam.cli.terminal import Terminal, echo
-from transientcam_server.cli.progress import progress_bars
+from transientcam.cli.terminal import Terminal, echo, progress_bars
 
 
 def compile_kernels(
@@ -41,7 +40,7 @@ def compile_kernels(
         echo(json.dumps(state))
     else:
         for failure in state["failed"]:
-            console.print(f"failed: {failure}", soft_wrap=True)
+            console.print(f"failed: {failure}")
         console.print(f"{len(state['compiled'])} kernels are ready.")
     if state["failed"]:
         raise typer.Exit(code=1)

@@ -11,9 +11,8 @@ import numpy as np
 import typer
 
 from transientcam.cli.options import JsonOption
-from transientcam.cli.terminal import Terminal, echo
+from transientcam.cli.terminal import Terminal, echo, progress_bar
 from transientcam_server.cli.options import RecordingArgument
-from transientcam_server.cli.progress import progress_bar
 
 _CLOCK_SET_S: Final = 1.0
 
@@ -62,16 +61,14 @@ def convert(
         echo(json.dumps({"file": str(output), "frames": frames}))
         return
     console = Terminal(stderr=True)
-    console.print(f"{output}: {frames} frames", soft_wrap=True)
+    console.print(f"{output}: {frames} frames")
     if frames and (step_s := float(np.ptp(arrived_s))) > _CLOCK_SET_S:
         console.print(
             f"the host's clock was set while it recorded, by up to {step_s:.0f} s: times of "
-            "captures are those of the camera's clock",
-            soft_wrap=True,
+            "captures are those of the camera's clock"
         )
     if "pointcloud" in products and lens.source == "assumed":
         console.print(
             f"the recording does not say its lens: points, depth and calibration assume "
-            f"fx = {lens.fx:.1f} pixels",
-            soft_wrap=True,
+            f"fx = {lens.fx:.1f} pixels"
         )

@@ -10,8 +10,7 @@ from typing import Annotated, Literal
 import typer
 
 from transientcam.cli.options import JsonOption, require_suffix
-from transientcam.cli.terminal import Terminal, echo
-from transientcam_server.cli.progress import progress_bar
+from transientcam.cli.terminal import Terminal, echo, progress_bar
 
 
 def import_kinect2(
@@ -46,4 +45,4 @@ def import_kinect2(
     if as_json:
         echo(json.dumps({"file": str(output), "frames": frames}))
     else:
-        Terminal(stderr=True).print(f"{output}: {frames} frames", soft_wrap=True)
+        Terminal(stderr=True).print(f"{output}: {frames} frames")

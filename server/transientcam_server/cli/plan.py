@@ -227,7 +227,7 @@ def _planned(
         if as_json:
             echo(json.dumps(document))
         else:
-            console.print(problem.detail, style="red", soft_wrap=True)
+            console.print(problem.detail, style="red")
             print_takes(document.get("takes", []))
         raise typer.Exit(1 if document.get("decided", True) else 3) from problem
 

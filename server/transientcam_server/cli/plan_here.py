@@ -1,10 +1,9 @@
 """The verb ``plan`` in this process: a look through a camera, and the search."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
-
-from rich.status import Status
 
 import transientcam_moments as tm
 from transientcam.cli.terminal import Terminal
@@ -72,7 +71,7 @@ def by_camera(
         planner = Planner(camera.capabilities, sensor, ReconstructionSettings())
         scene = _scene(planner, camera, view, goal, console)
     with tm.kernels.only_note(), console.status("predicting") as status:
-        progress = Progress(_shown(status))
+        progress = Progress(_shown(status.update))
         if front:
             return planner.tradeoff_document(goal, scene, progress), b""
         found = planner.plan(goal, scene, progress)
@@ -97,10 +96,10 @@ def _scene(
             camera,
             goal.base,
             ambient_dn_per_s=view.ambient_dn_per_s,
-            progress=Progress(_shown(status)),
+            progress=Progress(_shown(status.update)),
         )
 
 
-def _shown(status: Status) -> Report:
+def _shown(show: Callable[[str], None]) -> Report:
     """Return what shows how far a look or a plan has come."""
-    return lambda share, step: status.update(f"{share:.0%}: {step}")
+    return lambda share, step: show(f"{share:.0%}: {step}")

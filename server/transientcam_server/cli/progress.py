@@ -1,48 +1,18 @@
-"""Progress bars of the verbs, on standard error."""
+"""A job of a daemon, shown on standard error until it is done."""
 
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import typer
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TaskProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
-from transientcam.cli.terminal import Terminal
+from transientcam.cli.terminal import Terminal, progress_bars
 
 if TYPE_CHECKING:
     from transientcam import Camera
 
 _ENDING: Final = (signal.SIGTERM, signal.SIGHUP)
-
-
-def progress_bars(*, console: Terminal | None = None, counted: bool = False) -> Progress:
-    """Return bars for several tasks; ``counted`` shows "3/12" in place of a percentage."""
-    return Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn() if counted else TaskProgressColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=console or Terminal(stderr=True),
-    )
-
-
-@contextmanager
-def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
-    """Show one bar; the caller reports progress to its value as (done, total)."""
-    with progress_bars() as progress:
-        task = progress.add_task(what, total=None)
-        yield lambda done, total: progress.update(task, completed=done, total=total)
 
 
 def followed(camera: "Camera", start: Callable[[], dict[str, Any]]) -> dict[str, Any]:

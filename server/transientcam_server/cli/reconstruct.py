@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from transientcam.cli.options import JsonOption, TokenOption, require_suffix
-from transientcam.cli.terminal import Terminal, echo
+from transientcam.cli.terminal import Terminal, echo, progress_bars
 from transientcam_server.cli.cluster import DaskOption, WorkersOption
-from transientcam_server.cli.progress import progress_bars
 from transientcam_server.cli.reconstruct_recordings import (
     ReconstructionChoices,
     reconstruct_on_cluster,
@@ -181,8 +180,7 @@ def _document(measurement: "Measurement", cube: "TransientCube", output: str) ->
 def _print_cube(console: Terminal, document: dict[str, Any]) -> None:
     console.print(
         "{file}: {width} x {height} pixels, m = {harmonics} at ".format(**document)
-        + f"{document['base_frequency_hz'] / 1e6:g} MHz, {document['times']} times of flight",
-        soft_wrap=True,
+        + f"{document['base_frequency_hz'] / 1e6:g} MHz, {document['times']} times of flight"
     )
     for flag, count in document["flagged"].items():
         if count:

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from transientcam.cli.terminal import Terminal, echo
+from transientcam.cli.terminal import Terminal, echo, progress_bar
 from transientcam.text import plain
 from transientcam_server.cli.cluster import cluster_client
-from transientcam_server.cli.progress import progress_bar
 from transientcam_server.errors import MissingExtra, MixedVersions
 
 if TYPE_CHECKING:
@@ -104,7 +103,7 @@ def reconstruct_on_cluster(
             except Exception as error:  # of a file that anybody may have written
                 if len(outputs) == 1:
                     raise
-                console.print(plain(f"{each}: {error}"), soft_wrap=True)
+                console.print(plain(f"{each}: {error}"))
                 failed += 1
             else:
                 _report(into, options.products, frames, before, as_json=as_json)
@@ -141,6 +140,4 @@ def _report(
         echo(json.dumps(document))
         return
     resumed = f", {before} of them before" if before else ""
-    Terminal(stderr=True).print(
-        f"{output}: {', '.join(products)} of {frames} frames{resumed}", soft_wrap=True
-    )
+    Terminal(stderr=True).print(f"{output}: {', '.join(products)} of {frames} frames{resumed}")

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.text import Text
 
 from transientcam.cli.options import JsonOption
-from transientcam.cli.terminal import Terminal, echo
+from transientcam.cli.terminal import Terminal, Text, echo
 
 
 def serve(
@@ -152,4 +151,4 @@ def _announce(url: str, camera: str, *, as_json: bool) -> None:
     console = Terminal()
     link = url, f"bold link {url}"
     line = Text.assemble(f"transientcam serves {camera} at ", link, " (Ctrl-C ends it)")
-    console.print(line, soft_wrap=True)
+    console.print(line)

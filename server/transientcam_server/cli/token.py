@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich.table import Table
 
 from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import Terminal, echo
@@ -36,7 +35,8 @@ def create(
         typer.Option(help="viewer reads, operator controls, admin also takes over any lease."),
     ] = "viewer",
     days: Annotated[
-        float | None, typer.Option(min=0.0, help="How long it is valid.  [default: for ever]")
+        float | None,
+        typer.Option(min=0.0, max=36_500.0, help="How long it is valid.  [default: for ever]"),
     ] = None,
     may_light: Annotated[
         bool | None,
@@ -69,7 +69,6 @@ def create(
     Terminal(stderr=True).print(
         f"Token {token.id}, {role}, for {name}. It is shown only once; a running service accepts "
         "it at once.",
-        soft_wrap=True,
         highlight=False,
     )
 
@@ -89,15 +88,15 @@ def list_tokens(
     if not tokens:
         echo(f"There are no tokens in {file.path}.")
         return
-    table = Table("id", "name", "role", "light", "made", "expires", box=None)
+    rows = []
     for token in tokens:
         expires = "never" if token.expires is None else f"{token.expires:%Y-%m-%d %H:%M}"
         if token.expired(utc_now()):
             expires += " (over)"
         made = f"{token.created:%Y-%m-%d}"
         light = "yes" if token.lights else "no"
-        table.add_row(token.id, token.name, token.role, light, made, expires)
-    Terminal().print(table)
+        rows.append((token.id, token.name, token.role, light, made, expires))
+    Terminal().table("id", "name", "role", "light", "made", "expires", rows=rows)
 
 
 @app.command()

@@ -29,6 +29,8 @@ OTHER_VARIABLES: Final = frozenset(
     for name in ("TOKEN", "RELAY_TOKEN", "URL", "KERNELS", "TEST_DATA")
 )
 """Those that begin so, too, but are not for the daemon's settings."""
+_LINKS: Final = ("TRANSIENTCAM_SERVICE_", "TRANSIENTCAM_PORT_")
+"""Kubernetes sets these, and ``TRANSIENTCAM_PORT=tcp://…``, for a service of the same name."""
 DEFAULT_FILES: Final = (Path("transientcam.toml"), Path("/etc/transientcam/transientcam.toml"))
 _UNKNOWN: Final = "there is no such setting"
 _Location = tuple[str, ...]
@@ -142,7 +144,8 @@ class _MergedSettings:
     def read_environment(self, environment: Mapping[str, str]) -> None:
         variables = {name.upper(): text for name, text in environment.items()}
         for name, text in sorted(variables.items()):  # a table before its values
-            if name.startswith(ENVIRONMENT_PREFIX) and name not in OTHER_VARIABLES:
+            other = name in OTHER_VARIABLES or name.startswith(_LINKS) or text.startswith("tcp://")
+            if name.startswith(ENVIRONMENT_PREFIX) and not other:
                 self._read_variable(name, text)
 
     def _read_variable(self, name: str, text: str) -> None:

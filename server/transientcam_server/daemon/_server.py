@@ -65,8 +65,9 @@ def listen(host: str, port: int) -> socket.socket:
         except OSError:
             listener.close()
             raise
-    except OSError as error:
-        raise AddressUnavailable(host, port, error.strerror or str(error)) from error
+    except (OSError, UnicodeError) as error:  # the latter: no name of a host at all
+        reason = getattr(error, "strerror", None) or str(error)
+        raise AddressUnavailable(host, port, reason) from error
     return listener
 
 

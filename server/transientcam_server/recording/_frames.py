@@ -15,7 +15,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 import transientcam_moments as tm
 from transientcam_driver import Capabilities, RawFrame
@@ -25,7 +25,7 @@ from transientcam_server.recording._disk_threads import DiskThreads
 from transientcam_server.recording._layout import Header
 from transientcam_server.recording._library import Library
 from transientcam_server.recording._reader import Recording
-from transientcam_server.settings import LensSettings, ReconstructionSettings
+from transientcam_server.settings import LensSettings, ReconstructionSettings, dataclass_of
 
 LATEST: Final = "latest"
 MAX_TIMES: Final = 4096
@@ -210,13 +210,10 @@ def _unknown_frame(number: int, last: int) -> Problem:
     )
 
 
-_SENSOR: Final = TypeAdapter(tm.noise.Sensor)
-
-
 def recorded_sensor(header: Header) -> tm.noise.Sensor | None:
     """Return the sensor whose noise a recording's images have; None where it says none."""
     with contextlib.suppress(ValueError):
-        return _SENSOR.validate_python(header.camera.get("sensor"))
+        return dataclass_of(tm.noise.Sensor, header.camera.get("sensor"))
     return None
 
 

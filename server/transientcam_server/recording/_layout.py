@@ -14,12 +14,13 @@ from typing import Any, Final
 import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from transientcam_driver import AppliedSequence, Capabilities, ImageLabel, RawFrame, Sequence
 from transientcam_server.imaging import Column, Gains, image_columns, moment_columns, usable
 from transientcam_server.recording import _swmr as swmr
 from transientcam_server.recording._storage import MAX_CHUNK_BYTES, Storage
+from transientcam_server.settings import dataclass_of
 
 _LONGEST_S: Final = 1e12  # of a recording
 FORMAT: Final = "transientcam recording"
@@ -57,7 +58,6 @@ _LABELS: Final = {
     each.name: _LABEL_DTYPES[each.type] for each in fields(ImageLabel) if each.name != "index"
 }
 _LAST_S: Final = datetime(9999, 12, 31, tzinfo=UTC).timestamp()
-_CAPABILITIES: Final = TypeAdapter(Capabilities)
 
 
 @dataclass(frozen=True)
@@ -241,7 +241,7 @@ def read_header(storage: Storage, *, with_images: bool = True) -> Header:
 
 def _capabilities(document: Mapping[str, Any]) -> Capabilities:
     try:
-        capabilities = _CAPABILITIES.validate_python(document)
+        capabilities = dataclass_of(Capabilities, document)
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))

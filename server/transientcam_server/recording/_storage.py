@@ -65,6 +65,8 @@ class Storage:
         if attribute.shape != ():
             raise ValueError(f"its attribute {name} is an array")
         value = self._file.attrs[name]
+        if isinstance(value, np.bool_):
+            raise ValueError(f"its attribute {name} is {value}, and no number or text")
         if isinstance(value, bytes):
             return value.decode()
         if not isinstance(value, str):

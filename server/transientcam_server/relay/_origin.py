@@ -23,11 +23,9 @@ from transientcam_server.errors import OriginRefused
 from transientcam_server.imaging import FACTORY_ID, NOMINAL_ID, Calibration, load_calibration
 from transientcam_server.relay._delivery import ATTEMPT_S
 from transientcam_server.relay._frames import RAW, SUBSCRIBED
-from transientcam_server.settings import CorruptImages
+from transientcam_server.settings import CorruptImages, dataclass_of
 
-_CAPABILITIES: Final = TypeAdapter(Capabilities)
 _CORRUPT_IMAGES: Final[TypeAdapter[CorruptImages]] = TypeAdapter(CorruptImages)
-_SENSOR: Final = TypeAdapter(tm.noise.Sensor | None)
 _CREDITS: Final = 2
 """One frame travels while another is taken: more would only make frames older."""
 _TRANSIENT: Final = (HTTPStatus.REQUEST_TIMEOUT, HTTPStatus.TOO_MANY_REQUESTS)
@@ -108,7 +106,7 @@ class Origin:
                     version=str(info["version"]),
                     role=str(info["caller"]["role"]),
                     capabilities=_capabilities(camera["capabilities"]),
-                    sensor=_SENSOR.validate_python(camera["sensor"]),
+                    sensor=camera["sensor"] and dataclass_of(tm.noise.Sensor, camera["sensor"]),
                     intrinsics=camera["intrinsics"],
                     sequence=self._client.sequence,
                     calibration=self._calibration(),
@@ -266,7 +264,7 @@ class _WithHeaders(httpx.AsyncHTTPTransport):
 
 def _capabilities(document: Mapping[str, Any]) -> Capabilities:
     """Return what can be done through a relay: phases cannot be shifted over REST."""
-    return replace(_CAPABILITIES.validate_python(document), phase_offsets=False)
+    return replace(dataclass_of(Capabilities, document), phase_offsets=False)
 
 
 def require_same_camera(known: Capabilities, now: Capabilities) -> None:

@@ -309,6 +309,15 @@ def test_a_user_without_a_home_needs_none_where_the_directories_are_set(
     assert settings.recordings.directory == tmp_path / "recordings"
 
 
+def test_what_kubernetes_sets_for_a_service_of_the_same_name_is_no_setting() -> None:
+    links = {"TRANSIENTCAM_PORT": "tcp://10.0.0.7:8000", "TRANSIENTCAM_SERVICE_HOST": "10.0.0.7"}
+    links |= {"TRANSIENTCAM_PORT_8000_TCP_PROTO": "tcp", "TRANSIENTCAM_HOST": "127.0.0.2"}
+
+    settings = load(environment=links)
+
+    assert (settings.host, settings.port) == ("127.0.0.2", 8000)
+
+
 @pytest.mark.parametrize(
     ("lines", "said"),
     [
@@ -318,6 +327,7 @@ def test_a_user_without_a_home_needs_none_where_the_directories_are_set(
         ("[lens]\nlight_x_m = 300.0", "less than or equal to 10"),
         ("[history]\nseconds = false", "not true or false"),
         ("port = true", "not true or false"),
+        ("[lens]\nfx_px = 200.0\ndistortion = [0.1, 0, 0, 0, true]", "not true or false"),
         ('root_path = "lidar/"', "match pattern"),
     ],
 )

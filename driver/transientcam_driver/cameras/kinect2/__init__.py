@@ -40,7 +40,7 @@ from transientcam_driver.cameras.kinect2._commands import (
     Request,
 )
 from transientcam_driver.cameras.kinect2._device import Identity, Kinect2
-from transientcam_driver.cameras.kinect2._finding import PRODUCT, facts, list_kinects, open_kinect2
+from transientcam_driver.cameras.kinect2._finding import PRODUCT, SameKinect, facts, list_kinects
 from transientcam_driver.cameras.kinect2._layout import (
     BASE_FREQUENCY_HZ,
     HEIGHT,

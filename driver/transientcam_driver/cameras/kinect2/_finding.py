@@ -1,10 +1,10 @@
 """Find Kinects v2 on USB, and open one of them."""
 
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from typing import Any, Final
 
-from transientcam_driver.camera import FoundCamera
+from transientcam_driver.camera import FoundCamera, Plugged, SameDevice, listed, place_on
 from transientcam_driver.cameras.kinect2._device import Kinect2
 from transientcam_driver.cameras.kinect2._link import PRODUCT_IDS, VENDOR_ID
 from transientcam_driver.cameras.kinect2._parameters import DepthParameters
@@ -22,31 +22,33 @@ _RETURNS_S: Final = 1.0
 """What libfreenect2 waits for a camera that a reset let appear anew (``src/libfreenect2.cpp``)."""
 
 
-def open_kinect2(
-    serial: str | None, *, pause: Callable[[float], None], transfers: int = TRANSFERS
-) -> Kinect2:
-    """Open a camera, by its serial number or the first that can be opened.
+class SameKinect(SameDevice[Kinect2]):
+    """Opens a camera by its name, and once that is lost no other.
 
     Parameters
     ----------
+    name
+        Serial number or place; None for the first that can be opened.
     pause
         Sleeps for so many seconds.
     transfers
         Isochronous transfers in flight.
-
-    Raises
-    ------
-    CameraError
-        None can be opened.
     """
-    try:
-        return _opened(serial, pause, transfers)
-    except CameraLost:  # the reset let it appear anew, under another address
-        pause(_RETURNS_S)
-        return _opened(serial, pause, transfers)
+
+    def __init__(
+        self, name: str | None, *, pause: Callable[[float], None], transfers: int = TRANSFERS
+    ) -> None:
+        def claim(each: Plugged, _suffix: str) -> Kinect2:
+            try:
+                return Kinect2(_link(each, transfers), pause=pause, serial=each.serial or None)
+            except CameraLost:  # the reset let it appear anew, under another address
+                pause(_RETURNS_S)
+                return Kinect2(_link(each, transfers), pause=pause, serial=each.serial or None)
+
+        super().__init__("kinect2", name, _look, claim)
 
 
-def list_kinects() -> Iterator[FoundCamera]:
+def list_kinects() -> tuple[FoundCamera, ...]:
     """List the cameras that are plugged in; none is claimed.
 
     Raises
@@ -54,17 +56,7 @@ def list_kinects() -> Iterator[FoundCamera]:
     CameraError
         There is no libusb.
     """
-    with _context() as context:
-        for device in _kinects(context):
-            node = node_of(device)
-            try:
-                with translated("reading its serial number", node):
-                    serial = str(device.getSerialNumber())
-                require_bandwidth(device)
-            except CameraError as error:
-                yield FoundCamera("kinect2", None, PRODUCT, node, str(error))
-            else:
-                yield FoundCamera(f"kinect2:{serial}", serial, PRODUCT, node)
+    return listed("kinect2", _look())
 
 
 def facts(kinect: Kinect2) -> Iterator[tuple[str, str]]:
@@ -76,34 +68,35 @@ def facts(kinect: Kinect2) -> Iterator[tuple[str, str]]:
     yield "P0 tables", f"{len(identity.p0)} bytes, header {identity.p0[:32].hex(' ', 4)}"
 
 
-def _opened(serial: str | None, pause: Callable[[float], None], transfers: int) -> Kinect2:
-    with _context() as context:
-        nodes = [node_of(device) for device in _kinects(context)]
-    trouble: CameraError = CameraNotFound(serial)
-    for node in nodes:
-        try:
-            return Kinect2(_link(node, transfers), pause=pause, serial=serial)
-        except CameraNotFound:  # another one, or unplugged meanwhile
-            continue
-        except CameraError as error:
-            trouble = error
-    raise trouble
+def _look() -> list[Plugged]:
+    with closing(_opened_context()) as context:
+        return [_described(device) for device in _kinects(context)]
 
 
-def _link(node: str, transfers: int) -> UsbLink:
-    """Claim the camera at a node, with a context of its own."""
+def _described(device: Any) -> Plugged:
+    node, place, serial = node_of(device), _place_of(device), ""
+    try:
+        with translated("reading its serial number", node):
+            serial = str(device.getSerialNumber() or "")
+        require_bandwidth(device)
+    except CameraError as error:
+        return Plugged(place, serial, node, product=PRODUCT, problem=error)
+    return Plugged(place, serial, node, product=PRODUCT)
+
+
+def _place_of(device: Any) -> str:
+    ports = device.getPortNumberList()
+    return place_on(device.getBusNumber(), ports, device.getDeviceAddress())
+
+
+def _link(camera: Plugged, transfers: int) -> UsbLink:
+    """Claim a camera, with a context of its own."""
     context = _opened_context()
     for device in _kinects(context):
-        if node_of(device) == node:
+        if _place_of(device) == camera.place:
             return UsbLink(context, device, transfers=transfers)
     context.close()
     raise CameraNotFound
-
-
-@contextmanager
-def _context() -> Iterator[Any]:
-    with closing(_opened_context()) as context:
-        yield context
 
 
 def _opened_context() -> Any:

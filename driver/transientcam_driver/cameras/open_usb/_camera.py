@@ -5,6 +5,7 @@ import warnings
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 
 from transientcam_driver.camera import (
     IMAGE_HEADER_BYTES,
@@ -17,7 +18,7 @@ from transientcam_driver.camera import (
     Status,
 )
 from transientcam_driver.cameras.open_usb._receiving import Receiver
-from transientcam_driver.cameras.open_usb._transport import VENDOR_OUT, Transport
+from transientcam_driver.cameras.open_usb._transport import VENDOR_OUT, UsbTransport
 from transientcam_driver.cameras.open_usb.protocol import (
     CAPS_ROOM_BYTES,
     LAST_ERROR_BYTES,
@@ -77,7 +78,7 @@ class UsbCamera(HostCamera):
 
     def __init__(
         self,
-        connect: Callable[[str | None], Transport],
+        connect: Callable[[str | None], UsbTransport],
         *,
         clock: Clock | None = None,
         simulation: Simulation | None = None,
@@ -208,9 +209,11 @@ class UsbCamera(HostCamera):
         try:
             # usb-protocol 9: also where the last owner left the light on
             self._transport.control_out(Request.SAFE_OFF)
-            self._capabilities = unpack_capabilities(
+            capabilities = unpack_capabilities(
                 self._request_in(Request.GET_CAPS, length=CAPS_ROOM_BYTES)
             )
+            serial = capabilities.serial + self._transport.suffix
+            self._capabilities = replace(capabilities, serial=serial)
             self._transport.expect_transfers(IMAGE_HEADER_BYTES + self._capabilities.image_bytes)
             self._receiver = Receiver(self._capabilities, self.counters)
             self._configure(self._requested or self._capabilities.nearest(Sequence()))
@@ -378,7 +381,7 @@ class UsbCamera(HostCamera):
         )
 
 
-def _release(transport: Transport) -> None:
+def _release(transport: UsbTransport) -> None:
     """Light off when a camera is collected, or the interpreter ends, without close()."""
     warnings.warn("a camera was left open; use close() or `with`", ResourceWarning, stacklevel=2)
     with suppress(CameraError):

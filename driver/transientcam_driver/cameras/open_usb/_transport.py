@@ -5,16 +5,15 @@ Errors of pyusb are translated in ``translated`` and nowhere else.
 
 import array
 import errno
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import replace
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 import usb.backend.libusb1
 import usb.core
 import usb.util
 
-from transientcam_driver.camera import FoundCamera
+from transientcam_driver.camera import FoundCamera, Plugged, SameDevice, listed, place_on
 from transientcam_driver.cameras.open_usb.protocol import (
     IMAGE_ENDPOINT,
     PRODUCT_ID,
@@ -25,7 +24,6 @@ from transientcam_driver.errors import (
     CameraBusy,
     CameraError,
     CameraLost,
-    CameraNotFound,
     LibusbMissing,
     PermissionDenied,
     TransferOverflow,
@@ -43,9 +41,6 @@ _SMALLEST_READ_BYTES = 16 * 1024
 _GONE = {errno.ENODEV, errno.EIO, errno.EPROTO, errno.ESHUTDOWN, errno.ENOENT, None}
 
 
-Claimed = TypeVar("Claimed")
-
-
 def udev_rule(vendor_id: int, product_id: int) -> str:
     """Return the line for udev that lets users open such a device."""
     return (
@@ -57,55 +52,13 @@ def udev_rule(vendor_id: int, product_id: int) -> str:
 UDEV_RULE = udev_rule(VENDOR_ID, PRODUCT_ID)
 
 
-class Transport(Protocol):
-    """What a camera requires of its transport."""
-
-    @property
-    def serial(self) -> str:
-        """Serial number of the device at the other end."""
-        ...
-
-    @property
-    def node(self) -> str:
-        """Device node of usbfs."""
-        ...
-
-    def control_in(self, request: Request, *, value: int = 0, length: int) -> bytes:
-        """Send a request and return the answer."""
-        ...
-
-    def control_out(self, request: Request, data: bytes = b"") -> None:
-        """Send a request."""
-        ...
-
-    def expect_transfers(self, transfer_bytes: int) -> None:
-        """Prepare for transfers of this size."""
-        ...
-
-    def read(self, *, timeout_s: float) -> memoryview:
-        """Wait for the next transfer; the view is empty when the time runs out."""
-        ...
-
-    def clear_halt(self) -> None:
-        """Let the image endpoint run again after a stall."""
-        ...
-
-    def reset(self) -> None:
-        """Reset the device's port."""
-        ...
-
-    def close(self) -> None:
-        """Give the device back; never fails."""
-        ...
-
-
 class UsbTransport:
     """A camera that this process has claimed."""
 
-    def __init__(self, device: Any, serial: str) -> None:
+    def __init__(self, device: Any, serial: str, suffix: str) -> None:
         self._device = device
-        self.node, self.place = node_of(device), place_of(device)
-        self.serial = serial
+        self.node = node_of(device)
+        self.serial, self.suffix = serial, suffix
         self._buffer = array.array("B", bytes(_SMALLEST_READ_BYTES))
         claim(device)
 
@@ -167,7 +120,7 @@ class UsbTransport:
 
 
 def open_transport(name: str | None = None, *, backend: Any = None) -> UsbTransport:
-    """Find and claim a camera: by serial number, by `place_of`, or the first that can be opened.
+    """Find and claim a camera: by serial number, by place, or the first that can be opened.
 
     ``backend`` is one of pyusb; the system's libusb without one.
 
@@ -180,87 +133,16 @@ def open_transport(name: str | None = None, *, backend: Any = None) -> UsbTransp
     return SameCamera(name, backend=backend)()
 
 
-class SameCamera:
-    """Opens a camera by its name, and once that is lost no other, not even one of its number.
-
-    A camera with a serial number may come back in another place; one without, or one whose twin
-    is plugged in as it is lost, comes back where it was, since nothing else tells them apart.
-    """
+class SameCamera(SameDevice[UsbTransport]):
+    """Opens a camera by its name, and once that is lost no other."""
 
     def __init__(self, name: str | None, *, backend: Any = None) -> None:
-        self._name, self._backend = name, backend
-        self._had: tuple[str, str] | None = None
-        self._twins: set[str] | None = None
-
-    def __call__(self, serial: str | None = None) -> UsbTransport:
-        """Find and claim it; raises as `open_transport`."""
-        found = devices(VENDOR_ID, PRODUCT_ID, backend=self._backend)
-        if self._had is None:
-            serial = None if self._name is None or self._name.startswith("@") else self._name
-            wanted = self._named(found, serial)
-        else:
-            serial, place = self._had
-            elsewhere = {place_of(each) for each in _with_serial(found, serial or None)} - {place}
-            if self._twins is None:  # the first time after it was lost
-                self._twins = elsewhere
-            here = {place, *(elsewhere - self._twins)}
-            wanted = [each for each in found if place_of(each) in here]
-        if not wanted:
-            raise CameraNotFound(self._name)
-        transport = first_of(wanted, serial, serial_of, UsbTransport)
-        self._had, self._twins = (transport.serial, transport.place), None
-        return transport
-
-    def _named(self, found: list[Any], serial: str | None) -> list[Any]:
-        if serial is None:
-            return [each for each in found if self._name in (None, place_of(each))]
-        if len(twins := _with_serial(found, serial)) > 1:
-            places = " or ".join(f"usb:{place_of(each)}" for each in twins)
-            raise CameraError(f"several cameras have the serial number {serial}: name {places}")
-        return found
-
-
-def _with_serial(found: list[Any], serial: str | None) -> list[Any]:
-    same = []
-    for device in found if serial else ():
-        with suppress(CameraError):
-            if serial_of(device) == serial:
-                same.append(device)
-        forget(device)
-    return same
-
-
-def place_of(device: Any) -> str:
-    """Return where a device of pyusb is plugged in: bus and ports, as in ``@1-2.4``."""
-    ports = getattr(device, "port_numbers", None) or ("device", device.address)
-    return f"@{device.bus}-{'.'.join(map(str, ports))}"
-
-
-def first_of(
-    found: Iterable[Any],
-    serial: str | None,
-    serial_of: Callable[[Any], str],
-    claim: Callable[[Any, str], Claimed],
-) -> Claimed:
-    """Claim the device with a serial number, or the first that can be claimed.
-
-    Raises
-    ------
-    CameraError
-        Why the last one that might have been it could not, or `CameraNotFound`.
-    """
-    trouble: CameraError = CameraNotFound(serial)
-    for device in found:
-        try:
-            its = serial_of(device)
-            if serial in (None, its):
-                return claim(device, its)
-        except CameraLost:
-            pass  # it was unplugged meanwhile
-        except CameraError as error:
-            trouble = error
-        forget(device)
-    raise trouble
+        super().__init__(
+            "usb",
+            name,
+            lambda: plugged(VENDOR_ID, PRODUCT_ID, backend=backend),
+            lambda each, suffix: UsbTransport(each.device, each.serial, suffix),
+        )
 
 
 def give_back(device: Any) -> None:
@@ -285,17 +167,6 @@ def read_bulk(device: Any, endpoint: int, buffer: "array.array[int]", timeout_ms
         return 0
 
 
-def serial_of(device: Any, rule: str = UDEV_RULE) -> str:
-    """Return a device's serial number, empty where it has none; raises as `translated`."""
-    with translated("reading the serial number", node_of(device), rule):
-        return usb.util.get_string(device, device.iSerialNumber, _US_ENGLISH) or ""
-
-
-def forget(device: Any) -> None:
-    """Close what was opened to look at a device."""
-    usb.util.dispose_resources(device)
-
-
 def system_libusb() -> Any:
     """Return pyusb's backend for the libusb of this system; None where there is none."""
     return usb.backend.libusb1.get_backend()
@@ -308,28 +179,34 @@ def list_cameras(*, backend: Any = None) -> tuple[FoundCamera, ...]:
     ------
     LibusbMissing
     """
-    found = devices(VENDOR_ID, PRODUCT_ID, backend=backend)
-    described = [_described(device) for device in found]
-    serials = [each.serial for each in described]
-    return tuple(
-        replace(each, spec=f"usb:{each.serial}")
-        if each.serial and serials.count(each.serial) == 1
-        else each
-        for each in described
-    )
+    return listed("usb", plugged(VENDOR_ID, PRODUCT_ID, backend=backend))
 
 
-def _described(device: Any) -> FoundCamera:
-    node, place = node_of(device), f"usb:{place_of(device)}"
+def plugged(
+    vendor_id: int, product_id: int, *, rule: str = UDEV_RULE, backend: Any = None
+) -> list[Plugged]:
+    """Return the devices with these numbers, and what can be read of each without claiming it.
+
+    Raises
+    ------
+    LibusbMissing
+    """
+    found = devices(vendor_id, product_id, backend=backend)
+    return [_described(device, rule) for device in found]
+
+
+def _described(device: Any, rule: str) -> Plugged:
+    node = node_of(device)
+    place = place_on(device.bus, device.port_numbers, device.address)
     try:
-        with translated("reading its strings", node):
+        with translated("reading its strings", node, rule):
             serial, product = (
-                usb.util.get_string(device, index, _US_ENGLISH)
+                usb.util.get_string(device, index, _US_ENGLISH) or "" if index else ""
                 for index in (device.iSerialNumber, device.iProduct)
             )
-            return FoundCamera(place, serial, product, node)
+        return Plugged(place, serial, node, device, product or None)
     except CameraError as error:
-        return FoundCamera(place, node=node, problem=str(error))
+        return Plugged(place, "", node, device, problem=error)
     finally:
         usb.util.dispose_resources(device)
 

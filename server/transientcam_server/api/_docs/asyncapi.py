@@ -24,8 +24,8 @@ _SUMMARIES: Final = {
 _OF_CLIENT: Final = ("subscribe", "ack")
 
 
-def asyncapi(*, version: str, host: str, secure: bool) -> dict[str, Any]:
-    """Return the document for a service that is reached as ``host``.
+def asyncapi(*, version: str, host: str, secure: bool, root_path: str = "") -> dict[str, Any]:
+    """Return the document for a service that is reached as ``host``, below ``root_path``.
 
     It is seen from the service, as AsyncAPI has it: it receives what clients send.
     """
@@ -38,7 +38,9 @@ def asyncapi(*, version: str, host: str, secure: bool) -> dict[str, Any]:
             "message holding one msgpack map; docs/stream.md describes them in words.",
         },
         "defaultContentType": wire.MEDIA_TYPE,
-        "servers": {"here": {"host": host, "protocol": "wss" if secure else "ws"}},
+        "servers": {
+            "here": {"host": host, "pathname": root_path, "protocol": "wss" if secure else "ws"}
+        },
         "channels": {
             "stream": {
                 "address": "/api/v1/stream",

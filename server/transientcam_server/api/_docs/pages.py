@@ -19,7 +19,7 @@ frame is computed when it is requested, once for all clients.
 
 All quantities are in SI units, named in the name of each field; DN are digital numbers of the
 sensor. Every error is a problem document (RFC 9457). The stream of frames is the WebSocket
-`/api/v1/stream`, subprotocol `transientcam.v1.msgpack`; [asyncapi.json](/asyncapi.json) describes
+`/api/v1/stream`, subprotocol `transientcam.v1.msgpack`; [asyncapi.json](asyncapi.json) describes
 its messages.
 """
 
@@ -30,7 +30,7 @@ router = APIRouter(include_in_schema=False)
 async def problem_kinds() -> HTMLResponse:
     """List every kind of problem."""
     items = "".join(
-        f'<li><a href="{kind.type}">{escape(kind.title)}</a> ({kind.status})</li>'
+        f'<li><a href="{kind.type[1:]}">{escape(kind.title)}</a> ({kind.status})</li>'
         for kind in kinds.KINDS.values()
     )
     return _page("Problems", f"<ul>{items}</ul>")
@@ -94,10 +94,12 @@ async def interface() -> HTMLResponse:
 @router.get(asyncapi.PATH)
 async def stream_interface(request: Request) -> JSONResponse:
     """Describe the stream, which OpenAPI cannot."""
-    url = request.url
-    version = request.app.version
+    url, app = request.url, request.app
+    root_path = app.state.service.settings.root_path
     return JSONResponse(
-        asyncapi.asyncapi(version=version, host=url.netloc, secure=url.scheme == "https")
+        asyncapi.asyncapi(
+            version=app.version, host=url.netloc, secure=url.scheme == "https", root_path=root_path
+        )
     )
 
 

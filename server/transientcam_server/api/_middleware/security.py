@@ -57,7 +57,7 @@ class SecurityHeaders:
 
 
 class RootPath:
-    """Takes off the path below which a proxy serves this, and names it in addresses."""
+    """Takes off the path below which a proxy serves this; no ``Location`` begins at the root."""
 
     def __init__(self, app: ASGIApp, *, root_path: str) -> None:
         self._app = app
@@ -66,22 +66,33 @@ class RootPath:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer as without it; the path itself leads to the page below it."""
         path, raw = str(scope.get("path", "")), bytes(scope.get("raw_path") or b"")
-        if path == self._root and scope["type"] == "http":
-            # what the page names is relative to it
-            await RedirectResponse(f"{self._root}/", 308)(scope, receive, send)
-            return
         root = self._root.encode()
+        if root and path == self._root and scope["type"] == "http":
+            # what the page names is relative to it
+            await RedirectResponse(_relative(f"{path}/", path), 308)(scope, receive, send)
+            return
         if path.startswith(f"{self._root}/") and raw.startswith(root):
             scope = {**scope, "path": path[len(root) :], "raw_path": raw[len(root) :]}
 
         async def below(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
-                if (location := headers.get("location", "")).startswith("/"):
-                    headers["location"] = self._root + location
+                location = headers.get("location", "")
+                here = f"{scope['scheme']}://{Headers(scope=scope).get('host', '')}/"
+                if location.startswith(("/", here)):
+                    target = "/" + location.removeprefix(here).removeprefix("/")
+                    headers["location"] = _relative(target, scope["path"])
             await send(message)
 
         await self._app(scope, receive, below)
+
+
+def _relative(target: str, path: str) -> str:
+    """Return the address of ``target`` from ``path``, both below the same root."""
+    there, here = target.split("/")[1:], path.split("/")[1:-1]
+    while here and len(there) > 1 and here[0] == there[0]:
+        del here[0], there[0]
+    return "../" * len(here) + "/".join(there) or "./"
 
 
 def own_names() -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from transientcam.robotics import Pinhole
 from transientcam_driver import Lens
-from transientcam_server.settings import LensSettings
+from transientcam_server.settings import LensSettings, has_switch
 
 ASSUMED_FIELD_OF_VIEW_DEG: Final = 45.0
 """Of a camera whose lens is not known."""
@@ -77,6 +77,8 @@ class Intrinsics(Pinhole):
         KeyError, TypeError, ValueError
             If it holds something else.
         """
+        if has_switch(document):
+            raise TypeError("true or false stands for a number")
         fx, fy, cx, cy = (float(document[name]) for name in ("fx", "fy", "cx", "cy"))
         distortion = tuple(float(each) for each in document.get("distortion", ()))
         light_m = (float(document.get(name, 0.0)) for name in _LIGHT)

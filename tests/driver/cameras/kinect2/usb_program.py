@@ -8,7 +8,7 @@ import json
 import sys
 from typing import Any
 
-from transientcam_driver.cameras.kinect2 import Kinect2Camera, list_kinects, open_kinect2
+from transientcam_driver.cameras.kinect2 import Kinect2Camera, SameKinect, list_kinects
 from transientcam_driver.errors import DriverError
 
 
@@ -20,7 +20,7 @@ def main() -> None:
             if step == "list":
                 answer: Any = [(each.spec, each.problem) for each in list_kinects()]
             elif step == "open":
-                camera = Kinect2Camera(lambda serial: open_kinect2(serial, pause=lambda s: None))
+                camera = Kinect2Camera(SameKinect(None, pause=lambda s: None))
                 answer = [camera.capabilities.serial, camera.capabilities.firmware]
             elif step == "read":
                 frame = camera.read_frame(timeout_s=600.0)

@@ -255,7 +255,7 @@ def test_the_file_for_udev_holds_the_rules_that_errors_name() -> None:
     assert UDEV_RULES_FILE in str(PermissionDenied("/dev/bus/usb/001/002", UDEV_RULE))
 
 
-class Plugged:
+class Device:
     """What the transport reads of a device of pyusb."""
 
     iSerialNumber, iProduct = 3, 2  # noqa: N815 - pyusb's names
@@ -264,52 +264,18 @@ class Plugged:
         self.bus, self.address, self.port_numbers, self.serial = 1, 10 + port, (port,), serial
 
 
-@pytest.fixture
-def plugged(monkeypatch: pytest.MonkeyPatch) -> list[Plugged]:
-    there: list[Plugged] = []
-    monkeypatch.setattr(_transport, "devices", lambda *_, **__: list(there))
+@pytest.mark.parametrize(
+    ("serial", "name", "known_as"), [("0001", "@1-2", "0001@1-2"), ("", "@1-2", "@1-2")]
+)
+def test_twins_have_names_of_their_own_and_calibrations_too(
+    monkeypatch: pytest.MonkeyPatch, serial: str, name: str, known_as: str
+) -> None:
+    there = [Device(1, serial), Device(2, serial)]
+    monkeypatch.setattr(_transport, "devices", lambda *_, **__: there)
     monkeypatch.setattr(usb.util, "get_string", lambda device, *_: device.serial)
     monkeypatch.setattr(usb.util, "dispose_resources", lambda device: None)
     monkeypatch.setattr(usb.util, "claim_interface", lambda *_: None)
-    return there
 
-
-@pytest.mark.parametrize("serial", ["0001", ""])
-def test_twins_have_names_of_their_own_and_one_is_not_taken_for_the_other(
-    plugged: list[Plugged], serial: str
-) -> None:
-    one, other = Plugged(1, serial), Plugged(2, serial)
-    plugged += [one, other]
     assert [each.spec for each in list_cameras()] == ["usb:@1-1", "usb:@1-2"]
-
-    camera = _transport.SameCamera("@1-2")
-    assert camera().place == "@1-2"
-    plugged.remove(other)
-    for _ in range(2):
-        with pytest.raises(CameraNotFound):
-            camera(serial)
-    plugged.append(other)
-
-    assert camera(serial).place == "@1-2"
-
-
-def test_a_serial_number_of_two_cameras_is_no_name(plugged: list[Plugged]) -> None:
-    plugged += [Plugged(1, "0001"), Plugged(2, "0001")]
-
-    with pytest.raises(CameraError, match="usb:@1-1 or usb:@1-2"):
-        open_transport("0001")
-
-
-def test_a_camera_may_come_back_elsewhere_but_a_twin_that_was_there_is_not_it(
-    plugged: list[Plugged],
-) -> None:
-    plugged.append(Plugged(1, "0001"))
-    camera = _transport.SameCamera("0001")
-    camera()
-    plugged[:] = [Plugged(2, "0001")]  # its twin, plugged in while it worked
-    with pytest.raises(CameraNotFound):
-        camera("0001")
-
-    plugged.append(Plugged(3, "0001"))
-
-    assert camera("0001").place == "@1-3"
+    opened = open_transport(name)
+    assert opened.serial + opened.suffix == known_as

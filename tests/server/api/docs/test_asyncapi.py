@@ -66,7 +66,7 @@ def test_it_is_served_linked_and_says_where_it_was_found(steady: httpx.Client) -
     assert response.headers["content-type"] == "application/json"
     assert response.json()["servers"]["here"]["host"] == steady.base_url.netloc.decode()
     assert info["stream"]["asyncapi"] == "/asyncapi.json"
-    assert "/asyncapi.json" in steady.get("/openapi.json").json()["info"]["description"]
+    assert "(asyncapi.json)" in steady.get("/openapi.json").json()["info"]["description"]
 
 
 def test_what_the_daemon_sends_is_as_described(served: Served) -> None:

@@ -33,12 +33,16 @@ def http(bench: Served) -> Iterator[httpx.Client]:
         yield client
 
 
+def job_of(answer: httpx.Response) -> httpx.URL:
+    return answer.url.join(answer.headers["location"])
+
+
 def measured(http: httpx.Client, **wanted: Any) -> dict[str, Any]:
     """The job that measured a calibration, after its end."""
     answer = http.post(CALIBRATIONS, json={"frames": 3, **wanted})
     assert answer.status_code == 202, answer.text
     while True:
-        job: dict[str, Any] = http.get(answer.headers["location"], params={"wait_s": 30}).json()
+        job: dict[str, Any] = http.get(job_of(answer), params={"wait_s": 30}).json()
         if job["state"] != "running":
             return job
 
@@ -374,7 +378,7 @@ def test_the_next_start_has_the_active_one(tmp_path: Path) -> None:
 def started(http: httpx.Client) -> str:
     """Address of a job that would take minutes, once it captures."""
     answer = http.post(CALIBRATIONS, json={"frames": 2000})
-    job: str = answer.headers["location"]
+    job = job_of(answer)
     wait_until(lambda: http.get(job).json()["step"] == "capturing")
     return job
 
@@ -443,7 +447,7 @@ def test_a_lease_that_lapses_ends_it(bench: Served, http: httpx.Client) -> None:
     answer = http.post(CALIBRATIONS, json={"frames": 2000}, headers=own)
     http.put("/api/v1/lease", json={"duration_s": 1.0}, headers=own)
 
-    ended = http.get(answer.headers["location"], params={"wait_s": 30}).json()
+    ended = http.get(job_of(answer), params={"wait_s": 30}).json()
 
     assert ended["state"] == "cancelled"
     assert http.get("/api/v1/acquisition").json()["state"] == "stopped"

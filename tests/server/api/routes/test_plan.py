@@ -200,7 +200,7 @@ def start(client: httpx.Client, **request: Any) -> dict[str, Any]:
     response = client.post("/api/v1/plan/jobs", json={"fixed": FIXED, "scene": SCENE, **request})
     job: dict[str, Any] = response.json()
     assert response.status_code == 202
-    assert response.headers["location"] == f"/api/v1/jobs/{job['id']}"
+    assert response.headers["location"] == f"../jobs/{job['id']}"
     return job
 
 
