@@ -336,9 +336,23 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         )
         return self._ask(document("recordings", method="POST", body=body))
 
-    def recordings(self) -> _Document:
-        """Return all recordings of the daemon, the newest first."""
-        return self._ask(document("recordings"))
+    def recordings(
+        self,
+        *,
+        search: str | None = None,
+        tag: str | None = None,
+        sort: str | None = None,
+        offset: int | None = None,
+        limit: int | None = None,
+    ) -> _Document:
+        """Return the recordings that match, the newest 100 if nothing is said, and their totals.
+
+        ``search`` has words of id, name, camera or annotations, in any case, ``tag`` one of the
+        annotation ``tags``; ``sort`` names a field, with a ``-`` before it downwards. Where there
+        are more than ``limit`` (at most 1000), ``next_offset`` of the answer is their ``offset``.
+        """
+        asked = {"search": search, "tag": tag, "sort": sort, "offset": offset, "limit": limit}
+        return self._ask(document("recordings", params=asked.items()))
 
     def recording(self, recording_id: str) -> _Document:
         """Return the description of a recording."""

@@ -105,6 +105,17 @@ def _frames(
         yield arrays, frame.product("direct").array if "pointcloud" in products else None
 
 
+def ros2_message(message: Message, time_ns: int) -> Encoded:
+    """Return a message as ROS 2 has it, in CDR, stamped with ``time_ns`` (Unix time)."""
+    encoded: Encoded = _ros2().encode(message, time_ns)
+    return encoded
+
+
+def _ros2() -> Any:
+    library("rosbags", "messages of ROS 2")
+    return importlib.import_module("transientcam_server.offline._ros2")
+
+
 class _Topics:
     """Logs messages, each to a channel of its topic."""
 
@@ -114,8 +125,7 @@ class _Topics:
         self._columns = columns
         self._channels: dict[str, Any] = {}
         if schemas == "ros2":
-            library("rosbags", "messages of ROS 2")
-            ros2 = importlib.import_module("transientcam_server.offline._ros2")
+            ros2 = _ros2()
             self._encode: Callable[[Message, int], Encoded] = ros2.encode
             self._extra: Callable[[Message], dict[str, str]] = ros2.quality_of_service
         else:

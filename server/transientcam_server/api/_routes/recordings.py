@@ -2,7 +2,7 @@
 
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Path, status
+from fastapi import APIRouter, Path, Query, status
 from fastapi.responses import FileResponse
 
 from transientcam_server.api import _downloads as downloads
@@ -15,11 +15,12 @@ from transientcam_server.api._documents.recording import (
     RecordingLimitsDocument,
     RecordingRequest,
     RecordingsDocument,
+    RecordingTotalsDocument,
     document,
 )
 from transientcam_server.api._problems import documented
 from transientcam_server.errors import kinds
-from transientcam_server.recording import Limits, RecordingOptions
+from transientcam_server.recording import Limits, Order, RecordingOptions, select
 
 router = APIRouter(tags=["recordings"])
 
@@ -34,17 +35,34 @@ RecordingName = Annotated[
 ]
 
 
-@router.get("/recordings", summary="All recordings", responses=documented(kinds.DISK_STALLED))
-async def read_recordings(service: ServiceOf) -> RecordingsDocument:
-    """List the recordings, the newest first, with the one that runs."""
+@router.get(
+    "/recordings",
+    summary="Recordings, a page at a time",
+    responses=documented(kinds.INVALID_REQUEST, kinds.DISK_STALLED),
+)
+async def read_recordings(
+    service: ServiceOf,
+    search: Annotated[
+        str, Query(max_length=200, description="words of id, name, camera or annotations")
+    ] = "",
+    tag: Annotated[str | None, Query(max_length=200, description="one of the `tags`")] = None,
+    sort: Annotated[Order, Query(description="by this field; with `-` downwards")] = "-started_s",
+    offset: Annotated[int, Query(ge=0, le=2**31, description="how many are left out before")] = 0,
+    limit: Annotated[int, Query(ge=1, le=1000, description="how many there are on a page")] = 100,
+) -> RecordingsDocument:
+    """List recordings, by default the newest 100, and sum up all that match."""
     library = service.recordings
     described = await library.disk.run(library.describe_all)
+    found = select(described, search=search, tag=tag, order=sort, offset=offset, limit=limit)
     return RecordingsDocument(
         directory=str(library.directory),
         free_bytes=await library.disk.run(library.free_bytes),
         active=library.active_id,
         limits=RecordingLimitsDocument.model_validate(service.settings.recordings),
-        recordings=[document(each) for each in described],
+        recordings=[document(each) for each in found.recordings],
+        next_offset=found.next_offset,
+        totals=RecordingTotalsDocument.model_validate(found.totals),
+        tags=dict(found.tags),
     )
 
 
