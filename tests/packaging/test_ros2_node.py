@@ -1,12 +1,14 @@
 """The node of docker/ros2 before a real service, with rclpy replaced.
 
 Its image cannot be built here, since no registry of images is reached: what the image adds is not
-tested. Both programs run as they are; what takes the place of rclpy keeps what is published, which
-rosbags reads as ROS 2 would.
+tested. Both programs run as they are, one after the other; what takes the place of rclpy keeps
+what is published, which rosbags reads as ROS 2 would.
 """
 
+import io
 import json
 import os
+import runpy
 import subprocess
 import sys
 from typing import Any
@@ -67,36 +69,54 @@ for package in ("sensor_msgs", "tf2_msgs"):
 """
 
 
+class _Pipe(io.BytesIO):
+    """What reads at the other end goes away once two frames are whole."""
+
+    def flush(self) -> None:
+        if self.getvalue().count(b'"/pointcloud"') == 2:
+            raise BrokenPipeError
+
+
 @pytest.fixture(scope="module")
 def published(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[dict[str, Any], Any]]:
     """By its topic how each was offered, and its last message; of two frames of a still scene."""
     directory = tmp_path_factory.mktemp("published")
-    (directory / "replaced.py").write_text(_RCLPY)
+    main = runpy.run_path(str(_NODE.with_name("cdr.py")))["main"]
+    written = _Pipe()
     with serving("sim:mirrors?noise=off") as daemon:
-        environment = os.environ | {
-            "URL": daemon.url,
-            "TRANSIENTCAM_PYTHON": sys.executable,
-        }
-        program = f"import replaced, runpy; runpy.run_path({str(_NODE)!r}, run_name='__main__')"
-        done = subprocess.run(
-            [sys.executable, "-c", program],
-            cwd=directory,
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        assert "destroyed" in done.stdout, done.stderr
+        with pytest.raises(BrokenPipeError):
+            main([daemon.url], written)
         with Camera(daemon.url) as camera:
-            range_m = camera.frame("range").array
-    found = {}
+            expected = {name: camera.frame(name).array for name in ("range", "pointcloud")}
+    (directory / "replaced.py").write_text(_RCLPY)
+    (directory / "messages").write_bytes(written.getvalue())
+    child = directory / "child"
+    child.write_text("#!/bin/sh\nprintf '%s ' \"$@\" >asked\nexec cat messages\n")
+    child.chmod(0o755)
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            f"import replaced, runpy; runpy.run_path({str(_NODE)!r}, run_name='__main__')",
+        ],
+        cwd=directory,
+        env=os.environ | {"URL": "http://camera", "TRANSIENTCAM_PYTHON": str(child)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "destroyed" in done.stdout
+    assert (directory / "asked").read_text() == (
+        f"{_NODE.with_name('cdr.py')} http://camera range direct pointcloud --max-rate-hz 10.0 "
+    )
+    found: dict[str, Any] = {name: ({}, array) for name, array in expected.items()}
+    found = {f"expected {name}": each for name, each in found.items()}
     for path in directory.glob("*.json"):
         offered = json.loads(path.read_text())
         data = path.with_suffix(".cdr").read_bytes()
         found[path.stem] = offered, _STORE.deserialize_cdr(data, offered["type"])
-    found["expected"] = {}, range_m
     return found
 
 
@@ -118,16 +138,16 @@ def test_each_topic_has_its_type_and_quality(published: Any) -> None:
 
 
 def test_messages_are_the_frames_of_the_service(published: Any) -> None:
-    image, expected = published["range"][1], published["expected"][1]
-    points = published["pointcloud"][1]
+    image, points = published["range"][1], published["pointcloud"][1]
 
     values = image.data.view("<f4").reshape(image.height, image.width)
-    np.testing.assert_allclose(values, expected, rtol=1e-5)
+    np.testing.assert_allclose(values, published["expected range"][1], rtol=1e-5)
     assert [each.name for each in points.fields] == ["x", "y", "z", "intensity"]
-    xyz = points.data.view("<f4").reshape(points.height, points.width, 4)
-    np.testing.assert_allclose(np.linalg.norm(xyz[..., :3], axis=-1), expected, rtol=1e-4)
-    assert np.nanmax(xyz[..., 3]) > 0
-    assert published["range"][1].header.frame_id == "camera_optical_frame"
+    xyzi = points.data.view("<f4").reshape(points.height, points.width, 4)
+    xyz_m = np.moveaxis(published["expected pointcloud"][1], 0, -1)
+    np.testing.assert_allclose(xyzi[..., :3], xyz_m, rtol=1e-4)
+    assert np.nanmax(xyzi[..., 3]) > 0
+    assert image.header.frame_id == "camera_optical_frame"
 
 
 def test_the_image_copies_programs_and_locks_that_there_are() -> None:

@@ -24,22 +24,11 @@ def demo(
 
     camera = f"sim:{scene}"
     chosen = {"camera": camera, "host": "127.0.0.1", "port": port}
-    settings = load_settings(chosen, environment=os.environ)
 
     def listening(url: str) -> None:
         print_address(url, camera, as_json=as_json)
-        if browser:
-            _open(url)
+        # without these a browser would take the terminal that this runs in
+        if browser and {"BROWSER", "DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+            threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
 
-    run(settings, listening)
-
-
-def _open(url: str) -> None:
-    """Open a page, unless the browser would take the terminal that this runs in."""
-    try:
-        found = webbrowser.get()
-    except webbrowser.Error:
-        return
-    if type(found) is webbrowser.GenericBrowser and "BROWSER" not in os.environ:
-        return
-    threading.Thread(target=found.open, args=(url,), daemon=True).start()
+    run(load_settings(chosen, environment=os.environ), listening)

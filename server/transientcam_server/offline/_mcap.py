@@ -105,7 +105,7 @@ def _frames(
         yield arrays, frame.product("direct").array if "pointcloud" in products else None
 
 
-def ros2_message(message: Message, time_ns: int) -> Encoded:
+def ros2_message(message: Message, time_ns: int) -> "Encoded":
     """Return a message as ROS 2 has it, in CDR, stamped with ``time_ns`` (Unix time)."""
     encoded: Encoded = _ros2().encode(message, time_ns)
     return encoded

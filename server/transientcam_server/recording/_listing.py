@@ -1,25 +1,14 @@
 """Which of many recordings are asked for: by words, by a tag, in an order, a page at a time."""
 
+import json
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import chain
+from collections.abc import Iterable, Mapping
 from typing import Any, Final, Literal
 
 Order = Literal["-started_s", "started_s", "name", "-size_bytes", "-duration_s", "-frames"]
 """By a field of the description; ``-`` puts the newest or largest first."""
 _SEARCHED: Final = ("id", "name", "camera", "annotations")
 _SUMMED: Final = ("frames", "size_bytes", "duration_s")
-
-
-@dataclass(frozen=True, slots=True)
-class Listing:
-    """A page of descriptions, and of all that match: totals, and how many have each tag."""
-
-    recordings: Sequence[dict[str, Any]]
-    totals: Mapping[str, float]
-    tags: Mapping[str, int]
-    next_offset: int | None
 
 
 def tags_of(annotations: Mapping[str, Any]) -> list[str]:
@@ -38,10 +27,11 @@ def select(
     order: Order = "-started_s",
     offset: int = 0,
     limit: int,
-) -> Listing:
-    """Return the recordings whose text has all words of ``search``, in any case, and the ``tag``.
+) -> dict[str, Any]:
+    """Return a page of those whose `_SEARCHED` fields have all words of ``search``, and the tag.
 
-    The text is what a description has in `_SEARCHED`.
+    ``totals`` and ``tags``, how many have each, are of all that match; ``next_offset`` is None on
+    the last page.
     """
     found = [
         each
@@ -53,12 +43,13 @@ def select(
     found.sort(key=lambda each: (_key(each[field]), each["id"]), reverse=backwards)
     end = offset + limit
     totals = {name: sum(each[name] for each in found) for name in _SUMMED}
-    return Listing(
-        found[offset:end],
-        {"recordings": len(found), **totals},
-        dict(Counter(tag for each in found for tag in tags_of(each["annotations"])).most_common()),
-        end if end < len(found) else None,
-    )
+    counted = Counter(tag for each in found for tag in tags_of(each["annotations"]))
+    return {
+        "recordings": found[offset:end],
+        "totals": {"recordings": len(found), **totals},
+        "tags": dict(counted.most_common()),
+        "next_offset": end if end < len(found) else None,
+    }
 
 
 def _key(value: Any) -> Any:
@@ -66,10 +57,5 @@ def _key(value: Any) -> Any:
 
 
 def _text(described: Mapping[str, Any]) -> str:
-    return " ".join(_texts([described[name] for name in _SEARCHED])).casefold()
-
-
-def _texts(value: Any) -> Iterable[str]:
-    if isinstance(value, Mapping):
-        value = [*value.keys(), *value.values()]
-    return chain(*map(_texts, value)) if isinstance(value, list | tuple) else (f"{value}",)
+    fields = [described[name] for name in _SEARCHED]
+    return json.dumps(fields, ensure_ascii=False, separators=(" ", " ")).casefold()

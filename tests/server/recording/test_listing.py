@@ -21,7 +21,7 @@ def recording(name: str = "wall", **more: Any) -> dict[str, Any]:
 
 
 def names(*described: dict[str, Any], **wanted: Any) -> list[str]:
-    return [each["name"] for each in select(described, **{"limit": 100} | wanted).recordings]
+    return [each["name"] for each in select(described, **{"limit": 100} | wanted)["recordings"]]
 
 
 CORNER = recording("Corner", annotations={"sample": "white Paint", "at": {"distance_m": 3.25}})
@@ -40,7 +40,7 @@ STREET = recording("Straße", camera={"model": "Kinect", "serial": "K2-77"})
         ("distance", ["Corner"]),
         ("kinect k2-77", ["Straße"]),
         ("id-Corner", ["Corner"]),
-        ("[", []),
+        ("corner null", []),
     ],
 )
 def test_all_words_of_a_search_are_found_wherever_they_stand(search: str, found: list[str]) -> None:
@@ -67,9 +67,9 @@ def test_a_tag_chooses_and_is_counted_among_all_that_match() -> None:
 
     listing = select(many, tag="1", limit=1)
 
-    assert listing.totals["recordings"] == 3
-    assert listing.tags == {"all": 3, "1": 3}
-    assert select(many, search="2", limit=100).tags == {"all": 3, "2": 3}
+    assert listing["totals"]["recordings"] == 3
+    assert listing["tags"] == {"all": 3, "1": 3}
+    assert select(many, search="2", limit=100)["tags"] == {"all": 3, "2": 3}
     assert names(*many, tag="al") == []
 
 
@@ -93,10 +93,10 @@ def test_pages_are_together_the_whole_list_in_its_order(
     offset: int | None = 0
     while offset is not None:
         page = select(many, order=order, offset=offset, limit=limit)
-        assert page.totals["recordings"] == len(many)
-        assert page.totals["size_bytes"] == sum(sizes)
-        found.extend(page.recordings)
-        offset = page.next_offset
+        assert page["totals"]["recordings"] == len(many)
+        assert page["totals"]["size_bytes"] == sum(sizes)
+        found.extend(page["recordings"])
+        offset = page["next_offset"]
 
     assert sorted(each["id"] for each in found) == [each["id"] for each in many]
     if "size" in order:

@@ -5,7 +5,11 @@ import type { RecordingDocument, RecordingsDocument } from "../../src/stream/doc
 import { answering } from "../answering";
 
 /** A list whose answers the test gives, and what was asked. */
-function listing(): { recordings: Recordings; asked: URLSearchParams[]; answer: (at: number, found: Partial<RecordingsDocument>) => Promise<void> } {
+function listing(): {
+  recordings: Recordings;
+  asked: URLSearchParams[];
+  answer: (at: number, found: Partial<RecordingsDocument>) => Promise<void>;
+} {
   const asked: URLSearchParams[] = [];
   const waiting: ((found: RecordingsDocument) => void)[] = [];
   const api = answering({

@@ -15,7 +15,6 @@ from transientcam_server.api._documents.recording import (
     RecordingLimitsDocument,
     RecordingRequest,
     RecordingsDocument,
-    RecordingTotalsDocument,
     document,
 )
 from transientcam_server.api._problems import documented
@@ -25,6 +24,8 @@ from transientcam_server.recording import Limits, Order, RecordingOptions, selec
 router = APIRouter(tags=["recordings"])
 
 HDF5: Final = "application/x-hdf5"
+_OF_ONE: Final = (kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST, kinds.DISK_STALLED)
+_CHANGED: Final = (*_OF_ONE, kinds.RECORDING_UNFINISHED, kinds.RECORDING_NOT_STORED)
 RecordingName = Annotated[
     str,
     Path(
@@ -59,10 +60,7 @@ async def read_recordings(
         free_bytes=await library.disk.run(library.free_bytes),
         active=library.active_id,
         limits=RecordingLimitsDocument.model_validate(service.settings.recordings),
-        recordings=[document(each) for each in found.recordings],
-        next_offset=found.next_offset,
-        totals=RecordingTotalsDocument.model_validate(found.totals),
-        tags=dict(found.tags),
+        **found | {"recordings": [document(each) for each in found["recordings"]]},
     )
 
 
@@ -96,7 +94,7 @@ async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> Recor
 @router.get(
     "/recordings/{recording}",
     summary="A recording",
-    responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST, kinds.DISK_STALLED),
+    responses=documented(*_OF_ONE),
 )
 async def read_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
     """Describe a recording."""
@@ -106,14 +104,7 @@ async def read_recording(service: ServiceOf, recording: RecordingName) -> Record
 @router.patch(
     "/recordings/{recording}",
     summary="Annotate a recording",
-    responses=documented(
-        kinds.BAD_REQUEST,
-        kinds.UNKNOWN_RECORDING,
-        kinds.RECORDING_UNFINISHED,
-        kinds.INVALID_REQUEST,
-        kinds.RECORDING_NOT_STORED,
-        kinds.DISK_STALLED,
-    ),
+    responses=documented(kinds.BAD_REQUEST, *_CHANGED),
 )
 @needs(Role.OPERATOR, lease=False)
 async def annotate_recording(
@@ -127,7 +118,7 @@ async def annotate_recording(
 @router.post(
     "/recordings/{recording}/stop",
     summary="Stop a recording",
-    responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST, kinds.DISK_STALLED),
+    responses=documented(*_OF_ONE),
 )
 @needs(Role.OPERATOR, lease=False)
 async def stop_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
@@ -138,13 +129,7 @@ async def stop_recording(service: ServiceOf, recording: RecordingName) -> Record
 @router.delete(
     "/recordings/{recording}",
     summary="Delete a recording",
-    responses=documented(
-        kinds.UNKNOWN_RECORDING,
-        kinds.RECORDING_UNFINISHED,
-        kinds.INVALID_REQUEST,
-        kinds.RECORDING_NOT_STORED,
-        kinds.DISK_STALLED,
-    ),
+    responses=documented(*_CHANGED),
 )
 @needs(Role.ADMIN, lease=False)
 async def delete_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
@@ -157,13 +142,7 @@ async def delete_recording(service: ServiceOf, recording: RecordingName) -> Reco
     summary="The file of a recording",
     response_class=FileResponse,
     responses=downloads.documented_file(HDF5)
-    | documented(
-        kinds.UNKNOWN_RECORDING,
-        kinds.RECORDING_UNFINISHED,
-        kinds.RANGE_NOT_SATISFIABLE,
-        kinds.INVALID_REQUEST,
-        kinds.DISK_STALLED,
-    ),
+    | documented(*_OF_ONE, kinds.RECORDING_UNFINISHED, kinds.RANGE_NOT_SATISFIABLE),
 )
 async def read_recording_file(
     service: ServiceOf,

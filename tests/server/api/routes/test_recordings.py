@@ -556,7 +556,7 @@ def record_into(directory: Path) -> None:
 def test_recordings_are_listed_by_words_tags_and_pages(daemon: Served, http: httpx.Client) -> None:
     with transientcam.Camera(daemon.url) as camera:
         for name, tags in (("Corner", ["wet"]), ("wall", "wet, far"), ("hall", "")):
-            recorded(http, name=name, annotations={"tags": tags})
+            recorded(http, frames=1, name=name, annotations={"tags": tags})
 
         newest = camera.recordings(limit=2)
         rest = camera.recordings(offset=newest["next_offset"], limit=2)

@@ -92,10 +92,14 @@ function Looking({ known: { totals, tags } }: { known: RecordingsDocument }) {
   return (
     <div class="wrapped">
       <TextField label="Search" class="field inline-row" name="search" maxLength={200} placeholder="name, camera or note" text={search} />
-      {known.size > 1 && <Choice label="Tag" chosen={tag} of={[...known]} text={(each) => (each === "" ? "any tag" : `${each} (${tags[each] ?? 0})`)} />}
+      {known.size > 1 && (
+        <Choice label="Tag" chosen={tag} of={[...known]} text={(each) => (each === "" ? "any tag" : `${each} (${tags[each] ?? 0})`)} />
+      )}
       <Choice label="Order" chosen={order} of={Object.keys(ORDERS) as (keyof typeof ORDERS)[]} text={(each) => ORDERS[each]} />
       <span class="quiet" data-field="recordings-found">
-        {totals.recordings === 0 ? "No recording has all of these words." : `${grouped(totals.recordings)} recordings, ${grouped(totals.frames)} frames, ${bytes(totals.size_bytes)}, ${duration(totals.duration_s)}`}
+        {totals.recordings === 0
+          ? "No recording has all of these words."
+          : `${grouped(totals.recordings)} recordings, ${grouped(totals.frames)} frames, ${bytes(totals.size_bytes)}, ${duration(totals.duration_s)}`}
       </span>
     </div>
   );
