@@ -60,7 +60,8 @@ async def read_recordings(
         free_bytes=await library.disk.run(library.free_bytes),
         active=library.active_id,
         limits=RecordingLimitsDocument.model_validate(service.settings.recordings),
-        **found | {"recordings": [document(each) for each in found["recordings"]]},
+        recordings=[document(each) for each in found.pop("recordings")],
+        **found,
     )
 
 
