@@ -41,7 +41,7 @@ def test_readme_leads_to_support_security_and_conduct() -> None:
 
 
 def test_public_ci_runs_what_ci_runs_on_every_python_that_is_named() -> None:
-    command = ["check_jsonschema", "--builtin-schema", "vendor.github-workflows", _WORKFLOW]
+    command = ["check_jsonschema", "--builtin-schema", "vendor.github-workflows", str(_WORKFLOW)]
     checked = subprocess.run([sys.executable, "-m", *command], capture_output=True, text=True)
     assert checked.returncode == 0, checked.stdout
 
