@@ -117,10 +117,11 @@ OURS := -m pip install --quiet --no-deps --no-build-isolation --editable .
 
 # The client of the TOFcam660's vendor, which drives our emulation of it. What the tests use of it needs NumPy
 # alone; its own requirements (OpenCV, Bluetooth, serial ports) are for its other cameras. And LeRobot, which makes
-# the camera of examples/: that part of it needs draccus and no torch.
-.venv/test.stamp: pyproject.toml requirements/test.txt requirements/vendor.txt $(wildcard packages/*/pyproject.toml) | .venv/bin/python
+# the camera of examples/: that part of it needs draccus and no torch. It stands apart, as draccus has a package "tests".
+.venv/test.stamp: pyproject.toml requirements/test.txt requirements/vendor.txt requirements/lerobot.txt $(wildcard packages/*/pyproject.toml) | .venv/bin/python
 	$(BIN)/python $(LOCKED) --requirement requirements/test.txt
 	$(BIN)/python $(LOCKED) --requirement requirements/vendor.txt
+	$(BIN)/python $(LOCKED) --upgrade --target build/lerobot --requirement requirements/lerobot.txt
 	$(BIN)/python $(OURS) $(PACKAGES)
 	@touch $@ .venv/serve.stamp
 

@@ -112,7 +112,7 @@ def test_search_looks_in_a_script_beside_the_pages(small: Path) -> None:
 def test_a_search_finds_decisions_after_everything_else(small: Path) -> None:
     """The weights are those of the site's own script, as the browser loads it."""
     script = (small / "_static" / "language_data.js").read_text("utf-8")
-    program = f"""{script}
+    program = f"""globalThis.window = globalThis; {script}
         const best = 30;
         const found = ["decisions/17-kinect", "measured/notes/kinect", "cameras", "kinect2"]
             .map((page, at) => [Scorer.score([page, "Kinect", "", null, best - at, ""]), page]);
