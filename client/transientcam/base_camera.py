@@ -345,11 +345,10 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         offset: int | None = None,
         limit: int | None = None,
     ) -> _Document:
-        """Return the recordings that match, the newest 100 if nothing is said, and their totals.
+        """Return the newest 100 recordings, or those that match, and the totals of all of these.
 
-        ``search`` has words of id, name, camera or annotations, in any case, ``tag`` one of the
-        annotation ``tags``; ``sort`` names a field, with a ``-`` before it downwards. Where there
-        are more than ``limit`` (at most 1000), ``next_offset`` of the answer is their ``offset``.
+        ``search`` has words, ``tag`` a tag, ``sort`` a field, downwards with a ``-`` before it;
+        ``next_offset`` of the answer is the ``offset`` after a page of ``limit``, at most 1000.
         """
         asked = {"search": search, "tag": tag, "sort": sort, "offset": offset, "limit": limit}
         return self._ask(document("recordings", params=asked.items()))

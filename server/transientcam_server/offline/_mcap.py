@@ -9,7 +9,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,13 +107,8 @@ def _frames(
 
 def ros2_message(message: Message, time_ns: int) -> "Encoded":
     """Return a message as ROS 2 has it, in CDR, stamped with ``time_ns`` (Unix time)."""
-    encoded: Encoded = _ros2().encode(message, time_ns)
-    return encoded
-
-
-def _ros2() -> Any:
-    library("rosbags", "messages of ROS 2")
-    return importlib.import_module("transientcam_server.offline._ros2")
+    ros2 = importlib.import_module("transientcam_server.offline._ros2")
+    return cast("Encoded", ros2.encode(message, time_ns))
 
 
 class _Topics:
@@ -125,7 +120,8 @@ class _Topics:
         self._columns = columns
         self._channels: dict[str, Any] = {}
         if schemas == "ros2":
-            ros2 = _ros2()
+            library("rosbags", "messages of ROS 2")
+            ros2 = importlib.import_module("transientcam_server.offline._ros2")
             self._encode: Callable[[Message, int], Encoded] = ros2.encode
             self._extra: Callable[[Message], dict[str, str]] = ros2.quality_of_service
         else:

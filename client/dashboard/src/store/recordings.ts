@@ -10,13 +10,7 @@ const LOOK_MS = 1000;
 export const PAST_S = 10;
 
 /** Orders of the list, by what the service calls them. */
-export const ORDERS = {
-  "-started_s": "newest first",
-  started_s: "oldest first",
-  name: "by name",
-  "-size_bytes": "largest first",
-  "-duration_s": "longest first",
-} as const;
+export const ORDERS = { "-started_s": "newest first", started_s: "oldest first", name: "by name", "-size_bytes": "largest first" } as const;
 
 /** How many more are listed at a time. */
 export const PAGE = 50;

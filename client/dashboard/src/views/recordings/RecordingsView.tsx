@@ -16,9 +16,6 @@ import { RecordForm } from "./RecordForm";
 import { RecordingRow } from "./RecordingRow";
 import "./RecordingsView.css";
 
-/** The longest list that the service gives. */
-const MOST = 1000;
-
 /** Recordings: start and stop one, look through them, play them, take them home. */
 export function RecordingsView() {
   const store = useStore();
@@ -65,8 +62,8 @@ export function RecordingsView() {
               />
             ))}
         </ul>
-        {known?.next_offset != null && recordings.limit.value < MOST && (
-          <button type="button" onClick={() => (recordings.limit.value = Math.min(MOST, recordings.limit.value + PAGE))}>
+        {known?.next_offset != null && recordings.limit.value < 1000 && (
+          <button type="button" onClick={() => (recordings.limit.value = recordings.limit.value + PAGE)}>
             Show more
           </button>
         )}
