@@ -17,13 +17,15 @@ DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f 
 DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test test-fast mutants check bench paper docs docs-site dist lock release clean dashboard debian-packages \
+.PHONY: help install serve test test-fast mutants check bench paper docs docs-site dist lock release clean dashboard debian-packages debian-package-names \
 	check-pyright check-mypy check-style check-documents check-dashboard check-newest
 
 help:  ## Say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 16
 
-serve: .venv/serve.stamp .venv/version.stamp dashboard  ## Run the daemon and its dashboard (PORT=8000 CAMERA=sim:mirrors)
+install: .venv/serve.stamp .venv/version.stamp dashboard  ## Install client, service and dashboard into .venv
+
+serve: install  ## Run the daemon and its dashboard (PORT=8000 CAMERA=sim:mirrors)
 	$(BIN)/transientcam serve --host $(HOST) --port $(PORT) --camera '$(CAMERA)'
 
 test: check .venv/version.stamp debian-packages dashboard  ## Run every check and every test
@@ -57,10 +59,11 @@ docs-site: .venv/test.stamp  ## Write the documentation as a site: open build/si
 # The time of the last commit stands for now, so that the same commit gives the same bytes. An unpacked
 # sdist is no repository, or lies in another one: its files have that time.
 EPOCH_S = $(shell git ls-files --error-unmatch Makefile >/dev/null 2>&1 && git log -1 --format=%ct || date -r pyproject.toml +%s)
-dist: .venv/test.stamp dashboard  ## Build the sdist and, from it, the wheel (dist/)
+dist: build/dist.stamp dashboard  ## Build the sdist and, from it, the wheel (dist/), with the sample data beside
 	SOURCE_DATE_EPOCH=$${SOURCE_DATE_EPOCH:-$(EPOCH_S)} \
-		$(BIN)/python -m build --no-isolation --outdir dist && \
-	for each in packages/*; do $(BIN)/python -m build --no-isolation --wheel --outdir dist $$each; done
+		build/dist/bin/python -m build --no-isolation --outdir dist && \
+	for each in packages/*; do build/dist/bin/python -m build --no-isolation --wheel --outdir dist $$each; done
+	cp examples/measurement.npz dist/transientcam-measurement.npz
 
 # Every version and every hash of what is installed, for all platforms. uv's own lock names where packages
 # come from, and is not kept: what is exported from it is.
@@ -71,7 +74,7 @@ lock:  ## Resolve pyproject.toml anew, to the newest of all, into requirements/
 	$(EXPORT) --extra test --group build --output-file requirements/test.txt >/dev/null
 	$(EXPORT) --extra server --extra conformance --extra opt8241 --extra cluster --extra plot \
 		--output-file requirements/service.txt >/dev/null
-	for each in build release; do $(EXPORT) --only-group $$each --output-file requirements/$$each.txt >/dev/null; done
+	for each in build dist release; do $(EXPORT) --only-group $$each --output-file requirements/$$each.txt >/dev/null; done
 	rm uv.lock
 
 # What is released says what is in it, and of that nothing has a known weakness; both of the locked versions.
@@ -79,6 +82,12 @@ release: dist build/release.stamp  ## dist, with a bill of materials (CycloneDX)
 	build/release/bin/python -m cyclonedx_py requirements --output-reproducible --of JSON \
 		--output-file dist/transientcam.cdx.json requirements/service.txt
 	build/release/bin/python -m pip_audit --disable-pip --require-hashes --requirement requirements/service.txt
+
+# Small, and of its own: what builds needs nothing of what is built.
+build/dist.stamp: requirements/build.txt requirements/dist.txt
+	$(PYTHON) -m venv build/dist
+	build/dist/bin/python $(LOCKED) --requirement requirements/build.txt --requirement requirements/dist.txt
+	@touch $@
 
 build/release.stamp: requirements/release.txt
 	$(PYTHON) -m venv build/release
@@ -107,10 +116,12 @@ OURS := -m pip install --quiet --no-deps --no-build-isolation --editable .
 	@touch $@
 
 # The client of the TOFcam660's vendor, which drives our emulation of it. What the tests use of it needs NumPy
-# alone; its own requirements (OpenCV, Bluetooth, serial ports) are for its other cameras.
-.venv/test.stamp: pyproject.toml requirements/test.txt requirements/vendor.txt $(wildcard packages/*/pyproject.toml) | .venv/bin/python
+# alone; its own requirements (OpenCV, Bluetooth, serial ports) are for its other cameras. And LeRobot, which makes
+# the camera of examples/: that part of it needs draccus and no torch. It stands apart, as draccus has a package "tests".
+.venv/test.stamp: pyproject.toml requirements/test.txt requirements/vendor.txt requirements/lerobot.txt $(wildcard packages/*/pyproject.toml) | .venv/bin/python
 	$(BIN)/python $(LOCKED) --requirement requirements/test.txt
 	$(BIN)/python $(LOCKED) --requirement requirements/vendor.txt
+	$(BIN)/python $(LOCKED) --upgrade --target build/lerobot --requirement requirements/lerobot.txt
 	$(BIN)/python $(OURS) $(PACKAGES)
 	@touch $@ .venv/serve.stamp
 
@@ -173,6 +184,9 @@ dashboard:
 $(BUILT_PAGE): $(DASHBOARD) client/dashboard/node_modules/.package-lock.json
 	npm --prefix client/dashboard run build
 	@touch $@
+
+debian-package-names:
+	@echo $(DEBIAN_PACKAGES)
 
 debian-packages:
 	@missing=$$(for p in $(DEBIAN_PACKAGES); do dpkg -s $$p >/dev/null 2>&1 || echo $$p; done); \

@@ -33,6 +33,7 @@ html_favicon = "../client/dashboard/public/icon.svg"
 html_show_copyright = False
 html_copy_source = False
 html_show_search_summary = False  # it is fetched, which a page that is a file may not
+html_search_scorer = str(Path(__file__).with_name("search_scorer.js"))
 html_math_renderer = "mathml"
 
 # as GitHub reads the same files: anchors of all headings, and formulas between dollars

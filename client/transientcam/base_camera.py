@@ -336,9 +336,22 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         )
         return self._ask(document("recordings", method="POST", body=body))
 
-    def recordings(self) -> _Document:
-        """Return all recordings of the daemon, the newest first."""
-        return self._ask(document("recordings"))
+    def recordings(
+        self,
+        *,
+        search: str | None = None,
+        tag: str | None = None,
+        sort: str | None = None,
+        offset: int | None = None,
+        limit: int | None = None,
+    ) -> _Document:
+        """Return the newest 100 recordings, or those that match, and the totals of all of these.
+
+        ``search`` has words, ``tag`` a tag, ``sort`` a field, downwards with a ``-`` before it;
+        ``next_offset`` of the answer is the ``offset`` after a page of ``limit``, at most 1000.
+        """
+        asked = {"search": search, "tag": tag, "sort": sort, "offset": offset, "limit": limit}
+        return self._ask(document("recordings", params=asked.items()))
 
     def recording(self, recording_id: str) -> _Document:
         """Return the description of a recording."""

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import transientcam_moments as tm
 from tests.conftest import ROOT
 from tests.serving import Served, serving
 from transientcam import wire
@@ -49,7 +50,7 @@ def test_every_example_is_run_here() -> None:
 
     assert files == {
         *("range_map.py", "transient_video.py", "curl.sh", "frame.mjs", "stream.mjs"),
-        "transientcam_frame.m",
+        *("transientcam_frame.m", "make_measurement.py", "measurement.npz"),
     }
 
 
@@ -74,6 +75,29 @@ def test_transient_video(served: Served, tmp_path: Path) -> None:
     assert np.nanmax(film) > 0.0
     with Image.open(tmp_path / "film.gif") as image:
         assert image.size == (163, 120)
+
+
+def test_a_measurement_is_made_of_a_frame(served: Served, tmp_path: Path) -> None:
+    path = tmp_path / "measurement.npz"
+    printed = _run(sys.executable, _EXAMPLES / "make_measurement.py", served.url, path)
+
+    made = np.load(path)
+    assert printed.startswith(f"wrote {path}: moments (")
+    assert made["moments"].shape[1:] == made["range_m"].shape == (60, 82)
+    found = tm.range_m(
+        tm.separate(tm.pisarenko(made["moments"])).phase_rad, made["base_frequency_hz"]
+    )
+    assert np.nanmedian(abs(found - made["range_m"])) < 0.02
+
+
+def test_the_sample_measurement_gives_its_true_range() -> None:
+    sample = np.load(_EXAMPLES / "measurement.npz")
+
+    result = tm.reconstruct(sample["moments"], tm.Settings(float(sample["base_frequency_hz"])))
+    error_m = result.range_m - sample["range_m"]
+    assert np.isfinite(error_m).mean() > 0.99
+    assert np.median(abs(error_m)) < 0.03
+    assert (_EXAMPLES / "measurement.npz").stat().st_size < 250_000
 
 
 def test_curl(served: Served, tmp_path: Path) -> None:

@@ -54,7 +54,7 @@ def test_a_lock_has_what_the_project_asks_for(name: str, extras: list[str]) -> N
     assert not OURS & versions.keys()
 
 
-@pytest.mark.parametrize("group", ["build", "release"])
+@pytest.mark.parametrize("group", ["build", "dist", "release"])
 def test_the_tools_of_a_build_and_of_a_release_are_locked(group: str) -> None:
     versions = locked(group)
     for each in map(Requirement, PROJECT["dependency-groups"][group]):
@@ -67,7 +67,7 @@ def test_the_tools_of_a_build_and_of_a_release_are_locked(group: str) -> None:
 
 def test_what_builds_here_and_in_the_image_is_the_same() -> None:
     everything = locked("test")
-    for name in ("build", "service"):
+    for name in ("build", "dist", "service"):
         for package, versions in locked(name).items():
             assert versions == everything[package], package
 
@@ -87,6 +87,6 @@ def test_image_and_targets_install_what_is_locked_and_nothing_else() -> None:
         assert "--no-deps" in each
         assert "--require-hashes" in each or "--no-index" in each
     assert "LOCKED := -m pip install --quiet --require-hashes --no-deps" in makefile
-    for target in ("serve", "test"):
+    for target, installs_of in {"serve": 2, "test": 3}.items():
         rule = makefile[makefile.index(f".venv/{target}.stamp:") :].partition("\n\n")[0]
-        assert rule.count("$(LOCKED)") == 2
+        assert rule.count("$(LOCKED)") == installs_of

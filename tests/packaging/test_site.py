@@ -1,6 +1,7 @@
 """The documentation site: no link leads nowhere, and no page asks another host for anything."""
 
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -105,6 +106,28 @@ def test_search_looks_in_a_script_beside_the_pages(small: Path) -> None:
     """A script can be loaded from a file; what is fetched needs a server."""
     assert 'src="searchindex.js"' in (small / "search.html").read_text("utf-8")
     assert '"quokka"' in (small / "searchindex.js").read_text("utf-8")
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="Node.js is not installed")
+def test_a_search_finds_decisions_after_everything_else(small: Path) -> None:
+    """The weights are those of the site's own script, as the browser loads it."""
+    script = (small / "_static" / "language_data.js").read_text("utf-8")
+    program = f"""globalThis.window = globalThis; {script}
+        const best = 30;
+        const found = ["decisions/17-kinect", "measured/notes/kinect", "cameras", "kinect2"]
+            .map((page, at) => [Scorer.score([page, "Kinect", "", null, best - at, ""]), page]);
+        console.log(found.sort(([a], [b]) => b - a).map(([, page]) => page).join());
+    """
+    done = subprocess.run(["node", "-e", program], capture_output=True, text=True, check=True)
+
+    assert done.stdout == "cameras,kinect2,decisions/17-kinect,measured/notes/kinect\n"
+
+
+def test_the_reference_of_the_client_begins_with_its_camera() -> None:
+    page = (_DOCS / "api" / "transientcam.md").read_text("utf-8")
+
+    assert page.index("```python") < page.index("autoclass:: transientcam.Camera")
+    assert page.index("autoclass:: transientcam.Camera") < page.index("automodule:: transientcam")
 
 
 def test_the_gallery_has_every_figure_and_a_command_beside_each() -> None:

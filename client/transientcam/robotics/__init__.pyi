@@ -28,3 +28,7 @@ from ._rerun_bridge import (
 from ._rerun_messages import (
     blueprint as blueprint,
 )
+from ._source import (
+    Source as Source,
+    captured_s as captured_s,
+)

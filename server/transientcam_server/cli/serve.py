@@ -5,13 +5,17 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 
 import json
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import Terminal, Text, echo
+
+if TYPE_CHECKING:
+    from transientcam_server.settings import Settings
 
 
 def serve(
@@ -76,7 +80,11 @@ def serve(
         _check(command_line, config, as_json=as_json)
         return
     settings = load_settings(command_line, file=config, environment=os.environ)
+    run(settings, lambda url: print_address(url, settings.camera, as_json=as_json))
 
+
+def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
+    """Serve a camera until a signal; ``on_listening`` is given the address."""
     from transientcam_driver import open_camera
     from transientcam_server.api import build_app
     from transientcam_server.camera import start_with
@@ -103,7 +111,7 @@ def serve(
             freeze_startup_objects(service.pipeline.prepare_kernels(service.applied))
 
             def listening() -> None:
-                _announce(url, settings.camera, as_json=as_json)
+                on_listening(url)
                 service.planning.prepare()
 
             serve_app(app, settings, listener, on_listening=listening)
@@ -143,7 +151,8 @@ def _check(command_line: dict[str, Any], config: Path | None, *, as_json: bool) 
         echo(line)
 
 
-def _announce(url: str, camera: str, *, as_json: bool) -> None:
+def print_address(url: str, camera: str, *, as_json: bool) -> None:
+    """Say where a camera is served, to people or to a program."""
     if as_json:
         # flushed, since the caller reads the line from a pipe
         print(json.dumps({"url": url, "camera": camera, "pid": os.getpid()}), flush=True)  # noqa: T201

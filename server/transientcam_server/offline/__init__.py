@@ -11,7 +11,7 @@ from transientcam_server.offline._convert import convert_recording
 from transientcam_server.offline._impulse_responses import is_tal
 from transientcam_server.offline._job import installed, load_kernels, require_versions
 from transientcam_server.offline._kinect2 import import_kinect2, read_lens
-from transientcam_server.offline._mcap import lens_of
+from transientcam_server.offline._mcap import lens_of, ros2_message
 from transientcam_server.offline._measurement import (
     Measurement,
     TransientCube,

@@ -9,7 +9,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,6 +103,12 @@ def _frames(
     for frame in OpenedRecording(recording):
         arrays = {name: frame.product(name).array for name in products}
         yield arrays, frame.product("direct").array if "pointcloud" in products else None
+
+
+def ros2_message(message: Message, time_ns: int) -> "Encoded":
+    """Return a message as ROS 2 has it, in CDR, stamped with ``time_ns`` (Unix time)."""
+    ros2 = importlib.import_module("transientcam_server.offline._ros2")
+    return cast("Encoded", ros2.encode(message, time_ns))
 
 
 class _Topics:

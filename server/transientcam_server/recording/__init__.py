@@ -19,6 +19,7 @@ from transientcam_server.recording._frames import (
 from transientcam_server.recording._heaps import require_sound_heaps
 from transientcam_server.recording._layout import Header
 from transientcam_server.recording._library import Library, RecordingOptions
+from transientcam_server.recording._listing import Order, select, tags_of
 from transientcam_server.recording._product_stores import (
     EVERY_CHUNK,
     FORMAT,

@@ -1,4 +1,4 @@
-import { computed, effect, untracked } from "@preact/signals";
+import { effect, signal, untracked } from "@preact/signals";
 import type { RecordingDocument, RecordingRequest, RecordingsDocument } from "../stream/documents";
 import { type Api, refusalIn } from "./api";
 import { Known } from "./known";
@@ -9,17 +9,30 @@ const LOOK_MS = 1000;
 /** Seconds of the past that one button saves. */
 export const PAST_S = 10;
 
-/** The recordings of the service, as the page last saw them. */
+/** Orders of the list, by what the service calls them. */
+export const ORDERS = { "-started_s": "newest first", started_s: "oldest first", name: "by name", "-size_bytes": "largest first" } as const;
+
+/** How many more are listed at a time. */
+export const PAGE = 50;
+
+/** The recordings of the service that are looked for, as the page last saw them. */
 export class Recordings extends Known<RecordingsDocument> {
-  /** The one that runs; null while none does. */
-  readonly active = computed((): RecordingDocument | null => {
-    const { active = null, recordings = [] } = this.document.value ?? {};
-    return recordings.find(({ id }) => id === active) ?? null;
-  });
+  /** The one that runs, whether it is looked for or not; null while none does. */
+  readonly active = signal<RecordingDocument | null>(null);
+  readonly search = signal("");
+  /** "" for any. */
+  readonly tag = signal("");
+  readonly order = signal<keyof typeof ORDERS>("-started_s");
+  readonly limit = signal(PAGE);
+  #asked = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(private readonly api: Api) {
-    super(() => api.ask("GET /recordings"));
+    super(() => this.#read());
+    effect(() => {
+      void [this.search.value, this.tag.value, this.order.value, this.limit.value];
+      void untracked(() => this.keepUp());
+    });
     effect(() => {
       const running = this.active.value?.id;
       clearTimeout(this.#timer);
@@ -52,6 +65,20 @@ export class Recordings extends Known<RecordingsDocument> {
     await this.after(this.api.ask("DELETE /recordings/{recording}", { of: id }));
   }
 
+  async #read(): Promise<RecordingsDocument> {
+    const asked = ++this.#asked;
+    const query = new URLSearchParams({ search: this.search.peek(), sort: this.order.peek(), limit: `${this.limit.peek()}` });
+    if (this.tag.peek() !== "") query.set("tag", this.tag.peek());
+    const found = await this.api.ask("GET /recordings", { at: `/recordings?${query}` });
+    const of = found.active;
+    const listed = found.recordings.find(({ id }) => id === of) ?? null;
+    const active = of === null || listed !== null ? listed : await this.api.ask("GET /recordings/{recording}", { of });
+    // what was asked before the last one may be answered after it
+    if (asked !== this.#asked) return this.document.peek() ?? found;
+    this.active.value = active;
+    return found;
+  }
+
   async #look(id: string): Promise<void> {
     try {
       const document = await this.api.ask("GET /recordings/{recording}", { of: id });
@@ -64,6 +91,7 @@ export class Recordings extends Known<RecordingsDocument> {
   }
 
   #put(changed: RecordingDocument): void {
+    if (this.active.peek()?.id === changed.id) this.active.value = changed.state === "recording" ? changed : null;
     const known = this.document.peek();
     if (known === null) return;
     this.document.value = { ...known, recordings: known.recordings.map((each) => (each.id === changed.id ? changed : each)) };

@@ -7,6 +7,7 @@ from pydantic import AfterValidator, Field, JsonValue
 
 from transientcam_server.api._documents.document import Document, RequestDocument
 from transientcam_server.api._documents.sequence import AppliedDocument
+from transientcam_server.recording import tags_of
 
 _ANNOTATIONS_EXAMPLE: dict[str, JsonValue] = {"sample": "corner, white paint", "operator": "Åsa"}
 
@@ -49,6 +50,8 @@ class RecordingDocument(Document):
     problem: str | None = None
     """What went wrong, if anything did."""
     annotations: dict[str, Any]
+    tags: list[str]
+    """Those of the annotation `tags`: a list, or a text with commas between them."""
     sequence: AppliedDocument | None = None
     camera: dict[str, Any]
     calibration: dict[str, Any]
@@ -71,8 +74,17 @@ class RecordingLimitsDocument(Document):
     """What the disk keeps."""
 
 
+class RecordingTotalsDocument(Document):
+    """All recordings that match, on this page and on others."""
+
+    recordings: int
+    frames: int
+    size_bytes: int
+    duration_s: float
+
+
 class RecordingsDocument(Document):
-    """All recordings, the newest first."""
+    """Recordings that match, in the order that was asked for."""
 
     directory: str
     """Where they are kept, on the machine of the service."""
@@ -82,6 +94,12 @@ class RecordingsDocument(Document):
     """The one that runs."""
     limits: RecordingLimitsDocument
     recordings: list[RecordingDocument]
+    """Those of this page."""
+    next_offset: int | None = None
+    """Where the next page begins; null on the last one."""
+    totals: RecordingTotalsDocument
+    tags: dict[str, int]
+    """How many of all that match have each tag, the most frequent first."""
 
 
 class TimelineDocument(Document):
@@ -146,4 +164,4 @@ class RecordingChange(
 
 def document(described: dict[str, Any]) -> RecordingDocument:
     """Return the library's description of a recording as its document."""
-    return RecordingDocument.model_validate(described)
+    return RecordingDocument.model_validate(described | {"tags": tags_of(described["annotations"])})

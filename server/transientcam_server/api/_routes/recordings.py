@@ -2,7 +2,7 @@
 
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Path, status
+from fastapi import APIRouter, Path, Query, status
 from fastapi.responses import FileResponse
 
 from transientcam_server.api import _downloads as downloads
@@ -19,11 +19,13 @@ from transientcam_server.api._documents.recording import (
 )
 from transientcam_server.api._problems import documented
 from transientcam_server.errors import kinds
-from transientcam_server.recording import Limits, RecordingOptions
+from transientcam_server.recording import Limits, Order, RecordingOptions, select
 
 router = APIRouter(tags=["recordings"])
 
 HDF5: Final = "application/x-hdf5"
+_OF_ONE: Final = (kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST, kinds.DISK_STALLED)
+_CHANGED: Final = (*_OF_ONE, kinds.RECORDING_UNFINISHED, kinds.RECORDING_NOT_STORED)
 RecordingName = Annotated[
     str,
     Path(
@@ -34,17 +36,32 @@ RecordingName = Annotated[
 ]
 
 
-@router.get("/recordings", summary="All recordings", responses=documented(kinds.DISK_STALLED))
-async def read_recordings(service: ServiceOf) -> RecordingsDocument:
-    """List the recordings, the newest first, with the one that runs."""
+@router.get(
+    "/recordings",
+    summary="Recordings, a page at a time",
+    responses=documented(kinds.INVALID_REQUEST, kinds.DISK_STALLED),
+)
+async def read_recordings(
+    service: ServiceOf,
+    search: Annotated[
+        str, Query(max_length=200, description="words of id, name, camera or annotations")
+    ] = "",
+    tag: Annotated[str | None, Query(max_length=200, description="one of the `tags`")] = None,
+    sort: Annotated[Order, Query(description="by this field; with `-` downwards")] = "-started_s",
+    offset: Annotated[int, Query(ge=0, le=2**31, description="how many are left out before")] = 0,
+    limit: Annotated[int, Query(ge=1, le=1000, description="how many there are on a page")] = 100,
+) -> RecordingsDocument:
+    """List recordings, by default the newest 100, and sum up all that match."""
     library = service.recordings
     described = await library.disk.run(library.describe_all)
+    found = select(described, search=search, tag=tag, order=sort, offset=offset, limit=limit)
     return RecordingsDocument(
         directory=str(library.directory),
         free_bytes=await library.disk.run(library.free_bytes),
         active=library.active_id,
         limits=RecordingLimitsDocument.model_validate(service.settings.recordings),
-        recordings=[document(each) for each in described],
+        recordings=[document(each) for each in found.pop("recordings")],
+        **found,
     )
 
 
@@ -78,7 +95,7 @@ async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> Recor
 @router.get(
     "/recordings/{recording}",
     summary="A recording",
-    responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST, kinds.DISK_STALLED),
+    responses=documented(*_OF_ONE),
 )
 async def read_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
     """Describe a recording."""
@@ -88,14 +105,7 @@ async def read_recording(service: ServiceOf, recording: RecordingName) -> Record
 @router.patch(
     "/recordings/{recording}",
     summary="Annotate a recording",
-    responses=documented(
-        kinds.BAD_REQUEST,
-        kinds.UNKNOWN_RECORDING,
-        kinds.RECORDING_UNFINISHED,
-        kinds.INVALID_REQUEST,
-        kinds.RECORDING_NOT_STORED,
-        kinds.DISK_STALLED,
-    ),
+    responses=documented(kinds.BAD_REQUEST, *_CHANGED),
 )
 @needs(Role.OPERATOR, lease=False)
 async def annotate_recording(
@@ -109,7 +119,7 @@ async def annotate_recording(
 @router.post(
     "/recordings/{recording}/stop",
     summary="Stop a recording",
-    responses=documented(kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST, kinds.DISK_STALLED),
+    responses=documented(*_OF_ONE),
 )
 @needs(Role.OPERATOR, lease=False)
 async def stop_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
@@ -120,13 +130,7 @@ async def stop_recording(service: ServiceOf, recording: RecordingName) -> Record
 @router.delete(
     "/recordings/{recording}",
     summary="Delete a recording",
-    responses=documented(
-        kinds.UNKNOWN_RECORDING,
-        kinds.RECORDING_UNFINISHED,
-        kinds.INVALID_REQUEST,
-        kinds.RECORDING_NOT_STORED,
-        kinds.DISK_STALLED,
-    ),
+    responses=documented(*_CHANGED),
 )
 @needs(Role.ADMIN, lease=False)
 async def delete_recording(service: ServiceOf, recording: RecordingName) -> RecordingDocument:
@@ -139,13 +143,7 @@ async def delete_recording(service: ServiceOf, recording: RecordingName) -> Reco
     summary="The file of a recording",
     response_class=FileResponse,
     responses=downloads.documented_file(HDF5)
-    | documented(
-        kinds.UNKNOWN_RECORDING,
-        kinds.RECORDING_UNFINISHED,
-        kinds.RANGE_NOT_SATISFIABLE,
-        kinds.INVALID_REQUEST,
-        kinds.DISK_STALLED,
-    ),
+    | documented(*_OF_ONE, kinds.RECORDING_UNFINISHED, kinds.RANGE_NOT_SATISFIABLE),
 )
 async def read_recording_file(
     service: ServiceOf,

@@ -13,6 +13,7 @@ import httpx
 import numpy as np
 import pytest
 
+import transientcam
 from tests.server.contract import client_of
 from tests.server.recording.made import assert_same, record
 from tests.server.recording.test_recovery import abandoned
@@ -550,3 +551,29 @@ def test_a_recording_served_as_a_camera_gives_the_same_images_and_refuses_anothe
 def record_into(directory: Path) -> None:
     directory.mkdir(exist_ok=True)
     record(directory / "a.h5", 2)
+
+
+def test_recordings_are_listed_by_words_tags_and_pages(daemon: Served, http: httpx.Client) -> None:
+    with transientcam.Camera(daemon.url) as camera:
+        for name, tags in (("Corner", ["wet"]), ("wall", "wet, far"), ("hall", "")):
+            recorded(http, frames=1, name=name, annotations={"tags": tags})
+
+        newest = camera.recordings(limit=2)
+        rest = camera.recordings(offset=newest["next_offset"], limit=2)
+        wet = camera.recordings(tag="wet", sort="name")
+        none = camera.recordings(search="corner far")
+
+    assert [each["name"] for each in newest["recordings"] + rest["recordings"]] == [
+        *("hall", "wall", "Corner")
+    ]
+    assert rest["next_offset"] is None
+    assert newest["totals"]["recordings"] == 3
+    assert newest["totals"]["size_bytes"] == sum(
+        each["size_bytes"] for each in newest["recordings"] + rest["recordings"]
+    )
+    assert [each["tags"] for each in wet["recordings"]] == [["wet"], ["wet", "far"]]
+    assert wet["tags"] == {"wet": 2, "far": 1}
+    assert (none["recordings"], none["totals"]["recordings"]) == ([], 0)
+    refused = http.get(RECORDINGS, params={"sort": "colour"})
+    assert refused.status_code == 422
+    assert refused.json()["field"] == "sort"

@@ -36,8 +36,9 @@ const OPENERS: Readonly<Record<string, (store: Store, file: OpenedFile) => Promi
     return `The camera stands before the scene of ${file.name}.`;
   },
   ".h5": async (store, file) => {
-    await store.recordings.refresh();
-    const found = recordingIn(store.recordings.document.peek()?.recordings ?? [], file);
+    const [id = ""] = /\d{8}T\d{6}Z-[0-9a-f]+/.exec(file.name) ?? [];
+    const listed = await store.api.ask("GET /recordings", { at: `/recordings?limit=1000&search=${id}` });
+    const found = recordingIn(listed.recordings, file);
     if (found === null)
       throw new RequestError({
         detail: `The service has no recording like ${file.name}. A page cannot bring one to it: put the file into the directory of the recordings, or open it with "transientcam replay".`,

@@ -29,10 +29,12 @@ interface RowProps {
 /** One recording of the list. */
 export function RecordingRow({ recording, task, onAnnotate, onDelete }: RowProps) {
   const { api, replay } = useStore();
-  const { id, name, state, annotations } = recording;
+  const { id, name, state, annotations, tags } = recording;
   const whole = state === "complete";
   const shown = replay.recording.value?.id === id;
-  const notes = Object.entries(annotations).map(([key, value]) => `${key}: ${typeof value === "string" ? value : JSON.stringify(value)}`);
+  const notes = Object.entries({ ...annotations, ...(tags.length > 0 ? { tags: tags.join(", ") } : {}) }).map(
+    ([key, value]) => `${key}: ${typeof value === "string" ? value : JSON.stringify(value)}`,
+  );
   const why = recording.reason === null ? null : (END_REASONS[recording.reason] ?? recording.reason);
   return (
     <li class={shown ? "row recording recording-shown" : "row recording"} data-recording={id}>

@@ -1,8 +1,10 @@
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { grouped } from "../../scales/format";
+import { ORDERS, PAGE } from "../../store/recordings";
 import { useStore } from "../../store/store";
-import type { RecordingDocument } from "../../stream/documents";
+import type { RecordingDocument, RecordingsDocument } from "../../stream/documents";
+import { Choice, TextField } from "../../ui/controls";
 import { Deletion } from "../../ui/Deletion";
 import { Panel } from "../../ui/Panel";
 import { TaskLine } from "../../ui/Steer";
@@ -46,7 +48,7 @@ export function RecordingsView() {
         {recordings.active.value === null ? <RecordForm task={task} /> : <Running recording={recordings.active.value} task={task} />}
         <TaskLine task={task} field="recordings-status" />
         {recordings.trouble.value !== null && <p class="refusal">{recordings.trouble.value}</p>}
-        {known !== null && known.recordings.length === 0 && <p class="quiet recordings-none">Nothing was recorded yet.</p>}
+        {known !== null && <Looking known={known} />}
         <ul class="recording-list column">
           {known?.recordings
             .filter(({ id }) => id !== known.active)
@@ -60,6 +62,11 @@ export function RecordingsView() {
               />
             ))}
         </ul>
+        {known?.next_offset != null && recordings.limit.value < 1000 && (
+          <button type="button" onClick={() => (recordings.limit.value = recordings.limit.value + PAGE)}>
+            Show more
+          </button>
+        )}
       </div>
       {annotating.value !== null && <Annotations recording={annotating.value} onClose={() => (annotating.value = null)} />}
       <Deletion doomed={deleting} kind="recording" remove={({ id }) => remove(id)}>
@@ -70,6 +77,28 @@ export function RecordingsView() {
         )}
       </Deletion>
     </Panel>
+  );
+}
+
+/** What is looked for, and what all that is found amounts to. */
+function Looking({ known: { totals, tags } }: { known: RecordingsDocument }) {
+  const { search, tag, order } = useStore().recordings;
+  const all = search.value.trim() === "" && tag.value === "";
+  if (all && totals.recordings === 0) return <p class="quiet recordings-none">Nothing was recorded yet.</p>;
+  const known = new Set(["", tag.value, ...Object.keys(tags)]);
+  return (
+    <div class="wrapped">
+      <TextField label="Search" class="field inline-row" name="search" maxLength={200} placeholder="name, camera or note" text={search} />
+      {known.size > 1 && (
+        <Choice label="Tag" chosen={tag} of={[...known]} text={(each) => (each === "" ? "any tag" : `${each} (${tags[each] ?? 0})`)} />
+      )}
+      <Choice label="Order" chosen={order} of={Object.keys(ORDERS) as (keyof typeof ORDERS)[]} text={(each) => ORDERS[each]} />
+      <span class="quiet" data-field="recordings-found">
+        {totals.recordings === 0
+          ? "No recording has all of these words."
+          : `${grouped(totals.recordings)} recordings, ${grouped(totals.frames)} frames, ${bytes(totals.size_bytes)}, ${duration(totals.duration_s)}`}
+      </span>
+    </div>
   );
 }
 
