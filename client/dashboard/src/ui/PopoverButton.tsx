@@ -1,8 +1,7 @@
-import type { ComponentChildren } from "preact";
+import type { ComponentChildren, RefObject } from "preact";
 import { useId, useRef } from "preact/hooks";
 
 import { placeBeside } from "./popover";
-import "./ActionMenu.css";
 import "./PopoverButton.css";
 
 interface PopoverButtonProps {
@@ -11,13 +10,21 @@ interface PopoverButtonProps {
   readonly label: string;
   readonly title: string;
   readonly kind: string;
+  readonly role?: "dialog" | "menu";
+  /** What is opened, for who opens it otherwise. */
+  readonly popover?: RefObject<HTMLDivElement | null>;
+  readonly onOpened?: () => void;
+  readonly onButtonKey?: (event: KeyboardEvent) => void;
+  readonly onKey?: (event: KeyboardEvent) => void;
   readonly children: ComponentChildren;
 }
 
 /** A button and what it opens over the page; Escape or a click elsewhere closes it. */
-export function PopoverButton({ face, label, title, kind, children }: PopoverButtonProps) {
+export function PopoverButton(props: PopoverButtonProps) {
+  const { face, label, title, kind, role = "dialog", popover, onOpened, onButtonKey, onKey, children } = props;
   const id = useId();
   const button = useRef<HTMLButtonElement>(null);
+  const own = useRef<HTMLDivElement>(null);
   return (
     <>
       <button
@@ -26,19 +33,25 @@ export function PopoverButton({ face, label, title, kind, children }: PopoverBut
         class={`${kind}-button`}
         aria-label={label}
         title={title}
-        aria-haspopup="dialog"
+        aria-haspopup={role}
         popovertarget={id}
+        onKeyDown={onButtonKey}
       >
         {face}
       </button>
+      {/* biome-ignore lint/a11y/useAriaPropsSupportedByRole: both roles have names */}
       <div
+        ref={popover ?? own}
         id={id}
         class={`menu ${kind}`}
-        role="dialog"
+        role={role}
         aria-label={label}
         popover="auto"
+        onKeyDown={onKey}
         onToggle={(event) => {
-          if (event.newState === "open" && button.current !== null) placeBeside(event.currentTarget, button.current);
+          if (event.newState !== "open" || button.current === null) return;
+          placeBeside(event.currentTarget, button.current);
+          onOpened?.();
         }}
       >
         {children}

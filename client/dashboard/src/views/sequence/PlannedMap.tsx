@@ -10,7 +10,7 @@ export function PlannedMap() {
   return (
     <figure class="planned-map" data-field="planned_map">
       <img src={mapped.value.url} alt="Predicted error of each pixel" />
-      <figcaption class="quiet">Predicted error of each pixel: dark is 0, {middle}.</figcaption>
+      <figcaption class="small quiet">Predicted error of each pixel: dark is 0, {middle}.</figcaption>
     </figure>
   );
 }

@@ -2,7 +2,9 @@ import { engineering, fixed } from "../../scales/format";
 import type { ChoiceDocument, PlanDocument } from "../../stream/documents";
 import "./PriceBar.css";
 
-const ITEMS = ["light", "readout", "settling", "transport", "computing"] as const;
+/** What time goes to, in colours after Okabe and Ito, as the pins. */
+const COLOURS = { light: "#e69f00", readout: "#56b4e9", settling: "#cc79a7", transport: "#009e73", computing: "#d55e00" };
+const ITEMS = Object.keys(COLOURS) as (keyof typeof COLOURS)[];
 
 /** What a capture takes until its ranges are there, item by item, and what would buy most of it. */
 export function PriceBar({ choice }: { choice: ChoiceDocument | PlanDocument }) {
@@ -13,13 +15,14 @@ export function PriceBar({ choice }: { choice: ChoiceDocument | PlanDocument }) 
     <figure class="price" data-field="choice_price">
       <div class="price-bar" aria-hidden="true">
         {known.map((name) => (
-          <i key={name} class={`price-${name}`} style={{ flexGrow: (price[`${name}_s`] ?? 0) / sum_s }} />
+          <i key={name} style={{ background: COLOURS[name], flexGrow: (price[`${name}_s`] ?? 0) / sum_s }} />
         ))}
       </div>
-      <figcaption>
+      <figcaption class="small line">
         {known.map((name) => (
           <span key={name}>
-            <i class={`price-key price-${name}`} aria-hidden="true" /> {name} {engineering(price[`${name}_s`], "s", 2)}
+            <i class="price-key" style={{ background: COLOURS[name] }} aria-hidden="true" /> {name}{" "}
+            {engineering(price[`${name}_s`], "s", 2)}
           </span>
         ))}
         <span>

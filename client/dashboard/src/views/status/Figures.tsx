@@ -70,7 +70,7 @@ function Figure({ name, field, title, trend, children }: FigureProps) {
   return (
     <div class="figure" title={title}>
       <dt class="small quiet">{name}</dt>
-      <dd>
+      <dd class={trend === undefined ? "" : "row apart"}>
         <span data-field={field}>{children}</span>
         {trend !== undefined && <Course name={name} trend={trend} />}
       </dd>

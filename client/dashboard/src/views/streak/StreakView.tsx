@@ -3,7 +3,6 @@ import { useMemo, useRef } from "preact/hooks";
 import { rangeOfTime_m } from "../../physics/constants";
 import { COLOUR_MAPS, type ColourMapName } from "../../scales/colourMaps";
 import { fixed, significant } from "../../scales/format";
-import { ticks } from "../../scales/scale";
 import { scaleOf, TONES, type ToneKind } from "../../scales/tone";
 import { oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
@@ -14,7 +13,9 @@ import { ColourChoice, ToneChoice } from "../../ui/LookChoices";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { draw } from "../../ui/paint";
+import { Ticks } from "../../ui/Ticks";
 import { BINS, paintStreak, Streak, whiteOf } from "./streak";
+import "../../ui/Marks.css";
 import "./StreakView.css";
 
 const TONE: Setting<ToneKind> = { key: "streak.tone", initial: "root", ...oneOf(TONES) };
@@ -77,16 +78,10 @@ export function StreakView() {
         { text: "Density in DN/s (NPY)", run: () => save(`${name()}.npy`, new Blob([npy(streak.values, [BINS, streak.width])])) },
       ]}
     >
-      <div class="streak">
-        <div class="streak-axis small quiet" aria-hidden="true">
-          {ticks({ low: 0, high: period_ns, kind: "linear" }, 6).map((time_ns) => (
-            <span key={time_ns} style={{ top: `${(100 * time_ns) / period_ns}%` }}>
-              {fixed(time_ns, 0, "ns")}
-            </span>
-          ))}
-        </div>
+      <div class="streak grow spaced">
+        <Ticks class="streak-axis" side="top" end={period_ns} write={(time_ns) => fixed(time_ns, 0, "ns")} />
         <div
-          class="streak-picture"
+          class="streak-picture grow"
           role="img"
           aria-label={`Streak image of row ${row.value}: columns across, time of flight downwards`}
           onPointerMove={(event) => {
@@ -105,8 +100,8 @@ export function StreakView() {
           <ColourBar scale={scaleOf(tone.value, Number((bright.value * 1e-9).toPrecision(3)))} colours={colours.value} unit="DN/ns" />
         )}
       </div>
-      <footer class="panel-foot column">
-        <div class="panel-row">
+      <footer class="panel-foot column spaced">
+        <div class="panel-row wrapped apart">
           <label class="scanline row">
             <span class="quiet">Scanline</span>
             <input
@@ -153,16 +148,11 @@ function Readout({ frame, streak, pointed, width, period_ns }: ReadoutProps) {
 /** The player's time and the selected column. */
 function Marks({ width }: { width: number }) {
   const store = useStore();
-  const time = useRef<HTMLElement>(null);
-  useDrawing(() => {
-    const turn = store.player.turn.value;
-    if (time.current !== null) time.current.style.top = `${100 * turn}%`;
-  }, [store]);
   const selected = store.selected.value;
   return (
-    <>
-      <i ref={time} class="streak-time" />
-      {selected !== null && <i class="streak-column" style={{ left: `${(100 * (selected.x + 0.5)) / width}%` }} />}
-    </>
+    <div class="mark cover" style={{ "--y": `${100 * store.player.turn.value}%`, "--x": `${(100 * ((selected?.x ?? 0) + 0.5)) / width}%` }}>
+      <i class="mark-row" />
+      {selected !== null && <i class="mark-column" />}
+    </div>
   );
 }
