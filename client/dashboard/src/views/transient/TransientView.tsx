@@ -16,7 +16,7 @@ import { type FigureParts, pictureFiles } from "../../ui/figureFiles";
 import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
-import { litOf, peaksOf, steady, turnsOf } from "./arrivals";
+import { gapsOf, litOf, peaksOf, steady, turnsOf } from "./arrivals";
 import { Filming, FilmProgress } from "./Filming";
 import { LightBar, lightScale } from "./LightBar";
 import { LightSoFar } from "./LightSoFar";
@@ -55,6 +55,8 @@ export function TransientView() {
     const arrivals = frame.value?.light?.arrivals;
     if (arrivals === undefined) return;
     player.learn(steady(player.lit.peek(), litOf(arrivals)), peaksOf(arrivals));
+    // What is gathered over a time stays in sight.
+    player.gaps.value = look.play.value === "density" ? gapsOf(arrivals) : [];
   }, [frame, player]);
   const play = look.play.value;
   const subject = useMemo(() => ({ snapshot: () => look.snapshot(), parts: () => partsOf(look, store) }), [look, store]);
