@@ -8,7 +8,7 @@ import { Deletion } from "../../ui/Deletion";
 import { Panel } from "../../ui/Panel";
 import { TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
-import { OpenButton } from "../files/OpenButton";
+import { OpenButton } from "../files/FileDrop";
 import { bytes, duration } from "../replay/words";
 import { Annotations } from "./Annotations";
 import { RecordForm } from "./RecordForm";

@@ -1,7 +1,7 @@
 import { useStore } from "../../store/store";
 import { Button } from "../../ui/controls";
 import type { Task } from "../../ui/useTask";
-import { goalWords } from "./goals";
+import { goalWords } from "./words";
 import "./Finding.css";
 
 const HINT = "Predict shows what each sequence would give on this scene: some seconds of work for the service.";

@@ -1,4 +1,5 @@
 import { engineering, fixed } from "../../scales/format";
+import { useStore } from "../../store/store";
 import type { ChoiceDocument, PlanDocument } from "../../stream/documents";
 import "./PriceBar.css";
 
@@ -34,6 +35,20 @@ export function PriceBar({ choice }: { choice: ChoiceDocument | PlanDocument }) 
         </span>
         {"price_summary" in choice && <span class="price-words">{choice.price_summary}</span>}
       </figcaption>
+    </figure>
+  );
+}
+
+/** The error that a plan predicts of each pixel, before it is captured. */
+export function PlannedMap() {
+  const { mapped, looked } = useStore().accuracy;
+  if (mapped.value === null || looked.value !== mapped.value.plan) return null;
+  const target_m = mapped.value.plan.predicted.within?.target_m;
+  const middle = target_m == null ? "bright the worst" : `the middle colour ${engineering(target_m, "m", 2)}`;
+  return (
+    <figure class="planned-map" data-field="planned_map">
+      <img src={mapped.value.url} alt="Predicted error of each pixel" />
+      <figcaption class="small quiet">Predicted error of each pixel: dark is 0, {middle}.</figcaption>
     </figure>
   );
 }

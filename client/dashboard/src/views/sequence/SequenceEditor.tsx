@@ -8,7 +8,7 @@ import type { AppliedDocument } from "../../stream/documents";
 import type { Problem, SequenceRequest, TakeOrder, Zeroth } from "../../stream/protocol";
 import { Button, Form, keptAs, NumberField, Select } from "../../ui/controls";
 import { Obstacle, Steer } from "../../ui/Steer";
-import { DRAFT_FIELD, type Draft, documentOf, draftOf, missingOf } from "./draft";
+import { type Draft, documentOf, draftOf, missingOf, NUMBER_NAMES, NUMBERS } from "./draft";
 import { Figures } from "./Figures";
 import { PRESETS, presetOf } from "./presets";
 import { FIELD_NAMES, fieldOf, measuredOf, sequenceProblem, TAKE_ORDER_NAMES, ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
@@ -69,13 +69,9 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; 
   };
 
   const judged = verdict.value;
-  const wrong = judged.kind === "refused" ? (DRAFT_FIELD[fieldOf(judged.problem) ?? ""] ?? null) : null;
+  const wrong = judged.kind === "refused" ? fieldOf(judged.problem) : null;
   const set = (change: Partial<Draft>): void => {
     draft.value = { ...draft.peek(), ...change };
-  };
-  const field = (name: keyof Draft, label: string, unit: string) => {
-    const text = keptAs(draft.value[name], (typed) => set({ [name]: typed }));
-    return <NumberField {...{ label, unit, name, text }} aria-invalid={wrong === name} aria-describedby="sequence-verdict" />;
   };
 
   return (
@@ -91,10 +87,17 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; 
             onChoose={(name) => (draft.value = draftOf({ ...base, ...presetOf(name)?.sequence }))}
           />
         </label>
-        {field("base_frequency_mhz", "Base frequency", "MHz")}
-        {field("harmonics", measuredOf(base).name, "")}
-        {field("exposure_ms", "Exposure", "ms")}
-        {field("takes", "Takes", "")}
+        {NUMBER_NAMES.map((name) => (
+          <NumberField
+            key={name}
+            name={name}
+            label={name === "harmonics" ? measuredOf(base).name : FIELD_NAMES[name]}
+            unit={NUMBERS[name].unit}
+            text={keptAs(draft.value[name], (text) => set({ [name]: text }))}
+            aria-invalid={wrong === name}
+            aria-describedby="sequence-verdict"
+          />
+        ))}
         <label class="field whole-row">
           <span class="small quiet">Zeroth moment</span>
           <Select

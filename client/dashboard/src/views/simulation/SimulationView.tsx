@@ -7,7 +7,7 @@ import { Select } from "../../ui/controls";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
-import { OpenButton } from "../files/OpenButton";
+import { OpenButton } from "../files/FileDrop";
 import { effectWords, FAULTS, lacking, ordered, possible, sizeShare, sizeWords } from "./words";
 import "./SimulationView.css";
 

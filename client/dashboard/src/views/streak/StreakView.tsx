@@ -58,6 +58,13 @@ export function StreakView() {
     store.player.seek(turn);
   };
   const period_ns = store.period_s.value * 1e9;
+  const words = useComputed(() => {
+    const at = pointed.value;
+    if (frame.value === null || at === null) return "";
+    const time_s = ((at.bin + 0.5) / BINS) * store.period_s.value;
+    const density = streak.values[at.bin * streak.width + at.x] * 1e-9;
+    return `column ${at.x} · ${fixed(time_s * 1e9, 1, "ns")} · ${fixed(rangeOfTime_m(time_s), 2, "m")} · ${significant(density, 3, "DN/ns")}`;
+  });
   const name = (): string => `streak-row-${row.peek()}-${frame.peek()?.meta.frame ?? 0}`;
   return (
     <Panel
@@ -115,33 +122,12 @@ export function StreakView() {
               }
             />
           </label>
-          <Readout frame={frame} streak={streak} pointed={pointed} width={width} period_ns={period_ns} />
+          <span class="clipped" data-field="streak">
+            {words}
+          </span>
         </div>
       </footer>
     </Panel>
-  );
-}
-
-interface ReadoutProps {
-  readonly frame: { readonly value: unknown };
-  readonly streak: Streak;
-  readonly pointed: { readonly value: { readonly x: number; readonly bin: number } | null };
-  readonly width: number;
-  readonly period_ns: number;
-}
-
-function Readout({ frame, streak, pointed, width, period_ns }: ReadoutProps) {
-  const text = useComputed(() => {
-    const at = pointed.value;
-    if (frame.value === null || at === null) return "";
-    const time_ns = ((at.bin + 0.5) / BINS) * period_ns;
-    const density = streak.values[at.bin * width + at.x] * 1e-9;
-    return `column ${at.x} · ${fixed(time_ns, 1, "ns")} · ${fixed(rangeOfTime_m(time_ns * 1e-9), 2, "m")} · ${significant(density, 3, "DN/ns")}`;
-  });
-  return (
-    <span class="clipped" data-field="streak">
-      {text}
-    </span>
   );
 }
 

@@ -38,7 +38,10 @@ export function litOf(arrivals: ArrayLike<number>): Lit | null {
 export function gapsOf(arrivals: ArrayLike<number>): Lit[] {
   const worth = worthOf(arrivals);
   const lit = worth.flatMap((is, at) => (is ? [at] : []));
-  const [before, after] = [[-1, ...lit], [...lit, worth.length]];
+  const [before, after] = [
+    [-1, ...lit],
+    [...lit, worth.length],
+  ];
   const gaps = before.map((at, n) => ({ first: (at + 1) / worth.length, last: after[n] / worth.length }));
   return lit.length === 0 ? [] : gaps.filter(({ first, last }) => last > first);
 }
