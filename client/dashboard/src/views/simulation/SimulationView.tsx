@@ -44,9 +44,15 @@ export function SimulationView() {
         {world !== null && (
           <fieldset class="faults wrapped spaced">
             <legend class="small quiet">Let something go wrong</legend>
-            {(world.faults as readonly Fault[]).map((fault) => (
-              <FaultButton key={fault} fault={fault} task={task} />
-            ))}
+            {(world.faults as readonly Fault[]).map((fault) => {
+              const { word, title } = FAULTS[fault];
+              const cause = (): void => void task.run(`${title}…`, () => simulation.cause(fault));
+              return (
+                <Steer key={fault} title={title} task={task} disabled={!possible(fault, world.plugged)} onClick={cause}>
+                  {word}
+                </Steer>
+              );
+            })}
           </fieldset>
         )}
         <TaskLine task={task} field="simulation-status" />
@@ -149,21 +155,5 @@ function EffectRow({ effect, calledAbove, task }: { effect: EffectDocument; call
       </td>
       <td class="quiet effect-why">{effect.reason}</td>
     </tr>
-  );
-}
-
-function FaultButton({ fault, task }: { fault: Fault; task: Task }) {
-  const { simulation } = useStore();
-  const { word, title } = FAULTS[fault];
-  const plugged = simulation.world.value?.plugged ?? true;
-  return (
-    <Steer
-      title={title}
-      task={task}
-      disabled={!possible(fault, plugged)}
-      onClick={() => void task.run(`${title}…`, () => simulation.cause(fault))}
-    >
-      {word}
-    </Steer>
   );
 }
