@@ -32,7 +32,7 @@ def test_keys_never_do_what_was_not_asked_for(page: Page) -> None:
     open_page(page)
     downloads: list[str] = []
     page.on("download", lambda each: downloads.append(each.suggested_filename))
-    menu = page.locator(".panel-map .action-menu")
+    menu = page.locator(".panel-map .actions-button")
     # arrow keys open a menu and move in it; Escape leaves it, and nothing has run
     menu.focus()
     page.keyboard.press("ArrowDown")

@@ -1,5 +1,6 @@
 /** One pixel's density as a curve: sampled where it bends, its peaks found and weighed. */
 import { type Coefficients, densityAt } from "./maximumEntropy";
+import { Poles } from "./poles";
 
 const TURN = 2 * Math.PI;
 
@@ -44,10 +45,12 @@ export function peaks(c: Coefficients, pixel: number): Peak[] {
     if (at(n) > at(n - 1) && at(n) >= at(n + 1)) tops.push(refine(n, density));
     if (at(n) < at(n - 1) && at(n) <= at(n + 1)) bottoms.push(refine(n, (phase_rad) => -density(phase_rad)));
   }
+  const poles = new Poles(c.harmonics, 1);
+  poles.findOne(c, pixel, 0);
   const light = tops.map((top) => {
     const low = bottoms.filter((bottom) => bottom < top).at(-1) ?? bottoms[bottoms.length - 1] - TURN;
     const high = bottoms.find((bottom) => bottom > top) ?? bottoms[0] + TURN;
-    return integrate(density, low, top) + integrate(density, top, high);
+    return poles.upTo(0, high) - poles.upTo(0, low);
   });
   const total = light.reduce((sum, value) => sum + value, 0);
   return tops
@@ -121,25 +124,4 @@ function maximise(f: (x: number) => number, low: number, high: number): number {
     }
   }
   return 0.5 * (a + b);
-}
-
-/** Relative error that the integral of a peak's flank may have, and the deepest halving. */
-const TOLERANCE = 1e-4;
-const DEEPEST = 24;
-
-/** Adaptive Simpson quadrature of `f` over [low, high]. */
-function integrate(f: (x: number) => number, low: number, high: number): number {
-  const halve = (a: number, b: number, fa: number, fm: number, fb: number, whole: number, depth: number): number => {
-    const middle = 0.5 * (a + b);
-    const [fl, fr] = [f(0.5 * (a + middle)), f(0.5 * (middle + b))];
-    const left = ((middle - a) / 6) * (fa + 4 * fl + fm);
-    const right = ((b - middle) / 6) * (fm + 4 * fr + fb);
-    const error = left + right - whole;
-    if (depth >= DEEPEST || (depth > 2 && Math.abs(error) <= 15 * TOLERANCE * (left + right))) {
-      return left + right + error / 15;
-    }
-    return halve(a, middle, fa, fl, fm, left, depth + 1) + halve(middle, b, fm, fr, fb, right, depth + 1);
-  };
-  const [fa, fm, fb] = [f(low), f(0.5 * (low + high)), f(high)];
-  return halve(low, high, fa, fm, fb, ((high - low) / 6) * (fa + 4 * fm + fb), 0);
 }

@@ -68,7 +68,7 @@ export class Poles {
     this.brightness[at] = brightness;
   }
 
-  /** Light of pixel `at` up to `phase_rad`, 0 to 2 pi, in units of b_0. */
+  /** Light of pixel `at` up to `phase_rad`, in units of b_0; a turn more has all of its light more. */
   upTo(at: number, phase_rad: number): number {
     return this.#upTo(at, phase_rad, Math.cos(phase_rad), -Math.sin(phase_rad));
   }

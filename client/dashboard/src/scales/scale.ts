@@ -46,7 +46,8 @@ const FEWEST_TICKS = 3;
 /** What powers of ten are written with, the first that gives enough numbers; within a decade evenly spaced ones tell more. */
 const LOGARITHMIC_FACTORS: readonly (readonly number[])[] = [[1], [1, 2, 5]];
 
-function powersBetween(low: number, high: number, factors: readonly number[]): number[] {
+/** Powers of ten times these factors from one number to another. */
+export function powersBetween(low: number, high: number, factors: readonly number[]): number[] {
   const values: number[] = [];
   for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) {
     for (const factor of factors) {

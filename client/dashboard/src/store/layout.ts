@@ -82,7 +82,8 @@ function isPart(value: unknown): value is Partial<Slot & Stack> {
   return typeof value === "object" && value !== null;
 }
 
-export function isStack(part: Slot | Stack): part is Stack {
+/** Whether it is a stack, or a row. */
+export function isStack<Stacked extends Row>(part: Slot | Stacked): part is Stacked {
   return "slots" in part;
 }
 

@@ -49,22 +49,19 @@ export class Noise {
   /** Standard deviation of a pixel, by its place in the map; NaN before enough frames had a value there. */
   std(at: number): number {
     const count = this.#count[at] ?? 0;
-    return count < FEWEST ? NaN : Math.sqrt(this.#square[at] / (1 - SQUARED_WEIGHTS[count]));
+    return count < FEWEST ? NaN : Math.sqrt(this.#square[at] / (1 - squaredWeights(count)));
   }
 }
 
 /** Counts beyond this change the sum of squared weights no more. */
 const MOST = 500;
 
-/** Sum of the squared weights of all frames after a count of them. */
-const SQUARED_WEIGHTS = (() => {
-  const sums = new Float64Array(MOST + 1);
-  for (let count = 1; count <= MOST; count++) {
-    const weight = 1 / Math.min(count, WINDOW);
-    sums[count] = (1 - weight) ** 2 * sums[count - 1] + weight * weight;
-  }
-  return sums;
-})();
+/** Sum of the squared weights of a count of frames: alike at first; then each new one weighs 1 / WINDOW, and those before it the rest. */
+function squaredWeights(count: number): number {
+  if (count <= WINDOW) return 1 / count;
+  const limit = 1 / (2 * WINDOW - 1);
+  return limit + (1 / WINDOW - limit) * (1 - 1 / WINDOW) ** (2 * (count - WINDOW));
+}
 
 /** The noise of products, each measured from when it is first asked for, as frames come. */
 export class Noises {

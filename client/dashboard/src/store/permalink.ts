@@ -4,6 +4,7 @@ import { effect } from "@preact/signals";
 import { refusalIn } from "./api";
 import type { LinkPart } from "./settings";
 import type { Store } from "./store";
+import { until } from "./until";
 
 /** Puts the whole address of what is shown on the clipboard, and says so; shows it to be copied by hand where the browser refuses. */
 export async function copyLink(target: Window, store: Store): Promise<void> {
@@ -56,11 +57,11 @@ function timePart({ player, sequence, period_s }: Store): LinkPart {
       const time_ns = said.get("time_ns");
       if (time_ns === null || !/^\d+(\.\d+)?$/.test(time_ns)) return;
       player.playing.value = false;
-      const end = effect(() => {
-        // A time is a share of the period, which comes from the service.
-        if (sequence.value === null) return;
+      // A time is a share of the period, which comes from the service.
+      void until(() => {
+        if (sequence.value === null) return undefined;
         player.seek((Number(time_ns) * 1e-9) / period_s.peek());
-        queueMicrotask(() => end());
+        return true;
       });
     },
   };
@@ -86,29 +87,19 @@ function recordingPart(store: Store): LinkPart {
 
 /** Shows a recording, or says why it cannot be shown. */
 async function open(store: Store, recording: string, frame: number | undefined): Promise<void> {
-  const { replay, status } = store;
+  const { replay, status, api } = store;
   try {
     if (replay.recording.peek()?.id !== recording) await replay.open(recording, frame);
     else if (frame !== undefined) replay.seek(frame);
   } catch (error) {
     const { problem, message } = refusalIn(error);
     if (problem.status === 401) {
-      await tokenOf(store);
+      const { token } = api.credentials;
+      const before = token.peek();
+      await until(() => (token.value === before ? undefined : (token.value ?? undefined)));
       await open(store, recording, frame);
       return;
     }
     status.unreadable.value = `The recording of this link cannot be shown: ${message}`;
   }
-}
-
-/** Waits until the user enters a token, or another one. */
-function tokenOf({ api: { credentials } }: Store): Promise<void> {
-  const before = credentials.token.peek();
-  return new Promise((resolve) => {
-    const end = credentials.token.subscribe((token) => {
-      if (token === before || token === null) return;
-      queueMicrotask(() => end());
-      resolve();
-    });
-  });
 }

@@ -23,6 +23,8 @@ export class Player {
   readonly time_s: ReadonlySignal<number>;
   /** The part of the period in which there is light, in shares of it: what plays passes over the rest. */
   readonly lit = signal<Lit | null>(null);
+  /** Parts of it that are passed over, too. */
+  readonly gaps = signal<readonly Lit[]>([]);
   /** When most light arrives in the whole picture, in shares of the period, in their order. */
   readonly arrivals = signal<readonly number[]>([]);
   readonly phase_rad = computed(() => 2 * Math.PI * this.turn.value);
@@ -44,7 +46,9 @@ export class Player {
     if (!this.playing.peek()) return false;
     this.step(elapsed_s * this.speed_ns.peek() * 1e-9);
     const [lit, turn] = [this.lit.peek(), this.turn.peek()];
-    if (lit !== null && (turn < lit.first || turn > lit.last)) this.turn.value = lit.first;
+    const gap = this.gaps.peek().find(({ first, last }) => turn >= first && turn < last);
+    if (gap !== undefined) this.turn.value = gap.last % 1;
+    else if (lit !== null && (turn < lit.first || turn > lit.last)) this.turn.value = lit.first;
     return true;
   }
 

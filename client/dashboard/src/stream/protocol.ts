@@ -28,15 +28,10 @@ export type SequenceRequest = Partial<SequenceDocument>;
 export type Zeroth = SequenceDocument["zeroth"];
 export type TakeOrder = SequenceDocument["take_order"];
 
-/** What the frames of one subscription are like. */
-export interface Channel {
-  readonly product: string;
-  readonly shape: readonly number[];
-}
-
 export interface Hello {
   readonly type: "hello";
-  readonly channels?: readonly Channel[];
+  /** What the frames of each subscription are like. */
+  readonly channels?: readonly { readonly product: string; readonly shape: readonly number[] }[];
   readonly session: string;
   readonly server: { readonly name: string; readonly version: string };
   readonly sequence: AppliedDocument | null;

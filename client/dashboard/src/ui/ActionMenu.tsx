@@ -1,6 +1,6 @@
-import { useId, useRef } from "preact/hooks";
+import { useRef } from "preact/hooks";
 
-import { placeBeside } from "./popover";
+import { PopoverButton } from "./PopoverButton";
 import "./ActionMenu.css";
 
 export interface Action {
@@ -19,24 +19,18 @@ export interface ActionGroup {
  * Nothing runs before an entry is pressed: arrow keys only move between them.
  */
 export function ActionMenu({ label, groups }: { label: string; groups: readonly ActionGroup[] }) {
-  const button = useRef<HTMLButtonElement>(null);
   const menu = useRef<HTMLDivElement>(null);
-  const id = useId();
   const filled = groups.filter(({ actions }) => actions.length > 0);
   const entries = (): HTMLElement[] => [...(menu.current?.querySelectorAll<HTMLElement>("[role=menuitem]") ?? [])];
 
-  const open = (): void => {
-    if (menu.current === null || button.current === null || menu.current.matches(":popover-open")) return;
-    menu.current.showPopover();
-    placeBeside(menu.current, button.current);
-    entries()[0]?.focus();
-  };
   const onButtonKey = (event: KeyboardEvent): void => {
     if (event.key !== "ArrowDown" && event.key !== "ArrowUp") return;
     event.preventDefault();
     event.stopPropagation();
-    open();
-    if (event.key === "ArrowUp") entries().at(-1)?.focus();
+    menu.current?.showPopover();
+    entries()
+      .at(event.key === "ArrowUp" ? -1 : 0)
+      ?.focus();
   };
   const onMenuKey = (event: KeyboardEvent): void => {
     event.stopPropagation(); // keys of the page would move the light
@@ -52,58 +46,41 @@ export function ActionMenu({ label, groups }: { label: string; groups: readonly 
     all[next]?.focus();
   };
   return (
-    <>
-      <button
-        ref={button}
-        type="button"
-        class="action-menu"
-        aria-label={label}
-        title={label}
-        aria-haspopup="menu"
-        aria-controls={id}
-        popovertarget={id}
-        popovertargetaction="toggle"
-        onKeyDown={onButtonKey}
-      >
-        ⋯
-      </button>
-      <div
-        ref={menu}
-        id={id}
-        class="menu"
-        role="menu"
-        aria-label={label}
-        popover="auto"
-        onKeyDown={onMenuKey}
-        onToggle={(event) => {
-          if (event.newState !== "open" || button.current === null) return;
-          placeBeside(event.currentTarget, button.current);
-          if (!event.currentTarget.contains(document.activeElement)) entries()[0]?.focus();
-        }}
-      >
-        {filled.map(({ title, actions }) => (
-          <div key={title} class="menu-group" role="group" aria-label={title}>
-            <p class="menu-title small quiet" aria-hidden="true">
-              {title}
-            </p>
-            {actions.map(({ text, run }) => (
-              <button
-                key={text}
-                type="button"
-                role="menuitem"
-                tabIndex={-1}
-                onClick={() => {
-                  menu.current?.hidePopover();
-                  run();
-                }}
-              >
-                {text}
-              </button>
-            ))}
-          </div>
-        ))}
-      </div>
-    </>
+    <PopoverButton
+      face="⋯"
+      label={label}
+      title={label}
+      kind="actions"
+      role="menu"
+      popover={menu}
+      onButtonKey={onButtonKey}
+      onKey={onMenuKey}
+      onOpened={() => {
+        if (!menu.current?.contains(document.activeElement)) entries()[0]?.focus();
+      }}
+    >
+      {filled.map(({ title, actions }) => (
+        <div key={title} class="menu-group" role="group" aria-label={title}>
+          <p class="menu-title small quiet" aria-hidden="true">
+            {title}
+          </p>
+          {actions.map(({ text, run }) => (
+            <button
+              key={text}
+              type="button"
+              role="menuitem"
+              tabIndex={-1}
+              onClick={() => {
+                menu.current?.hidePopover();
+                run();
+              }}
+            >
+              {text}
+            </button>
+          ))}
+        </div>
+      ))}
+    </PopoverButton>
   );
 }
 

@@ -7,6 +7,7 @@ import { decimalsFor, fraction, histogram, niceStep, type Scale, type Span, tick
 import type { Look } from "../store/looks";
 import { useStore } from "../store/store";
 import { useComputedOf, useDrawing } from "./hooks";
+import "./Ticks.css";
 import "./ColourBar.css";
 
 /** Share of the scale's length that the bar goes on beyond either end: for what lies there, and for handles to be drawn to. */
@@ -73,19 +74,25 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
   const ends = onLimit === undefined ? [] : (["low", "high"] as const);
   return (
     <div
-      class={`colour-bar ${values === undefined ? "colour-bar-bare" : ""}`}
+      class={`colour-bar column ${values === undefined ? "colour-bar-bare" : ""}`}
       role="group"
       aria-label={`Colour scale from ${write(scale.low)} to ${withUnit(write(scale.high), unit)}`}
     >
       <p class="colour-bar-unit small quiet">{unit === "1" ? "" : unit}</p>
       <div
-        class="colour-bar-body"
+        class="colour-bar-body grow"
         title={onLimit === undefined ? undefined : "Drag the handles; double click lets the ends follow the data"}
         onDblClick={() => onLimit?.(null)}
       >
-        <canvas ref={canvas} width={COLOURS_PX + (values === undefined ? 0 : HISTOGRAM_PX)} height={ROWS} aria-hidden="true" />
+        <canvas
+          ref={canvas}
+          class="cover quiet"
+          width={COLOURS_PX + (values === undefined ? 0 : HISTOGRAM_PX)}
+          height={ROWS}
+          aria-hidden="true"
+        />
         {numbers.map((value) => (
-          <span key={value} class="colour-bar-tick small quiet" style={{ bottom: `${100 * onBar(base, value)}%` }}>
+          <span key={value} class="colour-bar-tick tick small quiet" style={{ bottom: `${100 * onBar(base, value)}%` }}>
             {write(value)}
           </span>
         ))}

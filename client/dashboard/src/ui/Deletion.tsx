@@ -1,5 +1,6 @@
 import type { Signal } from "@preact/signals";
 import type { ComponentChildren } from "preact";
+import { Button } from "./controls";
 
 import { Dialog } from "./Dialog";
 import { TaskLine } from "./Steer";
@@ -29,14 +30,11 @@ export function Deletion<T>({ doomed, kind, remove, children }: DeletionProps<T>
     <Dialog open={value !== null} title={`Delete this ${kind}?`} onClose={close}>
       <div class="control column">{value !== null && children(value)}</div>
       <TaskLine task={task} />
-      <div class="dialog-actions">
-        <span class="spring" />
-        <button type="button" onClick={close}>
-          Keep
-        </button>
-        <button type="button" class="danger" disabled={task.busy.value !== null} onClick={() => void confirm()}>
+      <div class="row at-end">
+        <Button onClick={close}>Keep</Button>
+        <Button class="danger" task={task} onClick={() => void confirm()}>
           Delete
-        </button>
+        </Button>
       </div>
     </Dialog>
   );

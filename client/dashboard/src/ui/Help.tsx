@@ -1,3 +1,4 @@
+import { Button } from "./controls";
 import type { Done } from "./Dialog";
 import { SHORTCUTS } from "./shortcuts";
 import "./Help.css";
@@ -25,10 +26,8 @@ export function Help({ onDone }: Done) {
           </div>
         ))}
       </dl>
-      <div class="dialog-actions">
-        <button type="button" onClick={onDone}>
-          Close
-        </button>
+      <div class="row at-end">
+        <Button onClick={onDone}>Close</Button>
       </div>
     </>
   );

@@ -36,7 +36,7 @@ export function LimitFields({ look, looks }: { look: Look; looks: Looks }) {
   const { unit } = look.product;
   return (
     <>
-      <p class="limits">
+      <p class="limits row apart">
         <span class="quiet">Limits</span>
         <span>
           {field("low", "Low")} <span class="quiet">to</span> {field("high", "High")} {unit === "1" ? "" : unit}

@@ -37,8 +37,8 @@ function Crosshair({ of, width, height }: SizeProps & { of: "selected" | "pointe
   if (style.value === null) return null;
   return (
     <div class={`mark cover mark-${of}`} style={style.value} aria-hidden="true">
-      <i class="mark-column" />
-      <i class="mark-row" />
+      {of === "pointed" && <i class="mark-column" />}
+      {of === "pointed" && <i class="mark-row" />}
       <i class="mark-pixel" />
     </div>
   );
@@ -86,7 +86,7 @@ function Pins({ width, height }: SizeProps) {
       {measures.pins.value.map((pin) => {
         const at = seenAt(viewport.view.value, centreOf(pin, width, height));
         return (
-          <b key={pin.name} class="mark-pin" style={{ left: percent(at.x), top: percent(at.y), "--pin": PIN_COLOURS[pin.name] }}>
+          <b key={pin.name} class="mark-pin pin" style={{ left: percent(at.x), top: percent(at.y), "--pin": PIN_COLOURS[pin.name] }}>
             {pin.name}
           </b>
         );

@@ -24,12 +24,12 @@ export function Panel({ name, title, tools, downloads = [], children }: PanelPro
   const slot = useContext(SlotContext);
   return (
     <section class={`panel column panel-${name}`} aria-label={name} data-view={name}>
-      <header class="panel-head row">
+      <header class="panel-head row apart">
         {/* onto another panel, to change places with it; the menu does the same */}
-        <div class="panel-title" draggable onDragStart={(event) => event.dataTransfer?.setData(DRAGGED, name)}>
+        <div class="panel-title grow" draggable onDragStart={(event) => event.dataTransfer?.setData(DRAGGED, name)}>
           {title}
         </div>
-        <div class="panel-tools">
+        <div class="panel-tools wrapped spaced">
           {tools}
           <ActionMenu label={`Panel ${name}: views and downloads`} groups={[{ title: "Download", actions: downloads }, ...slot]} />
         </div>

@@ -1,35 +1,18 @@
-import type { ComponentChildren } from "preact";
-
 import { useStore } from "../store/store";
+import { Button, type ButtonProps } from "./controls";
 import type { Task } from "./useTask";
 import "./Steer.css";
 
-interface SteerProps {
-  readonly onClick?: () => void;
-  readonly title?: string;
-  readonly primary?: boolean;
-  readonly danger?: boolean;
-  readonly disabled?: boolean;
-  readonly submit?: boolean;
-  /** What it waits for while that is busy. */
-  readonly task?: Task;
-  readonly children: ComponentChildren;
-}
-
 /** A button that changes something of the camera: not to be pressed where that would be refused, and it says why. */
-export function Steer({ onClick, title, primary = false, danger = false, disabled = false, submit = false, task, children }: SteerProps) {
-  const { obstacle } = useStore();
+export function Steer({ title, disabled = false, ...button }: ButtonProps) {
+  const obstacle = useStore().obstacle.value;
   return (
-    <button
-      type={submit ? "submit" : "button"}
-      class={primary ? "primary" : danger ? "danger" : undefined}
-      title={obstacle.value ?? title}
-      disabled={disabled || obstacle.value !== null || (task !== undefined && task.busy.value !== null)}
-      data-obstacle={obstacle.value === null ? undefined : ""}
-      onClick={onClick}
-    >
-      {children}
-    </button>
+    <Button
+      {...button}
+      title={obstacle ?? title}
+      disabled={disabled || obstacle !== null}
+      data-obstacle={obstacle === null ? undefined : ""}
+    />
   );
 }
 
@@ -41,9 +24,9 @@ export function Obstacle() {
   return (
     <p class="obstacle" role="status">
       {obstacle.value}: you can look, but not change this.{" "}
-      <button type="button" class="link" onClick={() => (asks.value = true)}>
+      <Button class="link" onClick={() => (asks.value = true)}>
         {way}
-      </button>
+      </Button>
     </p>
   );
 }

@@ -1,6 +1,19 @@
 import type { Signal } from "@preact/signals";
-import type { ComponentChildren, InputHTMLAttributes } from "preact";
+import type { ButtonHTMLAttributes, ComponentChildren, InputHTMLAttributes, SelectHTMLAttributes } from "preact";
+import type { Task } from "./useTask";
 import "./controls.css";
+
+export interface ButtonProps extends Omit<ButtonHTMLAttributes, "disabled" | "title"> {
+  readonly title?: string | undefined;
+  readonly disabled?: boolean;
+  /** What it waits for while that is busy. */
+  readonly task?: Task;
+}
+
+/** A button that does something in the page; of a form that is sent, its type says so. */
+export function Button({ task, disabled = false, ...button }: ButtonProps) {
+  return <button type="button" {...button} disabled={disabled || (task !== undefined && task.busy.value !== null)} />;
+}
 
 interface ChoiceProps<T extends string | number> {
   readonly label: string;
@@ -8,26 +21,42 @@ interface ChoiceProps<T extends string | number> {
   readonly chosen: Signal<T>;
   readonly of: readonly T[];
   readonly text: (value: T) => string;
+  /** What stands in it says what it is. */
+  readonly bare?: boolean;
 }
 
 /** One of several, as a drop-down. */
-export function Choice<T extends string | number>({ label, chosen, of, text }: ChoiceProps<T>) {
+export function Choice<T extends string | number>({ label, chosen, of, text, bare = false }: ChoiceProps<T>) {
   return (
-    <label class="choice inline-row">
-      <span class="quiet choice-label unseen">{label}</span>
-      <select
-        value={String(chosen.value)}
-        onChange={(event) => {
-          chosen.value = of.find((value) => String(value) === event.currentTarget.value) ?? chosen.peek();
-        }}
-      >
-        {of.map((value) => (
-          <option key={value} value={String(value)}>
-            {text(value)}
-          </option>
-        ))}
-      </select>
+    <label class="choice inline-row apart">
+      <span class={bare ? "unseen" : "quiet"}>{label}</span>
+      <Select value={chosen.value} of={of} text={text} onChoose={(value) => (chosen.value = value)} />
     </label>
+  );
+}
+
+interface SelectProps<T extends string | number> extends Omit<SelectHTMLAttributes, "value" | "onChange"> {
+  /** What is chosen. */
+  readonly value: T;
+  readonly of: readonly T[];
+  readonly text: (value: T) => string;
+  readonly onChoose: (value: T) => void;
+}
+
+/** A drop-down alone. */
+export function Select<T extends string | number>({ of, text, onChoose, value: chosen, ...select }: SelectProps<T>) {
+  return (
+    <select
+      {...(select as SelectHTMLAttributes)}
+      value={String(chosen)}
+      onChange={(event) => onChoose(of.find((value) => String(value) === event.currentTarget.value) ?? chosen)}
+    >
+      {of.map((value) => (
+        <option key={value} value={String(value)}>
+          {text(value)}
+        </option>
+      ))}
+    </select>
   );
 }
 
@@ -92,7 +121,7 @@ interface CheckProps {
 /** A box that is ticked or not, with its words. */
 export function Check({ checked, title, onChange, children }: CheckProps) {
   return (
-    <label class="check" title={title}>
+    <label class="check inline-row nowrap" title={title}>
       <input type="checkbox" checked={checked} onChange={(event) => onChange(event.currentTarget.checked)} />
       <span>{children}</span>
     </label>
@@ -108,42 +137,65 @@ export function Toggle({ on, title, children }: { on: Signal<boolean>; title: st
   );
 }
 
-interface TextFieldProps {
+/** What is typed, and what else an input has. */
+interface TypedProps extends Omit<InputHTMLAttributes, "value" | "onInput"> {
+  readonly text: { value: string };
+}
+
+/** An input alone. */
+export function Typed({ text, ...input }: TypedProps) {
+  return (
+    <input
+      type="text"
+      autocomplete="off"
+      {...(input as InputHTMLAttributes)}
+      value={text.value}
+      onInput={(event) => (text.value = event.currentTarget.value)}
+    />
+  );
+}
+
+/** What is typed and kept elsewhere than in a signal. */
+export function keptAs(value: string, onType: (text: string) => void): TypedProps["text"] {
+  return {
+    get value() {
+      return value;
+    },
+    set value(text) {
+      onType(text);
+    },
+  };
+}
+
+interface FieldProps extends TypedProps {
   readonly label: string;
-  /** What is typed. */
-  readonly text: Signal<string>;
-  readonly name: string;
-  readonly type?: "text" | "password";
-  readonly class?: string;
-  readonly placeholder?: string;
-  readonly maxLength?: number;
-  readonly autocomplete?: string;
-  readonly spellcheck?: boolean;
-  readonly "aria-invalid"?: boolean;
 }
 
 /** Words as they are typed. */
-export function TextField({ label, text, class: kind = "field", ...input }: TextFieldProps) {
+export function TextField({ label, class: kind = "field", ...input }: FieldProps) {
   return (
     <label class={kind}>
-      <span>{label}</span>
-      <input
-        {...({ type: "text", autocomplete: "off", ...input } as InputHTMLAttributes)}
-        value={text.value}
-        onInput={(event) => (text.value = event.currentTarget.value)}
-      />
+      <span class="small quiet">{label}</span>
+      <Typed {...input} />
     </label>
   );
 }
 
-interface FormProps {
-  readonly class: string;
-  readonly onSubmit: () => void;
-  readonly children: ComponentChildren;
+/** A number as it is typed, with its unit. */
+export function NumberField({ label, unit, ...input }: FieldProps & { readonly unit: string }) {
+  return (
+    <label class="field">
+      <span class="small quiet">{label}</span>
+      <span class="field-input row">
+        <Typed inputMode="decimal" {...input} />
+        <span class="quiet">{unit}</span>
+      </span>
+    </label>
+  );
 }
 
 /** Fields whose button, or the Enter key, does something in this page. */
-export function Form({ class: kind, onSubmit, children }: FormProps) {
+export function Form({ class: kind, onSubmit, children }: { class: string; onSubmit: () => void; children: ComponentChildren }) {
   return (
     <form
       class={kind}
@@ -154,29 +206,5 @@ export function Form({ class: kind, onSubmit, children }: FormProps) {
     >
       {children}
     </form>
-  );
-}
-
-interface NumberFieldProps {
-  readonly label: string;
-  readonly unit: string;
-  readonly name: string;
-  readonly value: string;
-  readonly onType: (text: string) => void;
-  readonly placeholder?: string;
-  readonly "aria-invalid"?: boolean;
-  readonly "aria-describedby"?: string;
-}
-
-/** A number as it is typed, with its unit. */
-export function NumberField({ label, unit, onType, ...input }: NumberFieldProps) {
-  return (
-    <label class="field">
-      <span>{label}</span>
-      <span class="field-input">
-        <input type="text" inputMode="decimal" autocomplete="off" {...input} onInput={(event) => onType(event.currentTarget.value)} />
-        <span class="quiet">{unit}</span>
-      </span>
-    </label>
   );
 }

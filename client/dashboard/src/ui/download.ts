@@ -1,4 +1,4 @@
-/** Files made in the page: what is on screen, as it is on screen. */
+/** Files made in the page: what is on screen, as it is on screen; and files of the service. */
 import { type Api, LIVE, liveFrame, refusalIn } from "../store/api";
 import type { Frame } from "../store/frames";
 import { frameUrl } from "../stream/frameUrl";
@@ -11,6 +11,24 @@ export function save(name: string, content: Blob): void {
   link.click();
   // The browser reads the address in a task of its own.
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+/**
+ * Hands a file of the service to the browser's downloads, under the name that the service gives it, else under `name`.
+ *
+ * Without a token the browser fetches it by itself, with its own progress; with one it cannot show the token, so the
+ * page fetches the file into what the browser keeps beside its memory. Raises RequestError then.
+ */
+export async function download(api: Api, path: string, name: string): Promise<void> {
+  if (api.credentials.token.peek() !== null) {
+    const file = await api.file(path);
+    save(file.name || name, file);
+    return;
+  }
+  const link = document.createElement("a");
+  link.href = `api/v1${path}`;
+  link.download = name;
+  link.click();
 }
 
 /** A canvas as PNG, in its own pixels. Of WebGL only in the task that drew it. */

@@ -1,4 +1,4 @@
-import { computed, effect, type ReadonlySignal, type Signal, useSignal } from "@preact/signals";
+import { computed, effect, type ReadonlySignal, useSignal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 
 import type { Frame } from "../store/frames";
@@ -32,8 +32,9 @@ export function useProducts(products: readonly string[]): void {
   useEffect(() => frames.claim(products), [frames, products.join()]);
 }
 
-/** A signal that is set from an element's size. */
-export function useSize(target: { readonly current: Element | null }, size: Signal<{ width: number; height: number }>): void {
+/** The size of an element in px; of one that is not there yet, zero. */
+export function useSize(target: { readonly current: Element | null }): ReadonlySignal<{ readonly width: number; readonly height: number }> {
+  const size = useSignal({ width: 0, height: 0 });
   useEffect(() => {
     const element = target.current;
     if (element === null) return undefined;
@@ -44,6 +45,7 @@ export function useSize(target: { readonly current: Element | null }, size: Sign
     observer.observe(element);
     return () => observer.disconnect();
   }, [target, size]);
+  return size;
 }
 
 /** The time of the page's clock in s, as often as is asked for. */

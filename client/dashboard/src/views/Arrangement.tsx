@@ -1,7 +1,7 @@
 import { useComputed } from "@preact/signals";
 import { Fragment } from "preact";
 import { useRef } from "preact/hooks";
-import { below, beside, closed, isStack, type Layout, type Row, replaced, type Slot, type Stack, split, viewsOf } from "../store/layout";
+import { below, beside, closed, isStack, type Layout, type Row, replaced, type Slot, split, viewsOf } from "../store/layout";
 import { type Store, useStore } from "../store/store";
 import { DRAGGED, Panel, SlotContext } from "../ui/Panel";
 import { VIEWS } from "./registry";
@@ -13,24 +13,10 @@ export function Arrangement() {
   const layout = store.layout.value;
   const alone = store.alone.value;
   const rows: Layout = alone === null ? layout : [{ share: 1, slots: [{ view: alone, share: 1 }] }];
-  const change = (made: Layout): void => {
-    store.layout.value = made;
-  };
   const aspect = useComputed(() => aspectOf(store)).value;
   return (
-    <main class="views" data-alone={alone !== null} style={{ "--aspect": aspect }}>
-      {rows.map((row, at) => (
-        <Fragment key={at}>
-          {at > 0 && (
-            <Splitter
-              kind="rows"
-              place={rows[at - 1].share / (rows[at - 1].share + row.share)}
-              onMove={(place) => change(split(rows, at - 1, place))}
-            />
-          )}
-          <RowOfViews row={row} onChange={(made) => change(rows.map((each, n) => (n === at ? made : each)))} />
-        </Fragment>
-      ))}
+    <main class="views column" data-alone={alone !== null} style={{ "--aspect": aspect }}>
+      <Parts kind="rows" parts={rows} onChange={(made) => (store.layout.value = made as Layout)} />
     </main>
   );
 }
@@ -41,50 +27,37 @@ function aspectOf({ frames }: Store): number {
   return width / height;
 }
 
-function RowOfViews({ row, onChange }: { row: Row; onChange: (row: Row) => void }) {
-  return (
-    <div class="views-row" style={{ "--share": row.share }}>
-      {row.slots.map((place, at) => (
-        <Fragment key={isStack(place) ? `stack ${at}` : place.view}>
-          {at > 0 && (
-            <Splitter
-              kind="columns"
-              place={row.slots[at - 1].share / (row.slots[at - 1].share + place.share)}
-              onMove={(share) => onChange({ ...row, slots: split(row.slots, at - 1, share) })}
-            />
-          )}
-          {isStack(place) ? (
-            <StackOfViews
-              stack={place}
-              onChange={(made) => onChange({ ...row, slots: row.slots.map((each, n) => (n === at ? made : each)) })}
-            />
-          ) : (
-            <Place {...place} />
-          )}
-        </Fragment>
-      ))}
-    </div>
-  );
+interface PartsProps {
+  /** Whether they stand one below the other or beside each other. */
+  readonly kind: "rows" | "columns";
+  readonly parts: readonly (Slot | Row)[];
+  readonly onChange: (parts: readonly (Slot | Row)[]) => void;
 }
 
-function StackOfViews({ stack, onChange }: { stack: Stack; onChange: (stack: Stack) => void }) {
-  const { slots } = stack;
-  return (
-    <div class="views-stack" style={{ "--share": stack.share }}>
-      {slots.map((slot, at) => (
-        <Fragment key={slot.view}>
-          {at > 0 && (
-            <Splitter
-              kind="rows"
-              place={slots[at - 1].share / (slots[at - 1].share + slot.share)}
-              onMove={(share) => onChange({ ...stack, slots: split(slots, at - 1, share) })}
-            />
-          )}
-          <Place {...slot} />
-        </Fragment>
-      ))}
-    </div>
-  );
+/** The rows of a layout, the places of a row or the panels of a stack, with splitters between them. */
+function Parts({ kind, parts, onChange }: PartsProps) {
+  return parts.map((part, at) => (
+    <Fragment key={isStack(part) ? at : part.view}>
+      {at > 0 && (
+        <Splitter
+          kind={kind}
+          place={parts[at - 1].share / (parts[at - 1].share + part.share)}
+          onMove={(place) => onChange(split(parts, at - 1, place))}
+        />
+      )}
+      {isStack(part) ? (
+        <div class={kind === "rows" ? "views-row column" : "views-stack column"} style={{ "--share": part.share }}>
+          <Parts
+            kind={kind === "rows" ? "columns" : "rows"}
+            parts={part.slots}
+            onChange={(slots) => onChange(parts.map((each, n) => (n === at ? ({ ...part, slots } as Row) : each)))}
+          />
+        </div>
+      ) : (
+        <Place {...part} />
+      )}
+    </Fragment>
+  ));
 }
 
 /** A view and what its panel may do with its place. */

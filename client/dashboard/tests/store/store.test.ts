@@ -73,7 +73,11 @@ describe("the player", () => {
     expect(player.turn.value).toBe(0.25);
     player.seek(0.9);
     expect(player.turn.value).toBe(0.9);
-    [player.playing.value, player.lit.value] = [false, null];
+    player.gaps.value = [{ first: 0.3, last: 0.4 }];
+    player.seek(0.3);
+    player.advance(0.001);
+    expect(player.turn.value).toBe(0.4);
+    [player.playing.value, player.lit.value, player.gaps.value] = [false, null, []];
   });
 
   test("jumps between the arrivals of light, around the period", () => {

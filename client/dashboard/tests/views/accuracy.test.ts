@@ -1,8 +1,8 @@
 import { describe, expect, test } from "vitest";
 
 import type { AppliedDocument, ChoiceDocument, FrameMeta, TradeoffDocument } from "../../src/stream/documents";
-import { goalWords } from "../../src/views/sequence/goals";
 import { endsOf, marksOf, nearest, placeOf, sameSequence, standingOf, stepOf } from "../../src/views/sequence/place";
+import { goalWords } from "../../src/views/sequence/words";
 
 const choice = (capture_s: number, median: number): ChoiceDocument =>
   ({

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 
-import { litOf, peaksOf, turnsOf } from "../../src/views/transient/arrivals";
+import { gapsOf, litOf, peaksOf, turnsOf } from "../../src/views/transient/arrivals";
 
 const PICTURES = 8;
 
@@ -33,6 +33,17 @@ test("light is there from its first to its last arrival, with a little dark arou
   arrivals[60] = 0.3;
   expect(litOf(arrivals)).toEqual({ first: expect.closeTo(0.18, 9), last: expect.closeTo(0.63, 9) });
   expect(litOf(new Float32Array(10))).toBeNull();
+});
+
+test("gaps are the times without light, before, between and after it", () => {
+  const arrivals = new Float32Array(10);
+  [arrivals[2], arrivals[3], arrivals[7]] = [1, 0.5, 0.06];
+  expect(gapsOf(arrivals)).toEqual([
+    { first: 0, last: 0.2 },
+    { first: 0.4, last: 0.7 },
+    { first: 0.8, last: 1 },
+  ]);
+  expect(gapsOf(new Float32Array(10))).toEqual([]);
 });
 
 test("arrivals are marked where most light comes, not where it only trembles", () => {

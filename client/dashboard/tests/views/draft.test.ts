@@ -15,7 +15,7 @@ const SEQUENCE: SequenceDocument = {
 };
 
 describe("a sequence being typed", () => {
-  test("shows the units people use", () => expect(draftOf(SEQUENCE)).toMatchObject({ base_frequency_mhz: "23", exposure_ms: "1.92" }));
+  test("shows the units people use", () => expect(draftOf(SEQUENCE)).toMatchObject({ base_frequency_hz: "23", exposure_s: "1.92" }));
 
   test("comes back as the document it was made from, with what is not edited, but for the camera's own sampling", () => {
     for (const take_order of ["sequential", "interleaved"] as const) {
@@ -32,5 +32,5 @@ describe("a sequence being typed", () => {
   });
 
   test("is read with a decimal comma", () =>
-    expect(documentOf({ ...draftOf(SEQUENCE), base_frequency_mhz: "12,5" }, SEQUENCE)?.base_frequency_hz).toBe(12.5e6));
+    expect(documentOf({ ...draftOf(SEQUENCE), base_frequency_hz: "12,5" }, SEQUENCE)?.base_frequency_hz).toBe(12.5e6));
 });

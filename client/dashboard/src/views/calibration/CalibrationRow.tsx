@@ -4,7 +4,8 @@ import { calibrationPath } from "../../store/api";
 import { useStore } from "../../store/store";
 import type { CalibrationDocument } from "../../stream/documents";
 import { ActionMenu } from "../../ui/ActionMenu";
-import { download } from "../../ui/files";
+import { Button } from "../../ui/controls";
+import { download } from "../../ui/download";
 import { Steer } from "../../ui/Steer";
 import type { Task } from "../../ui/useTask";
 import { clock } from "../replay/words";
@@ -17,9 +18,9 @@ export function NominalRow({ active, task }: { active: boolean; task: Task }) {
   const { calibrations } = useStore();
   return (
     <li class={active ? "row recording recording-shown" : "row recording"} data-calibration="nominal">
-      <div class="recording-words">
-        <p class="recording-name">Nominal gains {active && <em class="tag tag-good">in use</em>}</p>
-        <p class="small quiet recording-figures">those of an ideal modulation; nothing was measured</p>
+      <div class="recording-words grow">
+        <p class="recording-name strong">Nominal gains {active && <em class="tag small strong good">in use</em>}</p>
+        <p class="small quiet line">those of an ideal modulation; nothing was measured</p>
       </div>
       {!active && (
         <Steer task={task} onClick={() => void task.run("Switching…", () => calibrations.activate("nominal"))}>
@@ -30,14 +31,8 @@ export function NominalRow({ active, task }: { active: boolean; task: Task }) {
   );
 }
 
-interface RowProps {
-  readonly calibration: CalibrationDocument;
-  readonly task: Task;
-  readonly onDelete: () => void;
-}
-
 /** One calibration of the list. */
-export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
+export function CalibrationRow({ calibration, task, onDelete }: { calibration: CalibrationDocument; task: Task; onDelete: () => void }) {
   const { api, calibrations } = useStore();
   const { id, name, fits, reason, active, drift } = calibration;
   const called = name || id;
@@ -51,16 +46,17 @@ export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
   };
   return (
     <li class={active ? "row recording recording-shown" : "row recording"} data-calibration={id}>
-      <div class="recording-words">
-        <p class="recording-name" title={id}>
-          {called} {active && fits && <em class="tag tag-good">in use</em>} {active && !fits && <em class="tag">waits for its sequence</em>}{" "}
+      <div class="recording-words grow">
+        <p class="recording-name strong" title={id}>
+          {called} {active && fits && <em class="tag small strong good">in use</em>}{" "}
+          {active && !fits && <em class="tag small strong waiting">waits for its sequence</em>}{" "}
           {doubt !== null && (
-            <em class="tag tag-bad" data-field="verdict" title={calibration.verdict.reason ?? ""}>
+            <em class="tag small strong bad" data-field="verdict" title={calibration.verdict.reason ?? ""}>
               {doubt.tag}
             </em>
           )}
         </p>
-        <p class="small quiet recording-figures">
+        <p class="small quiet line">
           <span title={clock(calibration.created_at)}>{ageOf(calibration.age_s)}</span>
           <span>{fixed(calibration.temperature_c, 1, "°C")}</span>
           <span>{sequenceOf(calibration)}</span>
@@ -72,7 +68,7 @@ export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
           </p>
         )}
         {doubt !== null && (warned.value || active) && (
-          <div class="refusal doubt" role="status" data-field="doubt">
+          <div class="refusal row doubt" role="status" data-field="doubt">
             <Blocks verdict={calibration.verdict} />
             <p>
               {doubt.words} {calibration.verdict.reason} {!active && forcing && "Used anyway, ranges may be wrong everywhere."}
@@ -95,15 +91,14 @@ export function CalibrationRow({ calibration, task, onDelete }: RowProps) {
           {forcing && warned.value ? "Use anyway" : "Use"}
         </Steer>
       )}
-      <button
-        type="button"
+      <Button
         aria-label={`Export ${called}`}
         title="Its file, to be taken in elsewhere"
-        disabled={task.busy.value !== null}
+        task={task}
         onClick={() => void task.run("Fetching the file…", () => download(api, `${calibrationPath(id)}/file`, `${id}.npz`))}
       >
         Export
-      </button>
+      </Button>
       <ActionMenu
         label={`More of ${called}`}
         groups={[

@@ -3,7 +3,7 @@ import { useEffect } from "preact/hooks";
 import { fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
 import type { CalibrationDocument, JobDocument } from "../../stream/documents";
-import { Check, Form, NumberField, TextField } from "../../ui/controls";
+import { Button, Check, Form, NumberField, TextField } from "../../ui/controls";
 import { Deletion } from "../../ui/Deletion";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
@@ -27,7 +27,7 @@ export function CalibrationView() {
   const outcome = calibrations.outcome.value;
   return (
     <Panel name="calibration" title={<h2>Calibration</h2>} tools={<Import task={task} />}>
-      <div class="panel-body column fades">
+      <div class="panel-body column grow fades">
         {job === null ? <MeasureForm task={task} /> : <Measuring job={job} task={task} />}
         <Obstacle />
         <TaskLine task={task} field="calibration-status" />
@@ -72,20 +72,19 @@ function MeasureForm({ task }: { task: Task }) {
   return (
     <Form class="record-form measure-form" onSubmit={() => void measure()}>
       <TextField label="Name" class="field record-name" name="name" maxLength={200} placeholder="after warm-up" text={name} />
-      <NumberField
-        label="Frames, with and without light"
-        unit=""
-        name="frames"
-        aria-invalid={!sensible}
-        value={frames.value}
-        onType={(text) => (frames.value = text)}
-      />
+      <NumberField label="Frames, with and without light" unit="" name="frames" aria-invalid={!sensible} text={frames} />
       <div class="record-actions row">
-        <Steer submit primary title="Measure with the present sequence; no frames come meanwhile" disabled={!sensible} task={task}>
+        <Steer
+          type="submit"
+          class="primary"
+          title="Measure with the present sequence; no frames come meanwhile"
+          disabled={!sensible}
+          task={task}
+        >
           Measure
         </Steer>
       </div>
-      <p class="quiet form-wide">
+      <p class="quiet whole-row">
         Put filter and diffuser before the lens first, so that the light shines at the sensor. <Diffuser task={task} />{" "}
         <Check checked={activate.value} onChange={(checked) => (activate.value = checked)}>
           Use it at once
@@ -139,10 +138,10 @@ function Measuring({ job, task }: { job: JobDocument; task: Task }) {
         Measuring: <span data-field="job-step">{job.step}</span>
       </span>
       <span data-field="job-progress">{fixed(100 * job.progress, 0, "%")}</span>
-      <span class="spring" />
-      <button type="button" disabled={task.busy.value !== null} onClick={() => void task.run("Cancelling…", () => calibrations.cancel())}>
+      <span class="grow" />
+      <Button task={task} onClick={() => void task.run("Cancelling…", () => calibrations.cancel())}>
         Cancel
-      </button>
+      </Button>
       <progress max={1} value={job.progress} aria-label="Progress of the calibration" />
     </div>
   );
@@ -153,13 +152,8 @@ function Import({ task }: { task: Task }) {
   const store = useStore();
   const take = (file: File): void => void task.run(`Taking in ${file.name}…`, () => store.calibrations.take(file));
   return (
-    <button
-      type="button"
-      title="Take in a calibration that was exported elsewhere"
-      disabled={task.busy.value !== null}
-      onClick={() => chooseFile(store, ".npz", take)}
-    >
+    <Button title="Take in a calibration that was exported elsewhere" task={task} onClick={() => chooseFile(store, ".npz", take)}>
       Import…
-    </button>
+    </Button>
   );
 }

@@ -9,11 +9,11 @@ export function EventsView() {
   const all = [...events.all.value].reverse();
   return (
     <Panel name="events" title={<h2>What happened</h2>}>
-      <div class="panel-body column fades">
+      <div class="panel-body column grow fades">
         {all.length === 0 && <p class="quiet recordings-none">Nothing worth telling since the page was opened.</p>}
         <ul class="events fades" tabIndex={0} aria-label="What happened">
           {all.map(({ number, at_s, words, tone }) => (
-            <li key={number} class={`event event-${tone}`}>
+            <li key={number} class={tone === "bad" ? "event bad" : "event"}>
               <time class="quiet">{timeOfDay(at_s)}</time> {words}
             </li>
           ))}

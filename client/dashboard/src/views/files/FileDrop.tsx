@@ -2,7 +2,8 @@ import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 
 import { useStore } from "../../store/store";
-import { openFile } from "./openFile";
+import { Button } from "../../ui/controls";
+import { chooseFile, openFile } from "./openFile";
 import "./FileDrop.css";
 
 const carriesFiles = (event: DragEvent): boolean => event.dataTransfer?.types.includes("Files") ?? false;
@@ -38,5 +39,15 @@ export function FileDrop() {
     <div class="file-drop" aria-hidden="true">
       <p>A scene (.toml) to put the camera before, a recording (.h5) of this service to show, a calibration (.npz) to take in</p>
     </div>
+  );
+}
+
+/** Opens a file of one kind from the disk. */
+export function OpenButton({ kind, title }: { readonly kind: string; readonly title: string }) {
+  const store = useStore();
+  return (
+    <Button title={title} onClick={() => chooseFile(store, kind)}>
+      Open…
+    </Button>
   );
 }

@@ -30,13 +30,8 @@ export function SecondMapView() {
   return <MapPanel name="second-map" choice={useStore().secondMapProduct} />;
 }
 
-interface MapPanelProps {
-  readonly name: ViewName;
-  readonly choice: Signal<string>;
-}
-
 /** A map of one number a pixel: range, one of the lights, or how sure these are. */
-function MapPanel({ name, choice }: MapPanelProps) {
+function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) {
   const store = useStore();
   const absent = store.frames.absent.value;
   const obstacleOf = ({ product }: MapProduct): string | undefined => absent[product];
@@ -98,13 +93,8 @@ function MapLookMenu({ look, name }: { look: Look; name: ViewName }) {
   );
 }
 
-interface MapProps {
-  readonly look: Look;
-  readonly canvas: RefObject<HTMLCanvasElement | null>;
-}
-
 /** Nothing but the figures is keyed by the product: another map must not take the focus from the picture. */
-function MapPicture({ look, canvas }: MapProps) {
+function MapPicture({ look, canvas }: { look: Look; canvas: RefObject<HTMLCanvasElement | null> }) {
   const store = useStore();
   const { product: shown, frame } = look;
   useProducts([shown.product, store.frames.amplitude.value]);
@@ -132,14 +122,14 @@ function MapPicture({ look, canvas }: MapProps) {
 
   return (
     <>
-      <div class="picture">
+      <div class="picture grow spaced">
         <Stage frame={frame} label={`${shown.name} map`}>
           <canvas ref={canvas} />
           {shown.unit === "m" && <Hatch />}
         </Stage>
         <MapBar look={waiting.value ? null : look} marked={marked} />
       </div>
-      <footer class="panel-foot column">
+      <footer class="panel-foot column spaced">
         <Readout key={shown.product} look={look} />
         <Measured look={look} />
       </footer>

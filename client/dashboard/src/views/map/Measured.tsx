@@ -1,6 +1,5 @@
 import { type ReadonlySignal, useComputed } from "@preact/signals";
 import { useRef } from "preact/hooks";
-
 import { DEGREE } from "../../physics/constants";
 import { tiltOf } from "../../physics/plane";
 import { engineering, fixed, grouped } from "../../scales/format";
@@ -8,6 +7,7 @@ import { histogram } from "../../scales/scale";
 import type { Look } from "../../store/looks";
 import { figuresOf, type RegionFigures } from "../../store/measures";
 import { useStore } from "../../store/store";
+import { Button } from "../../ui/controls";
 import { useComputedOf, useDrawing } from "../../ui/hooks";
 import { lensOf } from "../points/lens";
 import { PinsRow } from "./PinsRow";
@@ -46,7 +46,7 @@ function RegionRow({ look }: { look: Look }) {
   }).value;
   if (found === null) return null;
   return (
-    <div class="panel-row measured" role="group" aria-label="Region">
+    <div class="panel-row wrapped measured" role="group" aria-label="Region">
       <span title="Mean over the pixels of the region">
         <span class="quiet">region</span> <span data-field="region-mean">{fixed(found.mean, decimals, unit)}</span>
       </span>
@@ -67,9 +67,9 @@ function RegionRow({ look }: { look: Look }) {
         </span>
       )}
       <RegionHistogram look={look} figures={figures} />
-      <button type="button" class="remove" aria-label="Remove region" title="Remove region" onClick={() => (measures.region.value = null)}>
+      <Button class="remove" aria-label="Remove region" title="Remove region" onClick={() => (measures.region.value = null)}>
         ✕
-      </button>
+      </Button>
     </div>
   );
 }

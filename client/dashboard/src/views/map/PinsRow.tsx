@@ -2,6 +2,7 @@ import { deviation, fixed } from "../../scales/format";
 import type { Look } from "../../store/looks";
 import { PIN_COLOURS, type Pin } from "../../store/measures";
 import { useStore } from "../../store/store";
+import { Button } from "../../ui/controls";
 import { useProducts } from "../../ui/hooks";
 import { distanceOf, lensOf, type Ranged } from "../points/lens";
 import { valueAtPixel } from "./Readout";
@@ -20,7 +21,7 @@ export function PinsRow({ look }: { look: Look }) {
   };
   const pairs = pins.flatMap((a, n) => pins.slice(n + 1).map((b) => [a, b] as const));
   return (
-    <div class="panel-row measured" role="group" aria-label="Pins">
+    <div class="panel-row wrapped measured" role="group" aria-label="Pins">
       {pins.map((pin) => (
         <span key={pin.name} data-pin={pin.name}>
           <b class="pin" style={{ "--pin": PIN_COLOURS[pin.name] }}>
@@ -46,9 +47,9 @@ export function PinsRow({ look }: { look: Look }) {
             </span>
           );
         })}
-      <button type="button" class="remove" aria-label="Remove pins" title="Remove pins" onClick={() => (measures.pins.value = [])}>
+      <Button class="remove" aria-label="Remove pins" title="Remove pins" onClick={() => (measures.pins.value = [])}>
         ✕
-      </button>
+      </Button>
     </div>
   );
 }

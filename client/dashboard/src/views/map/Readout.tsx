@@ -48,15 +48,15 @@ export function Readout({ look: { product: shown, frame } }: { look: Look }) {
   const isRange = shown.product === "range";
   const worth = useComputed(() => (isRange && looked.value !== null ? rangeWorth(store.rangeErrors, looked.value) : null));
   const number = useComputed(() => frame.value?.meta.frame ?? "");
-  if (place.value === "") return <p class="readout quiet">Point at the picture to read it.</p>;
+  if (place.value === "") return <p class="readout line quiet">Point at the picture to read it.</p>;
   return (
-    <p class="readout" data-frame={number} aria-live="off">
+    <p class="readout line" data-frame={number} aria-live="off">
       <span>
-        <output class="readout-value" data-field="value">
+        <output class="readout-value strong" data-field="value">
           {value}
         </output>{" "}
         {isRange ? (
-          <span class="readout-value readout-error" data-field="error" title="Half of the 90 % interval of this pixel's range">
+          <span class="readout-value readout-error strong" data-field="error" title="Half of the 90 % interval of this pixel's range">
             {value.value === NOTHING ? "" : worth.value?.error}
           </span>
         ) : (

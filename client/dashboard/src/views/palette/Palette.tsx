@@ -30,7 +30,7 @@ export function Palette({ onDone }: Done) {
     event.preventDefault();
   };
   return (
-    <div class="palette column">
+    <div class="palette column spaced">
       <input
         type="text"
         role="combobox"
@@ -52,8 +52,8 @@ export function Palette({ onDone }: Done) {
       />
       <ul ref={list} id={id} role="listbox" aria-label="Commands" tabIndex={-1}>
         {found.map(({ words, key }, n) => (
-          <li key={words} id={`${id}-${n}`} role="option" aria-selected={n === at} onClick={() => run(n)}>
-            {words} {key !== "" && <kbd>{key}</kbd>}
+          <li key={words} class="row apart" id={`${id}-${n}`} role="option" aria-selected={n === at} onClick={() => run(n)}>
+            {words} {key !== undefined && <kbd>{key}</kbd>}
           </li>
         ))}
       </ul>

@@ -34,7 +34,7 @@ export function LineChart({ label, lines, along, across, ends, data }: LineChart
     // Between a change of the lines and the next plot the data may be of other lines.
     if (data.value.length === plot?.series.length) plot.setData(data.value);
   }, [made, data]);
-  return <div class="line-chart" ref={box} role="img" aria-label={label} />;
+  return <div class="line-chart grow" ref={box} role="img" aria-label={label} />;
 }
 
 function makePlot(

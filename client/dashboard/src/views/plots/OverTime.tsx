@@ -5,6 +5,7 @@ import { deviation, fixed } from "../../scales/format";
 import type { Frame } from "../../store/frames";
 import type { Look } from "../../store/looks";
 import { figuresOf, PIN_COLOURS } from "../../store/measures";
+import { type Pixel, pixelText } from "../../store/pixel";
 import { type Store, useStore } from "../../store/store";
 import { useComputedOf, useDrawing } from "../../ui/hooks";
 import { valueAtPixel } from "../map/Readout";
@@ -43,7 +44,7 @@ export function OverTime({ look, data }: { look: Look; data: Signal<uPlot.Aligne
         ends={[-KEPT_S, 0]}
         data={data}
       />
-      <p class="plots-key">
+      <p class="key wrapped">
         {places.value.map(({ key, name: of, colour }) => {
           const { last, mean, std } = history.figures(key);
           return (
@@ -62,34 +63,18 @@ export function OverTime({ look, data }: { look: Look; data: Signal<uPlot.Aligne
 }
 
 function placesOf({ selected, measures }: Store): Place[] {
-  const pixel = selected.value;
-  const region = measures.region.value;
-  return [
-    ...(pixel === null
-      ? []
-      : [
-          {
-            key: `pixel ${pixel.x},${pixel.y}`,
-            name: `${pixel.x}, ${pixel.y}`,
-            colour: "--curve",
-            valueIn: (frame: Frame) => valueAtPixel(frame, pixel),
-          },
-        ]),
-    ...measures.pins.value.map((pin) => ({
-      key: `${pin.name} ${pin.x},${pin.y}`,
-      name: pin.name,
-      colour: PIN_COLOURS[pin.name],
-      valueIn: (frame: Frame) => valueAtPixel(frame, pin),
-    })),
-    ...(region === null
-      ? []
-      : [
-          {
-            key: `region ${JSON.stringify(region)}`,
-            name: "region",
-            colour: "--light",
-            valueIn: ({ values, shape }: Frame) => figuresOf(values, shape[1], shape[0], region).mean,
-          },
-        ]),
-  ];
+  const [pixel, region] = [selected.value, measures.region.value];
+  const at = (place: Pixel, name: string, colour: string): Place => ({
+    key: `${name} ${pixelText(place)}`,
+    name,
+    colour,
+    valueIn: (frame) => valueAtPixel(frame, place),
+  });
+  const places = measures.pins.value.map((pin) => at(pin, pin.name, PIN_COLOURS[pin.name]));
+  if (pixel !== null) places.unshift(at(pixel, `${pixel.x}, ${pixel.y}`, "--curve"));
+  if (region !== null) {
+    const valueIn = ({ values, shape }: Frame): number => figuresOf(values, shape[1], shape[0], region).mean;
+    places.push({ key: `region ${JSON.stringify(region)}`, name: "region", colour: "--light", valueIn });
+  }
+  return places;
 }

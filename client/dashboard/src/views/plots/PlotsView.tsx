@@ -47,7 +47,7 @@ export function PlotsView() {
       tools={<Tabs label="What of the values" value={side.value} options={SIDES} onChange={(value) => (side.value = value)} />}
       downloads={[{ text: "Values (CSV)", run: csv }]}
     >
-      <div class="plots column">
+      <div class="plots column grow spaced">
         {side.value === "time" ? <OverTime key={key} look={look} data={data} /> : <AlongLine key={key} look={look} data={data} />}
       </div>
     </Panel>

@@ -1,17 +1,24 @@
 /** What all plots of the page have in common: its ink and type, and the place that they fill. */
-import { signal, useSignal } from "@preact/signals";
+import { useSignal } from "@preact/signals";
 import type { RefObject } from "preact";
-import { useEffect, useMemo } from "preact/hooks";
+import { useEffect } from "preact/hooks";
 import type uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
 import { useDrawing, useSize } from "../../ui/hooks";
+import "./page.css";
 
 /** The colours of the page where a plot stands, by their custom properties, and how its axes are drawn. */
 export function inkOf(box: HTMLElement): { readonly ink: (name: string) => string; readonly axis: uPlot.Axis } {
+  // Of a custom property only the text is known, and not which of its two colours holds here.
+  const ink = (name: string): string => {
+    box.style.color = `var(${name})`;
+    const { color } = getComputedStyle(box);
+    box.style.color = "";
+    return color;
+  };
   const style = getComputedStyle(box);
-  const ink = (name: string): string => style.getPropertyValue(name);
-  const font = `${ink("--small")} ${style.fontFamily}`;
+  const font = `${style.getPropertyValue("--small")} ${style.fontFamily}`;
   const line = { stroke: ink("--hairline"), width: 1 };
   return { ink, axis: { stroke: ink("--quiet"), font, labelFont: font, grid: line, ticks: { ...line, size: 4 } } };
 }
@@ -32,8 +39,7 @@ export function usePlot<T extends { readonly plot: uPlot }>(
   make: (box: HTMLElement) => T,
   inputs: readonly unknown[],
 ) {
-  const size = useMemo(() => signal({ width: 0, height: 0 }), []);
-  useSize(box, size);
+  const size = useSize(box);
   const made = useSignal<T | null>(null);
   useEffect(() => {
     if (box.current === null) return undefined;

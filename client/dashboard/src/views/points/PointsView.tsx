@@ -2,30 +2,28 @@ import { signal, useComputed } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
 
 import { LightPainter } from "../../gl/paintLight";
-import type { Backdrop } from "../../gl/renderer";
 import { grouped } from "../../scales/format";
 import { LIVE, refusalIn } from "../../store/api";
-import { drawnOf, type Frame } from "../../store/frames";
-import type { TransientLook } from "../../store/lightLook";
+import type { Frame } from "../../store/frames";
 import { aBoolean, aNumber, oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { frameUrl } from "../../stream/frameUrl";
 import { MapBar } from "../../ui/ColourBar";
-import { Choice, Toggle } from "../../ui/controls";
-import { save, savePicture } from "../../ui/download";
+import { Button, Choice, Toggle } from "../../ui/controls";
+import { download, save, savePicture } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
-import { download } from "../../ui/files";
 import { useDrawing, useProducts, useSize } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { PinsRow } from "../map/PinsRow";
-import { LightBar } from "../transient/LightBar";
+import { backdropOf, LightBar } from "../transient/LightBar";
 import { byFlags, byPicture, byValue, colourCloud, fillCloud, type Painter } from "./cloud";
 import { FieldOfView } from "./FieldOfView";
 import { knownLens, lensOf } from "./lens";
 import { plyOf } from "./ply";
 import type { PointScene } from "./Scene";
 import { SceneStage } from "./SceneStage";
+import "../../ui/Ticks.css";
 import "./PointsView.css";
 
 const COLOURINGS = ["range", "light", "validity", "flight"] as const;
@@ -54,8 +52,7 @@ export function PointsView() {
   const range = store.frames.of("range");
   const canvas = useRef<HTMLCanvasElement>(null);
   const box = useRef<HTMLDivElement>(null);
-  const size = useMemo(() => signal({ width: 0, height: 0 }), []);
-  useSize(box, size);
+  const size = useSize(box);
   const scene = useMemo(() => signal<PointScene | null>(null), []);
   const trouble = useMemo(() => signal<string | null>(null), []);
   const count = useMemo(() => signal(0), []);
@@ -189,8 +186,8 @@ export function PointsView() {
         { text: "Points with light and flags (PLY)", run: () => void saveAll() },
       ]}
     >
-      <div class="picture">
-        <div class="points" ref={box}>
+      <div class="picture grow spaced">
+        <div class="points grow" ref={box}>
           <SceneStage canvas={canvas} scene={scene} range={range} />
           {trouble.value !== null ? (
             <p class="stage-empty">{trouble.value}</p>
@@ -206,13 +203,13 @@ export function PointsView() {
           <MapBar look={{ range: rangeLook, light: lightLook, validity: null }[colouring.value]} />
         )}
       </div>
-      <footer class="panel-foot column">
-        <div class="panel-row">
+      <footer class="panel-foot column spaced">
+        <div class="panel-row wrapped apart">
           <span>
             <span data-field="points">{grouped(count.value)}</span> <span class="quiet">points</span>
           </span>
           <FieldOfView />
-          <span class="panel-tools">
+          <span class="wrapped spaced">
             <Toggle on={surrounded} title="Floor with a grid in metres, the camera's axes (x red, y green, z blue) and its field of view">
               Grid
             </Toggle>
@@ -222,24 +219,12 @@ export function PointsView() {
             >
               Shading
             </Toggle>
-            <button type="button" onClick={() => scene.peek()?.fromCamera()}>
-              Camera's eye
-            </button>
-            <button type="button" onClick={() => scene.peek()?.aside()}>
-              Aside
-            </button>
+            <Button onClick={() => scene.peek()?.fromCamera()}>Camera's eye</Button>
+            <Button onClick={() => scene.peek()?.aside()}>Aside</Button>
           </span>
         </div>
         {store.measures.pins.value.length > 0 && <PinsRow look={rangeLook} />}
       </footer>
     </Panel>
   );
-}
-
-/** The still scene behind the light, where it is wanted. */
-function backdropOf(amplitude: Frame | null, light: TransientLook): Backdrop | null {
-  const white = amplitude?.map?.high ?? NaN;
-  return light.backdrop.value && white > 0 && amplitude?.values instanceof Float32Array
-    ? { values: drawnOf(amplitude) as Float32Array, white }
-    : null;
 }

@@ -108,20 +108,21 @@ export class PointScene {
 
   /** Looks from where the camera stands: the picture is the camera's own. */
   fromCamera(): void {
-    this.#eye = true;
-    this.#camera.position.set(0, 0, 1e-6 * this.#distance());
-    this.#controls.target.set(0, 0, -this.#distance());
-    this.#fit();
-    this.#controls.update();
-    this.#draw();
+    const distance = this.#distance();
+    this.#look([0, 0, 1e-6 * distance], -distance, true);
   }
 
   /** Looks from behind the camera and from its side, so that depth and the camera are seen. */
   aside(): void {
-    this.#eye = false;
     const distance = this.#distance();
-    this.#controls.target.set(0, 0, -0.6 * distance);
-    this.#camera.position.set(0.75 * distance, 0.45 * distance, 0.45 * distance);
+    this.#look([0.75 * distance, 0.45 * distance, 0.45 * distance], -0.6 * distance, false);
+  }
+
+  /** Looks from a place at one on the camera's axis, by the camera's own eye or another. */
+  #look(from: readonly [number, number, number], target_z: number, eye: boolean): void {
+    this.#eye = eye;
+    this.#camera.position.set(...from);
+    this.#controls.target.set(0, 0, target_z);
     this.#fit();
     this.#controls.update();
     this.#draw();

@@ -132,7 +132,7 @@ export function SceneStage({ canvas, scene, range }: SceneStageProps) {
         {marks.value.map(({ kind, x, y, text, colour }, n) => (
           <span
             key={n}
-            class={`scene-mark small scene-mark-${kind}`}
+            class={`scene-mark tick small scene-mark-${kind}`}
             style={{ left: `${x}px`, top: `${y}px`, ...(colour === undefined ? {} : { "--pin": colour }) }}
           >
             {text}

@@ -2,7 +2,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { useStore } from "../../store/store";
 import type { ParameterDocument } from "../../stream/documents";
-import { Form } from "../../ui/controls";
+import { Button, Form, keptAs, Select, Typed } from "../../ui/controls";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
@@ -44,7 +44,7 @@ export function ReconstructionView() {
       }
     >
       <Form
-        class="panel-body column fades"
+        class="panel-body column grow fades"
         onSubmit={() => {
           if ("settings" in reading) void apply(reading.settings, typed.peek()?.tag ?? current?.tag ?? null);
         }}
@@ -65,17 +65,16 @@ export function ReconstructionView() {
         {wrong !== null && <p class="refusal">{wrong.words}</p>}
         <TaskLine task={task} field="reconstruction-status" />
         {typed.value !== null && (
-          <div class="editor-actions">
-            <button
-              type="button"
+          <div class="editor-actions row at-end">
+            <Button
               onClick={() => {
                 typed.value = null;
                 task.dismiss();
               }}
             >
               Undo
-            </button>
-            <Steer submit primary disabled={wrong !== null} task={task}>
+            </Button>
+            <Steer type="submit" class="primary" disabled={wrong !== null} task={task}>
               Apply
             </Steer>
           </div>
@@ -99,26 +98,12 @@ function Parameter({ parameter, text, wrong, onInput }: ParameterProps) {
   const choices = allowed ?? (parameter.type === "boolean" ? ["true", "false"] : []);
   return (
     <label class="field" title={description}>
-      <span>{labelOf(name)}</span>
+      <span class="small quiet">{labelOf(name)}</span>
       {choices.length > 0 ? (
-        <select name={name} value={text} onChange={(event) => onInput(event.currentTarget.value)}>
-          {choices.map((choice) => (
-            <option key={choice} value={String(choice)}>
-              {String(choice).replaceAll("-", " ")}
-            </option>
-          ))}
-        </select>
+        <Select name={name} value={text} of={choices.map(String)} text={(choice) => choice.replaceAll("-", " ")} onChoose={onInput} />
       ) : (
-        <span class="field-input">
-          <input
-            type="text"
-            inputMode={isNumber(parameter) ? "decimal" : "text"}
-            autocomplete="off"
-            name={name}
-            value={text}
-            aria-invalid={wrong}
-            onInput={(event) => onInput(event.currentTarget.value)}
-          />
+        <span class="field-input row">
+          <Typed text={keptAs(text, onInput)} name={name} inputMode={isNumber(parameter) ? "decimal" : "text"} aria-invalid={wrong} />
           <span class="quiet">{unitOf(parameter)}</span>
         </span>
       )}

@@ -1,7 +1,7 @@
 import { useSignal } from "@preact/signals";
 import { useStore } from "../../store/store";
 import type { RecordingDocument } from "../../stream/documents";
-import { Form } from "../../ui/controls";
+import { Button, Form, keptAs, Typed } from "../../ui/controls";
 import { Dialog } from "../../ui/Dialog";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
@@ -23,46 +23,31 @@ export function Annotations({ recording, onClose }: { recording: RecordingDocume
   return (
     <Dialog open title={`Notes on ${recording.name}`} onClose={onClose}>
       <Form class="control column" onSubmit={() => void write()}>
-        <div class="lines column">
+        <div class="lines column spaced">
           {lines.value.map(({ name, text }, at) => (
-            <div key={at} class="line">
-              <input
-                type="text"
-                aria-label={`Name of line ${at + 1}`}
-                placeholder="sample"
-                value={name}
-                onInput={(event) => set(at, { name: event.currentTarget.value })}
-              />
-              <input
-                type="text"
+            <div key={at} class="note">
+              <Typed aria-label={`Name of line ${at + 1}`} placeholder="sample" text={keptAs(name, (typed) => set(at, { name: typed }))} />
+              <Typed
                 aria-label={`Text of line ${at + 1}`}
                 placeholder="corner, white paint"
-                value={text}
-                onInput={(event) => set(at, { text: event.currentTarget.value })}
+                text={keptAs(text, (typed) => set(at, { text: typed }))}
               />
-              <button
-                type="button"
-                aria-label={`Remove line ${at + 1}`}
-                onClick={() => (lines.value = lines.peek().filter((_, n) => n !== at))}
-              >
+              <Button aria-label={`Remove line ${at + 1}`} onClick={() => (lines.value = lines.peek().filter((_, n) => n !== at))}>
                 ×
-              </button>
+              </Button>
             </div>
           ))}
-          <button type="button" class="link" onClick={() => (lines.value = [...lines.peek(), { name: "", text: "" }])}>
+          <Button class="link" onClick={() => (lines.value = [...lines.peek(), { name: "", text: "" }])}>
             Add a line
-          </button>
+          </Button>
         </div>
         {said === null && <p class="refusal">Each line needs a name of its own.</p>}
         <TaskLine task={task} />
-        <div class="dialog-actions">
-          <span class="spring" />
-          <button type="button" onClick={onClose}>
-            Cancel
-          </button>
-          <button type="submit" class="primary" disabled={said === null || task.busy.value !== null}>
+        <div class="row at-end">
+          <Button onClick={onClose}>Cancel</Button>
+          <Button type="submit" class="primary" task={task} disabled={said === null}>
             Save
-          </button>
+          </Button>
         </div>
       </Form>
     </Dialog>

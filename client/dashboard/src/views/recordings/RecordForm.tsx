@@ -2,7 +2,7 @@ import { useSignal } from "@preact/signals";
 
 import { PAST_S } from "../../store/recordings";
 import { useStore } from "../../store/store";
-import { Form, NumberField, TextField } from "../../ui/controls";
+import { Button, Form, NumberField, TextField } from "../../ui/controls";
 import type { Task } from "../../ui/useTask";
 import { limitsOf } from "./limits";
 import "./RecordForm.css";
@@ -24,36 +24,28 @@ export function RecordForm({ task }: { task: Task }) {
     const saved = await task.run(`Saving the last ${PAST_S} s…`, () => recordings.savePast(called));
     if (saved) name.value = "";
   };
-  const number = (label: string, unit: string, text: typeof name, field: string) => (
-    <NumberField label={label} unit={unit} name={field} placeholder="none" value={text.value} onType={(typed) => (text.value = typed)} />
-  );
   const busy = task.busy.value !== null;
   return (
     <Form class="record-form" onSubmit={() => void start()}>
       <TextField label="Name" class="field record-name" name="name" maxLength={200} placeholder="named after the time" text={name} />
       <fieldset class="record-limits">
         <legend class="unseen">Ends after</legend>
-        {number("Duration", "s", duration_s, "duration_s")}
-        {number("Size", "MB", size_mb, "size_mb")}
-        {number("Frames", "", frames, "frames")}
+        <NumberField label="Duration" unit="s" name="duration_s" placeholder="none" text={duration_s} />
+        <NumberField label="Size" unit="MB" name="size_mb" placeholder="none" text={size_mb} />
+        <NumberField label="Frames" unit="" name="frames" placeholder="none" text={frames} />
       </fieldset>
       <div class="record-actions row">
-        <button
+        <Button
           type="submit"
-          class="record"
+          class="strong"
           disabled={busy || limits === null}
           title={limits === null ? "A limit must be a number above 0" : "Record every frame, raw"}
         >
-          <i aria-hidden="true" /> Record
-        </button>
-        <button
-          type="button"
-          disabled={busy}
-          title="Keep what the service still holds of the time that has just passed"
-          onClick={() => void savePast()}
-        >
+          <i class="dot bad" aria-hidden="true" /> Record
+        </Button>
+        <Button disabled={busy} title="Keep what the service still holds of the time that has just passed" onClick={() => void savePast()}>
           Save the last {PAST_S} s
-        </button>
+        </Button>
       </div>
     </Form>
   );

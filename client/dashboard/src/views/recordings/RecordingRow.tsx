@@ -4,7 +4,8 @@ import { END_REASONS } from "../../store/events";
 import { useStore } from "../../store/store";
 import type { RecordingDocument } from "../../stream/documents";
 import { ActionMenu } from "../../ui/ActionMenu";
-import { download } from "../../ui/files";
+import { Button } from "../../ui/controls";
+import { download } from "../../ui/download";
 import { PlayIcon } from "../../ui/icons";
 import type { Task } from "../../ui/useTask";
 import { bytes, clock, duration } from "../replay/words";
@@ -38,12 +39,12 @@ export function RecordingRow({ recording, task, onAnnotate, onDelete }: RowProps
   const why = recording.reason === null ? null : (END_REASONS[recording.reason] ?? recording.reason);
   return (
     <li class={shown ? "row recording recording-shown" : "row recording"} data-recording={id}>
-      <button
-        type="button"
+      <Button
         class="play"
         aria-label={`Play ${name}`}
         title="Play it in all views"
-        disabled={!whole || task.busy.value !== null}
+        task={task}
+        disabled={!whole}
         onClick={() =>
           void task.run("Opening…", async () => {
             await replay.open(id);
@@ -52,12 +53,12 @@ export function RecordingRow({ recording, task, onAnnotate, onDelete }: RowProps
         }
       >
         <PlayIcon />
-      </button>
-      <div class="recording-words">
-        <p class="recording-name">
-          {name} {STATES[state] !== null && <em class={state === "damaged" ? "tag tag-bad" : "tag"}>{STATES[state]}</em>}
+      </Button>
+      <div class="recording-words grow">
+        <p class="recording-name strong">
+          {name} {STATES[state] !== null && <em class={`tag small strong ${state === "damaged" ? "bad" : "waiting"}`}>{STATES[state]}</em>}
         </p>
-        <p class="small quiet recording-figures" title={why === null ? undefined : `It ${why}.`}>
+        <p class="small quiet line" title={why === null ? undefined : `It ${why}.`}>
           <span>{clock(recording.started_s)}</span>
           <span data-field="duration">{duration(recording.duration_s)}</span>
           <span data-field="frames">{grouped(recording.frames)} frames</span>
@@ -67,15 +68,15 @@ export function RecordingRow({ recording, task, onAnnotate, onDelete }: RowProps
         {notes.length > 0 && <p class="small recording-notes">{notes.join(" · ")}</p>}
         {recording.problem !== null && <p class="refusal">{recording.problem}</p>}
       </div>
-      <button
-        type="button"
-        disabled={!whole || task.busy.value !== null}
+      <Button
+        task={task}
+        disabled={!whole}
         title="The whole recording as HDF5"
         aria-label={`Download ${name}`}
         onClick={() => void task.run("Fetching the file…", () => download(api, `${recordingPath(id)}/file`, `${id}.h5`))}
       >
         Download
-      </button>
+      </Button>
       <ActionMenu
         label={`More of ${name}`}
         groups={[

@@ -4,12 +4,12 @@ import { grouped } from "../../scales/format";
 import { ORDERS, PAGE } from "../../store/recordings";
 import { useStore } from "../../store/store";
 import type { RecordingDocument, RecordingsDocument } from "../../stream/documents";
-import { Choice, TextField } from "../../ui/controls";
+import { Button, Choice, TextField } from "../../ui/controls";
 import { Deletion } from "../../ui/Deletion";
 import { Panel } from "../../ui/Panel";
 import { TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
-import { OpenButton } from "../files/OpenButton";
+import { OpenButton } from "../files/FileDrop";
 import { bytes, duration } from "../replay/words";
 import { Annotations } from "./Annotations";
 import { RecordForm } from "./RecordForm";
@@ -44,7 +44,7 @@ export function RecordingsView() {
         </>
       }
     >
-      <div class="panel-body column fades">
+      <div class="panel-body column grow fades">
         {recordings.active.value === null ? <RecordForm task={task} /> : <Running recording={recordings.active.value} task={task} />}
         <TaskLine task={task} field="recordings-status" />
         {recordings.trouble.value !== null && <p class="refusal">{recordings.trouble.value}</p>}
@@ -63,9 +63,7 @@ export function RecordingsView() {
             ))}
         </ul>
         {known?.next_offset != null && recordings.limit.value < 1000 && (
-          <button type="button" onClick={() => (recordings.limit.value = recordings.limit.value + PAGE)}>
-            Show more
-          </button>
+          <Button onClick={() => (recordings.limit.value = recordings.limit.value + PAGE)}>Show more</Button>
         )}
       </div>
       {annotating.value !== null && <Annotations recording={annotating.value} onClose={() => (annotating.value = null)} />}
@@ -108,8 +106,8 @@ function Running({ recording, task }: { recording: RecordingDocument; task: Task
   const limit_s = recording.limits?.duration_s ?? null;
   return (
     <div class="wrapped recording-now">
-      <span class="recording-sign inline-row">
-        <i aria-hidden="true" /> {recording.name}
+      <span class="recording-sign inline-row bad strong">
+        <i class="dot" aria-hidden="true" /> {recording.name}
       </span>
       <span data-field="recording-duration">
         {duration(recording.duration_s)}
@@ -120,24 +118,19 @@ function Running({ recording, task }: { recording: RecordingDocument; task: Task
       </span>
       <span data-field="recording-size">{bytes(recording.size_bytes)}</span>
       {recording.dropped_frames > 0 && <span class="refusal">{grouped(recording.dropped_frames)} left out</span>}
-      <span class="spring" />
+      <span class="grow" />
       {replay.recording.value?.id !== recording.id && (
-        <button
-          type="button"
-          disabled={recording.frames === 0 || task.busy.value !== null}
-          onClick={() => void task.run("Opening…", () => replay.open(recording.id))}
-        >
+        <Button task={task} disabled={recording.frames === 0} onClick={() => void task.run("Opening…", () => replay.open(recording.id))}>
           Watch from its start
-        </button>
+        </Button>
       )}
-      <button
-        type="button"
+      <Button
         class="danger"
-        disabled={task.busy.value !== null}
+        task={task}
         onClick={() => void task.run("Writing the rest to the disk…", () => recordings.stop(recording.id))}
       >
         Stop recording
-      </button>
+      </Button>
       {limit_s !== null && <progress max={limit_s} value={recording.duration_s} aria-label="Share of the recording that is done" />}
     </div>
   );

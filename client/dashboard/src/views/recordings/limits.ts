@@ -1,19 +1,11 @@
 import { numberOf } from "../../scales/format";
 import type { RecordingRequest } from "../../stream/documents";
 
-/** Limits of a recording as they are typed; empty for none. */
-export interface TypedLimits {
-  readonly duration_s: string;
-  readonly size_mb: string;
-  readonly frames: string;
-}
-
-/** What is typed, as the service takes it; null where it is no limit. */
-export function limitsOf({
-  duration_s,
-  size_mb,
-  frames,
-}: TypedLimits): Pick<RecordingRequest, "duration_s" | "max_bytes" | "frames"> | null {
+/** What is typed, empty for no limit, as the service takes it; null where it is none. */
+export function limitsOf(
+  typed: Readonly<Record<"duration_s" | "size_mb" | "frames", string>>,
+): Pick<RecordingRequest, "duration_s" | "max_bytes" | "frames"> | null {
+  const { duration_s, size_mb, frames } = typed;
   const [duration, size, count] = [duration_s, size_mb, frames].map((text) => (text.trim() === "" ? null : numberOf(text)));
   const sensible = (value: number | null): boolean => value === null || (Number.isFinite(value) && value > 0);
   if (![duration, size, count].every(sensible) || (count !== null && !Number.isInteger(count))) return null;

@@ -2,7 +2,7 @@ import { useEffect } from "preact/hooks";
 import { fixed, grouped } from "../../scales/format";
 import { REPLAY_SPEEDS, type Replay, type Timeline } from "../../store/replay";
 import { useStore } from "../../store/store";
-import { Choice } from "../../ui/controls";
+import { Button, Choice } from "../../ui/controls";
 import { PauseIcon, PlayIcon, StepIcon } from "../../ui/icons";
 import { clock } from "./words";
 import "./ReplayBar.css";
@@ -25,23 +25,23 @@ export function ReplayBar() {
         </span>
       </div>
       <div class="replay-controls row">
-        <button type="button" class="play" aria-label="One frame back" title="One frame back ([)" onClick={() => replay.step(-1)}>
+        <Button class="play" aria-label="One frame back" title="One frame back ([)" onClick={() => replay.step(-1)}>
           <StepIcon back />
-        </button>
-        <button
-          type="button"
+        </Button>
+        <Button
           class="play"
           aria-label={playing ? "Pause the recording" : "Play the recording"}
           title="Play or pause the recording (P)"
           onClick={() => replay.toggle()}
         >
           {playing ? <PauseIcon /> : <PlayIcon />}
-        </button>
-        <button type="button" class="play" aria-label="One frame on" title="One frame on (])" onClick={() => replay.step(1)}>
+        </Button>
+        <Button class="play" aria-label="One frame on" title="One frame on (])" onClick={() => replay.step(1)}>
           <StepIcon />
-        </button>
-        <Choice label="Speed of the recording" chosen={replay.speed} of={REPLAY_SPEEDS} text={(speed) => `${speed} ×`} />
+        </Button>
+        <Choice bare label="Speed of the recording" chosen={replay.speed} of={REPLAY_SPEEDS} text={(speed) => `${speed} ×`} />
         <Choice
+          bare
           label="Computed with"
           chosen={replay.settings}
           of={["recorded", "current"]}
@@ -49,9 +49,9 @@ export function ReplayBar() {
         />
       </div>
       <Scrubber replay={replay} timeline={timeline} />
-      <button type="button" class="primary" onClick={() => replay.leave()}>
+      <Button class="primary" onClick={() => replay.leave()}>
         Back to live
-      </button>
+      </Button>
     </section>
   );
 }
@@ -65,7 +65,7 @@ function Scrubber({ replay, timeline }: { replay: Replay; timeline: Timeline }) 
     if (frame > last) replay.seek(last);
   }, [replay, frame, last]);
   return (
-    <div class="scrubber">
+    <div class="scrubber grow">
       <input
         type="range"
         min={first}
@@ -83,7 +83,7 @@ function Scrubber({ replay, timeline }: { replay: Replay; timeline: Timeline }) 
           replay.seek(event.currentTarget.valueAsNumber);
         }}
       />
-      <p class="scrubber-words">
+      <p class="scrubber-words small">
         <span data-field="replay-time">{fixed(time_s, 2, "s")}</span> <span class="quiet">of {fixed(replay.timeOf(last), 2, "s")}</span>
         <span class="scrubber-frame">
           <span class="quiet">frame</span> <span data-field="replay-frame">{grouped(frame - first + 1)}</span>{" "}

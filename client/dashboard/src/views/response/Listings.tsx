@@ -1,7 +1,7 @@
 import { rangeOfTime_m } from "../../physics/constants";
 import { deviation, engineering, fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
-import type { PixelDocument, ReturnDocument } from "../../stream/documents";
+import type { PixelDocument } from "../../stream/documents";
 import { FLAGS } from "../../ui/flags";
 import type { FlagHistory } from "./flagShares";
 import { linesOf, type ReturnHistory, type ReturnLine, sifted } from "./returns";
@@ -64,11 +64,6 @@ function ReturnTable({ details, history }: { details: PixelDocument; history: Re
   const { strong, weak, weakShare } = sifted(details.returns);
   const lines = linesOf(strong, sifted(details.truth?.returns ?? []).strong);
   const beyond = Math.max(0, lines.length - LINES);
-  const [found, truth, difference] = [
-    lines.slice(0, LINES).map((line) => line.found),
-    lines.map((line) => line.truth),
-    lines.map(differenceOf),
-  ];
   const notes = [
     beyond > 0 ? `${beyond} more` : "",
     weak > 0 ? `${weak} weak, together ${fixed(100 * weakShare, 1, "%")} of the light` : "",
@@ -90,7 +85,7 @@ function ReturnTable({ details, history }: { details: PixelDocument; history: Re
         </thead>
         <tbody>
           {Array.from({ length: LINES }, (_, at) => (
-            <ReturnRow key={at} found={found[at] ?? null} truth={truth[at] ?? null} difference={difference[at] ?? ""} history={history} />
+            <ReturnRow key={at} line={lines[at] ?? NO_LINE} history={history} />
           ))}
         </tbody>
       </table>
@@ -107,14 +102,10 @@ function differenceOf({ found, truth }: ReturnLine): string {
   return `${difference_m > 0 ? "+" : ""}${engineering(difference_m, "m", 2)}`;
 }
 
-interface ReturnRowProps {
-  readonly found: ReturnDocument | null;
-  readonly truth: ReturnDocument | null;
-  readonly difference: string;
-  readonly history: ReturnHistory;
-}
+const NO_LINE: ReturnLine = { found: null, truth: null };
 
-function ReturnRow({ found, truth, difference, history }: ReturnRowProps) {
+function ReturnRow({ line, history }: { line: ReturnLine; history: ReturnHistory }) {
+  const { found, truth } = line;
   const scatter = found === null ? null : history.of(found);
   const cell = (value: string, std: string) => (
     <td>
@@ -128,7 +119,7 @@ function ReturnRow({ found, truth, difference, history }: ReturnRowProps) {
       {cell(found === null ? "" : fixed(rangeOfTime_m(found.time_s), 2, "m"), deviation(rangeOfTime_m(scatter?.time_s ?? NaN), "m"))}
       {cell(found === null ? "" : fixed(found.weight, 0, "DN"), deviation(scatter?.weight, "DN"))}
       {cell(truth === null ? "" : fixed(rangeOfTime_m(truth.time_s), 2, "m"), truth === null ? "" : fixed(truth.weight, 0, "DN"))}
-      <td>{difference}</td>
+      <td>{differenceOf(line)}</td>
     </tr>
   );
 }

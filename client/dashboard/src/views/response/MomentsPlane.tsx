@@ -16,7 +16,7 @@ export function MomentsPlane({ pixel }: { pixel: ReadonlySignal<Pixel | null> })
     return { j: at + 1, re, im };
   });
   return (
-    <div class="moments">
+    <div class="moments grow">
       <svg
         class="moments-plane"
         viewBox={`${-REACH} ${-REACH} ${2 * REACH} ${2 * REACH}`}

@@ -90,7 +90,7 @@ export function ResponseView() {
         </>
       }
     >
-      <div class="response">
+      <div class="response grow spaced">
         {frameless.value ? <FirstFrame /> : place.value === null && <p class="stage-empty">Click a pixel in one of the pictures.</p>}
         {place.value === null ? null : obstacle !== undefined ? (
           <p class="absent" data-field="absent">
@@ -102,7 +102,7 @@ export function ResponseView() {
           <Plot key={side.value} aspect={side.value} logarithmic={logarithmic} shown={shown} returns={returns} pointed={pointed} />
         )}
         {place.value !== null && (
-          <aside class="response-side column fades" aria-label="What was found at the pixel" tabIndex={0}>
+          <aside class="response-side column spaced fades" aria-label="What was found at the pixel" tabIndex={0}>
             <Found flags={flags} returns={returns} details={store.details.document.value} of={looked.value?.meta.frame ?? null} />
             <PixelFigures details={store.details.document.value} />
             <FlagWords flags={flags} looked={store.details.document.value !== null} />
@@ -196,8 +196,8 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
 
   const simulated = store.details.document.value?.truth != null;
   return (
-    <div class="response-plot-box column">
-      <div class="response-plot" ref={box} data-empty={shown.value === null} data-aspect={aspect} />
+    <div class="response-plot-box column grow">
+      <div class="response-plot grow" ref={box} data-empty={shown.value === null} data-aspect={aspect} />
       <div class="key wrapped small">
         {aspect === "bounds" && (
           <span class="key-band" title="Any light with these moments lies within them">
@@ -206,7 +206,7 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
         )}
         <span>estimate</span>
         {measures.pins.value.map(({ name }) => (
-          <span key={name} class="key-pin" style={{ "--pin": PIN_COLOURS[name] }}>
+          <span key={name} class="key-pin" style={{ "--line": PIN_COLOURS[name] }}>
             {name}
           </span>
         ))}
@@ -214,7 +214,7 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
           returns ± 1 σ
         </span>
         {simulated && (
-          <span class="key-truth" title="Stems are the true returns, as high as their share of the light">
+          <span style={{ "--line": "var(--truth)" }} title="Stems are the true returns, as high as their share of the light">
             truth
           </span>
         )}

@@ -2,6 +2,7 @@ import uPlot from "uplot";
 
 import { rangeOfTime_m } from "../../physics/constants";
 import { grouped, significant, withUnit } from "../../scales/format";
+import { powersBetween, ticks } from "../../scales/scale";
 import { PIN_COLOURS, PIN_NAMES } from "../../store/measures";
 import { inkOf, plain } from "../plots/page";
 import { type Curves, ESTIMATES, type PinLines } from "./curves";
@@ -112,7 +113,7 @@ export function responsePlot(box: HTMLElement, { aspect, logarithmic, top, ends_
     if (left >= 0) seek(plot.posToVal(left, "x"));
   });
   const head = document.createElement("i");
-  head.className = "response-head";
+  head.className = "response-head playhead";
   plot.over.append(head);
   return {
     plot,
@@ -138,8 +139,7 @@ function decade(value: number): number {
 }
 
 function powersOfTen(_plot: uPlot, _axis: number, low: number, high: number): number[] {
-  const count = decade(high) - decade(low) + 1;
-  return Array.from({ length: count }, (_, n) => 10 ** (decade(low) + n));
+  return powersBetween(low, high, [1]);
 }
 
 const all = (_plot: uPlot, splits: number[]): number[] => splits;
@@ -154,11 +154,8 @@ function bentSplits(share: number): (plot: uPlot, axis: number, low: number, hig
     const room = Math.max(BENT_ROOM, (BENT_ROOM_PX * uPlot.pxRatio) / plot.bbox.height);
     const place = (value: number): number => Math.asinh((share * value) / high) / Math.asinh(share);
     const kept = [0];
-    for (let power = decade(high / share); power <= decade(high); power++) {
-      for (const factor of [1, 2, 5]) {
-        const value = factor * 10 ** power;
-        if (value <= high && place(value) - place(kept[kept.length - 1]) >= room) kept.push(value);
-      }
+    for (const value of powersBetween(10 ** decade(high / share), high, [1, 2, 5])) {
+      if (place(value) - place(kept[kept.length - 1]) >= room) kept.push(value);
     }
     return kept;
   };
@@ -172,9 +169,5 @@ function tickText(value: number): string {
 const METRES_PER_NS = rangeOfTime_m(1e-9);
 
 function metres(low_ns: number, high_ns: number): number[] {
-  const span_m = (high_ns - low_ns) * METRES_PER_NS;
-  const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50].find((candidate) => span_m / candidate <= 9) ?? 100;
-  const values: number[] = [];
-  for (let n = Math.ceil((low_ns * METRES_PER_NS) / step); n * step <= high_ns * METRES_PER_NS + 1e-9; n++) values.push(n * step);
-  return values;
+  return ticks({ low: low_ns * METRES_PER_NS, high: high_ns * METRES_PER_NS, kind: "linear" }, 9);
 }

@@ -44,12 +44,6 @@ function nearest(each: ReturnDocument, others: readonly ReturnDocument[]): Retur
   return others.reduce<ReturnDocument | null>((best, other) => (best === null || distance(other) < distance(best) ? other : best), null);
 }
 
-/** Standard deviations (1 σ) of a return over the last looks; NaN before there were enough. */
-export interface Scatter {
-  readonly time_s: number;
-  readonly weight: number;
-}
-
 /** The returns of one pixel over its last looks. */
 export class ReturnHistory {
   readonly #looks = new Looks<readonly ReturnDocument[]>();
@@ -59,8 +53,8 @@ export class ReturnHistory {
     this.#looks.take([x, y, meta.sequence_id, meta.calibration_id, scene].join(), meta.frame, returns);
   }
 
-  /** How a return scatters. */
-  of(found: ReturnDocument): Scatter {
+  /** Standard deviations (1 σ) of a return over the last looks; NaN before there were enough. */
+  of(found: ReturnDocument): Pick<ReturnDocument, "time_s" | "weight"> {
     const same = this.#looks.all.flatMap((look) => {
       const near = nearest(found, look);
       return near !== null && Math.abs(near.time_s - found.time_s) <= SAME_S ? [near] : [];

@@ -1,18 +1,17 @@
 import { engineering, fixed } from "../../scales/format";
 import { useStore } from "../../store/store";
 import type { AppliedDocument, ChoiceDocument } from "../../stream/documents";
+import { Button } from "../../ui/controls";
 import { useProducts } from "../../ui/hooks";
 import { Obstacle, Steer } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
-import { ChoiceFacts } from "./ChoiceFacts";
+import { ChoiceFacts, Summary } from "./Figures";
 import { Finding } from "./Finding";
 import { FrontPlot } from "./FrontPlot";
 import { FrontSlider } from "./FrontSlider";
 import { GoalForm } from "./GoalForm";
-import { PlannedMap } from "./PlannedMap";
-import { PriceBar } from "./PriceBar";
+import { PlannedMap, PriceBar } from "./PriceBar";
 import { sameSequence, standingOf } from "./place";
-import { Summary } from "./Summary";
 import { errorWords } from "./words";
 import "./AccuracySection.css";
 
@@ -43,25 +42,23 @@ export function AccuracySection({ applied }: { applied: AppliedDocument }) {
   return (
     <div class="accuracy fades" data-predicted={tradeoff !== null}>
       {tradeoff !== null && <FrontPlot tradeoff={tradeoff} now={now} chosen={looked} onChoose={look} />}
-      <div class="accuracy-control">
-        <p class="accuracy-figures">
+      <div class="accuracy-control column spaced">
+        <p class="accuracy-figures line">
           {looked === null ? <NowFigures applied={applied} truth_m={truth_m} /> : <LookedFigures choice={looked} />}
         </p>
         <FrontSlider front={tradeoff?.front ?? []} now_s={applied.capture_s} looked={looked} onLook={look} onRelease={() => void apply()} />
         <Finding task={task} />
         {tradeoff !== null && <Obstacle />}
         {looked !== null && (
-          <div class="accuracy-actions">
-            <button type="button" onClick={() => (accuracy.looked.value = null)}>
-              Back to the present
-            </button>
-            <Steer primary disabled={busy} onClick={() => void apply()}>
+          <div class="row at-end">
+            <Button onClick={() => (accuracy.looked.value = null)}>Back to the present</Button>
+            <Steer class="primary" disabled={busy} onClick={() => void apply()}>
               Apply
             </Steer>
           </div>
         )}
       </div>
-      <div class="accuracy-facts fades">
+      <div class="accuracy-facts column spaced fades">
         {looked === null ? <Summary applied={applied} /> : <ChoiceFacts choice={looked} />}
         {looked !== null && <PriceBar choice={looked} />}
         <PlannedMap />

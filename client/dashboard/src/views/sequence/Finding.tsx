@@ -1,6 +1,7 @@
 import { useStore } from "../../store/store";
+import { Button } from "../../ui/controls";
 import type { Task } from "../../ui/useTask";
-import { goalWords } from "./goals";
+import { goalWords } from "./words";
 import "./Finding.css";
 
 const HINT = "Predict shows what each sequence would give on this scene: some seconds of work for the service.";
@@ -13,21 +14,19 @@ export function Finding({ task }: { task: Task }) {
   if (job !== null) {
     const share = `${Math.round(100 * job.progress)}\u202f%`;
     return (
-      <div class="finding" role="status" data-field="accuracy-status">
+      <div class="finding row" role="status" data-field="accuracy-status">
         <progress value={job.progress} aria-label={job.kind === "tradeoff" ? "Prediction" : "Plan"} />
         <span class="finding-words">
           {share} <span class="quiet">{job.step}</span>
         </span>
-        <button type="button" onClick={() => void accuracy.cancel()}>
-          Cancel
-        </button>
+        <Button onClick={() => void accuracy.cancel()}>Cancel</Button>
       </div>
     );
   }
   const refusal = task.refusal.value ?? (problem === null ? null : goalWords(problem));
   const found = accuracy.outdated.value ? "The scene changed since: predict again." : (accuracy.tradeoff.value?.summary ?? HINT);
   return (
-    <p class={refusal === null ? "finding quiet" : "finding refusal"} role="status" data-field="accuracy-status">
+    <p class={`finding row ${refusal === null ? "quiet" : "refusal"}`} role="status" data-field="accuracy-status">
       {task.busy.value ?? refusal ?? found}
     </p>
   );

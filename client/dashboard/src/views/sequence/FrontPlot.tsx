@@ -1,5 +1,4 @@
-import { signal } from "@preact/signals";
-import { useMemo, useRef } from "preact/hooks";
+import { useRef } from "preact/hooks";
 import { engineering, significant } from "../../scales/format";
 import type { ChoiceDocument, TradeoffDocument } from "../../stream/documents";
 import { useSize } from "../../ui/hooks";
@@ -23,9 +22,7 @@ interface FrontPlotProps {
 /** The Pareto front with its uncertainty, and where the camera stands now. Points are chosen by click or key. */
 export function FrontPlot({ tradeoff, now, chosen, onChoose }: FrontPlotProps) {
   const box = useRef<HTMLDivElement>(null);
-  const size = useMemo(() => signal({ width: 0, height: 0 }), []);
-  useSize(box, size);
-  const { width, height } = size.value;
+  const { width, height } = useSize(box).value;
   const ends = endsOf(tradeoff);
   const inner = { width: width - MARGIN.left - MARGIN.right, height: height - MARGIN.top - MARGIN.bottom };
   const x = (place: number): number => MARGIN.left + place * inner.width;
@@ -50,6 +47,7 @@ export function FrontPlot({ tradeoff, now, chosen, onChoose }: FrontPlotProps) {
     <div class="front" ref={box}>
       {width > 0 && inner.height > 0 && (
         <svg
+          class="cover"
           width={width}
           height={height}
           role="group"

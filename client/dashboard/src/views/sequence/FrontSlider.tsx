@@ -33,9 +33,9 @@ export function FrontSlider({ front, now_s, looked, onLook, onRelease }: FrontSl
   const at = front.findIndex((choice) => sameSequence(choice, looked));
   const step = at >= 0 ? at : looked !== null && last > 0 ? Math.round(stepOf(front, looked.capture_s)) : Math.round(ghost ?? 0);
   return (
-    <div class="front-slider">
+    <div class="row quiet">
       <span aria-hidden="true">fast</span>
-      <div class="front-track">
+      <div class="front-track grow">
         {ghost !== null && <i class="front-ghost" data-field="ghost" style={{ "--place": ghost / last }} title="The present setting" />}
         <input
           type="range"

@@ -4,16 +4,11 @@ import { numberOf } from "../../scales/format";
 import { askedRegion } from "../../store/measures";
 import { useStore } from "../../store/store";
 import type { PlanRequest } from "../../stream/documents";
-import { Check, NumberField } from "../../ui/controls";
+import { Button, Check, Form, NumberField } from "../../ui/controls";
 import "./GoalForm.css";
 
-interface GoalFormProps {
-  readonly disabled: boolean;
-  readonly onGoal: (goal: PlanRequest) => void;
-}
-
 /** A target, a budget, or both: for a share of the pixels, of the region that is marked or of all. */
-export function GoalForm({ disabled, onGoal }: GoalFormProps) {
+export function GoalForm({ disabled, onGoal }: { disabled: boolean; onGoal: (goal: PlanRequest) => void }) {
   const { measures } = useStore();
   const error_mm = useSignal("");
   const share_percent = useSignal("90");
@@ -24,33 +19,20 @@ export function GoalForm({ disabled, onGoal }: GoalFormProps) {
   const share = numberOf(share_percent.value) / 100;
   const sensible = wanted.some((value) => value !== null) && wanted.every((value) => value === null || value > 0) && share > 0 && share < 1;
   return (
-    <form
+    <Form
       class="goal"
-      onSubmit={(event) => {
-        event.preventDefault();
+      onSubmit={() =>
         onGoal({
           target: error === null ? {} : { range_error_m: error * 1e-3 },
           budget: rate === null ? {} : { frame_rate_hz: rate },
           share,
           region: inRegion.value ? askedRegion(measures.region.value) : null,
-        });
-      }}
+        })
+      }
     >
-      <NumberField
-        label="Error at most"
-        unit="mm"
-        name="range_error_mm"
-        value={error_mm.value}
-        onType={(text) => (error_mm.value = text)}
-      />
-      <NumberField
-        label="in so many pixels"
-        unit="%"
-        name="share_percent"
-        value={share_percent.value}
-        onType={(text) => (share_percent.value = text)}
-      />
-      <NumberField label="Frames at least" unit="Hz" name="frame_rate_hz" value={rate_hz.value} onType={(text) => (rate_hz.value = text)} />
+      <NumberField label="Error at most" unit="mm" name="range_error_mm" text={error_mm} />
+      <NumberField label="in so many pixels" unit="%" name="share_percent" text={share_percent} />
+      <NumberField label="Frames at least" unit="Hz" name="frame_rate_hz" text={rate_hz} />
       <Check
         checked={inRegion.value && measures.region.value !== null}
         title="Of the region that is drawn in a map"
@@ -58,9 +40,9 @@ export function GoalForm({ disabled, onGoal }: GoalFormProps) {
       >
         {measures.region.value === null ? "no region is marked" : "in the region"}
       </Check>
-      <button type="submit" disabled={disabled || !sensible}>
+      <Button type="submit" disabled={disabled || !sensible}>
         Plan
-      </button>
-    </form>
+      </Button>
+    </Form>
   );
 }

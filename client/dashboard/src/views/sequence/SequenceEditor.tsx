@@ -6,11 +6,11 @@ import { RequestError } from "../../store/api";
 import { useStore } from "../../store/store";
 import type { AppliedDocument } from "../../stream/documents";
 import type { Problem, SequenceRequest, TakeOrder, Zeroth } from "../../stream/protocol";
-import { NumberField } from "../../ui/controls";
+import { Button, Form, keptAs, NumberField, Select } from "../../ui/controls";
 import { Obstacle, Steer } from "../../ui/Steer";
-import { DRAFT_FIELD, type Draft, documentOf, draftOf, missingOf } from "./draft";
+import { type Draft, documentOf, draftOf, missingOf, NUMBER_NAMES, NUMBERS } from "./draft";
 import { Figures } from "./Figures";
-import { PRESETS } from "./presets";
+import { PRESETS, presetOf } from "./presets";
 import { FIELD_NAMES, fieldOf, measuredOf, sequenceProblem, TAKE_ORDER_NAMES, ZEROTH_COSTS, ZEROTH_NAMES } from "./words";
 import "./SequenceEditor.css";
 
@@ -69,80 +69,57 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; 
   };
 
   const judged = verdict.value;
-  const wrong = judged.kind === "refused" ? (DRAFT_FIELD[fieldOf(judged.problem) ?? ""] ?? null) : null;
-  const field = (name: keyof Draft, label: string, unit: string) => (
-    <NumberField
-      label={label}
-      unit={unit}
-      name={name}
-      value={draft.value[name] ?? ""}
-      aria-invalid={wrong === name}
-      aria-describedby="sequence-verdict"
-      onType={(text) => (draft.value = { ...draft.peek(), [name]: text })}
-    />
-  );
+  const wrong = judged.kind === "refused" ? fieldOf(judged.problem) : null;
+  const set = (change: Partial<Draft>): void => {
+    draft.value = { ...draft.peek(), ...change };
+  };
 
   return (
-    <form
-      class="editor fades"
-      onSubmit={(event) => {
-        event.preventDefault();
-        void apply();
-      }}
-    >
+    <Form class="editor column grow spaced fades" onSubmit={() => void apply()}>
       <div class="fields">
-        <label class="field field-wide">
-          <span>Begin with</span>
-          <select
+        <label class="field whole-row">
+          <span class="small quiet">Begin with</span>
+          <Select
             name="preset"
             value=""
-            onChange={(event) => {
-              const preset = PRESETS.find(({ name }) => name === event.currentTarget.value);
-              if (preset !== undefined) draft.value = draftOf({ ...base, ...preset.sequence });
-            }}
-          >
-            <option value="">the sequence in use</option>
-            {PRESETS.map(({ name, words }) => (
-              <option key={name} value={name}>
-                {name}: {words}
-              </option>
-            ))}
-          </select>
+            of={["", ...PRESETS.map(({ name }) => name)]}
+            text={(name) => (name === "" ? "the sequence in use" : `${name}: ${presetOf(name)?.words}`)}
+            onChoose={(name) => (draft.value = draftOf({ ...base, ...presetOf(name)?.sequence }))}
+          />
         </label>
-        {field("base_frequency_mhz", "Base frequency", "MHz")}
-        {field("harmonics", measuredOf(base).name, "")}
-        {field("exposure_ms", "Exposure", "ms")}
-        {field("takes", "Takes", "")}
-        <label class="field field-wide">
-          <span>Zeroth moment</span>
-          <select
+        {NUMBER_NAMES.map((name) => (
+          <NumberField
+            key={name}
+            name={name}
+            label={name === "harmonics" ? measuredOf(base).name : FIELD_NAMES[name]}
+            unit={NUMBERS[name].unit}
+            text={keptAs(draft.value[name], (text) => set({ [name]: text }))}
+            aria-invalid={wrong === name}
+            aria-describedby="sequence-verdict"
+          />
+        ))}
+        <label class="field whole-row">
+          <span class="small quiet">Zeroth moment</span>
+          <Select
             name="zeroth"
             value={draft.value.zeroth}
+            of={Object.keys(ZEROTH_NAMES) as Zeroth[]}
+            text={(zeroth) => `${ZEROTH_NAMES[zeroth]} (${ZEROTH_COSTS[zeroth]})`}
             aria-invalid={wrong === "zeroth"}
-            onChange={(event) => (draft.value = { ...draft.peek(), zeroth: event.currentTarget.value as Zeroth })}
-          >
-            {(Object.keys(ZEROTH_NAMES) as Zeroth[]).map((zeroth) => (
-              <option key={zeroth} value={zeroth}>
-                {ZEROTH_NAMES[zeroth]} ({ZEROTH_COSTS[zeroth]})
-              </option>
-            ))}
-          </select>
+            onChoose={(zeroth) => set({ zeroth })}
+          />
         </label>
-        <label class="field field-wide">
-          <span>Order of takes</span>
-          <select
+        <label class="field whole-row">
+          <span class="small quiet">Order of takes</span>
+          <Select
             name="take_order"
             value={draft.value.take_order}
+            of={Object.keys(TAKE_ORDER_NAMES) as TakeOrder[]}
+            text={(order) => TAKE_ORDER_NAMES[order]}
             aria-invalid={wrong === "take_order"}
             disabled={numberOf(draft.value.takes) === 1}
-            onChange={(event) => (draft.value = { ...draft.peek(), take_order: event.currentTarget.value as TakeOrder })}
-          >
-            {Object.entries(TAKE_ORDER_NAMES).map(([order, name]) => (
-              <option key={order} value={order}>
-                {name}
-              </option>
-            ))}
-          </select>
+            onChoose={(take_order) => set({ take_order })}
+          />
         </label>
       </div>
       <Obstacle />
@@ -154,15 +131,13 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; 
           </dl>
         )}
       </div>
-      <div class="editor-actions">
-        <button type="button" onClick={onDone}>
-          Cancel
-        </button>
-        <Steer submit primary disabled={sending.value || judged.kind === "refused"}>
+      <div class="editor-actions row at-end">
+        <Button onClick={onDone}>Cancel</Button>
+        <Steer type="submit" class="primary" disabled={sending.value || judged.kind === "refused"}>
           {sending.value ? "Applying…" : "Apply"}
         </Steer>
       </div>
-    </form>
+    </Form>
   );
 }
 

@@ -1,6 +1,6 @@
 import { useSignal } from "@preact/signals";
-
 import { useStore } from "../../store/store";
+import { Button } from "../../ui/controls";
 import { Panel } from "../../ui/Panel";
 import { Steer } from "../../ui/Steer";
 import { AccuracySection } from "./AccuracySection";
@@ -24,14 +24,13 @@ export function SequenceView() {
                 Undo
               </Steer>
             )}
-            <button
-              type="button"
+            <Button
               title="What accuracy costs in time on the scene before the camera, now"
               disabled={accuracy.job.value !== null}
               onClick={() => void accuracy.predict()}
             >
               Predict
-            </button>
+            </Button>
             <Steer title="Change what the camera measures with" onClick={() => (editing.value = true)}>
               Edit
             </Steer>

@@ -9,6 +9,10 @@ export interface Preset {
   readonly sequence: Pick<SequenceDocument, "base_frequency_hz" | "harmonics" | "zeroth" | "exposure_s" | "takes">;
 }
 
+export function presetOf(name: string): Preset | undefined {
+  return PRESETS.find((preset) => preset.name === name);
+}
+
 /** Measured in docs/measured/default-sequence.md and docs/accuracy.md. */
 export const PRESETS: readonly Preset[] = [
   {

@@ -1,12 +1,13 @@
 import { useEffect } from "preact/hooks";
 import { engineering } from "../../scales/format";
-import type { EffectChoice, Fault } from "../../store/simulation";
+import type { Fault } from "../../store/simulation";
 import { useStore } from "../../store/store";
 import type { EffectDocument } from "../../stream/documents";
+import { Select } from "../../ui/controls";
 import { Panel } from "../../ui/Panel";
 import { Obstacle, Steer, TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
-import { OpenButton } from "../files/OpenButton";
+import { OpenButton } from "../files/FileDrop";
 import { effectWords, FAULTS, lacking, ordered, possible, sizeShare, sizeWords } from "./words";
 import "./SimulationView.css";
 
@@ -31,7 +32,7 @@ export function SimulationView() {
         )
       }
     >
-      <div class="panel-body column fades">
+      <div class="panel-body column grow fades">
         {simulation.trouble.value !== null && <p class="quiet">{simulation.trouble.value}</p>}
         <Obstacle />
         {world !== null && (
@@ -41,11 +42,17 @@ export function SimulationView() {
           </p>
         )}
         {world !== null && (
-          <fieldset class="faults">
+          <fieldset class="faults wrapped spaced">
             <legend class="small quiet">Let something go wrong</legend>
-            {(world.faults as readonly Fault[]).map((fault) => (
-              <FaultButton key={fault} fault={fault} task={task} />
-            ))}
+            {(world.faults as readonly Fault[]).map((fault) => {
+              const { word, title } = FAULTS[fault];
+              const cause = (): void => void task.run(`${title}…`, () => simulation.cause(fault));
+              return (
+                <Steer key={fault} title={title} task={task} disabled={!possible(fault, world.plugged)} onClick={cause}>
+                  {word}
+                </Steer>
+              );
+            })}
           </fieldset>
         )}
         <TaskLine task={task} field="simulation-status" />
@@ -60,27 +67,19 @@ function ScenePicker({ task }: { task: Task }) {
   const { simulation, obstacle } = useStore();
   const world = simulation.world.value;
   if (world === null) return null;
-  const known = world.scenes.some(({ name }) => name === world.scene);
+  const names = world.scenes.map(({ name }) => name);
   return (
     <label class="scene-picker inline-row">
-      <span class="quiet">Scene</span>
-      <select
+      <span class="quiet roomy">Scene</span>
+      <Select
         name="scene"
         aria-label="Scene"
         value={world.scene}
+        of={names.includes(world.scene) ? names : [world.scene, ...names]}
+        text={String}
         disabled={task.busy.value !== null || obstacle.value !== null}
-        onChange={(event) => {
-          const scene = event.currentTarget.value;
-          void task.run(`Preparing ${scene}…`, () => simulation.set({ scene }));
-        }}
-      >
-        {!known && <option value={world.scene}>{world.scene}</option>}
-        {world.scenes.map(({ name }) => (
-          <option key={name} value={name}>
-            {name}
-          </option>
-        ))}
-      </select>
+        onChoose={(scene) => void task.run(`Preparing ${scene}…`, () => simulation.set({ scene }))}
+      />
     </label>
   );
 }
@@ -95,7 +94,7 @@ function Effects({ task }: { task: Task }) {
   return (
     <div class="effects">
       <table class="effect-table">
-        <caption>
+        <caption class="quiet">
           <span data-field="effects-built">
             {built} of {explanation.effects.length}
           </span>{" "}
@@ -108,7 +107,7 @@ function Effects({ task }: { task: Task }) {
             </Steer>
           )}
         </caption>
-        <thead>
+        <thead class="small quiet">
           <tr>
             <th scope="col">Effect</th>
             <th scope="col">Size over noise</th>
@@ -133,7 +132,7 @@ function EffectRow({ effect, calledAbove, task }: { effect: EffectDocument; call
   return (
     <tr data-effect={effect.effect} data-built={effect.built}>
       <th scope="row">{name}</th>
-      <td class="effect-size">
+      <td class="effect-size nowrap">
         <meter min={0} max={1} value={sizeShare(effect, calledAbove)} aria-label={`Size of ${name} over the noise floor`} />{" "}
         {sizeWords(effect)}
       </td>
@@ -141,40 +140,20 @@ function EffectRow({ effect, calledAbove, task }: { effect: EffectDocument; call
         {effect.choice === "always" || effect.choice === "never" ? (
           <span class="quiet">{effect.choice === "always" ? "always" : "cannot be made"}</span>
         ) : (
-          <select
+          <Select
             name={effect.effect}
             aria-label={`Whether ${name} is computed`}
             value={mine ?? ""}
+            of={["", "auto", "on", "off"]}
+            text={(choice) => ({ "": `${effect.built ? "yes" : "no"}, by the scene`, auto: "if called for", on: "on", off: "off" })[choice]}
             disabled={task.busy.value !== null || obstacle.value !== null}
-            onChange={(event) => {
-              const choice = event.currentTarget.value as EffectChoice | "";
-              void task.run(`Preparing ${name.toLowerCase()}…`, () => simulation.choose(effect.effect, choice === "" ? null : choice));
-            }}
-          >
-            <option value="">{effect.built ? "yes" : "no"}, by the scene</option>
-            <option value="auto">if called for</option>
-            <option value="on">on</option>
-            <option value="off">off</option>
-          </select>
+            onChoose={(choice) =>
+              void task.run(`Preparing ${name.toLowerCase()}…`, () => simulation.choose(effect.effect, choice === "" ? null : choice))
+            }
+          />
         )}
       </td>
       <td class="quiet effect-why">{effect.reason}</td>
     </tr>
-  );
-}
-
-function FaultButton({ fault, task }: { fault: Fault; task: Task }) {
-  const { simulation } = useStore();
-  const { word, title } = FAULTS[fault];
-  const plugged = simulation.world.value?.plugged ?? true;
-  return (
-    <Steer
-      title={title}
-      task={task}
-      disabled={!possible(fault, plugged)}
-      onClick={() => void task.run(`${title}…`, () => simulation.cause(fault))}
-    >
-      {word}
-    </Steer>
   );
 }

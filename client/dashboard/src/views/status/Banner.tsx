@@ -2,6 +2,7 @@ import type { ComponentChildren } from "preact";
 import { timeOfDay } from "../../scales/format";
 import { lossReason } from "../../store/events";
 import { useStore } from "../../store/store";
+import { Button } from "../../ui/controls";
 import { useNow } from "../../ui/hooks";
 import { tokenWords } from "./words";
 import "./Banner.css";
@@ -71,11 +72,7 @@ function Alert({ about, mild = false, word, onClick, children }: AlertProps) {
   return (
     <div class={mild ? "wrapped banner banner-mild" : "wrapped banner"} role="alert" data-banner={about}>
       <p>{children}</p>
-      {word !== undefined && (
-        <button type="button" onClick={onClick}>
-          {word}
-        </button>
-      )}
+      {word !== undefined && <Button onClick={onClick}>{word}</Button>}
     </div>
   );
 }

@@ -1,11 +1,10 @@
 import type { Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
-import { Form, TextField } from "../../ui/controls";
+import { Button, Form, TextField } from "../../ui/controls";
 import type { Done } from "../../ui/Dialog";
 import { useNow } from "../../ui/hooks";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
-import "./ControlDialog.css";
 
 /** Longest name the service takes. */
 const LONGEST_NAME = 80;
@@ -56,28 +55,21 @@ export function ControlDialog({ onDone }: Done) {
       {control.kind === "other" && task.refusal.value !== null && (
         <p class="quiet">Control can be taken over from tokens of the same role or a lower one.</p>
       )}
-      <div class="dialog-actions">
-        <button type="button" onClick={onDone}>
-          Close
-        </button>
+      <div class="row at-end">
+        <Button onClick={onDone}>Close</Button>
         {control.kind === "us" ? (
-          <button
-            type="button"
-            class="primary"
-            disabled={task.busy.value !== null}
-            onClick={() => void act("Giving control back…", () => lease.release())}
-          >
+          <Button class="primary" task={task} onClick={() => void act("Giving control back…", () => lease.release())}>
             Give back
-          </button>
+          </Button>
         ) : (
-          <button
+          <Button
             type="submit"
             class="primary"
             title={barred ?? undefined}
             disabled={barred !== null || task.busy.value !== null || control.kind === "unknown" || name.value.trim() === ""}
           >
             {control.kind === "other" ? "Take over" : "Take control"}
-          </button>
+          </Button>
         )}
       </div>
     </Form>

@@ -2,10 +2,9 @@ import { useComputed } from "@preact/signals";
 import { deviation, engineering, fixed, grouped, NOTHING } from "../../scales/format";
 import { CREDIBLE_LATENCY_S } from "../../store/status";
 import { useStore } from "../../store/store";
-import { KEPT_S, linesOf, type Trend } from "../../store/trends";
+import { KEPT_S, linesOf, type PlotPoint, type Trend } from "../../store/trends";
 import { PulseIcon } from "../../ui/icons";
 import { PopoverButton } from "../../ui/PopoverButton";
-import { Sparkline } from "../../ui/Sparkline";
 import "./Figures.css";
 
 /** All figures of the flow of frames, behind a button. */
@@ -70,7 +69,7 @@ function Figure({ name, field, title, trend, children }: FigureProps) {
   return (
     <div class="figure" title={title}>
       <dt class="small quiet">{name}</dt>
-      <dd>
+      <dd class={trend === undefined ? "" : "row apart"}>
         <span data-field={field}>{children}</span>
         {trend !== undefined && <Course name={name} trend={trend} />}
       </dd>
@@ -78,11 +77,25 @@ function Figure({ name, field, title, trend, children }: FigureProps) {
   );
 }
 
-/** A figure over the last minute, from zero to its largest value. */
+const [WIDTH, HEIGHT] = [88, 20];
+/** Room for the width of the line. */
+const EDGE = 1.5;
+
+/** A figure over the last minute, from zero to its largest value, as a line in a text's height; a single sample is a dot. */
 function Course({ name, trend }: { name: string; trend: Trend }) {
   const { samples } = useStore().trends;
   const { most, lines } = linesOf(samples.value, trend);
-  return <Sparkline lines={lines} label={`${name} over the last ${KEPT_S} s, from 0 to ${MOST_WORDS[trend](most)}`} />;
+  const label = `${name} over the last ${KEPT_S} s, from 0 to ${MOST_WORDS[trend](most)}`;
+  const place = ({ x, y }: PlotPoint): string =>
+    `${(EDGE + x * (WIDTH - 2 * EDGE)).toFixed(1)} ${(HEIGHT - EDGE - y * (HEIGHT - 2 * EDGE)).toFixed(1)}`;
+  // Of one point a line with round ends is a dot.
+  const path = lines.map((line) => `M${line.map(place).join("L")}${line.length === 1 ? "h0" : ""}`).join("");
+  return (
+    <svg class="course" width={WIDTH} height={HEIGHT} role="img" aria-label={label}>
+      <title>{label}</title>
+      <path d={path} />
+    </svg>
+  );
 }
 
 const MOST_WORDS: Readonly<Record<Trend, (most: number) => string>> = {

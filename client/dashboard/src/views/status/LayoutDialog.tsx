@@ -2,9 +2,8 @@ import { useSignal } from "@preact/signals";
 import { LAYOUTS } from "../../store/layout";
 import { LONGEST_NAME } from "../../store/layouts";
 import { useStore } from "../../store/store";
-import { Form, TextField } from "../../ui/controls";
+import { Button, Form, TextField } from "../../ui/controls";
 import type { Done } from "../../ui/Dialog";
-import "./LayoutDialog.css";
 
 /** Saves the present layout under a name, and removes saved ones. */
 export function LayoutDialog({ onDone }: Done) {
@@ -28,25 +27,22 @@ export function LayoutDialog({ onDone }: Done) {
           : "It is kept in this browser; a copied link shows it to others."}
       </p>
       {names.length > 0 && (
-        <ul class="saved-layouts column" aria-label="Saved layouts">
+        <ul class="column spaced" aria-label="Saved layouts">
           {names.map((each) => (
-            <li key={each} class="row">
+            <li key={each} class="row apart">
               {each}
-              <button type="button" aria-label={`Remove ${each}`} onClick={() => layouts.remove(each)}>
+              <Button aria-label={`Remove ${each}`} onClick={() => layouts.remove(each)}>
                 Remove
-              </button>
+              </Button>
             </li>
           ))}
         </ul>
       )}
-      <div class="dialog-actions">
-        <span class="spring" />
-        <button type="button" onClick={onDone}>
-          Close
-        </button>
-        <button type="submit" class="primary" disabled={name === "" || taken}>
+      <div class="row at-end">
+        <Button onClick={onDone}>Close</Button>
+        <Button type="submit" class="primary" disabled={name === "" || taken}>
           Save
-        </button>
+        </Button>
       </div>
     </Form>
   );

@@ -2,6 +2,7 @@ import { useComputed } from "@preact/signals";
 import { engineering, fixed } from "../../scales/format";
 import { flowTrouble } from "../../store/status";
 import { useStore } from "../../store/store";
+import { Button } from "../../ui/controls";
 import { useNow } from "../../ui/hooks";
 import { LightOffButton } from "../../ui/LightOffButton";
 import { Steer } from "../../ui/Steer";
@@ -36,7 +37,8 @@ export function StatusBar() {
   );
 }
 
-type Tone = "good" | "waiting" | "bad" | "still";
+/** A class of the style sheet. */
+type Tone = "good" | "waiting" | "bad" | "quiet";
 
 interface State {
   readonly tone: Tone;
@@ -51,19 +53,19 @@ function StateChip() {
     if (status.connection.value.kind === "connecting") return { tone: "waiting", word: "Connecting" };
     if (status.connection.value.kind === "waiting") return { tone: "bad", word: "Reconnecting" };
     if (status.connection.value.kind === "refused") return { tone: "bad", word: "Not let in" };
-    if (replay.active.value) return { tone: "still", word: "Replay" };
+    if (replay.active.value) return { tone: "quiet", word: "Replay" };
     if (status.cameraLoss.value !== null) return { tone: "bad", word: "Camera lost" };
     if (calibrating.value) return { tone: "waiting", word: "Calibrating" };
     if (status.cameraState.value === "arming") return { tone: "waiting", word: "Light soon", why: "The camera's light is about to go on" };
-    if (held.value) return { tone: "still", word: "Held" };
-    if (status.running.value === false) return { tone: "still", word: "Stopped" };
+    if (held.value) return { tone: "quiet", word: "Held" };
+    if (status.running.value === false) return { tone: "quiet", word: "Stopped" };
     if (status.newest.value === null) return { tone: "waiting", word: "Waiting" };
     return { tone: "good", word: "Live" };
   });
   const { tone, word, why } = slowed(state.value, flowTrouble(status.flow.value, sequence.value?.frame_rate_hz ?? null, now_s));
   return (
-    <span class={`chip inline-row chip-${tone}`} role="status" data-field="state" title={why}>
-      <i aria-hidden="true" />
+    <span class={`chip inline-row nowrap strong ${tone}`} role="status" data-field="state" title={why}>
+      <i class={tone === "quiet" ? "dot square" : "dot"} aria-hidden="true" />
       {word}
     </span>
   );
@@ -129,8 +131,8 @@ function Exposure() {
 /** A sign in the header, and what it means. */
 function Sign({ field, short, long }: { field: string; short: string; long: string }) {
   return (
-    <span class="chip inline-row chip-waiting sign" role="status" data-field={field} title={long}>
-      <i aria-hidden="true" />
+    <span class="chip inline-row nowrap strong waiting sign" role="status" data-field={field} title={long}>
+      <i class="dot" aria-hidden="true" />
       {short}
     </span>
   );
@@ -146,12 +148,12 @@ function Performance() {
     if (alone.peek() !== null && accuracy.tradeoff.peek() === null && status.newest.peek() !== null) void accuracy.predict();
   };
   return (
-    <button type="button" class="performance" title={`Frames drawn a second; ${long}. Shows what accuracy costs`} onClick={open}>
+    <Button class="performance nowrap strong" title={`Frames drawn a second; ${long}. Shows what accuracy costs`} onClick={open}>
       <span data-field="rate">{rate}</span>
-      <span class="quiet" data-field="deviation">
+      <span class="quiet roomy" data-field="deviation">
         {short}
       </span>
-    </button>
+    </Button>
   );
 }
 
@@ -162,7 +164,7 @@ function Subject() {
   const { capabilities, simulated } = camera.value;
   const scene = simulation.world.value?.scene;
   return (
-    <span class="camera-name quiet clipped" title={`Serial number ${String(capabilities.serial)}`} data-field="subject">
+    <span class="camera-name quiet clipped roomy" title={`Serial number ${String(capabilities.serial)}`} data-field="subject">
       {simulated && scene !== undefined ? `simulated ${scene}` : String(capabilities.model)}
     </span>
   );

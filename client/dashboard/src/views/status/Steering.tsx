@@ -1,12 +1,13 @@
 import { fixed } from "../../scales/format";
 import { captureOne } from "../../store/capture";
 import { useStore } from "../../store/store";
-import { Toggle } from "../../ui/controls";
+import { ActionMenu } from "../../ui/ActionMenu";
+import { Button, Toggle } from "../../ui/controls";
 import { useNow } from "../../ui/hooks";
 import { ControlIcon, HoldIcon, PauseIcon, PlayIcon, SingleIcon } from "../../ui/icons";
 import { Steer } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
-import { PageMenu } from "./PageMenu";
+import { pageActions } from "./pageActions";
 import "./Steering.css";
 
 /** What can be done to the camera and to the page from anywhere. */
@@ -22,7 +23,7 @@ export function Steering() {
         </Toggle>
       )}
       <Capture />
-      <PageMenu />
+      <ActionMenu label="Page: layout, colours, help" groups={pageActions(store)} />
     </div>
   );
 }
@@ -72,37 +73,24 @@ function Capture() {
 function ControlButton() {
   const { lease, asksForControl, caller } = useStore();
   const control = lease.control.value;
-  const barred = caller.obstacle.value;
-  if (barred !== null && control.kind !== "other") {
-    return (
-      <button
-        type="button"
-        class="control-button"
-        title={`${barred}: it can look, but not take control`}
-        data-field="control"
-        data-obstacle=""
-        onClick={() => (asksForControl.value = true)}
-      >
-        <ControlIcon /> <span class="wide">View only</span>
-      </button>
-    );
-  }
-  const words = { unknown: "Take control", free: "Take control", us: "You have control", other: "" }[control.kind];
+  const barred = control.kind === "other" ? null : caller.obstacle.value;
+  const words = barred !== null ? "View only" : control.kind === "us" ? "You have control" : "Take control";
+  const tone = { unknown: "", free: "", us: "good", other: "waiting" }[control.kind];
   return (
-    <button
-      type="button"
-      class={`control-button control-${control.kind}`}
-      title="Who controls the camera"
+    <Button
+      class={`control-button ${barred === null ? tone : ""}`}
+      title={barred === null ? "Who controls the camera" : `${barred}: it can look, but not take control`}
       data-field="control"
+      data-obstacle={barred === null ? undefined : ""}
       onClick={() => (asksForControl.value = true)}
     >
       <ControlIcon />
       {control.kind === "other" ? (
         <Other holder={control.holder} expires_s={control.expires_s} />
       ) : (
-        <span class={control.kind === "free" ? "wide" : ""}>{words}</span>
+        <span class={barred !== null || control.kind === "free" ? "wide" : ""}>{words}</span>
       )}
-    </button>
+    </Button>
   );
 }
 
@@ -121,8 +109,8 @@ function RecordingSign() {
   const active = recordings.active.value;
   if (active === null) return null;
   return (
-    <span class="recording-sign inline-row" title={`${active.name} is being recorded`} data-field="recording-sign">
-      <i aria-hidden="true" /> {fixed(active.duration_s, 0, "s")}
+    <span class="recording-sign inline-row nowrap bad strong" title={`${active.name} is being recorded`} data-field="recording-sign">
+      <i class="dot" aria-hidden="true" /> {fixed(active.duration_s, 0, "s")}
     </span>
   );
 }

@@ -1,8 +1,7 @@
-import { useSignal } from "@preact/signals";
-import { useEffect } from "preact/hooks";
-
 import type { Happening } from "../../store/events";
 import { useStore } from "../../store/store";
+import { Button } from "../../ui/controls";
+import { useNow } from "../../ui/hooks";
 import "./Toasts.css";
 
 /** How long a notice stays, one that something can be done about longer; and how many are seen together. */
@@ -13,27 +12,18 @@ const MOST = 2;
 /** What just happened, in the free part of the header: never over what can be pressed. It goes away by itself. */
 export function Toasts() {
   const { events } = useStore();
-  const now_s = useSignal(Date.now() / 1000);
-  const all = events.all.value;
-  const fresh = all.filter((each) => now_s.value < endOf(each)).slice(-MOST);
-  const soonest_s = fresh.length === 0 ? null : Math.min(...fresh.map(endOf));
-  useEffect(() => {
-    now_s.value = Date.now() / 1000;
-  }, [all, now_s]);
-  useEffect(() => {
-    if (soonest_s === null) return undefined;
-    const timer = setTimeout(() => (now_s.value = Date.now() / 1000), 1000 * Math.max(0.1, soonest_s - Date.now() / 1000));
-    return () => clearTimeout(timer);
-  }, [soonest_s, now_s]);
+  const now_s = useNow(1);
+  const fresh = events.all.value.filter((each) => now_s < endOf(each)).slice(-MOST);
   return (
-    <div class="toasts column small" role="log" aria-label="What just happened">
+    <div class="toasts column grow small" role="log" aria-label="What just happened">
       {fresh.map(({ number, words, tone, remedy }) => (
-        <p key={number} class={`toast row toast-${tone}`} title={words}>
-          <span class="toast-words clipped">{words}</span>
+        <p key={number} class="toast row" title={words}>
+          <i class={`dot ${tone}`} aria-hidden="true" />
+          <span class="clipped">{words}</span>
           {remedy !== undefined && (
-            <button type="button" class="link" onClick={remedy.run}>
+            <Button class="link" onClick={remedy.run}>
               {remedy.word}
-            </button>
+            </Button>
           )}
         </p>
       ))}

@@ -1,7 +1,7 @@
 import { useSignal } from "@preact/signals";
 
 import { useStore } from "../../store/store";
-import { Form, TextField } from "../../ui/controls";
+import { Button, Form, TextField } from "../../ui/controls";
 import type { Done } from "../../ui/Dialog";
 import { tokenWords } from "./words";
 
@@ -30,25 +30,22 @@ export function TokenDialog({ onDone }: Done) {
         </p>
       )}
       <p class="quiet">A token is kept until this tab is closed, and sent to this service only.</p>
-      <div class="dialog-actions">
+      <div class="row at-end">
         {known && (
-          <button
-            type="button"
+          <Button
             onClick={() => {
               credentials.use(null);
               onDone();
             }}
           >
             Forget the token
-          </button>
+          </Button>
         )}
-        <span class="spring" />
-        <button type="button" onClick={onDone}>
-          Close
-        </button>
-        <button type="submit" class="primary" disabled={text.value.trim() === ""}>
+        <span class="grow" />
+        <Button onClick={onDone}>Close</Button>
+        <Button type="submit" class="primary" disabled={text.value.trim() === ""}>
           Use this token
-        </button>
+        </Button>
       </div>
     </Form>
   );

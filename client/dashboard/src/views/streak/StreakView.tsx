@@ -3,7 +3,6 @@ import { useMemo, useRef } from "preact/hooks";
 import { rangeOfTime_m } from "../../physics/constants";
 import { COLOUR_MAPS, type ColourMapName } from "../../scales/colourMaps";
 import { fixed, significant } from "../../scales/format";
-import { ticks } from "../../scales/scale";
 import { scaleOf, TONES, type ToneKind } from "../../scales/tone";
 import { oneOf, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
@@ -14,7 +13,9 @@ import { ColourChoice, ToneChoice } from "../../ui/LookChoices";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { draw } from "../../ui/paint";
+import { Ticks } from "../../ui/Ticks";
 import { BINS, paintStreak, Streak, whiteOf } from "./streak";
+import "../../ui/Marks.css";
 import "./StreakView.css";
 
 const TONE: Setting<ToneKind> = { key: "streak.tone", initial: "root", ...oneOf(TONES) };
@@ -57,6 +58,13 @@ export function StreakView() {
     store.player.seek(turn);
   };
   const period_ns = store.period_s.value * 1e9;
+  const words = useComputed(() => {
+    const at = pointed.value;
+    if (frame.value === null || at === null) return "";
+    const time_s = ((at.bin + 0.5) / BINS) * store.period_s.value;
+    const density = streak.values[at.bin * streak.width + at.x] * 1e-9;
+    return `column ${at.x} · ${fixed(time_s * 1e9, 1, "ns")} · ${fixed(rangeOfTime_m(time_s), 2, "m")} · ${significant(density, 3, "DN/ns")}`;
+  });
   const name = (): string => `streak-row-${row.peek()}-${frame.peek()?.meta.frame ?? 0}`;
   return (
     <Panel
@@ -77,16 +85,10 @@ export function StreakView() {
         { text: "Density in DN/s (NPY)", run: () => save(`${name()}.npy`, new Blob([npy(streak.values, [BINS, streak.width])])) },
       ]}
     >
-      <div class="streak">
-        <div class="streak-axis small quiet" aria-hidden="true">
-          {ticks({ low: 0, high: period_ns, kind: "linear" }, 6).map((time_ns) => (
-            <span key={time_ns} style={{ top: `${(100 * time_ns) / period_ns}%` }}>
-              {fixed(time_ns, 0, "ns")}
-            </span>
-          ))}
-        </div>
+      <div class="streak grow spaced">
+        <Ticks class="streak-axis" side="top" end={period_ns} write={(time_ns) => fixed(time_ns, 0, "ns")} />
         <div
-          class="streak-picture"
+          class="streak-picture grow"
           role="img"
           aria-label={`Streak image of row ${row.value}: columns across, time of flight downwards`}
           onPointerMove={(event) => {
@@ -105,8 +107,8 @@ export function StreakView() {
           <ColourBar scale={scaleOf(tone.value, Number((bright.value * 1e-9).toPrecision(3)))} colours={colours.value} unit="DN/ns" />
         )}
       </div>
-      <footer class="panel-foot column">
-        <div class="panel-row">
+      <footer class="panel-foot column spaced">
+        <div class="panel-row wrapped apart">
           <label class="scanline row">
             <span class="quiet">Scanline</span>
             <input
@@ -120,49 +122,23 @@ export function StreakView() {
               }
             />
           </label>
-          <Readout frame={frame} streak={streak} pointed={pointed} width={width} period_ns={period_ns} />
+          <span class="clipped" data-field="streak">
+            {words}
+          </span>
         </div>
       </footer>
     </Panel>
   );
 }
 
-interface ReadoutProps {
-  readonly frame: { readonly value: unknown };
-  readonly streak: Streak;
-  readonly pointed: { readonly value: { readonly x: number; readonly bin: number } | null };
-  readonly width: number;
-  readonly period_ns: number;
-}
-
-function Readout({ frame, streak, pointed, width, period_ns }: ReadoutProps) {
-  const text = useComputed(() => {
-    const at = pointed.value;
-    if (frame.value === null || at === null) return "";
-    const time_ns = ((at.bin + 0.5) / BINS) * period_ns;
-    const density = streak.values[at.bin * width + at.x] * 1e-9;
-    return `column ${at.x} · ${fixed(time_ns, 1, "ns")} · ${fixed(rangeOfTime_m(time_ns * 1e-9), 2, "m")} · ${significant(density, 3, "DN/ns")}`;
-  });
-  return (
-    <span class="clipped" data-field="streak">
-      {text}
-    </span>
-  );
-}
-
 /** The player's time and the selected column. */
 function Marks({ width }: { width: number }) {
   const store = useStore();
-  const time = useRef<HTMLElement>(null);
-  useDrawing(() => {
-    const turn = store.player.turn.value;
-    if (time.current !== null) time.current.style.top = `${100 * turn}%`;
-  }, [store]);
   const selected = store.selected.value;
   return (
-    <>
-      <i ref={time} class="streak-time" />
-      {selected !== null && <i class="streak-column" style={{ left: `${(100 * (selected.x + 0.5)) / width}%` }} />}
-    </>
+    <div class="mark cover" style={{ "--y": `${100 * store.player.turn.value}%`, "--x": `${(100 * ((selected?.x ?? 0) + 0.5)) / width}%` }}>
+      <i class="mark-row" />
+      {selected !== null && <i class="mark-column" />}
+    </div>
   );
 }

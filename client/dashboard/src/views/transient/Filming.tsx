@@ -1,7 +1,7 @@
 import { type Signal, signal } from "@preact/signals";
-
 import type { Store } from "../../store/store";
 import type { Action } from "../../ui/ActionMenu";
+import { Button } from "../../ui/controls";
 import { save } from "../../ui/download";
 import type { FilmKind, Progress } from "../../ui/film";
 import { filmFrames, filmPass, type Subject } from "./film";
@@ -63,22 +63,18 @@ export class Filming {
 export function FilmProgress({ filming }: { filming: Filming }) {
   if (filming.trouble.value !== "") {
     return (
-      <div class="panel-row filming" role="alert">
+      <div class="panel-row wrapped apart nowrap filming" role="alert">
         <span>{filming.trouble.value}</span>
-        <button type="button" onClick={() => (filming.trouble.value = "")}>
-          Dismiss
-        </button>
+        <Button onClick={() => (filming.trouble.value = "")}>Dismiss</Button>
       </div>
     );
   }
   if (filming.share.value === null) return null;
   return (
-    <div class="panel-row filming" role="status">
+    <div class="panel-row wrapped apart nowrap filming" role="status">
       <span>Filming {Math.round(100 * filming.share.value)} %</span>
       <progress value={filming.share.value} aria-label="Film" />
-      <button type="button" onClick={() => filming.cancel()}>
-        Cancel
-      </button>
+      <Button onClick={() => filming.cancel()}>Cancel</Button>
     </div>
   );
 }

@@ -1,6 +1,8 @@
 import { useComputed } from "@preact/signals";
+import type { Backdrop } from "../../gl/renderer";
 import type { Scale } from "../../scales/scale";
 import { scaleOf } from "../../scales/tone";
+import { drawnOf, type Frame } from "../../store/frames";
 import type { Play, TransientLook } from "../../store/lightLook";
 import { AMPLITUDE } from "../../store/mapCatalogue";
 import { type Store, useStore } from "../../store/store";
@@ -23,4 +25,12 @@ export function LightBar({ look, play }: { look: TransientLook; play: Play }) {
   ) : (
     <div class="colour-bar colour-bar-bare" />
   );
+}
+
+/** The still scene behind the light, where it is wanted. */
+export function backdropOf(amplitude: Frame | null, light: TransientLook): Backdrop | null {
+  const white = amplitude?.map?.high ?? NaN;
+  return light.backdrop.value && white > 0 && amplitude?.values instanceof Float32Array
+    ? { values: drawnOf(amplitude) as Float32Array, white }
+    : null;
 }

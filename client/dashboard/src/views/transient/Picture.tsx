@@ -3,12 +3,12 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 
 import { createRenderer, hasGraphics } from "../../gl/createRenderer";
 import type { DensityRenderer } from "../../gl/renderer";
-import { drawnOf } from "../../store/frames";
 import type { TransientLook } from "../../store/lightLook";
 import { AMPLITUDE } from "../../store/mapCatalogue";
 import { useStore } from "../../store/store";
 import { useDrawing } from "../../ui/hooks";
 import { Stage } from "../../ui/Stage";
+import { backdropOf } from "./LightBar";
 
 /** Tries of WebGL2 before the page is content with typed arrays. */
 const GRAPHICS_TRIES = 2;
@@ -51,14 +51,9 @@ export function Picture({ look }: { look: TransientLook }) {
     const phase_rad = store.player.phase_rad.value;
     const tone = look.toneNow;
     const colours = look.colours.value;
-    const wanted = look.backdrop.value;
+    const scenery = backdropOf(brightness, look);
     if (renderer.value === null || coefficients === null) return;
-    const fits = brightness?.values.length === coefficients.width * coefficients.height;
-    const white = brightness?.map?.high ?? NaN;
-    const backdrop =
-      wanted && fits && white > 0 && brightness?.values instanceof Float32Array
-        ? { values: drawnOf(brightness) as Float32Array, white }
-        : null;
+    const backdrop = brightness?.values.length === coefficients.width * coefficients.height ? scenery : null;
     renderer.value.draw(coefficients, { phase_rad, tone, colours, backdrop });
     if (canvas.current !== null) canvas.current.dataset.frame = String(frame.peek()?.meta.frame);
     look.snapshot = () => {

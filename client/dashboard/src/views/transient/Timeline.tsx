@@ -1,9 +1,10 @@
+import { useComputed } from "@preact/signals";
 import { useEffect, useRef } from "preact/hooks";
 import { rangeOfTime_m } from "../../physics/constants";
 import { fixed } from "../../scales/format";
-import { ticks } from "../../scales/scale";
 import { useStore } from "../../store/store";
 import { useDrawing } from "../../ui/hooks";
+import { Ticks } from "../../ui/Ticks";
 import "../map/Readout.css";
 import "./Timeline.css";
 
@@ -47,16 +48,13 @@ export function Timeline() {
     };
   }, [player]);
 
-  const period_ns = period_s.value * 1e9;
-  const period_m = rangeOfTime_m(period_s.value);
-  const marks = ticks({ low: 0, high: period_ns, kind: "linear" }, 6);
   return (
     <div class="timeline">
       <canvas ref={canvas} width={CURVE_WIDTH} height={CURVE_HEIGHT} aria-hidden="true" />
       {player.arrivals.value.map((turn) => (
         <i key={turn} class="timeline-arrival" style={{ left: `${100 * turn}%` }} />
       ))}
-      <i ref={head} class="timeline-head" />
+      <i ref={head} class="timeline-head playhead" />
       <input
         ref={slider}
         type="range"
@@ -67,39 +65,27 @@ export function Timeline() {
         onPointerDown={() => ([player.playing.value, player.scrubbed.value] = [false, true])}
         onInput={(event) => player.seek(event.currentTarget.valueAsNumber)}
       />
-      <div class="timeline-metres small quiet" aria-hidden="true">
-        {ticks({ low: 0, high: period_m, kind: "linear" }, 6).map((range_m) => (
-          <span key={range_m} style={{ left: `${(100 * range_m) / period_m}%` }}>
-            {fixed(range_m, 0, "m")}
-          </span>
-        ))}
-      </div>
-      <div class="timeline-ticks small quiet" aria-hidden="true">
-        {marks.map((time_ns, at) => (
-          <span key={time_ns} style={{ left: `${(100 * time_ns) / period_ns}%` }}>
-            {fixed(time_ns, 0, at === marks.length - 1 ? "ns" : "")}
-          </span>
-        ))}
-      </div>
+      <Ticks class="timeline-metres" side="left" end={rangeOfTime_m(period_s.value)} write={(range_m) => fixed(range_m, 0, "m")} />
+      <Ticks
+        class="timeline-ticks"
+        side="left"
+        end={period_s.value * 1e9}
+        write={(time_ns, isLast) => fixed(time_ns, 0, isLast ? "ns" : "")}
+      />
     </div>
   );
 }
 
 /** The time of flight in words: when, how far the light has come, and the range that would be. */
 export function TimeReadout() {
-  const { player } = useStore();
-  const time = useRef<HTMLOutputElement>(null);
-  const range = useRef<HTMLSpanElement>(null);
-  useDrawing(() => {
-    const time_s = player.time_s.value;
-    if (time.current !== null) time.current.textContent = fixed(time_s * 1e9, 2, "ns");
-    if (range.current !== null) range.current.textContent = fixed(rangeOfTime_m(time_s), 2, "m");
-  }, [player]);
+  const { time_s } = useStore().player;
   return (
-    <p class="readout">
-      <output ref={time} class="readout-value readout-time" data-field="time" aria-live="off" />
+    <p class="readout line">
+      <output class="readout-value readout-time strong" data-field="time" aria-live="off">
+        {useComputed(() => fixed(time_s.value * 1e9, 2, "ns"))}
+      </output>
       <span title="Where light comes from that goes there and back in this time">
-        <span class="quiet">range</span> <span ref={range} data-field="range" />
+        <span class="quiet">range</span> <span data-field="range">{useComputed(() => fixed(rangeOfTime_m(time_s.value), 2, "m"))}</span>
       </span>
     </p>
   );

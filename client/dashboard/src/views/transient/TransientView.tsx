@@ -9,14 +9,14 @@ import { gateStart_rad, NAMES, type Play, type TransientLook } from "../../store
 import { AMPLITUDE } from "../../store/mapCatalogue";
 import { SPEEDS_NS } from "../../store/player";
 import { type Store, useStore } from "../../store/store";
-import { Choice, Tabs } from "../../ui/controls";
+import { Button, Choice, Tabs } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
 import { captionOf, timeWords } from "../../ui/figure";
 import { type FigureParts, pictureFiles } from "../../ui/figureFiles";
 import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
 import { PauseIcon, PlayIcon } from "../../ui/icons";
 import { Panel } from "../../ui/Panel";
-import { litOf, peaksOf, steady, turnsOf } from "./arrivals";
+import { gapsOf, litOf, peaksOf, steady, turnsOf } from "./arrivals";
 import { Filming, FilmProgress } from "./Filming";
 import { LightBar, lightScale } from "./LightBar";
 import { LightSoFar } from "./LightSoFar";
@@ -55,6 +55,8 @@ export function TransientView() {
     const arrivals = frame.value?.light?.arrivals;
     if (arrivals === undefined) return;
     player.learn(steady(player.lit.peek(), litOf(arrivals)), peaksOf(arrivals));
+    // What is gathered over a time stays in sight.
+    player.gaps.value = look.play.value === "density" ? gapsOf(arrivals) : [];
   }, [frame, player]);
   const play = look.play.value;
   const subject = useMemo(() => ({ snapshot: () => look.snapshot(), parts: () => partsOf(look, store) }), [look, store]);
@@ -88,30 +90,29 @@ export function TransientView() {
         </>
       }
     >
-      <div class="picture">
+      <div class="picture grow spaced">
         {play === "density" ? <Picture look={look} /> : <LightSoFar look={look} />}
         <LightBar look={look} play={play} />
       </div>
-      <footer class="panel-foot column">
+      <footer class="panel-foot column spaced">
         <FilmProgress filming={filming} />
         <Timeline />
-        <div class="panel-row">
-          <button
-            type="button"
+        <div class="panel-row wrapped apart">
+          <Button
             class="play"
             aria-label={player.playing.value ? "Pause" : "Play"}
             title={player.playing.value ? "Pause (space)" : "Play (space)"}
             onClick={() => player.toggle()}
           >
             {player.playing.value ? <PauseIcon /> : <PlayIcon />}
-          </button>
+          </Button>
           <TimeReadout />
           <DensityReadout play={play} />
-          <div class="panel-tools">
-            <span class="quiet slowed" title="How many times slower than light really is">
+          <div class="wrapped spaced">
+            <span class="quiet slowed roomy" title="How many times slower than light really is">
               1 : {slowness(player.speed_ns.value)}
             </span>
-            <Choice label="Speed" chosen={player.speed_ns} of={SPEEDS_NS} text={(speed) => `${speed} ns/s`} />
+            <Choice bare label="Speed" chosen={player.speed_ns} of={SPEEDS_NS} text={(speed) => `${speed} ns/s`} />
           </div>
         </div>
       </footer>
@@ -161,7 +162,7 @@ function DensityReadout({ play }: { play: Play }) {
     Number.isNaN(density.value) ? "" : play === "density" ? significant(density.value * 1e-9, 3, "DN/ns") : fixed(density.value, 0, "DN"),
   );
   return (
-    <span class="readout-density" data-field="density">
+    <span class="readout-density grow roomy" data-field="density">
       {text}
     </span>
   );

@@ -5,11 +5,17 @@ import type { Lit } from "../../store/player";
 /** Share of the brightest moment's light from which a moment is worth a picture. */
 const LEAST = 0.05;
 
-/** Turns, 0 to 1, evenly over the times at which light arrives and no others; over all times where none does. */
-export function turnsOf(arrivals: ArrayLike<number>, count: number): number[] {
+/** At which times there is light. */
+function worthOf(arrivals: ArrayLike<number>): boolean[] {
   const all = Array.from(arrivals);
   const least = LEAST * Math.max(...all);
-  const worth = all.flatMap((value, at) => (value > least && value > 0 ? [at] : []));
+  return all.map((value) => value > least && value > 0);
+}
+
+/** Turns, 0 to 1, evenly over the times at which light arrives and no others; over all times where none does. */
+export function turnsOf(arrivals: ArrayLike<number>, count: number): number[] {
+  const all = worthOf(arrivals);
+  const worth = all.flatMap((lit, at) => (lit ? [at] : []));
   const times = worth.length > 0 ? worth : all.map((_, at) => at);
   return Array.from({ length: count }, (_, n) => {
     const place = ((n + 0.5) / count) * times.length;
@@ -19,15 +25,25 @@ export function turnsOf(arrivals: ArrayLike<number>, count: number): number[] {
 
 /** From when to when there is light, in shares of the period, with a little dark around it; null where there is none. */
 export function litOf(arrivals: ArrayLike<number>): Lit | null {
-  const all = Array.from(arrivals);
-  const least = LEAST * Math.max(...all);
-  const worth = all.map((value) => value > least && value > 0);
+  const worth = worthOf(arrivals);
   if (!worth.includes(true)) return null;
   const room = 0.02;
   return {
-    first: Math.max(0, worth.indexOf(true) / all.length - room),
-    last: Math.min(1, (worth.lastIndexOf(true) + 1) / all.length + room),
+    first: Math.max(0, worth.indexOf(true) / worth.length - room),
+    last: Math.min(1, (worth.lastIndexOf(true) + 1) / worth.length + room),
   };
+}
+
+/** The parts of the period without light, in shares of it; none where there is no light at all. */
+export function gapsOf(arrivals: ArrayLike<number>): Lit[] {
+  const worth = worthOf(arrivals);
+  const lit = worth.flatMap((is, at) => (is ? [at] : []));
+  const [before, after] = [
+    [-1, ...lit],
+    [...lit, worth.length],
+  ];
+  const gaps = before.map((at, n) => ({ first: (at + 1) / worth.length, last: after[n] / worth.length }));
+  return lit.length === 0 ? [] : gaps.filter(({ first, last }) => last > first);
 }
 
 /** Ends that noise alone moves stay where they are. */

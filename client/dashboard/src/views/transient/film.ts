@@ -1,9 +1,8 @@
 /** Films of the light: one pass of it, or the next frames of the camera. */
-import { effect } from "@preact/signals";
-
 import { rangeOfTime_m } from "../../physics/constants";
 import type { Frame } from "../../store/frames";
 import type { Store } from "../../store/store";
+import { until } from "../../store/until";
 import { figureLayout, figureSvg, timeWords } from "../../ui/figure";
 import { type FigureParts, imageOf } from "../../ui/figureFiles";
 import { type FilmKind, type Progress, recorderOf } from "../../ui/film";
@@ -119,15 +118,9 @@ export async function filmFrames(subject: Subject, store: Store, kind: FilmKind,
 /** The next frame after one; null where the film was cancelled meanwhile, or frames ceased to come. */
 function frameAfter(store: Store, shown: Frame | null, progress: Progress): Promise<Frame | null> {
   const newest = store.frames.of("coefficients");
-  return new Promise((done) => {
-    const end = effect(() => {
-      const frame = newest.value;
-      const over = progress.cancelled || standstill(store) !== null;
-      if (!over && (frame === null || frame === shown)) return;
-      queueMicrotask(() => {
-        end();
-        done(over ? null : frame);
-      });
-    });
+  return until(() => {
+    const frame = newest.value;
+    if (progress.cancelled || standstill(store) !== null) return null;
+    return frame === null || frame === shown ? undefined : frame;
   });
 }
