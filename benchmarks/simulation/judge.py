@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from benchmarks.common.tables import Table, heads
 from benchmarks.simulation.accuracy import READOUT_S, SEQUENCES, SIZE, START_S
+from benchmarks.simulation.path_tracer import REPETITIONS, Tracer
 from benchmarks.simulation.scenes import BUILT_IN, scene_named, unseen
-from tests.simulation.light.path_tracer import REPETITIONS, Tracer
 from transientcam_driver.sequence import ImageLabel, Sequence
 from transientcam_simulation.effects import EFFECTS, LightEffect
 from transientcam_simulation.emulated import world_of

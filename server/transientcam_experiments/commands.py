@@ -4,7 +4,7 @@ What is heavy is imported when a verb runs, so that ``transientcam --help`` stay
 """
 
 import json
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -200,8 +200,12 @@ def _capture_on(
                 scene=name,
                 repetitions=repetitions,
                 seed=seed,
-                progress=lambda _, task=task: progress.advance(task),
+                progress=_steps(progress, task),
             )
+
+
+def _steps(progress: Any, task: Any) -> Callable[[str], None]:
+    return lambda _: progress.advance(task)
 
 
 def _measure_here(
@@ -228,5 +232,5 @@ def _measure_here(
                 records,
                 scene=name,
                 seed=seed,
-                progress=lambda _, task=task: progress.advance(task),
+                progress=_steps(progress, task),
             )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.simulation.light.path_tracer import Tracer
+from benchmarks.simulation.path_tracer import Tracer
 from transientcam_driver import Sequence
 from transientcam_simulation.emulated import world_of
 from transientcam_simulation.light._missing import SampledWays

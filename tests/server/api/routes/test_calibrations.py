@@ -375,7 +375,7 @@ def test_the_next_start_has_the_active_one(tmp_path: Path) -> None:
 # -- while it is measured ----------------------------------------------------------------------
 
 
-def started(http: httpx.Client) -> str:
+def started(http: httpx.Client) -> httpx.URL:
     """Address of a job that would take minutes, once it captures."""
     answer = http.post(CALIBRATIONS, json={"frames": 2000})
     job = job_of(answer)

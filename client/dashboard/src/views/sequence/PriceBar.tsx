@@ -62,7 +62,9 @@ export function PlannedMap() {
           </svg>
         )}
       </div>
-      <figcaption class="small quiet">Predicted error of each pixel: dark is 0, {middle}.{corners != null && " The plan is for the outlined region."}</figcaption>
+      <figcaption class="small quiet">
+        Predicted error of each pixel: dark is 0, {middle}.{corners != null && " The plan is for the outlined region."}
+      </figcaption>
     </figure>
   );
 }

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.simulation.light.path_tracer import REPETITIONS, Tracer
+from benchmarks.simulation.path_tracer import REPETITIONS, Tracer
 from transientcam_simulation.scene import parse_scene
 
 C = 299_792_458.0
