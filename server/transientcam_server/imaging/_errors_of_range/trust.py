@@ -48,8 +48,8 @@ def judged(
 ) -> tuple[_Array, _Array]:
     """Return the half width of each pixel's 90 % interval in m, and its `Trust`, (H, W).
 
-    The factors from `BIAS` to `NOISE_IN_LOSS` were chosen on random scenes of one seed so that
-    nine tenths of trusted pixels are within; ``python -m benchmarks trust`` measures others.
+    The factors from `BIAS` to `NOISE_IN_LOSS` were chosen on random scenes of two seeds;
+    ``python -m benchmarks trust`` measures how many pixels are within on others (decision 8).
     """
     sequence = recipe.applied.sequence
     range_m = np.where(found.has_range, found.range_m, np.nan).astype(np.float64)
