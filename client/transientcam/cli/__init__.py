@@ -29,11 +29,12 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # what its encoding lacks is escaped
             stream.reconfigure(errors="backslashreplace")
     code = run(sys.argv[1:])
+    output = sys.stdout
     try:
-        if sys.stdout is not None:
-            sys.stdout.flush()
+        if output is not None:
+            output.flush()
     except OSError as error:  # the disk is full, or nobody reads any more
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        os.dup2(os.open(os.devnull, os.O_WRONLY), output.fileno())
         if not isinstance(error, BrokenPipeError):
             echo(f"transientcam: {error.strerror}", err=True)
         code = code or FAILED

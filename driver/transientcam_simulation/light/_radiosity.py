@@ -48,8 +48,7 @@ class Gathering:
     ) -> NDArray[np.complex128]:
         """Return the moments that the camera sees, given those on the patches."""
         on_pixel = np.einsum("pk,pk->p", self.places[1], irradiance[self.places[0]])
-        moments: NDArray[np.complex128] = on_pixel * self.way(frequency_hz)
-        return moments
+        return np.asarray(on_pixel * self.way(frequency_hz), dtype=np.complex128)
 
     def way(self, frequency_hz: float) -> NDArray[np.complex128]:
         """Return what the way to the camera makes of moments at the rays' ends."""

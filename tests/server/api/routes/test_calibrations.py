@@ -396,7 +396,7 @@ def test_meanwhile_the_camera_is_for_the_job_alone(http: httpx.Client) -> None:
     ):
         assert answer.status_code == 409
         assert answer.json()["type"] == "/problems/camera-busy"
-        assert job.endswith(answer.json()["job"])
+        assert str(job).endswith(answer.json()["job"])
     http.post(f"{job}/cancel")
 
 
