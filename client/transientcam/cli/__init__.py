@@ -29,10 +29,9 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # what its encoding lacks is escaped
             stream.reconfigure(errors="backslashreplace")
     code = run(sys.argv[1:])
-    output = sys.stdout
+    output: Any = sys.stdout or io.StringIO()  # without a console there is none
     try:
-        if output is not None:
-            output.flush()
+        output.flush()
     except OSError as error:  # the disk is full, or nobody reads any more
         os.dup2(os.open(os.devnull, os.O_WRONLY), output.fileno())
         if not isinstance(error, BrokenPipeError):

@@ -53,7 +53,7 @@ class Gathering:
     def way(self, frequency_hz: float) -> NDArray[np.complex128]:
         """Return what the way to the camera makes of moments at the rays' ends."""
         turn = np.exp(2j * np.pi * frequency_hz / SPEED_OF_LIGHT_M_S * self._lit.distance_m)
-        way: NDArray[np.complex128] = self._lit.reflectance * turn
+        way = np.asarray(self._lit.reflectance * turn, dtype=np.complex128)
         if self._scatter is not None:
             way *= self._scatter.transfer(frequency_hz)
         return way
