@@ -29,7 +29,9 @@ class Page {
   readonly #requested: ((now_ms: number) => void)[] = [];
   readonly store = new Store({
     shelf: null,
-    api: new Api(() => Promise.resolve(new Response(JSON.stringify({ ...CAMERA, absent_products: this.absent })))),
+    api: new Api(() =>
+      Promise.resolve(new Response(JSON.stringify({ ...CAMERA, absent_products: this.absent, active: null, recordings: [] }))),
+    ),
   });
   readonly client = new StreamClient(
     this.store,
