@@ -40,6 +40,32 @@ describe("a cloud of points", () => {
     expect(fieldOfView(4, pinholeOf(4, 3, 1.2))).toBeCloseTo(1.2, 12);
   });
 
+  test("follows a lens that bends, and light from aside", () => {
+    const [k1, k2, p1, p2, k3] = [0.09, -0.27, 0.001, -0.002, 0.09];
+    const light = [0.3, -0.1, 0.05];
+    const lens = {
+      ...{ fx: 365, fy: 366, cx: 255.5, cy: 206.2, distortion: [k1, k2, p1, p2, k3] },
+      ...{ light_x_m: light[0], light_y_m: light[1], light_z_m: light[2] },
+    };
+    const cloud = makeCloud(512 * 424);
+    const range = new Float32Array(512 * 424).fill(2);
+    const count = fillCloud(cloud, range, 512, lens);
+    expect(count).toBe(range.length);
+    for (let at = 0; at < count; at += 997) {
+      const point = [cloud.positions[3 * at], -cloud.positions[3 * at + 1], -cloud.positions[3 * at + 2]];
+      const [x, y] = [point[0] / point[2], point[1] / point[2]];
+      const square = x * x + y * y;
+      const radial = 1 + k1 * square + k2 * square ** 2 + k3 * square ** 3;
+      const column = 365 * (x * radial + 2 * p1 * x * y + p2 * (square + 2 * x * x)) + 255.5;
+      const row = 366 * (y * radial + p1 * (square + 2 * y * y) + 2 * p2 * x * y) + 206.2;
+      expect([column, row]).toEqual([at % 512, Math.floor(at / 512)].map((each) => expect.closeTo(each, 3)));
+      const away = Math.hypot(...point.map((value, axis) => value - light[axis]));
+      expect(Math.hypot(...point) + away).toBeCloseTo(4, 5);
+    }
+    // a path that is shorter than the way to the light
+    expect(fillCloud(cloud, new Float32Array([0.1]), 1, lens)).toBe(0);
+  });
+
   test("is handed out as the camera sees it: x right, y down, z ahead", () => {
     const cloud = makeCloud(2);
     const count = fillCloud(cloud, new Float32Array([3, NaN]), 2, { fx: 2, fy: 4, cx: -1, cy: -4 });

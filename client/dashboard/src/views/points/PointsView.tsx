@@ -147,8 +147,8 @@ export function PointsView() {
     const [frame, drawn] = [range.peek(), scene.peek()];
     if (frame === null || drawn === null) return;
     const [height, width] = frame.shape;
-    const { fx, fy, cx, cy } = lensOf(store, width, height);
-    const facts = { frame: frame.meta.frame, intrinsics: { fx, fy, cx, cy, width, height, source: knownLens(store)?.source ?? "assumed" } };
+    const intrinsics = { width, height, source: knownLens(store)?.source ?? "assumed", ...lensOf(store, width, height) };
+    const facts = { frame: frame.meta.frame, intrinsics };
     save(`points-${frame.meta.frame}.ply`, new Blob([plyOf(drawn.cloudFor(width * height), count.peek(), facts)]));
   };
   const saveAll = async (): Promise<void> => {

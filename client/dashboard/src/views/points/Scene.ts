@@ -18,9 +18,10 @@ import {
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 import { DEGREE } from "../../physics/constants";
-import { type Cloud, fieldOfView, makeCloud, type Pinhole } from "./cloud";
+import { type Cloud, fieldOfView, makeCloud } from "./cloud";
 import { EyeDome } from "./eyeDome";
 import { onScreen, pointUnder } from "./picking";
+import type { Pinhole } from "./rays";
 import { axesLines, type Floor, floorOf, frustumLines, gridLabels, gridLines, type Label } from "./room";
 
 // Colours are those of the maps, byte for byte.

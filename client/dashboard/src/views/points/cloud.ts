@@ -3,6 +3,7 @@ import { type ColourMapName, rgbaOf } from "../../scales/colourMaps";
 import type { Scale } from "../../scales/scale";
 import { gravest } from "../../ui/flags";
 import { picker } from "../../ui/paint";
+import { alongRay, type Lens, type Pinhole, raysOf } from "./rays";
 
 export interface Cloud {
   /** x to the right, y up, z towards the viewer, in m: the camera stands at 0 and looks along -z. */
@@ -20,14 +21,6 @@ export function makeCloud(pixels: number): Cloud {
   return { positions: new Float32Array(3 * pixels), colours: new Uint8Array(3 * pixels), pixels: new Uint32Array(pixels) };
 }
 
-/** A pinhole camera, in pixels: a pixel looks along ((x - cx) / fx, (y - cy) / fy, 1), y down; centres are whole numbers. */
-export interface Pinhole {
-  readonly fx: number;
-  readonly fy: number;
-  readonly cx: number;
-  readonly cy: number;
-}
-
 /** Square pixels around the axis; the field of view is horizontal. */
 export function pinholeOf(width: number, height: number, fieldOfView_rad: number): Pinhole {
   const focal = width / (2 * Math.tan(fieldOfView_rad / 2));
@@ -39,23 +32,20 @@ export function fieldOfView(width: number, { fx }: Pinhole): number {
   return 2 * Math.atan(width / (2 * fx));
 }
 
-/** Writes the points of a range map, range along each pixel's ray; returns how many have one. */
-export function fillCloud(cloud: Cloud, range_m: ArrayLike<number>, width: number, { fx, fy, cx, cy }: Pinhole): number {
-  const height = range_m.length / width;
+/** Writes the points of a range map, half of the path of the light; returns how many have one. */
+export function fillCloud(cloud: Cloud, range_m: ArrayLike<number>, width: number, lens: Lens): number {
+  const rays = raysOf(lens, width, range_m.length / width);
   let at = 0;
-  for (let y = 0, pixel = 0; y < height; y++) {
-    const up = (cy - y) / fy;
-    for (let x = 0; x < width; x++, pixel++) {
-      const range = range_m[pixel];
-      if (!Number.isFinite(range)) continue;
-      const right = (x - cx) / fx;
-      const depth = range / Math.sqrt(1 + right * right + up * up);
-      cloud.positions[at] = right * depth;
-      cloud.positions[at + 1] = up * depth;
-      cloud.positions[at + 2] = -depth;
-      cloud.pixels[at / 3] = pixel;
-      at += 3;
-    }
+  for (let pixel = 0; pixel < range_m.length; pixel++) {
+    const [right, down] = [rays[2 * pixel], rays[2 * pixel + 1]];
+    const unit = 1 / Math.sqrt(1 + right * right + down * down);
+    const depth = unit * alongRay(lens, range_m[pixel], right, down, unit);
+    if (!Number.isFinite(depth)) continue;
+    cloud.positions[at] = right * depth;
+    cloud.positions[at + 1] = -down * depth;
+    cloud.positions[at + 2] = -depth;
+    cloud.pixels[at / 3] = pixel;
+    at += 3;
   }
   return at / 3;
 }

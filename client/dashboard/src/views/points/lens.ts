@@ -4,7 +4,8 @@ import type { Pixel } from "../../store/pixel";
 import { aNumber, type Setting } from "../../store/settings";
 import type { Store } from "../../store/store";
 import type { IntrinsicsDocument } from "../../stream/documents";
-import { fillCloud, makeCloud, type Pinhole, pinholeOf } from "./cloud";
+import { fillCloud, makeCloud, pinholeOf } from "./cloud";
+import type { Lens } from "./rays";
 
 /** What the service knows of the lens; null where it only assumes. */
 export function knownLens({ camera }: Store): IntrinsicsDocument | null {
@@ -18,7 +19,7 @@ export const FIELDS_DEG = aNumber(5, 150);
 export const FIELD_DEG: Setting<number> = { key: "points.field_deg", initial: 45, ...FIELDS_DEG };
 
 /** The lens for pictures of a size. */
-export function lensOf(store: Store, width: number, height: number): Pinhole {
+export function lensOf(store: Store, width: number, height: number): Lens {
   const lens = knownLens(store);
   return lens !== null && lens.width === width && lens.height === height
     ? lens
@@ -32,20 +33,20 @@ export interface Ranged extends Pixel {
 }
 
 /** Distance of what two pixels see, and its standard deviation by that of both ranges, to first order; in m. */
-export function distanceOf(lens: Pinhole, a: Ranged, b: Ranged): { readonly distance_m: number; readonly error_m: number } {
+export function distanceOf(lens: Lens, a: Ranged, b: Ranged): { readonly distance_m: number; readonly error_m: number } {
   const [from, to] = [pointAt(lens, a), pointAt(lens, b)];
   const between = from.map((value, axis) => value - to[axis]);
   const distance_m = Math.hypot(...between);
   // A range moves its point along its ray: only what of that lies along the distance changes it.
-  const share = (point: readonly number[], { range_m }: Ranged): number =>
-    point.reduce((sum, value, axis) => sum + (value / range_m) * (between[axis] / distance_m), 0);
-  return { distance_m, error_m: Math.hypot(share(from, a) * a.error_m, share(to, b) * b.error_m) };
+  const share = (point: readonly number[]): number =>
+    point.reduce((sum, value, axis) => sum + (value / Math.hypot(...point)) * (between[axis] / distance_m), 0);
+  return { distance_m, error_m: Math.hypot(share(from) * a.error_m, share(to) * b.error_m) };
 }
 
 /** The point that a pixel sees, in m, as `fillCloud` has it. */
-export function pointAt({ fx, fy, cx, cy }: Pinhole, { x, y, range_m }: Omit<Ranged, "error_m">): number[] {
+export function pointAt(lens: Lens, { x, y, range_m }: Omit<Ranged, "error_m">): number[] {
   const cloud = makeCloud(1);
   // The same ray from a picture of this one pixel.
-  fillCloud(cloud, [range_m], 1, { fx, fy, cx: cx - x, cy: cy - y });
+  fillCloud(cloud, [range_m], 1, { ...lens, cx: lens.cx - x, cy: lens.cy - y });
   return [...cloud.positions];
 }

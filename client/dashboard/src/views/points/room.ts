@@ -1,6 +1,6 @@
 /** What surrounds a cloud: a floor with a grid in metres, and the camera that sees it. Pure: lines as pairs of points, in m. */
 import { niceStep } from "../../scales/scale";
-import type { Pinhole } from "./cloud";
+import type { Pinhole } from "./rays";
 
 /** A floor, parallel to the camera's own horizontal plane; its edges are whole steps. */
 export interface Floor {
