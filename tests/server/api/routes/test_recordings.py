@@ -163,6 +163,9 @@ def test_nothing_is_made_on_the_disk_before_the_first_recording(
         "free_bytes": None,
         "active": None,
         "recordings": [],
+        "totals": {"recordings": 0, "frames": 0, "size_bytes": 0, "duration_s": 0},
+        "tags": {},
+        "next_offset": None,
     }
     assert not directory.exists()
 
