@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -30,11 +30,8 @@ STORED: Final = ROOT / "tests" / "driver" / "cameras" / "kinect2" / "libfreenect
 
 
 def spec(scene: str) -> str:
-    """Return the name of the camera in front of a scene; its frames are all the same.
-
-    libfreenect2 knows nothing of its lens, whose distortion is left out.
-    """
-    return f"kinect2:emulated?scene={scene}&noise=off&distortion=off"
+    """Return the name of the camera in front of a scene; its frames are all the same."""
+    return f"kinect2:emulated?scene={scene}&noise=off"
 
 
 @dataclass(frozen=True)
@@ -66,8 +63,7 @@ class ObservedFrame:
         measured = tm.measure(images, zeroth="estimated", phases_rad=SAMPLING.phases_rad)
         moments = np.asarray(tm.calibrate(measured, gains[:, *EVERY]))[1:]
         # the principal point is in the middle, so that rows may be counted from either end
-        straight = replace(lens, distortion=())  # as the device reported it then
-        x, y = (each[EVERY] for each in straight.slopes(WIDTH, HEIGHT))
+        x, y = (each[EVERY] for each in lens.slopes(WIDTH, HEIGHT))
         return cls(moments, (images == SATURATED_DN).any(axis=0), true_m, (x, y))
 
     def infrared(self) -> Array:
