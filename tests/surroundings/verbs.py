@@ -20,6 +20,7 @@ CLOSED: Final = "http://127.0.0.1:1"
 USUAL: Final[Mapping[str, Sequence[str]]] = {
     "calibrate": [CLOSED],
     "compile": ["--harmonics", "0"],
+    "demo": ["there-is-no-such-scene"],
     "devices": ["--no-network"],
     "emulate": ["there-is-no-such-scene"],
     "explain": ["wall"],
