@@ -42,10 +42,16 @@ class CaptureClock:
         return self._unix_s
 
 
+_LATEST_S: Final = 1e15
+"""What a file of others says beyond it is no time, and must not overflow."""
+
+
 def capture_times(
     device_time_s: NDArray[Any], capture_s: NDArray[Any], host_time_s: NDArray[Any]
 ) -> NDArray[np.float64]:
     """Return when the first exposure of each recorded frame began; times as in `RawFrame`."""
+    stated_s = np.nan_to_num(np.stack([device_time_s, capture_s, host_time_s]).astype(np.float64))
+    device_time_s, capture_s, host_time_s = np.clip(stated_s, -_LATEST_S, _LATEST_S)
     offset_s = host_time_s - capture_s - device_time_s
     times_s = np.empty(len(offset_s))
     begins = np.flatnonzero(np.diff(device_time_s) <= 0.0) + 1

@@ -53,3 +53,15 @@ def test_live_times_follow_a_device_whose_clock_runs_apart_from_the_hosts(drift:
     late_s = found - 1.8e9 - true_s
     assert abs(late_s[-600:]).max() < 0.01
     np.testing.assert_allclose(np.diff(found)[30:], np.diff(device_s)[30:], rtol=3e-3)
+
+
+@pytest.mark.parametrize("absurd_s", [np.nan, np.inf, -1.7e308, 1.7e308])
+@pytest.mark.parametrize("which", [0, 1, 2])
+def test_times_that_are_none_cost_no_other_frame_its_time(which: int, absurd_s: float) -> None:
+    stated_s = [DEVICE_S.copy(), CAPTURE_S + 0.0 * DEVICE_S, BEGUN_S + CAPTURE_S]
+    stated_s[which][-1] = absurd_s
+
+    found = capture_times(*stated_s)
+
+    assert np.isfinite(found).all()
+    np.testing.assert_allclose(found[:-1], BEGUN_S[:-1], atol=1e-6)
