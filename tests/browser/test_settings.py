@@ -97,8 +97,10 @@ def test_points_are_handed_out_where_the_lens_says(page: Page, served: Served) -
     points = np.array([point[:3] for point in struct.iter_unpack("<3f3B", body)])
     y, x = np.nonzero(valid)
     rays = np.stack([(x - lens["cx"]) / lens["fx"], (y - lens["cy"]) / lens["fy"], np.ones_like(x)])
-    expected = rays / np.linalg.norm(rays, axis=0) * ranges[valid]
-    np.testing.assert_allclose(points.T, expected, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(points.T, rays * points[:, 2], rtol=1e-4, atol=1e-5)
+    light_m = [lens[f"light_{axis}_m"] for axis in "xyz"]
+    path_m = np.linalg.norm(points, axis=1) + np.linalg.norm(points - light_m, axis=1)
+    np.testing.assert_allclose(path_m, 2 * ranges[valid], rtol=1e-5)
     with page.expect_download() as download:
         choose(page, "points", "Points with light and flags (PLY)")
     assert b"property float amplitude" in Path(download.value.path()).read_bytes()[:400]
