@@ -3,6 +3,7 @@
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import httpx
 import numpy as np
@@ -161,8 +162,7 @@ def test_pins_and_regions_measure_what_the_daemon_serves(page: Page, served: Ser
         shown = page.locator(f"[data-pin={pin}]")
         expect(shown).to_contain_text(f"{ranges[y, x]:.3f}")
         expect(page.locator(".panel-transient .mark-pin", has_text=pin)).to_be_visible()
-        ray = np.array([(x - lens["cx"]) / lens["fx"], (y - lens["cy"]) / lens["fy"], 1])
-        places.append(ranges[y, x] * ray / np.linalg.norm(ray))
+        places.append(points_of(ranges[y, x], x, y, lens))
     apart_m = float(np.linalg.norm(places[0] - places[1]))
     expect(page.locator("[data-distance=AB]")).to_contain_text(f"{apart_m:.3f}")
     # dragging with Shift marks a region
@@ -222,14 +222,31 @@ def plane_is_shown(
     assert text(page, ".panel-map", "plane-tilt") == f"{tilt_deg:.1f} °"
 
 
+def points_of(range_m: Any, x: Any, y: Any, lens: dict[str, float]) -> NDArray[np.float64]:
+    """Points on the rays of pixels to which the light's path is twice the range, by bisection."""
+    rays = np.stack(
+        [(x - lens["cx"]) / lens["fx"], (y - lens["cy"]) / lens["fy"], np.ones_like(range_m)]
+    )
+    rays /= np.linalg.norm(rays, axis=0)
+    light_m = np.array([lens[f"light_{axis}_m"] for axis in "xyz"])
+    nearer_m, farther_m = np.zeros_like(range_m), np.asarray(range_m) + np.linalg.norm(light_m)
+    for _ in range(60):
+        middle_m = (nearer_m + farther_m) / 2
+        back_m = np.linalg.norm((middle_m * rays).T - light_m, axis=-1).T
+        longer = middle_m + back_m > 2 * range_m
+        nearer_m, farther_m = (
+            np.where(longer, nearer_m, middle_m),
+            np.where(longer, middle_m, farther_m),
+        )
+    return np.asarray(nearer_m * rays)
+
+
 def plane_of(
     ranges: NDArray[np.float64], lens: dict[str, float], inside: NDArray[np.bool_]
 ) -> tuple[float, float]:
     """Deviation from the nearest plane in m and its tilt in degrees, by singular values."""
     y, x = np.nonzero(inside & np.isfinite(ranges))
-    across, down = (x - lens["cx"]) / lens["fx"], (y - lens["cy"]) / lens["fy"]
-    rays = np.stack([across, down, np.ones(x.shape)], axis=-1)
-    found = ranges[y, x, None] * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    found = points_of(ranges[y, x], x, y, lens).T
     _, singular, axes = np.linalg.svd(found - found.mean(axis=0), full_matrices=False)
     tilt = np.degrees(np.arccos(abs(axes[2, 2])))
     return float(singular[2] / np.sqrt(len(found) - 3)), float(tilt)
