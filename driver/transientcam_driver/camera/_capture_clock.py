@@ -43,15 +43,20 @@ class CaptureClock:
 
 
 _LATEST_S: Final = 1e15
-"""What a file of others says beyond it is no time, and must not overflow."""
+"""What a file of others says beyond it is no time: that frame has one between its neighbours'."""
 
 
 def capture_times(
     device_time_s: NDArray[Any], capture_s: NDArray[Any], host_time_s: NDArray[Any]
 ) -> NDArray[np.float64]:
     """Return when the first exposure of each recorded frame began; times as in `RawFrame`."""
-    stated_s = np.nan_to_num(np.stack([device_time_s, capture_s, host_time_s]).astype(np.float64))
-    device_time_s, capture_s, host_time_s = np.clip(stated_s, -_LATEST_S, _LATEST_S)
+    stated_s = np.stack([device_time_s, capture_s, host_time_s]).astype(np.float64)
+    known = np.asarray((np.abs(stated_s) < _LATEST_S).all(axis=0))
+    if not known.all():
+        if not known.any():
+            return np.zeros(len(known))
+        others_s = capture_times(*stated_s[:, known])
+        return np.interp(np.arange(len(known)), np.flatnonzero(known), others_s)
     offset_s = host_time_s - capture_s - device_time_s
     times_s = np.empty(len(offset_s))
     begins = np.flatnonzero(np.diff(device_time_s) <= 0.0) + 1

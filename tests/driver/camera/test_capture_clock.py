@@ -57,11 +57,19 @@ def test_live_times_follow_a_device_whose_clock_runs_apart_from_the_hosts(drift:
 
 @pytest.mark.parametrize("absurd_s", [np.nan, np.inf, -1.7e308, 1.7e308])
 @pytest.mark.parametrize("which", [0, 1, 2])
-def test_times_that_are_none_cost_no_other_frame_its_time(which: int, absurd_s: float) -> None:
-    stated_s = [DEVICE_S.copy(), CAPTURE_S + 0.0 * DEVICE_S, BEGUN_S + CAPTURE_S]
-    stated_s[which][-1] = absurd_s
+@pytest.mark.parametrize("at", [0, 5, 11])
+def test_times_that_are_none_cost_no_other_frame_its_time(
+    at: int, which: int, absurd_s: float
+) -> None:
+    stated_s = [DEVICE_S.copy(), CAPTURE_S.copy(), BEGUN_S + CAPTURE_S]
+    stated_s[which][at] = absurd_s
 
     found = capture_times(*stated_s)
 
-    assert np.isfinite(found).all()
-    np.testing.assert_allclose(found[:-1], BEGUN_S[:-1], atol=1e-6)
+    others = np.arange(len(found)) != at
+    np.testing.assert_allclose(found[others], BEGUN_S[others], atol=1e-6)
+    assert (np.diff(found) >= 0).all()
+
+
+def test_frames_that_all_state_no_time_are_read_all_the_same() -> None:
+    assert np.isfinite(capture_times(np.full(3, np.inf), np.zeros(3), np.full(3, np.nan))).all()
