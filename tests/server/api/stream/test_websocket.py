@@ -198,7 +198,7 @@ def test_no_client_waits_for_a_start_that_is_not_captured_yet(served: Served) ->
         frame = client.frame()
 
     assert gap.details["to"] == latest + 1_000_000 - 1
-    assert gap.details["from"] == frame.meta["frame"]
+    assert latest < gap.details["from"] <= frame.meta["frame"]  # more may be dropped
     assert gap.details["reason"] == "not captured yet"
 
 
