@@ -1,19 +1,18 @@
 """The reference pages: every verb of the command line, every setting of the daemon."""
 
 import re
-import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import typer
 
-from benchmarks.common.records import DOCS
 from transientcam.cli import app_for
 from transientcam_server.daemon._configuration import ENVIRONMENT_PREFIX
 from transientcam_server.settings import Settings
 
-BEGIN = "<!-- python -m benchmarks reference --write writes what follows -->"
+DOCS = Path(__file__).parents[1] / "docs"
+BEGIN = "<!-- `python tools/documents.py --write` writes what follows -->"
 _DEFAULT_IN_HELP = re.compile(r"\s*\[default: (.*?)\]")
 _OF_THIS_MACHINE = {
     "calibrations.directory": "calibrations in the state directory",
@@ -169,15 +168,3 @@ def _json(value: object) -> str:
 def variable(setting: str) -> str:
     """Return the environment variable of a setting, as in ``stream.max_clients``."""
     return ENVIRONMENT_PREFIX + setting.replace(".", "__").upper()
-
-
-def reference(*, write: bool) -> None:
-    """Write the pages, or say which of them are old, and fail where one is."""
-    old = [path for path, text in pages().items() if path.read_text(encoding="utf-8") != text]
-    for path in old:
-        print(f"{'wrote' if write else 'old'}: {path}")
-    if write:
-        for path, text in pages().items():
-            path.write_text(text, encoding="utf-8")
-    if old and not write:
-        sys.exit(1)

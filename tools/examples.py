@@ -1,9 +1,12 @@
 """The examples of the OpenAPI document: what the daemon answers with a simulated camera.
 
+``python -m tools.examples --write`` writes them.
+
 What differs from run to run (ids, times, numbers of frames) is replaced by fixed values, and lists
 of objects keep their first two.
 """
 
+import argparse
 import json
 import time
 from collections.abc import Iterator
@@ -209,8 +212,11 @@ def _field(name: str, value: Any, fields: dict[str, Any]) -> Any:
     return fixed
 
 
-def write_examples(*, write: bool) -> None:
+def main() -> None:
     """Write the examples, or print which of them are old."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--write", action="store_true", help="write what differs")
+    write = parser.parse_args().write
     found, former = examples(), json.loads(EXAMPLES_FILE.read_text(encoding="utf-8"))
     for name in sorted(found.keys() | former.keys()):
         if found.get(name) != former.get(name):
@@ -218,3 +224,7 @@ def write_examples(*, write: bool) -> None:
     if write:
         text = json.dumps(found, indent=1, ensure_ascii=False)
         EXAMPLES_FILE.write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
