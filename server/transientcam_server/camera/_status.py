@@ -53,3 +53,17 @@ class AcquisitionStatus:
     off_because: Cause | None = None
     off_kept: bool | None = None
     switching_off: bool = False
+
+    @property
+    def obstacles(self) -> list[str]:
+        """Why no frames can be had; empty where they can."""
+        reasons = []
+        if self.state == "lost":
+            reasons.append(f"the camera is lost: {self.reason}")
+        if self.state == "arming":
+            reasons.append("the light is announced and not on yet")
+        if self.state in ("starting", "streaming") and not self.frames:
+            reasons.append("the camera is starting")
+        if self.stalled:
+            reasons.append(f"no frame arrived for {self.frame_age_s:.1f} s")
+        return reasons
