@@ -1,10 +1,9 @@
-"""Draw the pictures of docs/mathematics.md.
+"""Draw the pictures of docs/mathematics.md: ``python -m tools.mathematics``.
 
 One pixel without noise, whose moments are known in closed form: two sharp returns and a share of
 uniform light. Nothing is captured, and no number depends on the machine.
 """
 
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -13,6 +12,7 @@ from matplotlib.figure import Figure
 
 import transientcam_moments as tm
 from benchmarks.common.picture import blank, saved
+from benchmarks.common.records import DOCS
 
 BASE_FREQUENCY_HZ: Final = 23e6
 RETURNS_S: Final = np.array([10e-9, 17e-9])
@@ -138,8 +138,7 @@ PICTURES: Final = {
 }
 
 
-def draw(figures: Path) -> None:
-    """Write all four."""
-    for name, picture in PICTURES.items():
-        (figures / name).write_bytes(saved(picture(), "png"))
-        print(name)
+if __name__ == "__main__":
+    for _name, _picture in PICTURES.items():
+        (DOCS / "figures" / _name).write_bytes(saved(_picture(), "png"))
+        print(_name)
