@@ -31,8 +31,8 @@ def test_a_page_has_each_figure_with_its_picture_statements_and_tables() -> None
     assert "## Figure 7: Title 7, of it" in lines
     assert "![Figure 2: Title 2, of it](figures/paper/figure-02.png)" in lines
     assert r"| It is \| so. (Sec. 1) | how \| much | at most 2.00 | 1.00 | holds |" in lines
-    assert r"| It is \| so. (Sec. 1) | how \| much | at most 2 | 3 | **differs** |" in lines
-    assert "- **Differs:** “It is | so.” (3): because." in lines
+    assert r"| It is \| so. (Sec. 1) | how \| much | at most 2.00 | 3.00 | **differs** |" in lines
+    assert "- **Differs:** “It is | so.” (3.00): because." in lines
     assert "- A remark." in lines
     assert [line for line in lines if line.startswith((r"| x\|y", "| 3 | –", "| 0.123"))] == [
         r"| x\|y | 1,234 |",
