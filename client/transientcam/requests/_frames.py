@@ -144,10 +144,7 @@ def file(
 ) -> Request[bytes]:
     """Build the request for a product of a frame as a file.
 
-    Raises
-    ------
-    ParameterError
-        If ``form`` is no `FileFormat`.
+    Raises ParameterError if ``form`` is no `FileFormat`.
     """
     if form not in tuple(FileFormat):
         raise ParameterError("form", form, f"one of {', '.join(FileFormat)}")

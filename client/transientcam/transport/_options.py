@@ -54,10 +54,7 @@ def http_client(
 def request_options(request: Request[Any], *, timeout_s: float) -> dict[str, Any]:
     """Return the options of one request, besides its method and address.
 
-    Raises
-    ------
-    ParameterError
-        If nothing can wait for so long.
+    Raises ParameterError if nothing can wait for so long.
     """
     return {
         "params": list(request.params),

@@ -77,10 +77,7 @@ def plugin_of(spec: str) -> tuple[CameraName, CameraPlugin]:
 def _load(point: EntryPoint) -> CameraPlugin:
     """Import the plug-in of an entry point.
 
-    Raises
-    ------
-    PluginError
-        It cannot be imported, or is something else.
+    Raises PluginError where it cannot be imported, or is something else.
     """
     try:
         plugin = point.load()

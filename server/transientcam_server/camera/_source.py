@@ -107,14 +107,9 @@ def start_with(camera: Camera, settings: SequenceSettings) -> None:
 class SimulationSnapshot:
     """What another simulated camera is opened by, before the same scene, as old as the first.
 
-    Attributes
-    ----------
-    spec
-        What the first one was opened with.
-    age_s
-        Device time of the first one.
-    scene, definition, effects, diffuser
-        What it simulates at present.
+    ``spec``: what the first one was opened with.
+    ``age_s``: device time of the first one.
+    ``scene``, ``definition``, ``effects``, ``diffuser``: what it simulates at present.
     """
 
     spec: str
@@ -127,10 +122,7 @@ class SimulationSnapshot:
     def open(self) -> Camera:
         """Open it, in virtual time.
 
-        Raises
-        ------
-        SpecError, SceneError, CameraError
-            As `transientcam_driver.open_camera`.
+        Raises SpecError, SceneError, CameraError as `transientcam_driver.open_camera`.
         """
         clock = VirtualClock()
         camera = open_camera(self.spec, clock=clock)
