@@ -193,10 +193,7 @@ def given(**parts: object) -> dict[str, Any]:
 def recording_path(recording_id: str) -> str:
     """Return the path of a recording.
 
-    Raises
-    ------
-    ParameterError
-        If ``recording_id`` is no id.
+    Raises ParameterError if ``recording_id`` is no id.
     """
     return f"recordings/{segment(recording_id)}"
 

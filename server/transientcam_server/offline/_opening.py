@@ -40,7 +40,7 @@ def open_recording(
     settings: Mapping[str, Any] | None = None,
     timeout_s: float = 10.0,
 ) -> "OpenedRecording":
-    """Open the recording at a path, or a daemon's by its address; parameters of `transientcam.open`.
+    """Open the recording at a path, or a daemon's by its address, as `transientcam.open` does.
 
     Raises NotARecording if it cannot be read as one, InputError if its settings cannot be used,
     TransientcamError if the daemon does not have it, OSError if the file cannot be read.

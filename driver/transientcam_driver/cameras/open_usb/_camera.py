@@ -64,16 +64,11 @@ class UsbCamera(HostCamera):
     The light goes off with ``stop``, ``safe_off`` and ``close``, when the object is collected or
     the interpreter ends, and by the device's own watchdog when the process dies.
 
-    Parameters
-    ----------
-    connect
-        Finds and claims the device with a serial number, or any when it is None.
-    clock
-        Real time by default.
-    simulation
-        The handle on a simulated camera; None for a real one.
-    sequence
-        What to configure first; by default the nearest that the camera can do to ``Sequence()``.
+    ``connect``: finds and claims the device with a serial number, or any when it is None.
+    ``clock``: real time by default.
+    ``simulation``: the handle on a simulated camera; None for a real one.
+    ``sequence``: what to configure first; by default the nearest that the camera can do to
+    ``Sequence()``.
     """
 
     def __init__(
