@@ -51,7 +51,8 @@ paper: .venv/test.stamp  ## Make the paper's figures, beside what the paper says
 
 docs: .venv/test.stamp dashboard  ## Measure anew, and write a page of docs/ (PAGE=plans) or all (hours)
 	$(BIN)/python -m benchmarks $(PAGE) --write
-	@if [ '$(PAGE)' = all ]; then $(BIN)/transientcam paper -o docs; fi
+	@if [ '$(PAGE)' = all ]; then $(BIN)/transientcam paper -o docs && $(BIN)/python -m tools.mathematics && \
+		$(BIN)/python -m tools.examples --write && $(BIN)/python tools/documents.py --write; fi
 
 docs-site: .venv/test.stamp  ## Write the documentation as a site: open build/site/index.html
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs build/site

@@ -149,9 +149,6 @@ _ALL: Final = (
     Measurement("pages.pictures:draw"),
     Measurement("pages.pictures:draw_views", named="views", by_hand=True),
     Measurement("pages.notebooks:draw"),
-    Measurement("pages.mathematics:draw"),
-    Measurement("pages.reference:reference"),
-    Measurement("pages.examples:write_examples"),
 )
 MEASUREMENTS: Final = {each.name: each for each in _ALL}
 """By their names, in the order of their pages."""

@@ -1,4 +1,4 @@
-"""What is written of what the programs state: types for both clients, a table of operations.md.
+"""What is written of what the programs state: types for both clients, pages of docs/.
 
 The models of `transientcam_server.api._documents` state each document once. OpenAPI and AsyncAPI
 documents follow from them, and of these the types of the Python client and of the dashboard: run
@@ -19,6 +19,7 @@ from pathlib import Path
 from textwrap import indent
 from typing import Any
 
+import reference  # type: ignore[import-not-found]  # beside this script, no package
 from light_table import (  # type: ignore[import-not-found]  # beside this script, no package
     with_table,
 )
@@ -83,6 +84,7 @@ def files() -> dict[Path, str]:
         PYTHON: _formatted(python),
         TYPESCRIPT: typescript + "\n",
         OPERATIONS: with_table(OPERATIONS.read_text(encoding="utf-8")),
+        **reference.pages(),
     }
 
 

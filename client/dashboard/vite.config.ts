@@ -22,5 +22,7 @@ export default defineConfig({
   },
   worker: { format: "es" },
   server: { proxy: { "/api": { target: DAEMON, ws: true } } },
-  test: { include: ["tests/**/*.test.ts"], environment: "node" },
+  // The tests stand with all others of the project, and find packages here.
+  resolve: { dedupe: ["@preact/signals", "@msgpack/msgpack"] },
+  test: { dir: "../../tests/dashboard", environment: "node" },
 });

@@ -37,20 +37,12 @@ class Refusal:
 class Admission:
     """What a connection has to show before anything is sent to it or read of it.
 
-    Parameters
-    ----------
-    host
-        Where it is served. Beside addresses of this machine a ``Host`` header may name it, and this
-        machine if others reach it; else a page could rebind its own name to this address.
-    secret
-        Path of the address, without its slash; None where everybody who reaches the port may enter.
-    origins
-        Pages that may connect, such as https://app.foxglove.dev; programs have no origin.
-
-    Raises
-    ------
-    ParameterError
-        If an origin is none.
+    ``host``: where it is served. Beside addresses of this machine a ``Host`` header may name it,
+    and this machine if others reach it; else a page could rebind its own name to this address.
+    ``secret``: path of the address, without its slash; None where everybody who reaches the port
+    may enter.
+    ``origins``: pages that may connect, such as https://app.foxglove.dev; programs have no origin.
+    Raises ParameterError if an origin is none.
     """
 
     def __init__(self, host: str, *, secret: str | None, origins: Iterable[str] = ()) -> None:
@@ -93,12 +85,8 @@ class Admission:
     def refusal(self, path: str, *, hosts: Sequence[str], origins: Sequence[str]) -> Refusal | None:
         """Return why a request may not enter, None if it may.
 
-        Parameters
-        ----------
-        path
-            As the request line has it.
-        hosts, origins
-            Values of all headers of these names.
+        ``path``: as the request line has it.
+        ``hosts``, ``origins``: values of all headers of these names.
         """
         if len(hosts) != 1 or not self._is_ours(hosts[0]):
             return Refusal(421, "the Host header names no host that is served here")

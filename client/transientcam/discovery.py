@@ -74,12 +74,8 @@ class FoundCamera:
 class Search:
     """What a search has found.
 
-    Attributes
-    ----------
-    cameras
-        Those that answered, by name; at most `MAX_CAMERAS`.
-    left_out
-        How many more names were announced, which were not asked.
+    ``cameras``: those that answered, by name; at most `MAX_CAMERAS`.
+    ``left_out``: how many more names were announced, which were not asked.
     """
 
     cameras: tuple[FoundCamera, ...]

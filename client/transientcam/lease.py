@@ -19,12 +19,8 @@ GIVE_BACK: Final = document("lease", method="DELETE")
 class BaseLease:
     """What `Lease` and `AsyncLease` have in common.
 
-    Attributes
-    ----------
-    holder
-        Name shown to other clients.
-    id
-        The secret that changes under it carry; empty before it was granted.
+    ``holder``: name shown to other clients.
+    ``id``: the secret that changes under it carry; empty before it was granted.
     """
 
     def __init__(self, show: Callable[[str | None], None], terms: dict[str, Any]) -> None:

@@ -158,17 +158,9 @@ def open(  # noqa: A001 - it is called as transientcam.open
 def remote_recording(url: str, *, token: str | None = None, timeout_s: float = 10.0) -> RemoteFile:
     """Return the file of a daemon's recording, of which what is read travels.
 
-    Parameters
-    ----------
-    url
-        Of the recording, ``URL/api/v1/recordings/ID``, or of its file.
-
-    Raises
-    ------
-    ParameterError
-        If it is another address.
-    ServerUnreachable, ProblemError, ProtocolError
-        If the daemon does not have it.
+    ``url``: of the recording, ``URL/api/v1/recordings/ID``, or of its file.
+    Raises ParameterError if it is another address.
+    Raises ServerUnreachable, ProblemError, ProtocolError if the daemon does not have it.
     """
     return RemoteFile(_file_url(url), token=token, timeout_s=timeout_s)
 

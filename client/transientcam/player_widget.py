@@ -31,14 +31,9 @@ class TransientPlanes(NamedTuple):
 class PlayerWidget(anywidget.AnyWidget):
     """One frame of coefficients at a time, and what its page asks for; made by `player`.
 
-    Attributes
-    ----------
-    time_s
-        Time of flight that is shown, in s; setting it shows another one.
-    index
-        Of the frame of a recording, from 0.
-    problem
-        Why no newer frame came; empty where one did.
+    ``time_s``: time of flight that is shown, in s; setting it shows another one.
+    ``index``: of the frame of a recording, from 0.
+    ``problem``: why no newer frame came; empty where one did.
     """
 
     _esm = MODULE

@@ -18,23 +18,13 @@ _BLOCKS: Final = 2048
 class RemoteFile(io.RawIOBase):
     """A file on a server that answers with ranges; it keeps what was read last, up to 32 MiB.
 
-    Parameters
-    ----------
-    url
-        Of the file.
-    token
-        Bearer token, where the server requires one.
-    timeout_s
-        How long to wait for each answer, all of it.
-    transport
-        How httpx sends requests, for tests and unusual networks.
-
-    Raises
-    ------
-    ServerUnreachable, ProblemError
-        If there is no such file, as of every read.
-    ProtocolError
-        If the server has no ranges, or the file changed while it was open, as of every read.
+    ``url``: of the file.
+    ``token``: bearer token, where the server requires one.
+    ``timeout_s``: how long to wait for each answer, all of it.
+    ``transport``: how httpx sends requests, for tests and unusual networks.
+    Raises ServerUnreachable, ProblemError if there is no such file, as of every read.
+    Raises ProtocolError if the server has no ranges, or the file changed while it was open, as of
+    every read.
     """
 
     def __init__(

@@ -91,10 +91,7 @@ def subscribe_message(
 ) -> Subscribe:
     """Build the message that subscribes to some products, given by name or in full.
 
-    Raises
-    ------
-    ParameterError
-        If there is no product, or a number is out of range.
+    Raises ParameterError if there is no product, or a number is out of range.
     """
     subscriptions = tuple(
         Subscription(each, max_rate_hz) if isinstance(each, str) else each for each in products
@@ -149,10 +146,7 @@ class StreamState:
     def opening(self, subprotocol: str | None) -> bytes:
         """Return the first message of a connection for which the server chose ``subprotocol``.
 
-        Raises
-        ------
-        ProtocolError
-            If it chose none, as a server of another protocol may do.
+        Raises ProtocolError if it chose none, as a server of another protocol may do.
         """
         if subprotocol != SUBPROTOCOL:
             raise ProtocolError("subprotocol", subprotocol, SUBPROTOCOL)
@@ -171,12 +165,8 @@ class StreamState:
     def received(self, data: bytes | str) -> Frame | None:
         """Process one message; return the frame if it is one.
 
-        Raises
-        ------
-        ProblemError
-            If the server refuses a message of this client.
-        ProtocolError
-            If the message is not one of the protocol.
+        Raises ProblemError if the server refuses a message of this client.
+        Raises ProtocolError if the message is not one of the protocol.
         """
         message = parse_server_message(data)
         match message:

@@ -37,34 +37,21 @@ class Kernels(Generic[Key]):
     ``TRANSIENTCAM_KERNELS``: "off" (or 0, no, false) leaves everything to NumPy; with "manual"
     there is nothing but what the process itself compiles.
 
-    Parameters
-    ----------
-    environ : mapping
-        Of the process.
-    cache : Cache
-        In which the code is kept.
-    load : callable, optional
-        Returns a kernel, which `Cache.compile` has loaded or compiled; a function of a module. Left
-        out where it is set later, from above: kernels may be compiled of functions of modules that
-        look them up.
-    added : callable, optional
-        Called with each kernel that has become ready, and its key before it.
-    expected_s : callable, optional
-        About how long it takes to compile a kernel on an idle processor; what takes less goes
-        first.
-
-    Attributes
-    ----------
-    enabled, automatic : bool
-        Whether there are kernels at all, and whether calls have them made ready.
-    noting : bool
-        What calls want is made ready only when that is asked for.
-    compiled : dict
-        What is ready: read by every call, without a lock.
-    compiling
-        What is made ready now, or None.
-    failed : dict
-        Reasons, in one line each. What has failed is not tried again.
+    ``environ`` (mapping): of the process.
+    ``cache`` (Cache): in which the code is kept.
+    ``load`` (callable, optional): returns a kernel, which `Cache.compile` has loaded or compiled; a
+    function of a module. Left out where it is set later, from above: kernels may be compiled of
+    functions of modules that look them up.
+    ``added`` (callable, optional): called with each kernel that has become ready, and its key
+    before it.
+    ``expected_s`` (callable, optional): about how long it takes to compile a kernel on an idle
+    processor; what takes less goes first.
+    ``enabled``, ``automatic`` (bool): whether there are kernels at all, and whether calls have them
+    made ready.
+    ``noting`` (bool): what calls want is made ready only when that is asked for.
+    ``compiled`` (dict): what is ready: read by every call, without a lock.
+    ``compiling``: what is made ready now, or None.
+    ``failed`` (dict): reasons, in one line each. What has failed is not tried again.
     """
 
     def __init__(

@@ -99,26 +99,14 @@ class ChildProcess:
     ) -> Any:
         """Return ``function(*arguments, tell)`` of the other process; waits for it.
 
-        Parameters
-        ----------
-        function
-            Of a module, or a method of what can be pickled.
-        arguments
-            Pickled.
-        ask
-            Called here several times a second meanwhile. What it raises gives the call up, which
-            kills the process, and is raised.
-        told
-            Called here with all that the function hands to its ``tell``; may raise, too.
-
-        Raises
-        ------
-        ProcessEnded
-            Where the process has ended; the next call starts another one.
-        OSError
-            As `start` does.
-        Exception
-            What the function raises.
+        ``function``: of a module, or a method of what can be pickled.
+        ``arguments``: pickled.
+        ``ask``: called here several times a second meanwhile. What it raises gives the call up,
+        which kills the process, and is raised.
+        ``told``: called here with all that the function hands to its ``tell``; may raise, too.
+        Raises ProcessEnded where the process has ended; the next call starts another one.
+        Raises OSError as `start` does.
+        Raises what the function raises.
         """
         self.start()
         try:

@@ -38,31 +38,37 @@ which recovers from them or raises one of the others.
 import reprlib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, dataclass_transform
 
 _SHOWN = reprlib.Repr()  # of a value that may be of any size and depth
 _SHOWN.maxstring = _SHOWN.maxother = _SHOWN.maxlong = 200
 UDEV_RULES_FILE = "/etc/udev/rules.d/60-transientcam.rules"
 
 
-class DriverError(Exception):
-    """Everything this package raises on purpose.
+@dataclass_transform(eq_default=False, field_specifiers=(field,))
+class StatedError(Exception):
+    """A dataclass of its data, whose ``_sentence`` is a format string of its fields.
 
-    A subclass is a dataclass of its data; ``_sentence`` is a format string of its fields, and what
-    ``str`` gives. Without one, the error has its sentence as its only argument.
+    The sentence is what ``str`` gives.
     """
 
     _sentence: ClassVar[str] = ""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(eq=False, repr=False)(cls)
 
     def __post_init__(self) -> None:
         self.args = tuple(vars(self).values())  # by which it is pickled
 
     def __str__(self) -> str:
-        return self._sentence.format_map(vars(self)) if self._sentence else super().__str__()
+        return self._sentence.format_map(vars(self))
 
 
-@dataclass(eq=False, repr=False)
-class FieldError(DriverError):
+class DriverError(Exception):
+    """Everything this package raises on purpose; without fields its argument is a sentence."""
+
+
+class FieldError(DriverError, StatedError):
     """``field`` has a ``value`` beyond its ``limit``."""
 
     field: str
@@ -81,8 +87,7 @@ class EffectError(FieldError):
     """An effect of the simulation, or a choice for one, that does not exist."""
 
 
-@dataclass(eq=False, repr=False)
-class SceneError(DriverError):
+class SceneError(DriverError, StatedError):
     """A scene file holds a key or a value that is not valid, or lacks one that is required."""
 
     file: str | Path
@@ -96,8 +101,7 @@ class SceneError(DriverError):
         super().__post_init__()
 
 
-@dataclass(eq=False, repr=False)
-class SpecError(DriverError):
+class SpecError(DriverError, StatedError):
     """The name given to ``open_camera`` is not valid."""
 
     spec: str
@@ -105,8 +109,7 @@ class SpecError(DriverError):
     _sentence = "camera {spec!r}: {reason}"
 
 
-@dataclass(eq=False, repr=False)
-class PluginError(DriverError):
+class PluginError(DriverError, StatedError):
     """The plug-in of a kind of camera cannot be used."""
 
     kind: str
@@ -114,8 +117,7 @@ class PluginError(DriverError):
     _sentence = "the camera {kind!r} cannot be used: {reason}"
 
 
-@dataclass(eq=False, repr=False)
-class CompilerMissing(DriverError):
+class CompilerMissing(DriverError, StatedError):
     """The light of a simulated scene that moves is computed by numba, which cannot be used."""
 
     reason: str
@@ -129,8 +131,7 @@ class CalibrationError(DriverError):
     """Something about a calibration measurement."""
 
 
-@dataclass(eq=False, repr=False)
-class CalibrationMismatch(CalibrationError):
+class CalibrationMismatch(CalibrationError, StatedError):
     """A calibration is good for one camera, sequence and exposure, and ``field`` differs."""
 
     field: str
@@ -139,8 +140,7 @@ class CalibrationMismatch(CalibrationError):
     _sentence = "the calibration is for {field} = {needed!r}, not {value!r}"
 
 
-@dataclass(eq=False, repr=False)
-class CalibrationFileError(CalibrationError):
+class CalibrationFileError(CalibrationError, StatedError):
     """A file holds no calibration: ``key`` is ``found``, not ``expected``."""
 
     file: str | Path
@@ -158,8 +158,7 @@ class CameraError(DriverError):
     """Something between this process and the camera."""
 
 
-@dataclass(eq=False, repr=False)
-class CameraNotFound(CameraError):
+class CameraNotFound(CameraError, StatedError):
     """No camera of this kind, or none with this serial number, is plugged in."""
 
     serial: str | None = None
@@ -170,7 +169,6 @@ class CameraNotFound(CameraError):
         return f"no camera with serial number {self.serial!r} is plugged in"
 
 
-@dataclass(eq=False, repr=False)
 class CameraUnreachable(CameraNotFound):
     """No camera answers at an address of the network."""
 
@@ -178,8 +176,7 @@ class CameraUnreachable(CameraNotFound):
         return f"no camera answers at {self.serial}"
 
 
-@dataclass(eq=False, repr=False)
-class PermissionDenied(CameraError):
+class PermissionDenied(CameraError, StatedError):
     """The camera is plugged in, but this user may not open its device node."""
 
     node: str
@@ -192,60 +189,54 @@ class PermissionDenied(CameraError):
     )
 
 
-@dataclass(eq=False, repr=False)
-class CameraBusy(CameraError):
+class CameraBusy(CameraError, StatedError):
     """Another program has claimed the camera; a camera serves one program at a time."""
 
     node: str
     _sentence = "another program holds the camera at {node} (`fuser -v {node}` names it)"
 
 
-class LibusbMissing(CameraError):
+class LibusbMissing(CameraError, StatedError):
     """The system has no libusb-1.0."""
 
     _sentence = "libusb-1.0 was not found (Debian, Ubuntu: apt install libusb-1.0-0)"
 
 
-@dataclass(eq=False, repr=False)
-class CameraLost(CameraError):
+class CameraLost(CameraError, StatedError):
     """The camera was unplugged or stopped to answer; ``Camera.reconnect`` finds it again."""
 
     reason: str
     _sentence = "the camera was lost: {reason}"
 
 
-class CameraClosed(CameraError):
+class CameraClosed(CameraError, StatedError):
     """The camera was closed by this process."""
 
     _sentence = "the camera is closed"
 
 
-@dataclass(eq=False, repr=False)
-class NotStreaming(CameraError):
+class NotStreaming(CameraError, StatedError):
     """``read_frame`` while the camera was not started, or was stopped meanwhile."""
 
     state: str
     _sentence = "the camera is {state}, not streaming: call start() first"
 
 
-@dataclass(eq=False, repr=False)
-class FrameTimeout(CameraError):
+class FrameTimeout(CameraError, StatedError):
     """No complete frame arrived within the time given."""
 
     timeout_s: float
     _sentence = "no complete frame within {timeout_s:g} s"
 
 
-@dataclass(eq=False, repr=False)
-class CameraFault(CameraError):
+class CameraFault(CameraError, StatedError):
     """The device switched its light off by itself."""
 
     reason: str
     _sentence = "the camera switched its light off: {reason}"
 
 
-@dataclass(eq=False, repr=False)
-class DeviceRefused(CameraError):
+class DeviceRefused(CameraError, StatedError):
     """The device stalled a request; ``code`` and ``detail`` are its answer to GET_LAST_ERROR."""
 
     request: str
@@ -256,35 +247,32 @@ class DeviceRefused(CameraError):
         return f"the camera refused {self.request}: {self.detail or self.code}"
 
 
-@dataclass(eq=False, repr=False)
-class ImagesLost(CameraError):
+class ImagesLost(CameraError, StatedError):
     """Images that were asked for will not come, or not whole."""
 
     reason: str
     _sentence = "images were lost: {reason}"
 
 
-class TransferStalled(CameraError):
+class TransferStalled(CameraError, StatedError):
     """An endpoint answered with a stall."""
 
     _sentence = "the camera stalled a transfer"
 
 
-class TransferOverflow(CameraError):
+class TransferOverflow(CameraError, StatedError):
     """The device sent more in one transfer than the host had requested."""
 
     _sentence = "the camera sent more than was asked for"
 
 
-@dataclass(eq=False, repr=False)
-class ProtocolError(CameraError):
+class ProtocolError(CameraError, StatedError):
     """The device sent something the protocol does not allow."""
 
     detail: str
     _sentence = "the camera does not keep to the protocol: {detail}"
 
 
-@dataclass(eq=False, repr=False)
 class FirmwareTooOld(ProtocolError):
     """The firmware has a version of the protocol that this driver does not have."""
 

@@ -15,12 +15,8 @@ _OTHERS: Final = (
 def read_text(path: Path) -> str:
     """Return the text of a file in UTF-8, with or without a byte order mark, any line ends as LF.
 
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    ValueError
-        If it is in another encoding: a clause that says which, and what to do.
+    Raises OSError if it cannot be read.
+    Raises ValueError if it is in another encoding: a clause that says which, and what to do.
     """
     data = path.read_bytes()
     for mark, name in _OTHERS:

@@ -14,8 +14,7 @@ from typing import Any, Final, Protocol
 
 import transientcam_moments as tm
 from transientcam import wire
-from transientcam_driver import AppliedSequence, CalibrationError, Camera
-from transientcam_driver.calibration import DEVICE_FIELDS
+from transientcam_driver import AppliedSequence, Camera
 from transientcam_server.broadcast import Channel, Hub
 from transientcam_server.camera import (
     Acquisition,
@@ -44,15 +43,13 @@ from transientcam_server.camera import (
     SharedAcquisition,
     Supervision,
     Timer,
-    load_given,
+    calibration_of,
     sensor_of,
     snapshot_of,
     stated_sensor,
 )
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging import (
-    NOMINAL_ID,
-    Calibration,
     Frame,
     History,
     Intrinsics,
@@ -61,7 +58,6 @@ from transientcam_server.imaging import (
     Workers,
     calibration_id,
     known_intrinsics,
-    load_calibration,
     require_estimator,
     suited,
 )
@@ -154,7 +150,7 @@ class Service:
             reconstruction,
             self.workers,
             sensor=self.sensor,
-            calibration=_calibration(camera, settings, kept),
+            calibration=calibration_of(camera, settings.calibration, kept),
             intrinsics=lambda: self.intrinsics,
             images_known=self.has_images,
         )
@@ -328,17 +324,7 @@ class Service:
 
     def not_ready(self) -> list[str]:
         """Return why no frames can be had; empty where they can."""
-        status = self.acquisition.status()
-        reasons = []
-        if status.state == "lost":
-            reasons.append(f"the camera is lost: {status.reason}")
-        if status.state == "arming":
-            reasons.append("the light is announced and not on yet")
-        if status.state in ("starting", "streaming") and not status.frames:
-            reasons.append("the camera is starting")
-        if status.stalled:
-            reasons.append(f"no frame arrived for {status.frame_age_s:.1f} s")
-        return reasons
+        return self.acquisition.status().obstacles
 
     def _from_acquisition(self, event: Event) -> None:
         """Carry an event from the acquisition's thread to the loop."""
@@ -540,18 +526,6 @@ class Service:
         return asyncio.get_running_loop().call_later(delay_s, callback)
 
     def _lease_changed(self, change: Change, lease: Lease, former: Lease | None) -> None:
-        if former is not None:
-            _log.warning(
-                "%r (%s) took the lease over from %r (%s)",
-                lease.holder,
-                lease.by,
-                former.holder,
-                former.by,
-            )
-        elif change == "lapsed":
-            _log.warning("the lease of %r lapsed; on lapse: %s", lease.holder, lease.on_lapse)
-        else:
-            _log.info("the lease of %r (%s) was %s", lease.holder, lease.by, change)
         details = {"change": change, "holder": lease.holder}
         self.hub.notify("lease-changed", details | ({"from": former.holder} if former else {}))
         if change == "lapsed" and lease.on_lapse == "stop":
@@ -584,42 +558,3 @@ def _log_failure(stopped: Future[None]) -> None:
     if stopped.exception() is not None:
         # it is unplugged, or its heartbeat ends and it turns its light off by itself
         _log.error("the capture could not be stopped: %s", stopped.exception())
-
-
-def _calibration(camera: Camera, settings: Settings, kept: CalibrationStore) -> Calibration | None:
-    """Load the calibration that is given, or was active last; refuse one of another camera."""
-    path = settings.calibration
-    if path is not None and isinstance(camera, RelayCamera) and not camera.has_images:
-        raise CalibrationError(
-            f"moments are calibrated at {camera.url}: leave out the setting calibration, or relay "
-            "product=raw"
-        )
-    if path is None and isinstance(camera, RelayCamera):
-        if camera.origin.calibration is not None:
-            kept.keep(camera.origin.calibration.capture)
-        return camera.origin.calibration
-    if path is None:
-        return _last_active(camera, kept)
-    loaded = load_given(path)
-    misfit = loaded.capture.misfit(camera.applied, camera.capabilities)
-    if misfit is not None and misfit.field in DEVICE_FIELDS:
-        raise misfit
-    if misfit is not None:
-        _log.warning("%s; using nominal gains", misfit)
-    return loaded
-
-
-def _last_active(camera: Camera, kept: CalibrationStore) -> Calibration | None:
-    """Load what was active last, if it is still there and of this camera."""
-    active_id = kept.active_id
-    if active_id == NOMINAL_ID:
-        return None
-    try:
-        stored = kept.get(active_id)
-        misfit = stored.subject.misfit(camera.applied, camera.capabilities)
-        if misfit is not None and misfit.field in DEVICE_FIELDS:
-            raise misfit
-        return load_calibration(stored.path)
-    except (Problem, CalibrationError) as error:
-        _log.warning("%s was active last, but cannot be used: %s", active_id, error)
-        return None

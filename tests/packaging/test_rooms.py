@@ -2,10 +2,13 @@
 
 import importlib
 import pkgutil
+import re
+import subprocess
 from pathlib import Path
 
 import pytest
 
+ROOT = Path(__file__).resolve().parents[2]
 ENTRY_POINTS = {"cli", "entries"}
 """Rooms of entry points, whose files pyproject.toml names."""
 PACKAGES = (
@@ -17,6 +20,17 @@ PACKAGES = (
     "transientcam_server",
     "transientcam_simulation",
 )
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is no repository")
+def test_every_test_stands_in_one_place() -> None:
+    command = ["git", "ls-files"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    named = re.compile(r"(^|/)(test_[^/]*\.py|[^/]*_test\.py|[^/]*\.(test|spec)\.tsx?)$")
+    tests = [file for file in done.stdout.splitlines() if named.search(file)]
+
+    assert [file for file in tests if file.endswith(".test.ts")]
+    assert [file for file in tests if not file.startswith("tests/")] == []
 
 
 def _folder(package: str) -> Path:

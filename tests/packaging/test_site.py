@@ -1,5 +1,6 @@
 """The documentation site: no link leads nowhere, and no page asks another host for anything."""
 
+import importlib.util
 import re
 import shutil
 import subprocess
@@ -141,6 +142,8 @@ def test_the_gallery_has_every_figure_and_a_command_beside_each() -> None:
     for command in commands:
         if measured := re.match(r"python -m benchmarks (\w+) --write", command):
             assert measured.group(1) in MEASUREMENTS, command
+        elif drawn := re.fullmatch(r"python -m (tools\.\w+)", command):
+            assert importlib.util.find_spec(drawn.group(1)), command
         else:
             number = re.fullmatch(r"transientcam paper (\d+) -o docs", command)
             assert number, command

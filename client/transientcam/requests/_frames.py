@@ -68,10 +68,7 @@ class Which:
     def path(self) -> str:
         """Its path.
 
-        Raises
-        ------
-        ParameterError
-            If ``number`` is below 1, or ``recording`` is no id.
+        Raises ParameterError if ``number`` is below 1, or ``recording`` is no id.
         """
         if self.number is not None and self.number < 1:
             raise ParameterError("number", self.number, "from 1")
@@ -103,10 +100,7 @@ class Part:
     def params(self) -> tuple[tuple[str, object], ...]:
         """Its parameters in a query.
 
-        Raises
-        ------
-        ParameterError
-            If times are not finite, or the region is not four whole numbers.
+        Raises ParameterError if times are not finite, or the region is not four whole numbers.
         """
         return (
             *_times(self.time_s),
@@ -144,10 +138,7 @@ def file(
 ) -> Request[bytes]:
     """Build the request for a product of a frame as a file.
 
-    Raises
-    ------
-    ParameterError
-        If ``form`` is no `FileFormat`.
+    Raises ParameterError if ``form`` is no `FileFormat`.
     """
     if form not in tuple(FileFormat):
         raise ParameterError("form", form, f"one of {', '.join(FileFormat)}")

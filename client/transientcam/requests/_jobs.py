@@ -41,10 +41,7 @@ class Jobs(Generic[_Document]):
 def ended(job: Mapping[str, Any]) -> bool:
     """Return whether a job is done or cancelled.
 
-    Raises
-    ------
-    ProblemError
-        If it failed.
+    Raises ProblemError if it failed.
     """
     if job.get("state") == "failed":
         raise problem_error(job.get("problem") or {})

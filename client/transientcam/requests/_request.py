@@ -148,10 +148,7 @@ def _read_document(answer: Answer) -> dict[str, Any]:
 def body_of(answer: Answer, media_type: str) -> bytes:
     """Return the body of an answer of a media type.
 
-    Raises
-    ------
-    ProtocolError
-        If its media type is another.
+    Raises ProtocolError if its media type is another.
     """
     if answer.media_type != media_type:
         raise ProtocolError("content-type", answer.media_type, media_type)
@@ -196,10 +193,7 @@ def given(**parts: object) -> dict[str, Any]:
 def recording_path(recording_id: str) -> str:
     """Return the path of a recording.
 
-    Raises
-    ------
-    ParameterError
-        If ``recording_id`` is no id.
+    Raises ParameterError if ``recording_id`` is no id.
     """
     return f"recordings/{segment(recording_id)}"
 
@@ -207,10 +201,7 @@ def recording_path(recording_id: str) -> str:
 def segment(name: str) -> str:
     """Return a name that may be a part of a path.
 
-    Raises
-    ------
-    ParameterError
-        If it would be more than that.
+    Raises ParameterError if it would be more than that.
     """
     if not name or not name.replace("-", "").replace("_", "").isalnum():
         raise ParameterError("product", name, "a product's name, such as range")

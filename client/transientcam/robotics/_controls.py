@@ -22,16 +22,10 @@ class Controls:
     A change is made under a lease of its own, which no other client can interrupt; it is refused
     while another one holds the lease. Methods may be called from any thread.
 
-    Parameters
-    ----------
-    camera
-        Whose parameters.
-    holder
-        Name of the lease.
-    writable
-        Whether anything may be changed.
-    light
-        Whether the camera may be started, which switches the light on.
+    ``camera``: whose parameters.
+    ``holder``: name of the lease.
+    ``writable``: whether anything may be changed.
+    ``light``: whether the camera may be started, which switches the light on.
     """
 
     def __init__(self, camera: Camera, *, holder: str, writable: bool, light: bool) -> None:

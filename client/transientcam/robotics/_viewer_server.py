@@ -109,25 +109,13 @@ class ViewerServer:
 
     Methods may be called from any thread.
 
-    Parameters
-    ----------
-    name
-        What viewers show.
-    host, port
-        Where; port 0 chooses a free one.
-    admission
-        Who may enter.
-    channels
-        Schema of the messages of each topic.
-    services
-        By name, the schemas of request and response, which are JSON.
-    listener
-        Who answers.
-
-    Raises
-    ------
-    OSError
-        If nothing can be served there.
+    ``name``: what viewers show.
+    ``host``, ``port``: where; port 0 chooses a free one.
+    ``admission``: who may enter.
+    ``channels``: schema of the messages of each topic.
+    ``services``: by name, the schemas of request and response, which are JSON.
+    ``listener``: who answers.
+    Raises OSError if nothing can be served there.
     """
 
     def __init__(

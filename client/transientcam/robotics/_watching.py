@@ -21,15 +21,8 @@ class Watching:
 
     The server calls it from threads of its own.
 
-    Parameters
-    ----------
-    controls
-        The camera's parameters.
-
-    Attributes
-    ----------
-    on_report
-        Called with what was refused, and why; to be set once the server runs.
+    ``controls``: the camera's parameters.
+    ``on_report``: called with what was refused, and why; to be set once the server runs.
     """
 
     def __init__(self, controls: Controls) -> None:

@@ -29,11 +29,8 @@ def http_client(
 ) -> _Client:
     """Return a client of httpx.
 
-    Raises
-    ------
-    ParameterError
-        If the token is none, nothing can wait for so long, or the environment has proxies or
-        authorities that cannot be used; no secret is shown.
+    Raises ParameterError if the token is none, nothing can wait for so long, or the environment has
+    proxies or authorities that cannot be used; no secret is shown.
     """
     # what is unpacked here has no bound: the bytes of an answer count as they travel
     headers = {"user-agent": USER_AGENT, "accept-encoding": "identity"}
@@ -54,10 +51,7 @@ def http_client(
 def request_options(request: Request[Any], *, timeout_s: float) -> dict[str, Any]:
     """Return the options of one request, besides its method and address.
 
-    Raises
-    ------
-    ParameterError
-        If nothing can wait for so long.
+    Raises ParameterError if nothing can wait for so long.
     """
     return {
         "params": list(request.params),
@@ -104,10 +98,7 @@ class DownloadProgress:
 def require_direct(connection: Any, url: str) -> None:
     """Refuse a connection that was redirected, before a token is sent over it.
 
-    Raises
-    ------
-    ProtocolError
-        If ``connection``, of websockets, is not one to ``url``.
+    Raises ProtocolError if ``connection``, of websockets, is not one to ``url``.
     """
     found = connection.protocol.uri
     if found != parse_uri(url):

@@ -13,10 +13,7 @@ of a board without compensation; the simulated prototype has 4 ps."""
 class TemperatureDrift:
     """How much warmer a camera is than it was when it was calibrated.
 
-    Attributes
-    ----------
-    calibrated_c, now_c
-        Both temperatures of the sensor.
+    ``calibrated_c``, ``now_c``: both temperatures of the sensor.
     """
 
     calibrated_c: float

@@ -22,12 +22,8 @@ class HostCamera(ABC):
     A camera of it sets ``_capabilities`` and ``_applied``, and moves ``_state`` on from
     "connecting".
 
-    Parameters
-    ----------
-    clock
-        Of the times that frames carry; its zero is when the camera was opened.
-    simulation
-        The handle on a simulated camera; None for a real one.
+    ``clock``: of the times that frames carry; its zero is when the camera was opened.
+    ``simulation``: the handle on a simulated camera; None for a real one.
     """
 
     factory: FactoryCalibration | None = None

@@ -41,10 +41,7 @@ def open_camera(spec: str = DEFAULT_SPEC, *, clock: Clock | None = None) -> Came
 def check_camera(spec: str) -> None:
     """Read what a camera's name names, without opening the camera.
 
-    Raises
-    ------
-    DriverError
-        As `open_camera`, as far as it can be known.
+    Raises DriverError as `open_camera`, as far as it can be known.
     """
     name, plugin = plugin_of(spec)
     plugin.check(name)
@@ -58,10 +55,7 @@ def kinds() -> tuple[str, ...]:
 def plugin_of(spec: str) -> tuple[CameraName, CameraPlugin]:
     """Take a name apart, and return the plug-in that opens it.
 
-    Raises
-    ------
-    SpecError, PluginError
-        As `open_camera`.
+    Raises SpecError, PluginError as `open_camera`.
     """
     name = CameraName.parse(spec)
     points = {point.value: point for point in entry_points(group=GROUP, name=name.kind)}
@@ -77,10 +71,7 @@ def plugin_of(spec: str) -> tuple[CameraName, CameraPlugin]:
 def _load(point: EntryPoint) -> CameraPlugin:
     """Import the plug-in of an entry point.
 
-    Raises
-    ------
-    PluginError
-        It cannot be imported, or is something else.
+    Raises PluginError where it cannot be imported, or is something else.
     """
     try:
         plugin = point.load()

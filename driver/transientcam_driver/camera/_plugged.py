@@ -78,11 +78,8 @@ class SameDevice(Generic[Opened]):
     def __call__(self, _serial: str | None = None) -> Opened:
         """Find and open it.
 
-        Raises
-        ------
-        CameraError
-            Why the last one that might have been it could not be opened, `CameraNotFound`, or that
-            several have this serial number.
+        Raises CameraError saying why the last one that might have been it could not be opened,
+        `CameraNotFound`, or that several have this serial number.
         """
         trouble: CameraError = CameraNotFound(self._name)
         found = self._look()

@@ -9,18 +9,11 @@ IDEAL_BITS = 16
 class Sensor:
     """A pixel and its converter; one for all pixels.
 
-    Attributes
-    ----------
-    full_well_e
-        Electrons a pixel holds.
-    gain_e_per_dn
-        Electrons a digital number stands for.
-    read_noise_e
-        Standard deviation of the read-out, in electrons.
-    dark_dn
-        What the converter gives for an empty pixel: room for the read noise below zero.
-    bits
-        Of the converter; its highest code means saturation.
+    ``full_well_e``: electrons a pixel holds.
+    ``gain_e_per_dn``: electrons a digital number stands for.
+    ``read_noise_e``: standard deviation of the read-out, in electrons.
+    ``dark_dn``: what the converter gives for an empty pixel: room for the read noise below zero.
+    ``bits``: of the converter; its highest code means saturation.
     """
 
     full_well_e: float = 40_000.0

@@ -102,21 +102,17 @@ class Truth:
 class ExplainedEffect:
     """What one effect makes of a scene and a sequence.
 
-    Attributes
-    ----------
-    what
-        The effect in a few words.
-    choice
-        "auto", "on" or "off"; "always" where there is no choice, "never" of what cannot be made.
-    called_for, built
-        Whether the conditions call for the effect, and whether the choice lets it be built.
-    size_dn, relative
-        The error it causes in one moment, as a root mean square over the lit pixels, and the same
-        of the errors over each pixel's own noise, at the worst of the times judged.
-    worst
-        The largest such ratio of any pixel judged.
-    cost_s
-        Of one frame, by the order of magnitude; what is computed once a sequence costs nothing.
+    ``what``: the effect in a few words.
+    ``choice``: "auto", "on" or "off"; "always" where there is no choice, "never" of what cannot be
+    made.
+    ``called_for``, ``built``: whether the conditions call for the effect, and whether the choice
+    lets it be built.
+    ``size_dn``, ``relative``: the error it causes in one moment, as a root mean square over the lit
+    pixels, and the same of the errors over each pixel's own noise, at the worst of the times
+    judged.
+    ``worst``: the largest such ratio of any pixel judged.
+    ``cost_s``: of one frame, by the order of magnitude; what is computed once a sequence costs
+    nothing.
     """
 
     effect: str

@@ -44,16 +44,10 @@ class FaultyDevice(Protocol):
 class SimulationHandle:
     """A `transientcam_driver.Simulation`: see there for what each member guarantees.
 
-    Parameters
-    ----------
-    scene
-        The scene in front of the camera.
-    world, device
-        The renderer of its images, and the device that sends them.
-    prepare
-        Prepares another scene, or other effects.
-    set_interlock
-        Closes or opens the safety interlock; None where the camera has none.
+    ``scene``: the scene in front of the camera.
+    ``world``, ``device``: the renderer of its images, and the device that sends them.
+    ``prepare``: prepares another scene, or other effects.
+    ``set_interlock``: closes or opens the safety interlock; None where the camera has none.
     """
 
     def __init__(

@@ -13,19 +13,10 @@ Link = TypeVar("Link")
 class PluggedCamera(ABC, Generic[Link]):
     """What emulated cameras below the seam of their drivers have in common.
 
-    Parameters
-    ----------
-    spec
-        Its name for `open_camera`.
-    product
-        What it is called.
-
-    Attributes
-    ----------
-    changed
-        Held while anything here changes, and notified of it.
-    plugged
-        Whether the cable is in.
+    ``spec``: its name for `open_camera`.
+    ``product``: what it is called.
+    ``changed``: held while anything here changes, and notified of it.
+    ``plugged``: whether the cable is in.
     """
 
     def __init__(self, spec: str, product: str) -> None:

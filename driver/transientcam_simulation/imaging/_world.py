@@ -79,24 +79,16 @@ class _Plan:
 class World:
     """The renderer behind the simulated firmware.
 
-    Parameters
-    ----------
-    scenery
-        The light in front of the camera.
-    sensor
-        Turns electrons into numbers.
-    electrons_per_s
-        Electrons a second that a relative brightness of 1 gives a pixel.
-    effects
-        "auto", "on" or "off" by the effect's name.
-    seed
-        Of all randomness: the noise of an image depends on the seed and its sequence number only.
-    device
-        Imperfections of the camera.
-    ambient_electrons_per_s
-        Electrons a second that other light gives a pixel that sees a white surface.
-    readout_s
-        Time between two exposures.
+    ``scenery``: the light in front of the camera.
+    ``sensor``: turns electrons into numbers.
+    ``electrons_per_s``: electrons a second that a relative brightness of 1 gives a pixel.
+    ``effects``: "auto", "on" or "off" by the effect's name.
+    ``seed``: of all randomness: the noise of an image depends on the seed and its sequence number
+    only.
+    ``device``: imperfections of the camera.
+    ``ambient_electrons_per_s``: electrons a second that other light gives a pixel that sees a white
+    surface.
+    ``readout_s``: time between two exposures.
     """
 
     def __init__(

@@ -37,12 +37,8 @@ _MEAN_BEND = np.float32(24)
 class Crossing:
     """Lines ``apex + t way`` and a shape.
 
-    Attributes
-    ----------
-    inside
-        Functions of the line that are above 0 where it meets the shape, all of them.
-    at
-        The t at which it meets a rectangle's plane, or is closest to an ellipsoid's centre.
+    ``inside``: functions of the line that are above 0 where it meets the shape, all of them.
+    ``at``: the t at which it meets a rectangle's plane, or is closest to an ellipsoid's centre.
     """
 
     inside: tuple[Plane, ...]

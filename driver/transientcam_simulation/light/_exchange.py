@@ -23,15 +23,10 @@ _SAMPLES = 3  # a side, of the direct light on a patch: its edge may cross the p
 class Exchange:
     """Light between the patches of a scene.
 
-    Attributes
-    ----------
-    factors, distance_m
-        (N, N) form factors, receivers first, and distances.
-    delay_s, radiosity
-        (K, N, S) direct light on S samples of each patch by each chain of mirrors, and what it
-        gives on.
-    over_mirrors
-        What mirrors show patches of each other.
+    ``factors``, ``distance_m``: (N, N) form factors, receivers first, and distances.
+    ``delay_s``, ``radiosity``: (K, N, S) direct light on S samples of each patch by each chain of
+    mirrors, and what it gives on.
+    ``over_mirrors``: what mirrors show patches of each other.
     """
 
     scene: Scene

@@ -79,22 +79,14 @@ class Way:
 class Ends:
     """Points on surfaces that rays of the camera end on.
 
-    Attributes
-    ----------
-    still
-        What stands still, for its light.
-    surfaces, index
-        All surfaces, and which one each point lies on; points of one follow each other.
-    point
-        Components of the points.
-    distance_m
-        From the camera.
-    direction
-        Components of the unit vectors along which rays of the camera arrive.
-    throughput
-        Share of light that mirrors leave on its way to the camera.
-    boxes
-        (S, 2, 3) lowest and highest coordinates of all surfaces.
+    ``still``: what stands still, for its light.
+    ``surfaces``, ``index``: all surfaces, and which one each point lies on; points of one follow
+    each other.
+    ``point``: components of the points.
+    ``distance_m``: from the camera.
+    ``direction``: components of the unit vectors along which rays of the camera arrive.
+    ``throughput``: share of light that mirrors leave on its way to the camera.
+    ``boxes``: (S, 2, 3) lowest and highest coordinates of all surfaces.
     """
 
     still: Scene

@@ -79,15 +79,8 @@ class _Dimmed:
 class MovingResponses:
     """Impulse responses at one time.
 
-    Parameters
-    ----------
-    uncovered
-        Shares (H, W) of pixels that show what stands still.
-
-    Attributes
-    ----------
-    region
-        The pixels that differ from those of what stands still.
+    ``uncovered``: shares (H, W) of pixels that show what stands still.
+    ``region``: the pixels that differ from those of what stands still.
     """
 
     def __init__(

@@ -73,14 +73,9 @@ class _VisibleSurface:
 class MovingLight:
     """The light of a scene at any time.
 
-    Parameters
-    ----------
-    scene
-        With moving surfaces that scatter light.
-    still
-        Light of what stands still (see ``still_scene``).
-    soft
-        Whether pixels that a silhouette or a shadow crosses take a share of it.
+    ``scene``: with moving surfaces that scatter light.
+    ``still``: light of what stands still (see ``still_scene``).
+    ``soft``: whether pixels that a silhouette or a shadow crosses take a share of it.
     """
 
     def __init__(self, scene: Scene, still: StillLight, *, soft: bool) -> None:

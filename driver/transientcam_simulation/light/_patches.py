@@ -18,12 +18,8 @@ _BLOCK = 1 << 18  # segments at a time
 class Patches:
     """All patches of the scattering surfaces of a scene, flat.
 
-    Attributes
-    ----------
-    surface
-        (N) index of the surface a patch is cut from.
-    cells
-        By the surface's index, its grid; ``first`` is where its patches begin.
+    ``surface``: (N) index of the surface a patch is cut from.
+    ``cells``: by the surface's index, its grid; ``first`` is where its patches begin.
     """
 
     surface: NDArray[np.intp]

@@ -62,18 +62,12 @@ class ImageLight:
 class Lit:
     """The light that rays of the camera see, one entry a ray, flat.
 
-    Attributes
-    ----------
-    surface
-        (P) index of the surface a ray ends on, -1 for none.
-    point
-        (P, 3) where it ends.
-    distance_m
-        (P) its length.
-    reflectance
-        (P) share of the light on its end that it takes to the camera: albedo times mirrors.
-    delay_s, weight
-        (K, P) whole time of flight and brightness by each chain of mirrors.
+    ``surface``: (P) index of the surface a ray ends on, -1 for none.
+    ``point``: (P, 3) where it ends.
+    ``distance_m``: (P) its length.
+    ``reflectance``: (P) share of the light on its end that it takes to the camera: albedo times
+    mirrors.
+    ``delay_s``, ``weight``: (K, P) whole time of flight and brightness by each chain of mirrors.
     """
 
     surface: NDArray[np.intp]

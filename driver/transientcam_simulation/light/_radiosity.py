@@ -62,16 +62,11 @@ class Gathering:
 class Interreflection:
     """The light that reaches pixels over more than one scattering surface.
 
-    Parameters
-    ----------
-    scene, lit
-        A scene, and the light that the camera's rays see of it.
-    fine
-        The light of several rays in each of the pixels that are the mean over these.
-    tolerance
-        Brightness that light may lack, where the scene does not say how far it is followed.
-    exchange
-        Light between the scene's patches, where that is known.
+    ``scene``, ``lit``: a scene, and the light that the camera's rays see of it.
+    ``fine``: the light of several rays in each of the pixels that are the mean over these.
+    ``tolerance``: brightness that light may lack, where the scene does not say how far it is
+    followed.
+    ``exchange``: light between the scene's patches, where that is known.
     """
 
     def __init__(

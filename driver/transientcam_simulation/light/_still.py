@@ -36,12 +36,8 @@ _COUNTS_ABOVE = 0.5  # of the noise, what one ray more or less changes
 class Sight:
     """Rays of the camera behind so many mirrors.
 
-    Attributes
-    ----------
-    fills
-        (H, W) share of each pixel that the last mirror fills; (1, W) where all are the same.
-    throughput
-        Share of the light that the mirrors leave.
+    ``fills``: (H, W) share of each pixel that the last mirror fills; (1, W) where all are the same.
+    ``throughput``: share of the light that the mirrors leave.
     """
 
     bundle: Bundle
@@ -52,14 +48,10 @@ class Sight:
 class StillLight:
     """What the pixels of a camera see of a scene that stands still.
 
-    Parameters
-    ----------
-    scene
-        With a camera.
-    noise, highest_hz
-        Which differences of light between pixels matter: None if none do, and at which frequency.
-    followed
-        Rays into the same scene; its own where it shares none.
+    ``scene``: with a camera.
+    ``noise``, ``highest_hz``: which differences of light between pixels matter: None if none do,
+    and at which frequency.
+    ``followed``: rays into the same scene; its own where it shares none.
     """
 
     def __init__(

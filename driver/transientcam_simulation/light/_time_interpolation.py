@@ -26,16 +26,10 @@ class Steps:
 
     Steps are longer while everything is slower than it ever gets, and depend on the time alone.
 
-    Parameters
-    ----------
-    scene
-        With moving surfaces.
-    at
-        Computes the light at a time.
-    pixel_rad
-        Angle of a pixel.
-    every_s
-        Time between images: where steps are shorter, each image has its own light.
+    ``scene``: with moving surfaces.
+    ``at``: computes the light at a time.
+    ``pixel_rad``: angle of a pixel.
+    ``every_s``: time between images: where steps are shorter, each image has its own light.
     """
 
     def __init__(

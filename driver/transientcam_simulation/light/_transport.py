@@ -215,10 +215,7 @@ class SurfaceScenery:
     def view(self, wanted: LightRequirements) -> Views:
         """Trace a still scene once; of a moving one what moves, for each time.
 
-        Raises
-        ------
-        CompilerMissing
-            It moves, and there is no compiler.
+        Raises CompilerMissing where it moves, and there is no compiler.
         """
         # what moves is remembered by its views, which belong to one camera
         if self.moves:

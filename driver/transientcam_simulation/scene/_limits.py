@@ -66,10 +66,7 @@ def most_patches(scene: Scene) -> int:
 def require_modest(scene: Scene) -> None:
     """Refuse a scene that would take much memory or time to prepare.
 
-    Raises
-    ------
-    SceneError
-        Naming the key, its value and the limit.
+    Raises SceneError naming the key, its value and the limit.
     """
     surfaces, transport = scene.surfaces, scene.transport
     if len(surfaces) > MOST_SURFACES:

@@ -24,22 +24,7 @@ from transientcam_experiments.paper import (
 from transientcam_experiments.paper.bench import Bench
 from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table
 
-FIGURES: Final[dict[int, PaperFigure]] = {
-    module.FIGURE.number: module.FIGURE
-    for module in (
-        figure02,
-        figure03,
-        figure05,
-        figure06,
-        figure07,
-        figure08,
-        figure09,
-        figure10,
-        figure11,
-        figure12,
-        figure13,
-        figure14,
-        figure15,
-    )
-}
+_TO_10: Final = (figure02, figure03, figure05, figure06, figure07, figure08, figure09, figure10)
+_MODULES: Final = (*_TO_10, figure11, figure12, figure13, figure14, figure15)
+FIGURES: Final[dict[int, PaperFigure]] = {each.FIGURE.number: each.FIGURE for each in _MODULES}
 """Every figure by its number."""

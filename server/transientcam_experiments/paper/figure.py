@@ -44,7 +44,7 @@ def check(
     *,
     at_most: float | None = None,
     at_least: float | None = None,
-    form: str = "{:.3g}",
+    form: str = "{:.2f}",
     otherwise: str = "",
 ) -> Statement:
     """Check a value against limits, of which one that is no number keeps none.

@@ -95,7 +95,6 @@ def _statements(
             "least",
             min(noise[1] / noise[0], noise[2] / noise[1]),
             at_least=1.0,
-            form="{:.2f}",
         ),
         check(
             "Sec. 5.1",

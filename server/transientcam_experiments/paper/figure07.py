@@ -204,7 +204,6 @@ def _statements(
             f"[{begin:.2f}, {end:.2f}])",
             (end - begin) / (2 * np.pi / _M),
             at_most=0.5,
-            form="{:.2f}",
         ),
     ]
 

@@ -145,7 +145,6 @@ def _statements(captures: dict[str, list[ReconstructedShot]]) -> list[Statement]
             "typical height of the highest peak over brightness, over that at m = 3",
             heights["b"] / heights["a"],
             at_least=1.0,
-            form="{:.2f}",
         ),
         check(
             "Sec. 6.1",
@@ -153,7 +152,6 @@ def _statements(captures: dict[str, list[ReconstructedShot]]) -> list[Statement]
             "the same, m = 8 at 11.5 MHz over m = 3 at 23 MHz",
             heights["c"] / heights["a"],
             at_least=1.0,
-            form="{:.2f}",
         ),
         check(
             "Sec. 6.1",
@@ -162,7 +160,6 @@ def _statements(captures: dict[str, list[ReconstructedShot]]) -> list[Statement]
             "(b)",
             _stray(first["c"]) / _stray(first["b"]),
             at_most=1.0,
-            form="{:.2f}",
             otherwise="with twice the period in time a peak of the same width in phase is twice as "
             "wide in time, and what it leaves beside the wave is more than what m = 8 saves",
         ),
@@ -202,7 +199,6 @@ def _statements(captures: dict[str, list[ReconstructedShot]]) -> list[Statement]
             "typical difference of two single takes, m = 3 over m = 4",
             noise["a"] / noise["1"],
             at_most=1.0,
-            form="{:.2f}",
             otherwise="measured pixel by pixel and relative to the density, the noise of a peak's "
             "height and place weighs as much at m = 3",
         ),

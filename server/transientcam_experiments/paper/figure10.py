@@ -124,7 +124,6 @@ def _statements(shot: ReconstructedShot, walls: dict[str, _Wall]) -> list[Statem
             right.width_ns / right.true_width_ns,
             at_least=0.67,
             at_most=1.5,
-            form="{:.2f}",
             otherwise=f"{reason}. Exact moments give "
             f"{right.exact_width_ns / right.true_width_ns:.2f}",
         ),
@@ -135,7 +134,6 @@ def _statements(shot: ReconstructedShot, walls: dict[str, _Wall]) -> list[Statem
             "estimated for a sparse response",
             right.error / right.error_without,
             at_most=0.8,
-            form="{:.2f}",
             otherwise=reason,
         ),
     ]

@@ -147,7 +147,6 @@ def _statements(ranged: list[Ranged], shot: ReconstructedShot) -> list[Statement
             1 / (shot.applied.capture_s / shot.applied.sequence.takes * DATA.takes),
             at_least=2.2 * 0.95,
             at_most=2.2 * 1.05,
-            form="{:.2f}",
         ),
         check(
             "Sec. 6.2",
@@ -163,7 +162,6 @@ def _statements(ranged: list[Ranged], shot: ReconstructedShot) -> list[Statement
             "median absolute error over that of a single frequency",
             godbaz.median_m / single.median_m,
             at_most=0.7,
-            form="{:.2f}",
         ),
         check(
             "Sec. 6.2",
@@ -179,7 +177,6 @@ def _statements(ranged: list[Ranged], shot: ReconstructedShot) -> list[Statement
             "root mean square error (m = 3) over that of a single frequency",
             maximum.rms_m / single.rms_m,
             at_most=0.5,
-            form="{:.2f}",
         ),
         check(
             "Sec. 6.2",
@@ -198,7 +195,6 @@ def _statements(ranged: list[Ranged], shot: ReconstructedShot) -> list[Statement
             "entropy (m = 3), in percentage points",
             100 * (pisarenko.outliers - maximum.outliers),
             at_least=1.0,
-            form="{:.2f}",
         ),
         check(
             "Sec. 6.2",
@@ -206,7 +202,6 @@ def _statements(ranged: list[Ranged], shot: ReconstructedShot) -> list[Statement
             "root mean square error, maximum entropy (m = 3) over Pisarenko (m = 4)",
             maximum.rms_m / pisarenko.rms_m,
             at_most=1.0,
-            form="{:.2f}",
         ),
     ]
 

@@ -95,7 +95,6 @@ def _statements(
             1 / interval_s,
             at_least=VIDEO_HZ - 0.1,
             at_most=VIDEO_HZ + 0.1,
-            form="{:.2f}",
         ),
         check(
             "Sec. 6.3",
@@ -112,7 +111,6 @@ def _statements(
             "worst distance of these medians from the true ones, in ns",
             off,
             at_most=0.5,
-            form="{:.2f}",
         ),
         check(
             "Sec. 6.3",
@@ -129,7 +127,6 @@ def _statements(
             f"typical difference of the wall in two frames, over that at {_LONG_S * 1e3:g} ms",
             _noise(pairs[0]) / _noise(bright),
             at_least=1.2,
-            form="{:.2f}",
         ),
     ]
 

@@ -18,16 +18,10 @@ from transientcam_server.imaging import Frame
 class Hub:
     """Hands frames and notices of the service to the outboxes of its clients.
 
-    Attributes
-    ----------
-    latest
-        The newest frame, None before the first.
-    reads
-        How often a single frame was asked for.
-    dropped
-        Frames that clients were too slow for, of all clients together.
-    deserted
-        Set while there are no clients.
+    ``latest``: the newest frame, None before the first.
+    ``reads``: how often a single frame was asked for.
+    ``dropped``: frames that clients were too slow for, of all clients together.
+    ``deserted``: set while there are no clients.
     """
 
     def __init__(self) -> None:

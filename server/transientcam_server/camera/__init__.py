@@ -41,6 +41,7 @@ from transientcam_server.camera._photon_transfer import PhotonTransfer, measure_
 from transientcam_server.camera._shared import SharedAcquisition
 from transientcam_server.camera._source import (
     LightRules,
+    calibration_of,
     sensor_of,
     snapshot_of,
     start_with,

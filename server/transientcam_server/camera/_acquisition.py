@@ -131,10 +131,7 @@ class Acquisition:
 
         The future raises `SequenceConflict` where it has another one.
 
-        Raises
-        ------
-        Problem
-            ``camera-busy`` while a job has exclusive use of the camera.
+        Raises Problem ``camera-busy`` while a job has exclusive use of the camera.
         """
         with self._occupied:
             self.require_free()
@@ -147,11 +144,8 @@ class Acquisition:
 
         ``offs`` is what `offs` was when a start was asked for, None for now.
 
-        Raises
-        ------
-        Problem
-            ``start-outdated``, by the future, if the light was to go off since; ``camera-busy`` if
-            it is to start while a job has exclusive use of the camera.
+        Raises Problem ``start-outdated``, by the future, if the light was to go off since;
+        ``camera-busy`` if it is to start while a job has exclusive use of the camera.
         """
         with self._occupied:
             if running:
@@ -197,10 +191,7 @@ class Acquisition:
         call its second argument several times a second; it raises `JobCancelled` once the light
         has to go off. ``offs`` is what `offs` was when the job was asked for.
 
-        Raises
-        ------
-        Problem
-            ``camera-busy`` if another job has it.
+        Raises Problem ``camera-busy`` if another job has it.
         """
         with self._occupied:
             self.require_free()
@@ -212,10 +203,7 @@ class Acquisition:
     def require_free(self) -> None:
         """Refuse what would disturb a job with exclusive use of the camera.
 
-        Raises
-        ------
-        Problem
-            ``camera-busy``, with the job that has it.
+        Raises Problem ``camera-busy``, with the job that has it.
         """
         job_id = self._occupant
         if job_id is not None:

@@ -86,12 +86,9 @@ class Drift:
 class Calibrator:
     """Measures, activates and deletes calibrations; on the event loop, slow work on workers.
 
-    Parameters
-    ----------
-    store
-        The stored calibrations.
-    notify
-        Called when other gains are used, with the details of a ``calibration-changed`` notice.
+    ``store``: the stored calibrations.
+    ``notify``: called when other gains are used, with the details of a ``calibration-changed``
+    notice.
     """
 
     def __init__(
@@ -178,10 +175,7 @@ class Calibrator:
 
         One that was not measured on a diffuser is used only with ``force``.
 
-        Raises
-        ------
-        Problem
-            ``unknown-calibration``, ``calibration-misfit``, ``calibration-doubted``.
+        Raises Problem ``unknown-calibration``, ``calibration-misfit``, ``calibration-doubted``.
         """
         calibration = None
         if new_id != NOMINAL_ID:
@@ -205,10 +199,7 @@ class Calibrator:
 
         Once more, and the present one is used again.
 
-        Raises
-        ------
-        Problem
-            ``no-former-calibration``, ``calibration-misfit``.
+        Raises Problem ``no-former-calibration``, ``calibration-misfit``.
         """
         if self._former_id is None:
             raise Problem(kinds.NO_FORMER_CALIBRATION, "There is none to return to.")
@@ -217,10 +208,7 @@ class Calibrator:
     async def delete(self, deleted_id: str) -> StoredCalibration:
         """Delete a calibration that is not active.
 
-        Raises
-        ------
-        Problem
-            ``unknown-calibration``, ``calibration-in-use``, ``calibration-not-stored``.
+        Raises Problem ``unknown-calibration``, ``calibration-in-use``, ``calibration-not-stored``.
         """
         if deleted_id == self.active_id != NOMINAL_ID:
             raise Problem(
@@ -242,11 +230,8 @@ class Calibrator:
 
         ``offs`` is as `Acquisition.occupy` has it.
 
-        Raises
-        ------
-        Problem
-            ``camera-busy``, ``too-many-jobs``, ``calibration-not-stored``, ``invalid-request``
-            where the images would not fit into memory.
+        Raises Problem ``camera-busy``, ``too-many-jobs``, ``calibration-not-stored``,
+        ``invalid-request`` where the images would not fit into memory.
         """
         self._acquisition.require_free()
         once = self._camera.validate(replace(applied().sequence, takes=1, take_order="sequential"))

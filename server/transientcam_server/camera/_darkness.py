@@ -57,19 +57,10 @@ class _Document(BaseModel):
 class Darkness:
     """Keeps why the light of one camera is off; a thread writes, so that no disk delays the light.
 
-    Parameters
-    ----------
-    directory
-        Of the files of all cameras.
-    camera
-        Which of them.
-    retry_s
-        Pause after a failed write.
-
-    Attributes
-    ----------
-    written
-        Done once the disk holds what was told last.
+    ``directory``: of the files of all cameras.
+    ``camera``: which of them.
+    ``retry_s``: pause after a failed write.
+    ``written``: done once the disk holds what was told last.
     """
 
     def __init__(self, directory: Path, camera: str, *, retry_s: float = RETRY_S) -> None:

@@ -32,22 +32,14 @@ State = Literal["queued", "running", "done", "failed", "cancelled"]
 class Job:
     """Long work, and its progress.
 
-    Attributes
-    ----------
-    in_turn
-        Whether it waits for those that were started before.
-    progress
-        From 0 to 1.
-    step
-        The present step, in a word or two.
-    result
-        A document, once it is done; before, and where it was cancelled, what there is of it.
-    problem
-        Why it failed.
-    files
-        What it made beside its result, by format.
-    cancelled, ended
-        Set when it is to be cancelled, and when it has ended.
+    ``in_turn``: whether it waits for those that were started before.
+    ``progress``: from 0 to 1.
+    ``step``: the present step, in a word or two.
+    ``result``: a document, once it is done; before, and where it was cancelled, what there is of
+    it.
+    ``problem``: why it failed.
+    ``files``: what it made beside its result, by format.
+    ``cancelled``, ``ended``: set when it is to be cancelled, and when it has ended.
     """
 
     id: str
@@ -72,10 +64,7 @@ class Job:
     def report(self, progress: float, step: str) -> None:
         """Report the progress of the work; from any thread.
 
-        Raises
-        ------
-        JobCancelled
-            If it was cancelled.
+        Raises JobCancelled if it was cancelled.
         """
         if self.cancelled.is_set():
             raise JobCancelled(self.id)
@@ -107,12 +96,8 @@ Work = Callable[[Job], Awaitable[dict[str, Any]]]
 class Jobs:
     """Starts, remembers and cancels jobs.
 
-    Parameters
-    ----------
-    report
-        Called when a job begins and when it ends.
-    clock
-        Unix time.
+    ``report``: called when a job begins and when it ends.
+    ``clock``: Unix time.
     """
 
     def __init__(
@@ -132,10 +117,7 @@ class Jobs:
     def get(self, job_id: str) -> Job:
         """Return a job.
 
-        Raises
-        ------
-        Problem
-            ``unknown-job``.
+        Raises Problem ``unknown-job``.
         """
         try:
             return self._jobs[job_id]
@@ -148,10 +130,7 @@ class Jobs:
     def start(self, kind: str, work: Work, *, in_turn: bool = True) -> Job:
         """Start a job; one ``in_turn`` runs after those of these that were started before.
 
-        Raises
-        ------
-        Problem
-            ``too-many-jobs``.
+        Raises Problem ``too-many-jobs``.
         """
         unfinished = [each for each in self._jobs.values() if each.in_turn == in_turn]
         unfinished = [each for each in unfinished if not each.finished]
@@ -172,10 +151,7 @@ class Jobs:
     def cancel(self, job_id: str) -> Job:
         """Cancel a job; one that has ended stays as it is.
 
-        Raises
-        ------
-        Problem
-            ``unknown-job``.
+        Raises Problem ``unknown-job``.
         """
         job = self.get(job_id)
         job.cancelled.set()

@@ -3,6 +3,7 @@
 Everything here runs on the event loop. The clock and its timers are arguments.
 """
 
+import logging
 import secrets
 import time
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Final, Literal, Protocol
 
 from transientcam_server.errors import Problem, kinds
 
+_log = logging.getLogger("transientcam_server.camera.lease")
 DEFAULT_DURATION_S: Final = 30.0
 MIN_DURATION_S: Final = 1.0
 MAX_DURATION_S: Final = 3600.0
@@ -66,7 +68,7 @@ class LeaseManager:
         due: Callable[[Lease | None], None] = lambda lease: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._report = report
+        self._reported = report
         self._call_later = call_later
         self._due = due
         self._clock = clock
@@ -190,6 +192,16 @@ class LeaseManager:
         if lease is not None and self.remaining_s(lease) == 0.0:
             self._forget()
             self._report("lapsed", lease, None)
+
+    def _report(self, change: Change, lease: Lease, former: Lease | None) -> None:
+        who = f"{lease.holder!r} ({lease.by})"
+        if former is not None:
+            _log.warning("%s took the lease over from %r (%s)", who, former.holder, former.by)
+        elif change == "lapsed":
+            _log.warning("the lease of %r lapsed; on lapse: %s", lease.holder, lease.on_lapse)
+        else:
+            _log.info("the lease of %s was %s", who, change)
+        self._reported(change, lease, former)
 
     def _timer_fired(self) -> None:
         self._expire()

@@ -43,10 +43,7 @@ class PhotonTransfer:
     ) -> "PhotonTransfer":
         """Fit points; full pixels scatter less than the line, and hold so much, if they were seen.
 
-        Raises
-        ------
-        Problem
-            ``invalid-request`` where they do not tell the gain to 10 %.
+        Raises Problem ``invalid-request`` where they do not tell the gain to 10 %.
         """
         signal, variance = points = points[:, np.argsort(points[0])]
         growth, dark, error, used = 0.0, 0.0, 0.0, signal <= signal.max(initial=0.0) / 2

@@ -4,11 +4,23 @@ import contextlib
 import logging
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Final, Self
 
 import transientcam_moments as tm
-from transientcam_driver import Camera, CameraError, CameraName, Sequence, open_camera
+from transientcam_driver import (
+    CalibrationError,
+    Camera,
+    CameraError,
+    CameraName,
+    Sequence,
+    open_camera,
+)
+from transientcam_driver.calibration import DEVICE_FIELDS
 from transientcam_driver.clock import VirtualClock
+from transientcam_server.camera._calibration_store import CalibrationStore, load_given
+from transientcam_server.errors import Problem
+from transientcam_server.imaging import NOMINAL_ID, Calibration, load_calibration
 from transientcam_server.recording import ReplayCamera
 from transientcam_server.relay import RelayCamera
 from transientcam_server.settings import SensorSettings, SequenceSettings, Settings
@@ -95,14 +107,9 @@ def start_with(camera: Camera, settings: SequenceSettings) -> None:
 class SimulationSnapshot:
     """What another simulated camera is opened by, before the same scene, as old as the first.
 
-    Attributes
-    ----------
-    spec
-        What the first one was opened with.
-    age_s
-        Device time of the first one.
-    scene, definition, effects, diffuser
-        What it simulates at present.
+    ``spec``: what the first one was opened with.
+    ``age_s``: device time of the first one.
+    ``scene``, ``definition``, ``effects``, ``diffuser``: what it simulates at present.
     """
 
     spec: str
@@ -115,10 +122,7 @@ class SimulationSnapshot:
     def open(self) -> Camera:
         """Open it, in virtual time.
 
-        Raises
-        ------
-        SpecError, SceneError, CameraError
-            As `transientcam_driver.open_camera`.
+        Raises SpecError, SceneError, CameraError as `transientcam_driver.open_camera`.
         """
         clock = VirtualClock()
         camera = open_camera(self.spec, clock=clock)
@@ -148,3 +152,44 @@ def snapshot_of(camera: Camera, spec: str) -> SimulationSnapshot:
     with contextlib.suppress(CameraError):  # an unplugged one is as new as the twin
         age_s = camera.status().device_time_s
     return SimulationSnapshot(spec, age_s, own.scene, own.definition, own.effects, own.diffuser)
+
+
+def calibration_of(camera: Camera, path: Path | None, kept: CalibrationStore) -> Calibration | None:
+    """Load the calibration at a path, or that of the origin, or that which was active last.
+
+    Raises CalibrationError where the one that is given is of another camera.
+    """
+    if path is not None and isinstance(camera, RelayCamera) and not camera.has_images:
+        raise CalibrationError(
+            f"moments are calibrated at {camera.url}: leave out the setting calibration, or relay "
+            "product=raw"
+        )
+    if path is None and isinstance(camera, RelayCamera):
+        if camera.origin.calibration is not None:
+            kept.keep(camera.origin.calibration.capture)
+        return camera.origin.calibration
+    if path is None:
+        return _last_active(camera, kept)
+    loaded = load_given(path)
+    misfit = loaded.capture.misfit(camera.applied, camera.capabilities)
+    if misfit is not None and misfit.field in DEVICE_FIELDS:
+        raise misfit
+    if misfit is not None:
+        _log.warning("%s; using nominal gains", misfit)
+    return loaded
+
+
+def _last_active(camera: Camera, kept: CalibrationStore) -> Calibration | None:
+    """Load what was active last, if it is still there and of this camera."""
+    active_id = kept.active_id
+    if active_id == NOMINAL_ID:
+        return None
+    try:
+        stored = kept.get(active_id)
+        misfit = stored.subject.misfit(camera.applied, camera.capabilities)
+        if misfit is not None and misfit.field in DEVICE_FIELDS:
+            raise misfit
+        return load_calibration(stored.path)
+    except (Problem, CalibrationError) as error:
+        _log.warning("%s was active last, but cannot be used: %s", active_id, error)
+        return None

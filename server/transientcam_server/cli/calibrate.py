@@ -1,7 +1,4 @@
-"""The verb ``calibrate`` of the ``transientcam`` command.
-
-What is heavy is imported when the verb runs, so that ``transientcam --help`` stays quick.
-"""
+"""The verb ``calibrate`` of the ``transientcam`` command."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence

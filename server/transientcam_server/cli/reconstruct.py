@@ -1,7 +1,4 @@
-"""The verb ``reconstruct`` of the ``transientcam`` command.
-
-What is heavy is imported when the verb runs, so that ``transientcam --help`` stays quick.
-"""
+"""The verb ``reconstruct`` of the ``transientcam`` command."""
 
 import json
 from pathlib import Path

@@ -1,7 +1,4 @@
-"""The verb ``serve`` of the ``transientcam`` command.
-
-What is heavy is imported when the verb runs, so that ``transientcam --help`` stays quick.
-"""
+"""The verb ``serve`` of the ``transientcam`` command."""
 
 import json
 import os

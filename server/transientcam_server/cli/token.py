@@ -1,7 +1,4 @@
-"""The verbs ``token create``, ``token list`` and ``token revoke``.
-
-What is heavy is imported when a verb runs, so that ``transientcam --help`` stays quick.
-"""
+"""The verbs ``token create``, ``token list`` and ``token revoke``."""
 
 import json
 import os

@@ -116,18 +116,11 @@ class Admission:
 class Acceptor:
     """Accepts the connections of a listening socket from `open` to `close`.
 
-    Parameters
-    ----------
-    listener
-        It stays the caller's.
-    protocol
-        Makes the protocol of a connection.
-    watched
-        Whether frames are sent or recorded at present, for which time has to be left.
-    tls
-        With what connections are encrypted; None for not at all.
-    offs
-        As `ReadLimiter` has it.
+    ``listener``: it stays the caller's.
+    ``protocol``: makes the protocol of a connection.
+    ``watched``: whether frames are sent or recorded at present, for which time has to be left.
+    ``tls``: with what connections are encrypted; None for not at all.
+    ``offs``: as `ReadLimiter` has it.
     """
 
     def __init__(

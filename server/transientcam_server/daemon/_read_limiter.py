@@ -31,21 +31,15 @@ _portion: Final = _Portion()
 class ReadLimiter(asyncio.BufferedProtocol):
     """Reads a connection for a protocol, portion by portion.
 
-    Parameters
-    ----------
-    protocol
-        An `asyncio.Protocol`; its transport is a `Valve`.
-    requests, streams
-        What the address of the client has of the time for requests, and for WebSockets.
-    first
-        What it has for requests that switch the light off.
-    beyond
-        How a connection beyond a limit is refused whose first request is another one; None within
-        the limits.
-    lost
-        Called once when the connection has ended.
-    offs, arrived
-        How often the light was to go off; when the first request arrived, if any of it is here.
+    ``protocol``: an `asyncio.Protocol`; its transport is a `Valve`.
+    ``requests``, ``streams``: what the address of the client has of the time for requests, and for
+    WebSockets.
+    ``first``: what it has for requests that switch the light off.
+    ``beyond``: how a connection beyond a limit is refused whose first request is another one; None
+    within the limits.
+    ``lost``: called once when the connection has ended.
+    ``offs``, ``arrived``: how often the light was to go off; when the first request arrived, if any
+    of it is here.
     """
 
     def __init__(

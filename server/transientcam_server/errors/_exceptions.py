@@ -28,26 +28,15 @@ Errors of the driver and of the arithmetic become problems in one place,
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any
 
 from transientcam_driver import AppliedSequence, CameraError
+from transientcam_driver.errors import StatedError
 from transientcam_server.errors._kinds import ProblemKind
 
 
 class ServerError(Exception):
-    """Root of all errors of this package.
-
-    Most are dataclasses of their data; ``_sentence`` is a format string of its fields, and what
-    ``str`` returns.
-    """
-
-    _sentence: ClassVar[str] = ""
-
-    def __post_init__(self) -> None:
-        self.args = tuple(vars(self).values())  # by which it is pickled
-
-    def __str__(self) -> str:
-        return self._sentence.format_map(vars(self)) if self._sentence else super().__str__()
+    """Root of all errors of this package; most state their data."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +51,7 @@ class SettingsMistake:
         return f"{self.place}: {self.reason} (given: {self.value!r})"
 
 
-@dataclass(eq=False, repr=False)
-class SettingsError(ServerError):
+class SettingsError(ServerError, StatedError):
     """Settings cannot be used; ``mistakes`` lists every one of them with its place."""
 
     mistakes: Sequence[SettingsMistake]
@@ -72,8 +60,7 @@ class SettingsError(ServerError):
         return "\n".join(str(mistake) for mistake in self.mistakes)
 
 
-@dataclass(eq=False, repr=False)
-class AddressUnavailable(ServerError):  # noqa: N818 - says what is wrong
+class AddressUnavailable(ServerError, StatedError):  # noqa: N818 - says what is wrong
     """The address cannot be listened on."""
 
     host: str
@@ -82,8 +69,7 @@ class AddressUnavailable(ServerError):  # noqa: N818 - says what is wrong
     _sentence = "cannot listen on {host}, port {port}: {reason}"
 
 
-@dataclass(eq=False, repr=False)
-class MissingExtra(ServerError):  # noqa: N818 - says what is wrong
+class MissingExtra(ServerError, StatedError):  # noqa: N818 - says what is wrong
     """An optional feature was requested whose packages are not installed."""
 
     what: str
@@ -92,8 +78,7 @@ class MissingExtra(ServerError):  # noqa: N818 - says what is wrong
     _sentence = "{what} needs {module}: pip install 'transientcam[{extra}]'"
 
 
-@dataclass(eq=False, repr=False)
-class InputError(ServerError):
+class InputError(ServerError, StatedError):
     """A measurement cannot be reconstructed: ``key`` of ``file`` is ``found``, not ``expected``."""
 
     file: str
@@ -107,8 +92,7 @@ class RecordingError(ServerError):
     """Something about a recording."""
 
 
-@dataclass(eq=False, repr=False)
-class NotARecording(RecordingError):  # noqa: N818 - says what is wrong
+class NotARecording(RecordingError, StatedError):  # noqa: N818 - says what is wrong
     """A file cannot be read as a recording."""
 
     file: str
@@ -116,8 +100,7 @@ class NotARecording(RecordingError):  # noqa: N818 - says what is wrong
     _sentence = "{file} is no recording that can be read: {reason}"
 
 
-@dataclass(eq=False, repr=False)
-class DamagedFrame(RecordingError):  # noqa: N818 - says what is wrong
+class DamagedFrame(RecordingError, StatedError):  # noqa: N818 - says what is wrong
     """The bytes of a frame (counted from 0) are not the ones that were written."""
 
     file: str
@@ -126,16 +109,14 @@ class DamagedFrame(RecordingError):  # noqa: N818 - says what is wrong
     _sentence = "{file}: frame {frame} is damaged: {reason}"
 
 
-@dataclass(eq=False, repr=False)
-class RecordingInUse(RecordingError):  # noqa: N818 - says what is wrong
+class RecordingInUse(RecordingError, StatedError):  # noqa: N818 - says what is wrong
     """An unfinished recording is being written, recovered or deleted by another service."""
 
     file: str
     _sentence = "{file} is being written, recovered or deleted by another program"
 
 
-@dataclass(eq=False, repr=False)
-class NotConvertible(RecordingError):  # noqa: N818 - says what is wrong
+class NotConvertible(RecordingError, StatedError):  # noqa: N818 - says what is wrong
     """A file's suffix names no format that ``what`` is written in."""
 
     file: str
@@ -148,8 +129,7 @@ class NotConvertible(RecordingError):  # noqa: N818 - says what is wrong
         )
 
 
-@dataclass(eq=False, repr=False)
-class ClusterError(ServerError):
+class ClusterError(ServerError, StatedError):
     """A cluster cannot be reached, or gave up; what it has written stays."""
 
     address: str
@@ -157,8 +137,7 @@ class ClusterError(ServerError):
     _sentence = "the cluster {address} failed: {reason}; the same command goes on where it stopped"
 
 
-@dataclass(eq=False, repr=False)
-class StorageError(ServerError):
+class StorageError(ServerError, StatedError):
     """What is behind an address cannot be read or written; ``address`` has bucket and key."""
 
     address: str
@@ -166,8 +145,7 @@ class StorageError(ServerError):
     _sentence = "{address} cannot be read or written: {reason}"
 
 
-@dataclass(eq=False, repr=False)
-class MixedVersions(ServerError):  # noqa: N818 - says what is wrong
+class MixedVersions(ServerError, StatedError):  # noqa: N818 - says what is wrong
     """A worker would compute otherwise: ``found`` of ``package`` instead of ``wanted``."""
 
     worker: str
@@ -177,8 +155,7 @@ class MixedVersions(ServerError):  # noqa: N818 - says what is wrong
     _sentence = "the worker {worker} has {package} {found}, and not {wanted} as this process"
 
 
-@dataclass(eq=False, repr=False)
-class TokenFileError(ServerError):
+class TokenFileError(ServerError, StatedError):
     """The file of tokens cannot be read or written."""
 
     file: str
@@ -186,8 +163,7 @@ class TokenFileError(ServerError):
     _sentence = "the tokens in {file} cannot be used: {reason}"
 
 
-@dataclass(eq=False, repr=False)
-class UnknownToken(ServerError):  # noqa: N818 - says what is wrong
+class UnknownToken(ServerError, StatedError):  # noqa: N818 - says what is wrong
     """No token has this id."""
 
     token_id: str
@@ -195,24 +171,21 @@ class UnknownToken(ServerError):  # noqa: N818 - says what is wrong
     _sentence = "{file} has no token {token_id}"
 
 
-@dataclass(eq=False, repr=False)
-class JobCancelled(ServerError):  # noqa: N818 - says what is wrong
+class JobCancelled(ServerError, StatedError):  # noqa: N818 - says what is wrong
     """A client cancelled a job."""
 
     job_id: str
     _sentence = "the job {job_id} was cancelled"
 
 
-@dataclass(eq=False, repr=False)
-class SequenceConflict(ServerError):  # noqa: N818 - says what is wrong
+class SequenceConflict(ServerError, StatedError):  # noqa: N818 - says what is wrong
     """The sequence was changed since; ``running`` is the one that runs now."""
 
     running: AppliedSequence
     _sentence = "the running sequence has epoch {running.epoch}"
 
 
-@dataclass(eq=False, repr=False)
-class OriginRefused(ServerError, CameraError):  # noqa: N818 - says what is wrong
+class OriginRefused(ServerError, CameraError, StatedError):  # noqa: N818 - says what is wrong
     """The service at ``url``, which is relayed, refuses a change with this problem document."""
 
     url: str

@@ -61,34 +61,22 @@ def reconstruct_on(
 ) -> tuple[int, int]:
     """Compute products of all frames into a Zarr store; return all frames, and those it had before.
 
-    Parameters
-    ----------
-    client
-        Of the cluster.
-    place
-        Of the recording: a path that all workers can read, or the address of a daemon's recording.
-    output
-        A directory that all workers can write, or any address that fsspec knows. A store that is
-        not complete is gone on with.
-    token
-        Bearer token, where the daemon requires one.
-
-    Raises
-    ------
-    FileExistsError
-        If the output is there already, complete, or is a directory of something else.
-    InputError
-        If what was begun there is of another recording, or made with other settings.
-    MixedVersions
-        If a worker has other versions of what the values depend on.
-    ClusterError
-        If the scheduler is lost, or a task ended several workers.
-    DamagedFrame
-        If a frame is not what was recorded.
-    StorageError
-        If what is behind the output's address refuses, as where a bucket is missing.
-    ServerError, TransientcamError, OSError
-        If the recording cannot be read, or the output not be written.
+    ``client``: of the cluster.
+    ``place``: of the recording: a path that all workers can read, or the address of a daemon's
+    recording.
+    ``output``: a directory that all workers can write, or any address that fsspec knows. A store
+    that is not complete is gone on with.
+    ``token``: bearer token, where the daemon requires one.
+    Raises FileExistsError if the output is there already, complete, or is a directory of something
+    else.
+    Raises InputError if what was begun there is of another recording, or made with other settings.
+    Raises MixedVersions if a worker has other versions of what the values depend on.
+    Raises ClusterError if the scheduler is lost, or a task ended several workers.
+    Raises DamagedFrame if a frame is not what was recorded.
+    Raises StorageError if what is behind the output's address refuses, as where a bucket is
+    missing.
+    Raises ServerError, TransientcamError, OSError if the recording cannot be read, or the output
+    not be written.
     """
     job = Job.of(place, options, token=token)
     with recording_at(place, token=token) as recording:

@@ -27,29 +27,15 @@ def convert_recording(
 ) -> None:
     """Write a recording into ``output``, in the format of its suffix.
 
-    Parameters
-    ----------
-    products
-        What an .mcap holds of each frame; other formats hold the raw images.
-    schemas
-        Whose messages an .mcap holds.
-    url
-        Where readers of a .json find the recording; None for where it is now.
-
-    Raises
-    ------
-    NotConvertible
-        If the suffix names none.
-    InputError
-        If the format, or a message, cannot hold a product.
-    MissingExtra
-        If the format's library is not installed.
-    DamagedFrame
-        If a frame is not what was recorded.
-    FileExistsError
-        If the output is there already.
-    OSError
-        If the output cannot be written.
+    ``products``: what an .mcap holds of each frame; other formats hold the raw images.
+    ``schemas``: whose messages an .mcap holds.
+    ``url``: where readers of a .json find the recording; None for where it is now.
+    Raises NotConvertible if the suffix names none.
+    Raises InputError if the format, or a message, cannot hold a product.
+    Raises MissingExtra if the format's library is not installed.
+    Raises DamagedFrame if a frame is not what was recorded.
+    Raises FileExistsError if the output is there already.
+    Raises OSError if the output cannot be written.
     """
     refers = output.suffix.lower() == ".json"
     if url is not None and not refers:

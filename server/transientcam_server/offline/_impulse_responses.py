@@ -73,12 +73,8 @@ def is_tal(path: Path) -> bool:
 def arrays_of(path: Path) -> dict[str, _Array]:
     """Return the named arrays of an .npz, or those of a file of tal.
 
-    Raises
-    ------
-    InputError
-        If it is neither.
-    OSError
-        If it cannot be read.
+    Raises InputError if it is neither.
+    Raises OSError if it cannot be read.
     """
     with path.open("rb") as opened:
         begin = opened.read(32)
@@ -111,10 +107,7 @@ def impulse_response(
 
     ``highest_hz`` is the highest frequency that is to be measured.
 
-    Raises
-    ------
-    InputError
-        Naming the file, the key, what it is and what it must be.
+    Raises InputError naming the file, the key, what it is and what it must be.
     """
     key = next(each for each in KEYS if each in arrays)
     start, width, offset_bins = _TIMES[key]

@@ -23,21 +23,11 @@ def write_references(
 ) -> None:
     """Write the references of a recording as JSON.
 
-    Parameters
-    ----------
-    url
-        Where readers find the recording; None for the file that it was read from.
-
-    Raises
-    ------
-    InputError
-        If its images are not in chunks, or the file is not finished.
-    DamagedFrame
-        If a chunk is not where the file says.
-    FileExistsError
-        If the output is there already.
-    OSError
-        If the output cannot be written.
+    ``url``: where readers find the recording; None for the file that it was read from.
+    Raises InputError if its images are not in chunks, or the file is not finished.
+    Raises DamagedFrame if a chunk is not where the file says.
+    Raises FileExistsError if the output is there already.
+    Raises OSError if the output cannot be written.
     """
     file, keys = recording.path, ZarrKeys(recording)
     if file.name.endswith(".part"):

@@ -96,20 +96,12 @@ def reconstruct_recording(
     The suffix says the format: .h5, .npz, .nc or .zarr. Until it is complete there is an HDF5 file
     ``<output>.part``, whatever the format, which a second run continues.
 
-    Raises
-    ------
-    NotConvertible
-        If the suffix names no format.
-    MissingExtra
-        If the format's library is not installed.
-    InputError
-        If the unfinished file is of another recording, or made with other settings.
-    DamagedFrame
-        If a frame is not what was recorded; those before it stay done.
-    FileExistsError
-        If the output is there already.
-    OSError
-        If the output cannot be written.
+    Raises NotConvertible if the suffix names no format.
+    Raises MissingExtra if the format's library is not installed.
+    Raises InputError if the unfinished file is of another recording, or made with other settings.
+    Raises DamagedFrame if a frame is not what was recorded; those before it stay done.
+    Raises FileExistsError if the output is there already.
+    Raises OSError if the output cannot be written.
     """
     if output.exists():
         raise FileExistsError(17, "it is there already", str(output))

@@ -19,16 +19,9 @@ def stability(frames: Iterable[tuple[float, NDArray[Any]]]) -> dict[str, Any]:
     The overlapping Allan deviation (IEEE Std 1139) of the median pixel and of nine in ten: noise
     falls with the root of the time, drift and motion rise, and the least is the best time.
 
-    Parameters
-    ----------
-    frames
-        Time in s and range in m (H, W) of frames in succession, which are taken as even. Of pixels
-        that have a range in all of them 4096 are used.
-
-    Raises
-    ------
-    InputError
-        For less than 16 frames, or where no pixel is left.
+    ``frames``: time in s and range in m (H, W) of frames in succession, which are taken as even. Of
+    pixels that have a range in all of them 4096 are used.
+    Raises InputError for less than 16 frames, or where no pixel is left.
     """
     times_s, ranges_m = zip(*frames, strict=True)
     seen = np.array([each.ravel()[:: -(-each.size // _PIXELS)] for each in ranges_m])

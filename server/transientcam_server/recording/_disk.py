@@ -39,17 +39,9 @@ _checksum.restype = ctypes.c_uint32
 class DiskFile(io.RawIOBase):
     """A file for h5py to write.
 
-    Parameters
-    ----------
-    mode
-        ``r+``, ``w`` or ``x``, as h5py has them.
-
-    Attributes
-    ----------
-    error
-        The first that occurred; None while there is none.
-    size_bytes
-        Of the file.
+    ``mode``: ``r+``, ``w`` or ``x``, as h5py has them.
+    ``error``: the first that occurred; None while there is none.
+    ``size_bytes``: of the file.
     """
 
     def __init__(self, path: Path, mode: str) -> None:

@@ -27,17 +27,9 @@ _Work = tuple[Future[Any], Callable[[], Any]]
 class DiskThreads:
     """Runs work that waits for the disk.
 
-    Parameters
-    ----------
-    stalled_s
-        How long nothing is done before the disk is said to be stalled.
-    activity
-        Returns what changes while the disk does something.
-
-    Attributes
-    ----------
-    around
-        Is given work on the caller's thread, and returns what is done in place of it.
+    ``stalled_s``: how long nothing is done before the disk is said to be stalled.
+    ``activity``: returns what changes while the disk does something.
+    ``around``: is given work on the caller's thread, and returns what is done in place of it.
     """
 
     around: Callable[[Callable[[], Any]], Callable[[], Any]]

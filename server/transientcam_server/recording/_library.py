@@ -56,14 +56,9 @@ class RecordingOptions:
 class Library:
     """Makes, lists and deletes recordings; its methods run on any thread and wait for the disk.
 
-    Parameters
-    ----------
-    header
-        Returns the header of a new recording for its id, name and time of start.
-    notify
-        Called for ``recording-started``, ``recording-dropped``, ``recording-stopped`` and
-        ``disk-stalled``, on the
-        thread on which it happens.
+    ``header``: returns the header of a new recording for its id, name and time of start.
+    ``notify``: called for ``recording-started``, ``recording-dropped``, ``recording-stopped`` and
+    ``disk-stalled``, on the thread on which it happens.
     """
 
     def __init__(
@@ -173,11 +168,8 @@ class Library:
     def start(self, options: RecordingOptions) -> dict[str, Any]:
         """Start a recording and describe it.
 
-        Raises
-        ------
-        Problem
-            ``recording-runs`` when there is one already, ``recording-not-stored`` where no file
-            can be made.
+        Raises Problem ``recording-runs`` when there is one already, ``recording-not-stored`` where
+        no file can be made.
         """
         require_annotations(options.annotations or {})
         with self._starting:
@@ -223,10 +215,7 @@ class Library:
     def describe(self, recording_id: str) -> dict[str, Any]:
         """Describe a recording.
 
-        Raises
-        ------
-        Problem
-            ``unknown-recording``.
+        Raises Problem ``unknown-recording``.
         """
         document = self._described(recording_id)
         if document is None:
@@ -251,10 +240,7 @@ class Library:
     def path(self, recording_id: str) -> Path:
         """Return the file of a whole recording.
 
-        Raises
-        ------
-        Problem
-            ``unknown-recording``, or ``recording-unfinished``.
+        Raises Problem ``unknown-recording``, or ``recording-unfinished``.
         """
         path = self._directory.find(recording_id)
         if path is None:
@@ -266,10 +252,7 @@ class Library:
     def download_name(self, recording_id: str) -> str:
         """Return what the file of a recording is called where it is downloaded.
 
-        Raises
-        ------
-        Problem
-            ``unknown-recording``.
+        Raises Problem ``unknown-recording``.
         """
         return names.download_name(self.describe(recording_id)["name"], recording_id)
 

@@ -82,21 +82,13 @@ class Totals:
 class Recorder:
     """Writes what is offered until a limit is reached or it is stopped.
 
-    Parameters
-    ----------
-    writer
-        Closed by the recorder.
-    queue_frames
-        How many frames may wait for the disk.
-    free_bytes
-        Returns the free space of the disk.
-    on_dropped
-        Called on the writing thread, at most once a second, with how many frames were dropped
-        since the call before, and in all.
-    on_end
-        Called last, on the writing thread.
-    awaits_past
-        Write nothing before `precede` was called.
+    ``writer``: closed by the recorder.
+    ``queue_frames``: how many frames may wait for the disk.
+    ``free_bytes``: returns the free space of the disk.
+    ``on_dropped``: called on the writing thread, at most once a second, with how many frames were
+    dropped since the call before, and in all.
+    ``on_end``: called last, on the writing thread.
+    ``awaits_past``: write nothing before `precede` was called.
     """
 
     def __init__(

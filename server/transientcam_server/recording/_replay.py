@@ -153,18 +153,9 @@ class ReplayCamera(HostCamera):
         return float(times[index]) + self._round * self._length_s
 
     def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
-        """Wait for the next frame.
+        """Wait for the next frame, as `Camera.read_frame` does; CameraLost after the last one.
 
-        Raises
-        ------
-        FrameTimeout
-            It is not due within that time.
-        NotStreaming
-            The replay was not started, or was paused meanwhile.
-        CameraLost
-            That was the last frame.
-        DamagedFrame
-            The frame is not what was recorded; the next call goes on after it.
+        Raises DamagedFrame where it is not what was recorded; the next call goes on after it.
         """
         with self._changed:
             end_s = self._clock.now_s() + timeout_s

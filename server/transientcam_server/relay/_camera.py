@@ -50,23 +50,13 @@ class RelayCamera(HostCamera):
 
     The connection is closed with the camera, also where this cannot be opened.
 
-    Attributes
-    ----------
-    service_id
-        That of the service this camera belongs to; by it a loop of relays is found.
-    origin
-        What is relayed, as it described itself last.
-    relayed
-        What was missed on the way.
-    on_unconfirmed
-        Called, on any thread, when the origin does not confirm that its light is off, with False,
-        and when that has ended, with True.
-
-    Raises
-    ------
-    CameraLost
-        The origin does not answer, is too old, lacks what is to be relayed, or relays this very
-        service.
+    ``service_id``: that of the service this camera belongs to; by it a loop of relays is found.
+    ``origin``: what is relayed, as it described itself last.
+    ``relayed``: what was missed on the way.
+    ``on_unconfirmed``: called, on any thread, when the origin does not confirm that its light is
+    off, with False, and when that has ended, with True.
+    Raises CameraLost where the origin does not answer, is too old, lacks what is to be relayed, or
+    relays this very service.
     """
 
     def __init__(

@@ -63,21 +63,11 @@ class Origin:
     Every method raises `CameraLost` where it does not answer as it should, and those that change
     something `OriginRefused` where it refuses.
 
-    Parameters
-    ----------
-    url
-        Its address.
-    token
-        What authenticates this relay there; None where none is required.
-    timeout_s
-        For a connection, and for each answer.
-    product
-        What is relayed: a key of `SUBSCRIBED`.
-
-    Attributes
-    ----------
-    product, timeout_s
-        As given.
+    ``url``: its address.
+    ``token``: what authenticates this relay there; None where none is required.
+    ``timeout_s``: for a connection, and for each answer.
+    ``product``: what is relayed: a key of `SUBSCRIBED`.
+    ``product``, ``timeout_s``: as given.
     """
 
     def __init__(

@@ -17,17 +17,12 @@ _FLAGS = {
 
 @dataclass(slots=True)
 class RelayCounters:
-    """What happened between an origin and its relay, since the relay was opened."""
+    """What happened between an origin and its relay since that was opened: see `OriginDocument`."""
 
     missed_frames: int = 0
-    """Frames that the origin captured and the relay never got, by their numbers; how many there
-    were across a restart of the origin is not known."""
     dropped_frames: int = 0
-    """Those of them that the origin dropped because the relay, or the network, was too slow."""
     reconnects: int = 0
     restarts: int = 0
-    """``reconnects``, ``restarts``: how often the origin was found again, and how often it was
-    another process then."""
 
 
 def hops_of(

@@ -2,11 +2,11 @@
 
 import pytest
 
-from benchmarks.common.records import DOCS
-from benchmarks.pages import reference
+from tools import reference
+from tools.reference import DOCS
 from transientcam import cli
 
-_REMEDY = "run: python -m benchmarks reference --write"
+_REMEDY = "run: python tools/documents.py --write"
 
 
 @pytest.mark.parametrize("name", ["command-line.md", "settings.md"])

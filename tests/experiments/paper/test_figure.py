@@ -43,8 +43,8 @@ def test_documents_hold_plain_values_for_json() -> None:
         "says": "says",
         "measure": "measure",
         "value": 2.0,
-        "shown": "2",
-        "criterion": "at most 1",
+        "shown": "2.00",
+        "criterion": "at most 1.00",
         "passes": False,
         "reason": "why",
     }

@@ -30,9 +30,9 @@ def test_a_page_has_each_figure_with_its_picture_statements_and_tables() -> None
     assert "| [7](#figure-7-title-7-of-it) | Title 7, of it | 0 of 1 | 1 |" in lines
     assert "## Figure 7: Title 7, of it" in lines
     assert "![Figure 2: Title 2, of it](figures/paper/figure-02.png)" in lines
-    assert r"| It is \| so. (Sec. 1) | how \| much | at most 2 | 1 | holds |" in lines
-    assert r"| It is \| so. (Sec. 1) | how \| much | at most 2 | 3 | **differs** |" in lines
-    assert "- **Differs:** “It is | so.” (3): because." in lines
+    assert r"| It is \| so. (Sec. 1) | how \| much | at most 2.00 | 1.00 | holds |" in lines
+    assert r"| It is \| so. (Sec. 1) | how \| much | at most 2.00 | 3.00 | **differs** |" in lines
+    assert "- **Differs:** “It is | so.” (3.00): because." in lines
     assert "- A remark." in lines
     assert [line for line in lines if line.startswith((r"| x\|y", "| 3 | –", "| 0.123"))] == [
         r"| x\|y | 1,234 |",

@@ -48,27 +48,14 @@ class Kinect2Camera(HostCamera):
     started and no frame is read for ``unread_s``, a thread here switches it off, and the next
     ``read_frame`` on again. That thread ends with this process; `off_switch` does not.
 
-    Parameters
-    ----------
-    connect
-        Opens the camera with a serial number, any where it is None.
-    rows
-        How the principal point is counted; see `parameters.ROWS`.
-    clock
-        Of the times that frames carry; real time by default.
-    simulation
-        The handle on an emulated camera; None for a real one.
-    silence_s
-        Without a whole frame for so long the camera is lost.
-    unread_s
-        Without a reader for so long, or twice as long, the light goes off.
-    now_s
-        Monotonic time, by which waits end.
-
-    Raises
-    ------
-    CameraError
-        As ``connect``, and `ProtocolError` where the camera's tables are none.
+    ``connect``: opens the camera with a serial number, any where it is None.
+    ``rows``: how the principal point is counted; see `parameters.ROWS`.
+    ``clock``: of the times that frames carry; real time by default.
+    ``simulation``: the handle on an emulated camera; None for a real one.
+    ``silence_s``: without a whole frame for so long the camera is lost.
+    ``unread_s``: without a reader for so long, or twice as long, the light goes off.
+    ``now_s``: monotonic time, by which waits end.
+    Raises CameraError as ``connect``, and `ProtocolError` where the camera's tables are none.
     """
 
     def __init__(

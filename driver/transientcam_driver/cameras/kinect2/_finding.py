@@ -25,14 +25,9 @@ _RETURNS_S: Final = 1.0
 class SameKinect(SameDevice[Kinect2]):
     """Opens a camera by its name, and once that is lost no other.
 
-    Parameters
-    ----------
-    name
-        Serial number or place; None for the first that can be opened.
-    pause
-        Sleeps for so many seconds.
-    transfers
-        Isochronous transfers in flight.
+    ``name``: serial number or place; None for the first that can be opened.
+    ``pause``: sleeps for so many seconds.
+    ``transfers``: isochronous transfers in flight.
     """
 
     def __init__(
@@ -51,10 +46,7 @@ class SameKinect(SameDevice[Kinect2]):
 def list_kinects() -> tuple[FoundCamera, ...]:
     """List the cameras that are plugged in; none is claimed.
 
-    Raises
-    ------
-    CameraError
-        There is no libusb.
+    Raises CameraError where there is no libusb.
     """
     return listed("kinect2", _look())
 

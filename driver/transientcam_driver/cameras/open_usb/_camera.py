@@ -64,16 +64,11 @@ class UsbCamera(HostCamera):
     The light goes off with ``stop``, ``safe_off`` and ``close``, when the object is collected or
     the interpreter ends, and by the device's own watchdog when the process dies.
 
-    Parameters
-    ----------
-    connect
-        Finds and claims the device with a serial number, or any when it is None.
-    clock
-        Real time by default.
-    simulation
-        The handle on a simulated camera; None for a real one.
-    sequence
-        What to configure first; by default the nearest that the camera can do to ``Sequence()``.
+    ``connect``: finds and claims the device with a serial number, or any when it is None.
+    ``clock``: real time by default.
+    ``simulation``: the handle on a simulated camera; None for a real one.
+    ``sequence``: what to configure first; by default the nearest that the camera can do to
+    ``Sequence()``.
     """
 
     def __init__(
@@ -138,20 +133,10 @@ class UsbCamera(HostCamera):
             return unpack_time(self._request_in(Request.GET_TIME, length=TIME_BYTES))
 
     def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
-        """Wait for the next complete frame.
+        """Wait for the next complete frame; raises what `Camera.read_frame` does.
 
-        Raises
-        ------
-        FrameTimeout
-            None was complete in time; the camera goes on capturing.
-        ProtocolError
-            None was complete in time, because images have another size than the capabilities say.
-        NotStreaming
-            The camera was not started, or was stopped meanwhile.
-        CameraLost
-            It was unplugged or does not answer; see ``reconnect``.
-        CameraFault
-            The device switched itself off.
+        Raises ProtocolError where none is complete in time because images have another size than
+        the capabilities say.
         """
         with self._reading:
             end_s = self._clock.now_s() + timeout_s
@@ -167,12 +152,10 @@ class UsbCamera(HostCamera):
                     self._check_silence()
 
     def reconnect(self) -> None:
-        """After CameraLost: find the same device again, restore the sequence, resume streaming.
+        """Find the device again after CameraLost, as `Camera.reconnect` says.
 
-        Does nothing unless the camera is disconnected.
-        Raises CameraNotFound where it is still absent; try again later. Raises CameraError where it
-        is there but cannot be opened: not yet (a node without its permissions, a second
-        unplugging), or because another program has claimed it.
+        A CameraNotFound where it is still absent; else it cannot be opened: not yet (a node without
+        its permissions, a second unplugging), or another program has claimed it.
         """
         with self._reading, self._control:
             self._require_open()

@@ -12,14 +12,9 @@ from transientcam_driver.sequence import ImageLabel
 class PartialFrame:
     """Collects the images of one frame, group by group.
 
-    Attributes
-    ----------
-    settled_s
-        When the device is ready for the next group; None before it was prepared.
-    exposing
-        Whether images of the next group were asked for.
-    begun_s
-        When the first ones were asked for.
+    ``settled_s``: when the device is ready for the next group; None before it was prepared.
+    ``exposing``: whether images of the next group were asked for.
+    ``begun_s``: when the first ones were asked for.
     """
 
     def __init__(self, applied: AppliedSequence, capabilities: Capabilities) -> None:

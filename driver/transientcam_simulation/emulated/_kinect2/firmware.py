@@ -39,17 +39,9 @@ _PARAMETERS: Final = (0, 1, 4)
 class EmulatedFirmware:
     """Answers requests, and knows whether the light is on.
 
-    Parameters
-    ----------
-    parameters, p0
-        Answers with the lens and the P0 tables.
-    polls
-        How often the status is asked for until the camera is ready.
-
-    Attributes
-    ----------
-    requests
-        Numbers of the commands so far, with their parameters.
+    ``parameters``, ``p0``: answers with the lens and the P0 tables.
+    ``polls``: how often the status is asked for until the camera is ready.
+    ``requests``: numbers of the commands so far, with their parameters.
     """
 
     def __init__(self, serial: str, parameters: bytes, p0: bytes, *, polls: int = 1) -> None:

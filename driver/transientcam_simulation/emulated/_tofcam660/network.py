@@ -32,21 +32,11 @@ _READ_BYTES: Final = 4096
 class EmulatedTofcam660:
     """An emulated camera on the network, from its construction until `close`.
 
-    Parameters
-    ----------
-    power_on
-        Makes the firmware, at the start and when the cable is plugged in again.
-    host
-        Address to listen on.
-    control_port, data_port
-        For commands and for images over TCP; 0 takes any free one.
-    udp_port
-        Of the host, where images over UDP go.
-
-    Raises
-    ------
-    CameraError
-        A port cannot be had.
+    ``power_on``: makes the firmware, at the start and when the cable is plugged in again.
+    ``host``: address to listen on.
+    ``control_port``, ``data_port``: for commands and for images over TCP; 0 takes any free one.
+    ``udp_port``: of the host, where images over UDP go.
+    Raises CameraError where a port cannot be had.
     """
 
     def __init__(

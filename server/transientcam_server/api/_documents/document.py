@@ -17,7 +17,7 @@ from pydantic_core import CoreSchema
 from transientcam_server.settings import no_switch_for_a_number
 
 EXAMPLES_FILE: Final = Path(__file__).with_name("examples.json")
-"""What a simulated camera answered; ``python -m benchmarks examples --write`` writes it."""
+"""What a simulated camera answered; ``python -m tools.examples --write`` writes it."""
 EXAMPLES: Final[dict[str, Any]] = json.loads(EXAMPLES_FILE.read_text(encoding="utf-8"))
 """An example of each document that is answered, by the name of its model."""
 

@@ -69,16 +69,11 @@ def judge(
     It is compared with an ideal camera, and if it does not look like a diffuser so, with the
     ``reference``: what the same camera measured before has its delay and its pattern.
 
-    Parameters
-    ----------
-    capture
-        The measurement.
-    bad : boolean array, shape (H, W), optional
-        Pixels that are left out.
-    full_scale
-        Largest value of an image in DN; saturated pixels are left out where it is known.
-    reference
-        A calibration of the same camera and sequence that is trusted.
+    ``capture``: the measurement.
+    ``bad`` (boolean array, shape (H, W), optional): pixels that are left out.
+    ``full_scale``: largest value of an image in DN; saturated pixels are left out where it is
+    known.
+    ``reference``: a calibration of the same camera and sequence that is trusted.
     """
     usable = np.ones(capture.images.shape[1:], dtype=bool) if bad is None else ~bad
     if full_scale is not None:

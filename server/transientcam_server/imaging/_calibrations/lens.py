@@ -24,10 +24,7 @@ def lens_of_walls(ranges: Sequence[_Array], start: Intrinsics) -> tuple[Lens, fl
     ``ranges`` (H, W) in m are each of a flat wall from another side, NaN without a return. The lens
     begins with ``start``, and keeps its light. Walls are planes (V, 3) in 1/m: plane . point = 1.
 
-    Raises
-    ------
-    InputError
-        If less than half of the pixels have a range.
+    Raises InputError if less than half of the pixels have a range.
     """
     from scipy.optimize import least_squares  # which a daemon need not load
 
@@ -62,10 +59,7 @@ def lens_of_walls(ranges: Sequence[_Array], start: Intrinsics) -> tuple[Lens, fl
 def second_in_first(first: _Array, second: _Array) -> _Array:
     """Return the pose (4, 4) in m of a second camera in the first, by walls (V, 3) that both see.
 
-    Raises
-    ------
-    InputError
-        If the walls do not stand in three directions.
+    Raises InputError if the walls do not stand in three directions.
     """
     from scipy.spatial.transform import Rotation  # likewise
 
