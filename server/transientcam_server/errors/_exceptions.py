@@ -118,7 +118,7 @@ class NotARecording(RecordingError):  # noqa: N818 - says what is wrong
 
 @dataclass(eq=False, repr=False)
 class DamagedFrame(RecordingError):  # noqa: N818 - says what is wrong
-    """The bytes of a frame (counted from 0) are not the ones that were written."""
+    """The bytes of a frame (its number, from 1) are not the ones that were written."""
 
     file: str
     frame: int
