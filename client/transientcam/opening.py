@@ -27,8 +27,10 @@ class RecordedFrame(Protocol):
 
     Attributes
     ----------
+    number
+        From 1, as over HTTP, in ``meta`` and along the axis ``frame`` of arrays and files.
     index
-        From 0.
+        Its place in the recording, ``number - 1``.
     raw : array, shape (N, H, W), uint16
         Its images in DN.
     range_m : array, shape (H, W)
@@ -37,6 +39,7 @@ class RecordedFrame(Protocol):
         As the daemon's frames have it.
     """
 
+    number: int
     index: int
     raw: NDArray[np.uint16]
     range_m: NDArray[np.float32]

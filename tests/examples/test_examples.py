@@ -16,6 +16,7 @@ from PIL import Image
 
 import transientcam_moments as tm
 from tests.conftest import ROOT
+from tests.programs import needs_octave
 from tests.serving import Served, serving
 from transientcam import wire
 
@@ -23,9 +24,6 @@ _EXAMPLES = ROOT / "examples"
 _MSGPACK = ROOT / "client" / "dashboard" / "node_modules" / "@msgpack"
 
 needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="Node.js is not installed")
-needs_octave = pytest.mark.skipif(
-    shutil.which("octave-cli") is None, reason="GNU Octave is not installed"
-)
 
 
 # of all examples: none relies on what another one has set

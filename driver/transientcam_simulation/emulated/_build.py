@@ -1,6 +1,6 @@
 """From a scene to a simulated camera on a simulated bus."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from transientcam_driver.clock import Clock
 from transientcam_driver.errors import EffectError, SceneError
-from transientcam_simulation.base import DeviceProfile, SparseResponses
+from transientcam_simulation.base import DeviceProfile, Lens, SparseResponses
 from transientcam_simulation.effects import (
     CHOICES,
     EFFECTS,
@@ -92,6 +92,11 @@ def through_diffuser(diffuser: Diffuser, *, width: int, height: int) -> SparseRe
     return SparseResponses(np.full_like(weight, diffuser.delay_s)[None], weight[None])
 
 
+def field_deg_of(scene: Scene) -> float:
+    """Return the horizontal field of view, 70 degrees of a scene without a camera of its own."""
+    return 70.0 if scene.camera is None else scene.camera.field_of_view_deg
+
+
 def world_of(
     scene: Scene, *, width: int, height: int, seed: int | None = None, readout_s: float
 ) -> World:
@@ -155,12 +160,13 @@ def world_before(
     height: int,
     seed: int | None,
     readout_s: float,
-    seen_by: Callable[[Scene], Scene] = lambda scene: scene,
+    lens: Lens | None = None,
 ) -> tuple[SwitchableWorld, PrepareScene]:
     """Build the world in front of a unit of a camera, and what prepares another one for it.
 
-    Sensor, imperfections and what is off of its noise stay those of the scene given; ``seen_by``
-    gives another scene the device's own lens.
+    Sensor, imperfections and what is off of its noise stay those of the scene given. A device with
+    a ``lens`` of its own shows all scenes through it, with the field of view of the one given; the
+    light stays where each has it.
     Raises SceneError where a file that the scene names cannot be read, or has other content;
     CompilerMissing where it moves, and there is no compiler.
     """
@@ -174,7 +180,14 @@ def world_before(
 
     def seen(found: Scene, effects: Mapping[str, str]) -> Scene:
         choices = found.effects | quiet | checked_effects(effects)
-        return replace(found, sensor=scene.sensor, device=scene.device, effects=choices)
+        found = replace(found, sensor=scene.sensor, device=scene.device, effects=choices)
+        return through_lens(found)
+
+    def through_lens(found: Scene) -> Scene:
+        if lens is None or found.camera is None:
+            return found
+        camera = replace(found.camera, field_of_view_deg=field_deg_of(scene), lens=lens)
+        return replace(found, camera=camera)
 
     def named(name: str) -> Scene:
         return scene if name == scene.name else find_scene(name)
@@ -182,11 +195,11 @@ def world_before(
     def prepare(
         wanted: Scene | str, effects: Mapping[str, str], diffuser: bool
     ) -> tuple[Scene, World]:
-        found = seen_by(seen(named(wanted) if isinstance(wanted, str) else wanted, effects))
+        found = seen(named(wanted) if isinstance(wanted, str) else wanted, effects)
         behind = seen(find_scene(CALIBRATION), effects) if diffuser else found
         return found, world_of_scene(behind)
 
-    return SwitchableWorld(world_of_scene(scene)), prepare
+    return SwitchableWorld(world_of_scene(through_lens(scene))), prepare
 
 
 def checked_effects(effects: Mapping[str, str]) -> dict[str, str]:

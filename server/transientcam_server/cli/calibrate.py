@@ -15,7 +15,7 @@ from transientcam_driver.texts import in_celsius, read_text
 
 if TYPE_CHECKING:
     from transientcam import Camera as Client
-    from transientcam_driver import Camera
+    from transientcam_driver import Camera, Lens
     from transientcam_server.imaging import Calibration
 
 
@@ -81,10 +81,18 @@ def calibrate(
         bool,
         typer.Option(
             "--lens",
-            help="Measure the lens instead, by a flat wall from several sides: prints [lens] of "
-            "the settings.",
+            help="Measure the lens instead, by a flat wall from several sides, or a printed "
+            "--board: prints [lens] of the settings.",
         ),
     ] = False,
+    board: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CxR",
+            help="A chessboard of so many inner corners across and down, as 9x6, or charuco:7x5, "
+            "of so many squares. Needs OpenCV.",
+        ),
+    ] = None,
     views: Annotated[int, typer.Option(min=2, max=100, help="From how many sides.")] = 5,
     second: Annotated[
         str | None,
@@ -113,10 +121,15 @@ def calibrate(
         _refuse(kept | others, "is not for --lens")
         if url is None:
             raise typer.BadParameter("needs the URL of a daemon", param_hint="--lens")
+        if board is not None:
+            _refuse({"--second": second}, "needs walls, not a --board")
+            _measure_by_board(url, board, views=views, takes=takes, token=token, as_json=as_json)
+            return
         _measure_lens(
             [url, *filter(None, [second])], views=views, takes=takes, token=token, as_json=as_json
         )
         return
+    _refuse({"--board": board, "--second": second}, "is for --lens")
     if undo:
         _undo(url, token, as_json=as_json)
         return
@@ -164,26 +177,57 @@ def _measure_lens(
         known = [Intrinsics.of_document(each.camera["intrinsics"]) for each in cameras]
         ranges: list[list[Any]] = [[] for _ in cameras]
         for view in range(views):
-            asked = f"the wall from side {view + 1} of {views}, then Enter"
-            typer.prompt(asked, default="", show_default=False, err=True)
+            _ask_for(f"the wall from side {view + 1} of {views}")
             for each, own in zip(cameras, ranges, strict=True):
-                own.append(_mean_range(each, takes))
+                own.append(_mean(each, "range", takes))
     lenses, off_m, walls = zip(*map(lens_of_walls, ranges, known), strict=True)
-    lens = {f"{name}_px": round(getattr(lenses[0], name), 3) for name in ("fx", "fy", "cx", "cy")}
-    lens["distortion"] = [round(each, 5) for each in lenses[0].distortion]
     beside = {"deviation_m": off_m[0], "walls": walls[0].tolist()}
     if len(urls) > 1:
         beside["second_in_first"] = second_in_first(*walls).tolist()
-    lines = [f"{name} = {value}" for name, value in lens.items()]
+    _print_lens(lenses[0], beside, as_json=as_json)
+
+
+def _measure_by_board(
+    url: str, text: str, *, views: int, takes: int, token: str | None, as_json: bool
+) -> None:
+    from transientcam import Camera
+    from transientcam_server.imaging import Board, Intrinsics
+
+    board = Board(text)
+    with Camera(url, token=token) as camera:
+        known = Intrinsics.of_document(camera.camera["intrinsics"])
+        found = []
+        for view in range(views):
+            _ask_for(f"the board from side {view + 1} of {views}")
+            picture = _mean(camera, "brightness", takes)
+            height, width = picture.shape
+            seen = board.corners(picture)
+            if seen is None:
+                echo("no board was found: nearer, whole, in even light", err=True)
+            else:
+                found.append(seen)
+    lens, off_px, deviations = board.lens(found, known.lens, width=width, height=height)
+    beside = {"pictures": len(found), "deviation_px": off_px, "standard_deviation_px": deviations}
+    _print_lens(lens, beside, as_json=as_json)
+
+
+def _ask_for(what: str) -> None:
+    typer.prompt(f"{what}, then Enter", default="", show_default=False, err=True)
+
+
+def _print_lens(lens: "Lens", beside: Mapping[str, Any], *, as_json: bool) -> None:
+    found = {f"{name}_px": round(getattr(lens, name), 3) for name in ("fx", "fy", "cx", "cy")}
+    found["distortion"] = [round(each, 5) for each in lens.distortion]
+    lines = [f"{name} = {value}" for name, value in found.items()]
     lines += [f"# {name} = {value}" for name, value in beside.items()]
-    echo(json.dumps({"lens": lens} | beside) if as_json else "\n".join(["[lens]", *lines]))
+    echo(json.dumps({"lens": found} | dict(beside)) if as_json else "\n".join(["[lens]", *lines]))
 
 
-def _mean_range(camera: "Client", takes: int) -> Any:
+def _mean(camera: "Client", product: str, takes: int) -> Any:
     import numpy as np
 
     begun = camera.latest()["frame"] + 3  # some are under way
-    with camera.stream("range") as stream:
+    with camera.stream(product) as stream:
         new = (frame.array for frame in iter(stream.receive, None) if frame.frame > begun)
         return np.mean([next(new) for _ in range(takes)], axis=0, dtype=np.float64)
 

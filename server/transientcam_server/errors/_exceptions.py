@@ -101,7 +101,7 @@ class NotARecording(RecordingError, StatedError):  # noqa: N818 - says what is w
 
 
 class DamagedFrame(RecordingError, StatedError):  # noqa: N818 - says what is wrong
-    """The bytes of a frame (counted from 0) are not the ones that were written."""
+    """The bytes of a frame (its number, from 1) are not the ones that were written."""
 
     file: str
     frame: int

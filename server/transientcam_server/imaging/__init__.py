@@ -1,5 +1,6 @@
 """From captures to products: frames, what is computed of them, and their encodings."""
 
+from transientcam_server.imaging._calibrations.board import Board
 from transientcam_server.imaging._calibrations.diffuser import judge
 from transientcam_server.imaging._calibrations.lens import lens_of_walls, second_in_first
 from transientcam_server.imaging._calibrations.verdict import Verdict

@@ -61,6 +61,11 @@ class ComputedFrame:
         return self._read(self.index - 1) if self.recipe.fills and self.index else None
 
     @property
+    def number(self) -> int:
+        """Its number, from 1, as over HTTP, in metadata and along the axis ``frame``."""
+        return self.index + 1
+
+    @property
     def raw(self) -> NDArray[np.uint16]:
         """Its images (N, H, W) in DN."""
         return self.raw_frame.images
@@ -77,8 +82,8 @@ class ComputedFrame:
 
     @property
     def meta(self) -> FrameDocument:
-        """Its metadata, as the daemon's frames have them; the frame's number counts from 1."""
-        return frame_meta(self.index + 1, self.raw_frame, self.recipe, self._computed, None)
+        """Its metadata, as the daemon's frames have them."""
+        return frame_meta(self.number, self.raw_frame, self.recipe, self._computed, None)
 
     def product(
         self,
@@ -125,7 +130,7 @@ class ComputedFrame:
 
     def __repr__(self) -> str:
         images, height, width = self.raw.shape
-        return f"<RecordedFrame {self.index}: {images} images of {width} x {height} pixels>"
+        return f"<RecordedFrame {self.number}: {images} images of {width} x {height} pixels>"
 
     def _repr_html_(self) -> str:
         """Return the map of its range, for notebooks."""

@@ -46,7 +46,7 @@ _MATLAB_7: Final = b"MATLAB 7.3 MAT-file"
 """What a file begins with that MATLAB wrote with -v7.3: HDF5 with the axes turned round."""
 _MATLAB_5: Final = b"MATLAB 5.0 MAT-file"
 """The same of its other options but -v4, and of Octave's -v6 and -v7."""
-_OCTAVE: Final = (b"# Created by Octave", b"Octave-1")
+_OCTAVE: Final = (b"# Created by Octave", b"Octave-1", b"\x1f\x8b")  # the last of its option -zip
 LEAST_BIN_S: Final = 1e-15
 LONGEST_S: Final = 1e-3
 """A response ends before: light goes 150 km there and back. Bins are longer than a femtosecond, and
@@ -172,6 +172,9 @@ def _of_hdf5(path: Path, *, matlab: bool) -> dict[str, _Array]:
         with open_unknown(path) as file:
             storage = Storage(file, path.stat().st_size * _DEFLATE_AT_MOST)
             _require_known(path, file)
+            if not matlab and "H" not in file:
+                found = "in HDF5, but not of tal or MATLAB"
+                raise InputError(str(path), "content", found, "an .npz, or what `save -v7` writes")
             return {
                 name: _of_matlab(storage.values(name).T) if matlab else storage.values(name)
                 for name in (_OF_MATLAB if matlab else _OF_TAL)

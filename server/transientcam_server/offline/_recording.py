@@ -133,7 +133,7 @@ def reconstruct_recording(
             series = {
                 "device_time_s": raw.device_time_s,
                 "host_time_s": raw.host_time_s,
-                "frame": raw.number,
+                "frame": index + 1,
             }
             found = reconstructor.compute(raw, previous)
             rows.append(found | parts_of(found), series)

@@ -20,7 +20,7 @@ def columns_of(recording: Recording) -> dict[str, Column]:
     header, labels = recording.header, recording.labels
     columns = {
         name: Column(("frame",), recording.series(name), attributes)
-        for name, (_, attributes) in layout.SERIES.items()
+        for name, (_, attributes) in (layout.SERIES | layout.NUMBERS).items()
     }
     columns["captured_unix_s"] = Column(
         ("frame",),

@@ -48,10 +48,12 @@ SERIES: Final[dict[str, tuple[str, dict[str, str]]]] = {
     "lost_images": ("<i8", {"units": "1", "long_name": "images lost on the cable before"}),
     "dropped_frames": ("<i8", {"units": "1", "long_name": "frames the recorder dropped before"}),
     "crc32": ("<u4", {"long_name": "CRC-32 of the images' uint16 values, little endian"}),
-    "frame": ("<u8", {"units": "1", "long_name": "frame counter of the device"}),
+    "device_frame": ("<u8", {"units": "1", "long_name": "frame counter of the device"}),
 }
-"""One value a frame: type and attributes. ``frame`` is written last: it counts the frames."""
+"""One value a frame: type and attributes."""
 ROW_AXIS: Final = "frame"
+NUMBERS: Final = {ROW_AXIS: ("<u8", {"units": "1", "long_name": "number of the frame, from 1"})}
+"""The series that is written last: it counts the frames."""
 _AXES: Final = ("frame", "image", "y", "x")
 _LABEL_DTYPES: Final[dict[object, str]] = {int: "<i4", float: "<f8", bool: "|u1"}
 _LABELS: Final = {
@@ -140,7 +142,7 @@ def _create(file: swmr.File, header: Header, annotations: Mapping[str, Any]) -> 
     )
     shape = len(labels), capabilities.height, capabilities.width
     swmr.create_blocks(file, "raw", shape, "<u2", units="DN", long_name="raw images")
-    for name, (dtype, attributes) in SERIES.items():
+    for name, (dtype, attributes) in (SERIES | NUMBERS).items():
         swmr.create_series(file, name, dtype, **attributes)
     for name, size in zip(("image", "y", "x"), shape, strict=True):
         file.create_dataset(name, data=np.arange(size, dtype="<i4"))
@@ -175,8 +177,8 @@ def _scale(file: swmr.File) -> None:
     """Attach the axes as HDF5 dimension scales, which xarray and netCDF read."""
     for axis, name in enumerate(_AXES):
         file["raw"].dims[axis].attach_scale(file[name])
-    for name in SERIES.keys() - {ROW_AXIS}:
-        file[name].dims[0].attach_scale(file["frame"])
+    for name in SERIES:
+        file[name].dims[0].attach_scale(file[ROW_AXIS])
 
 
 def encoded(document: Mapping[str, Any]) -> bytes:
@@ -195,7 +197,7 @@ def row(raw: RawFrame, *, dropped_frames: int) -> dict[str, object]:
         "lost_images": raw.lost_images,
         "dropped_frames": dropped_frames,
         "crc32": checksum(raw.images),
-        "frame": raw.number,
+        "device_frame": raw.number,
     }
 
 
@@ -306,11 +308,18 @@ def read_labels(storage: Storage, applied: AppliedSequence) -> tuple[ImageLabel,
 
 
 def read_series(storage: Storage) -> dict[str, NDArray[Any]]:
-    """Return `SERIES`; one may be longer than another while the file is written.
+    """Return `SERIES` and `NUMBERS`; one may be longer than another while the file is written.
+
+    Older files have the counter of the device in the place of the numbers.
 
     Raises KeyError, ValueError if one is not there, or is a time that is no number.
     """
-    found = {name: storage.values(name, axes=1, dtype=kind) for name, (kind, _) in SERIES.items()}
+    stored = {} if "device_frame" in storage else {"device_frame": ROW_AXIS}
+    found = {
+        name: storage.values(stored.get(name, name), axes=1, dtype=kind)
+        for name, (kind, _) in (SERIES | NUMBERS).items()
+    }
+    found[ROW_AXIS] = np.arange(1, len(found[ROW_AXIS]) + 1, dtype=np.uint64)
     for name in ("host_time_s", "device_time_s", "capture_s"):
         _finite(name, *found[name][~np.isfinite(found[name])])
     return found

@@ -91,7 +91,7 @@ class Recording:
         return int(self._file.id.get_vfd_handle())
 
     def series(self, name: str) -> NDArray[Any]:
-        """Return one of `layout.SERIES`, one value a frame."""
+        """Return one of `layout.SERIES`, or ``frame``, one value a frame."""
         values: NDArray[Any] = self._series[name][: self.frames]
         return values
 
@@ -114,10 +114,10 @@ class Recording:
             raise IndexError(f"frame {index} of {self.frames}")
         images = self._images(index)
         if layout.checksum(images) != self._series["crc32"][index]:
-            raise DamagedFrame(str(self.path), index, "its checksum does not hold")
+            raise DamagedFrame(str(self.path), index + 1, "its checksum does not hold")
         value = {name: values[index].item() for name, values in self._series.items()}
         return RawFrame(
-            number=value["frame"],
+            number=value["device_frame"],
             epoch=value["epoch"],
             images=images,
             labels=self.labels,
@@ -151,7 +151,7 @@ class Recording:
         try:
             images = read_rows(self._raw, index, index + 1)[0]
         except Exception as error:  # h5py raises anything of a damaged file
-            raise DamagedFrame(str(self.path), index, _reason(error)) from error
+            raise DamagedFrame(str(self.path), index + 1, _reason(error)) from error
         native: NDArray[np.uint16] = images.astype(np.uint16, copy=False)
         return native
 

@@ -200,7 +200,7 @@ class ReplayCamera(HostCamera):
 
     @property
     def _length_frames(self) -> int:
-        numbers = self._recording.series("frame")
+        numbers = self._recording.series("device_frame")
         return int(numbers[-1]) - int(numbers[0]) + 1
 
     def _take(self, now_s: float) -> RawFrame:

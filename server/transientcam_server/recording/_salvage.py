@@ -77,6 +77,8 @@ def rebuild(part: Path, target: Path, frames: Sequence[SealedFrame]) -> None:
         for name, (kind, _) in layout.SERIES.items():
             file[name].resize(len(frames), 0)
             file[name][:] = np.array([frame.values[name] for frame in frames], kind)
+        file[layout.ROW_AXIS].resize(len(frames), 0)
+        file[layout.ROW_AXIS][:] = np.arange(1, len(frames) + 1)
 
 
 def _copy_blocks(dataset: swmr.Dataset, copy: swmr.File, rows: int, disk: DiskFile) -> None:

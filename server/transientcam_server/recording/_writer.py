@@ -34,7 +34,7 @@ class RecordingWriter:
         try:
             _require_none(path, self.part)
             _write(self._lock.descriptor, empty)
-            self._rows = swmr.Appender(made, ["raw"], list(layout.SERIES), seal=seal)
+            self._rows = swmr.Appender(made, ["raw"], [*layout.SERIES, *layout.NUMBERS], seal=seal)
             made = made.rename(self.part)
             swmr.synchronise(path.parent)
         except BaseException:
@@ -68,7 +68,7 @@ class RecordingWriter:
         Raises OSError if it cannot be written; the frames before are safe.
         """
         row = layout.row(raw, dropped_frames=dropped_frames)
-        self._rows.append({"raw": raw.images}, row)
+        self._rows.append({"raw": raw.images}, row | {layout.ROW_AXIS: self.frames + 1})
 
     def synchronise(self, now_s: float) -> None:
         """Bring the file to the disk once a second, which bounds what a power cut takes."""

@@ -157,7 +157,7 @@ class ZarrKeys:
             offset, size = place_of_chunk(self._raw, corner, os.fstat(descriptor).st_size)
         except Exception as error:  # h5py raises anything of a damaged file
             first = numbers[0] * self._raw_chunks[0]
-            raise DamagedFrame(str(self._recording.path), first, str(error)) from error
+            raise DamagedFrame(str(self._recording.path), first + 1, str(error)) from error
         last = min(size, seal.SIZE_BYTES)
         end = os.pread(descriptor, last, offset + size - last)
         return Place(offset, seal.unsealed_size(size, end))

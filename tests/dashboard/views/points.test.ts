@@ -116,16 +116,20 @@ describe("the distance of two pins", () => {
     expect(distanceOf(lens, b, a).distance_m).toBeCloseTo(3, 5);
   });
 
-  test("has the deviation that small changes of the ranges give it", () => {
-    const a = { x: 10, y: 70, range_m: 2.5, error_m: 0.01 };
-    const b = { x: 90, y: 20, range_m: 4.1, error_m: 0.02 };
-    const apart = (da: number, db: number): number =>
-      distanceOf(lens, { ...a, range_m: a.range_m + da }, { ...b, range_m: b.range_m + db }).distance_m;
-    const step = 1e-2;
-    const byA = (apart(step, 0) - apart(-step, 0)) / (2 * step);
-    const byB = (apart(0, step) - apart(0, -step)) / (2 * step);
-    expect(distanceOf(lens, a, b).error_m).toBeCloseTo(Math.hypot(byA * 0.01, byB * 0.02), 4);
-  });
+  test.each([{}, { light_x_m: 0.6, light_z_m: -0.1 }, { light_y_m: 2, distortion: [0.1, -0.2, 0.01, 0.02, 0.05] }])(
+    "has the deviation that small changes of the ranges give it: %o",
+    (aside) => {
+      const camera = { ...lens, ...aside };
+      const a = { x: 10, y: 70, range_m: 2.5, error_m: 0.01 };
+      const b = { x: 90, y: 20, range_m: 4.1, error_m: 0.02 };
+      const apart = (da: number, db: number): number =>
+        distanceOf(camera, { ...a, range_m: a.range_m + da }, { ...b, range_m: b.range_m + db }).distance_m;
+      const step = 1e-2;
+      const byA = (apart(step, 0) - apart(-step, 0)) / (2 * step);
+      const byB = (apart(0, step) - apart(0, -step)) / (2 * step);
+      expect(distanceOf(camera, a, b).error_m).toBeCloseTo(Math.hypot(byA * 0.01, byB * 0.02), 5);
+    },
+  );
 });
 
 describe("the room around a cloud", () => {

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from tests.server.imaging.calibrations.test_board import LENS, SIDES, chessboard, picture
 from tests.serving import Served, serving
 from transientcam import Camera
 from transientcam.cli import run
@@ -62,9 +63,31 @@ def test_walls_that_are_shown_one_after_the_other_give_settings_of_the_lens(
     assert found.distortion[0] == pytest.approx(-0.15, abs=0.02)
 
 
+def test_a_board_that_is_shown_from_several_sides_gives_settings_of_the_lens(
+    served: Served, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pictures = [picture(chessboard, *side) for side in SIDES]
+    pictures.insert(1, 0 * pictures[0])
+    views = str(len(pictures))
+    monkeypatch.setattr("typer.prompt", lambda text, **_: None)
+    monkeypatch.setattr("transientcam_server.cli.calibrate._mean", lambda *_: pictures.pop())
+
+    assert run(["calibrate", served.url, "--lens", "--board", "9x6", "--views", views]) == 0
+
+    out, err = capfd.readouterr()
+    assert "no board was found" in err
+    assert f"# pictures = {len(SIDES)}" in out
+    found = LensSettings(**tomllib.loads(out)["lens"])
+    assert found.fx_px == pytest.approx(LENS.fx, abs=1.5)
+    assert found.distortion[0] == pytest.approx(LENS.distortion[0], abs=0.02)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["--board", "9x6"], "--board"),
+        (["--lens", "--board", "9"], "9x6 or charuco"),
+        (["--lens", "--board", "9x6", "--second", "http://127.0.0.1:9"], "--second"),
         (["--lens", "-o", "lens.npz"], "--output"),
         (["--lens", "--undo"], "--undo"),
     ],

@@ -41,7 +41,7 @@ _DOCUMENTS: Final = (
 )
 _SERIES: Final = (
     "epoch", "device_time_s", "host_time_s", "capture_s", "temperature_c", "lost_images",
-    "dropped_frames", "crc32", "frame",
+    "dropped_frames", "crc32", "device_frame", "frame",
 )  # fmt: skip
 _LABELS: Final = ("take", "harmonic", "frequency_hz", "phase_rad", "exposure_s", "illumination")
 _TYPES: Final = (

@@ -83,7 +83,7 @@ def test_frames_become_a_recording_with_the_gains_of_the_tables(
     with open_recording(str(tmp_path / "out.h5"), settings=settings) as recording:
         assert recording.sequence["sampling"]["multiples"] == [2, 10, 15]
         assert (recording.gains == tables.gains()).all()
-        assert recording.series("frame").tolist() == [0, 2, 10]
+        assert recording.series("device_frame").tolist() == [0, 2, 10]
         assert recording.series("device_time_s") == pytest.approx([0, 2 / 30, 10 / 30])
         found_m = recording[2].range_m
         assert (recording.raw[0] == recording.raw[2]).all()

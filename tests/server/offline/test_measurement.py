@@ -1,3 +1,4 @@
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +8,7 @@ import pytest
 import scipy.io
 from numpy.typing import NDArray
 
+from tests.programs import needs_octave
 from transientcam_server.errors import InputError
 from transientcam_server.offline import (
     Measurement,
@@ -221,6 +223,39 @@ def test_files_of_octave_alone_and_cut_ones_are_named(tmp_path: Path, content: b
 
     with pytest.raises(InputError, match=r"a\.mat: content is (in a format of Octave|unreadable)"):
         load_measurement(file)
+
+
+@needs_octave
+def test_what_octave_writes_is_read_or_named(tmp_path: Path) -> None:
+    program = """moments = complex(reshape(1:24, 2, 3, 4), 2); moments(1, :, :) = 99;
+        base_frequency_hz = 23e6;
+        for each = {'-v7', '-v6', '-text', '-binary', '-hdf5', '-float-hdf5', '-zip'}
+            save(each{1}, [each{1}(2:end) '.mat'], 'moments', 'base_frequency_hz');
+        end"""
+    subprocess.run(
+        ["octave-cli", "--quiet", "--norc", "--eval", program],
+        cwd=tmp_path,
+        check=True,
+        timeout=600,
+    )
+    expected = np.arange(1, 25).reshape(2, 3, 4, order="F") + 2j
+    expected[0] = 99
+
+    for readable in ("v7", "v6"):
+        found = load_measurement(tmp_path / f"{readable}.mat")
+        np.testing.assert_array_equal(found.moments, expected)
+        assert found.base_frequency_hz == 23e6
+    for refused in ("text", "binary", "hdf5", "float-hdf5", "zip"):
+        with pytest.raises(InputError, match=r"\.mat: content is .*`save -v7`"):
+            load_measurement(tmp_path / f"{refused}.mat")
+
+
+def test_hdf5_of_others_is_refused(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["moments"] = np.ones((3, 2, 2))
+
+    with pytest.raises(InputError, match="content is in HDF5, but not of tal or MATLAB"):
+        load_measurement(tmp_path / "a.h5")
 
 
 def test_a_file_of_other_arrays_says_which(tmp_path: Path) -> None:

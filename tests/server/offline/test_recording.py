@@ -1,20 +1,27 @@
+import re
+import shutil
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+import scipy.io
 
+import transientcam
 import transientcam_moments as tm
+from tests.conftest import ROOT
+from tests.programs import needs_octave
 from tests.server.recording.failing import FailingDisk, Fault
 from transientcam_driver import Sequence, open_camera
 from transientcam_driver.clock import VirtualClock
 from transientcam_server.errors import InputError
 from transientcam_server.imaging import PRODUCTS, Recipe
 from transientcam_server.imaging._products.view import EVERYTHING
-from transientcam_server.offline import BatchOptions, reconstruct_recording
+from transientcam_server.offline import BatchOptions, convert_recording, reconstruct_recording
 from transientcam_server.offline._recording import DEFAULT_PRODUCTS
-from transientcam_server.recording import Header, Recording, RecordingWriter
+from transientcam_server.recording import Header, Recording, RecordingWriter, ZarrKeys
 from transientcam_server.settings import ReconstructionSettings
 
 FRAMES = 4
@@ -50,6 +57,63 @@ def test_complex_products_also_lie_in_parts_that_octave_reads(path: Path, tmp_pa
             whole = found["moments_re"][()] + 1j * found["moments_im"][()]
             np.testing.assert_array_equal(whole, found["moments"][()])
         assert file["moments_re"].shape[0] == FRAMES
+
+
+@needs_octave
+def test_octave_reads_images_weights_and_gains_as_the_page_says(path: Path, tmp_path: Path) -> None:
+    shutil.copy(path, tmp_path / "corner.h5")
+    page = (ROOT / "docs" / "recordings.md").read_text("utf-8")
+    (block,) = re.findall(r"^```octave\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    rest = """weight = complex(d.weight_re, d.weight_im);
+        save('-v6', 'o.mat', 'images', 'gain', 'weight')"""
+    done = subprocess.run(
+        ["octave-cli", "--quiet", "--norc", "--eval", block + rest],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+
+    assert (done.returncode, done.stderr) == (0, "")
+    found = scipy.io.loadmat(tmp_path / "o.mat")
+    with h5py.File(path) as file:
+        np.testing.assert_array_equal(found["images"].T, file["raw"][0])
+        np.testing.assert_array_equal(found["weight"].T, file["weight"][()])
+        np.testing.assert_array_equal(found["gain"].ravel(), file["gain"][()])
+
+
+def test_a_frame_has_one_number_wherever_it_is_read(path: Path, tmp_path: Path) -> None:
+    numbers = list(range(1, FRAMES + 1))
+    with Recording(path) as recording:
+        reconstruct_recording(recording, tmp_path / "p.npz", QUICK)
+        convert_recording(recording, tmp_path / "r.npz")
+        stored = np.frombuffer(ZarrKeys(recording).value("frame/0"), "<u8")[:FRAMES]
+
+    with h5py.File(path) as file, transientcam.open(path) as opened:
+        dataset = opened.to_xarray()
+        assert [each.number for each in opened] == numbers
+        assert [each.meta["frame"] for each in opened] == numbers
+        assert [each.index + 1 for each in opened] == numbers
+        assert "RecordedFrame 1:" in repr(opened[0])
+        files = [np.load(tmp_path / name)["frame"] for name in ("p.npz", "r.npz")]
+        for found in (file["frame"], dataset["frame"], opened.series("frame"), stored, *files):
+            assert np.asarray(found).tolist() == numbers
+        assert file["device_frame"][()].tolist() == dataset["device_frame"].values.tolist()
+
+
+def test_numbers_of_an_older_file_count_from_1_and_its_counter_is_kept(
+    path: Path, tmp_path: Path
+) -> None:
+    old = shutil.copy(path, tmp_path / "old.h5")
+    with h5py.File(old, "r+") as file:
+        del file["device_frame"]
+        file["frame"][:] = [40, 41, 43, 44]
+
+    with Recording(old) as recording:
+        assert recording.series("frame").tolist() == [1, 2, 3, 4]
+        assert recording.series("device_frame").tolist() == [40, 41, 43, 44]
+        assert recording.frame(2).number == 43
 
 
 def test_products_are_those_the_service_computes(path: Path, tmp_path: Path) -> None:

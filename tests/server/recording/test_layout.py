@@ -51,7 +51,7 @@ def test_a_row_has_what_a_frame_states() -> None:
         "lost_images": raw.lost_images,
         "dropped_frames": 4,
         "crc32": zlib.crc32(raw.images.tobytes()),
-        "frame": 3,
+        "device_frame": 3,
     }
     assert list(row) == list(layout.SERIES)
 

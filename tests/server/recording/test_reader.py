@@ -237,7 +237,7 @@ def test_a_flipped_byte_in_a_chunk_is_found(tmp_path: Path) -> None:
 
     with Recording(path) as recording:
         assert_same(recording.frame(0), frame(0))
-        with pytest.raises(DamagedFrame, match="frame 1 is damaged"):
+        with pytest.raises(DamagedFrame, match="frame 2 is damaged"):
             recording.frame(1)
         assert_same(recording.frame(2), frame(2))
 
@@ -327,7 +327,7 @@ def capability(file: Any, **changes: Any) -> None:
 
 
 def longer(file: Any, rows: int) -> None:
-    for name in (*recording_layout.SERIES, "raw"):
+    for name in (*recording_layout.SERIES, "frame", "raw"):
         file[name].resize(rows, 0)
 
 

@@ -156,7 +156,7 @@ def test_a_slow_disk_costs_frames_and_never_the_camera(start: Start, tmp_path: P
 
     assert recorder.wait(PATIENCE_S)
     with Recording(tmp_path / "a.h5") as recording:
-        assert recording.series("frame").tolist() == [0, 1, 2, 3, 9]
+        assert recording.series("device_frame").tolist() == [0, 1, 2, 3, 9]
         assert recording.series("dropped_frames").tolist() == [0, 0, 0, 0, 5]
         assert recording.end["dropped_frames"] == 5
     assert sum(count for count, _ in reported) == 5

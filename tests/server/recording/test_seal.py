@@ -17,14 +17,14 @@ MAGIC = bytes.fromhex("7f5d0a1ae3c14b9f8e62d00dfeed5ea1")
 
 
 def sealed(row: int, chunk: bytes) -> bytes:
-    return chunk + seal(row, chunk, FIGURES | {"frame": row})
+    return chunk + seal(row, chunk, FIGURES | {"device_frame": row})
 
 
 def found(path: Path, data: bytes) -> list[tuple[int, bytes]]:
     """Frames of a file: the number of each, and its bytes."""
     path.write_bytes(data)
     return [
-        (each.values["frame"], data[each.offset : each.offset + each.size])
+        (each.values["device_frame"], data[each.offset : each.offset + each.size])
         for each in sealed_frames(path)
     ]
 
@@ -51,7 +51,7 @@ def test_frames_are_found_in_the_order_of_their_rows_wherever_they_are(path: Pat
 
     assert found(path, b"head" + three + b"between" + one + two + b"tail") == [*enumerate(chunks)]
     path.write_bytes(one)
-    assert sealed_frames(path)[0].values == FIGURES | {"frame": 0}
+    assert sealed_frames(path)[0].values == FIGURES | {"device_frame": 0}
 
 
 def test_frames_stop_before_the_first_row_that_is_missing(path: Path) -> None:

@@ -201,7 +201,7 @@ def test_a_recording_of_the_relay_has_the_origins_range_to_the_bit(
     wait_until(lambda: at_relay.recording(recorded["id"])["state"] == "complete")
     path = next(relay.settings.recordings.directory.glob(f"*{recorded['id']}*"))
     with Recording(path) as recording:
-        numbers = recording.series("frame")
+        numbers = recording.series("device_frame")
     with transientcam.open(path) as opened:
         for index, number in enumerate(numbers):
             theirs = at_origin.frame("range", number=int(number))

@@ -8,6 +8,7 @@ from typing import Final, TypeVar
 from transientcam_driver.camera import (
     AppliedSequence,
     CameraState,
+    FactoryCalibration,
     HostCamera,
     RawFrame,
     Simulation,
@@ -49,7 +50,7 @@ class TriggeredCamera(HostCamera):
     clock
         Real time by default.
     simulation
-        The handle on a simulated camera; None for a real one.
+        The handle on a simulated camera, whose lens is then known; None for a real one.
     on_close
         Called once the device was given back.
 
@@ -82,6 +83,9 @@ class TriggeredCamera(HostCamera):
         except BaseException:
             self._device.close()
             raise
+        width, height = self._capabilities.width, self._capabilities.height
+        lens = None if simulation is None else simulation.lens(width=width, height=height)
+        self.factory = None if lens is None else FactoryCalibration(lens=lens)
         self._state = CameraState.IDLE
 
     # --- state -------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from functools import partial
 from typing import Final
 
 import numpy as np
@@ -20,7 +19,7 @@ from transientcam_driver.cameras.kinect2 import (
 )
 from transientcam_driver.clock import Clock
 from transientcam_simulation.base import Lens
-from transientcam_simulation.emulated._build import world_before
+from transientcam_simulation.emulated._build import field_deg_of, world_before
 from transientcam_simulation.emulated._handle import SimulationHandle
 from transientcam_simulation.emulated._kinect2.device import EmulatedKinect2
 from transientcam_simulation.emulated._kinect2.firmware import EmulatedFirmware
@@ -29,8 +28,6 @@ from transientcam_simulation.scene import Scene
 
 GAIN_E_PER_DN: Final = 4.0
 """A full well is then within the largest code; an assumption, as all noise is."""
-FIELD_OF_VIEW_DEG: Final = 70.0
-"""Of a scene without a camera of its own; about that of the device."""
 LENS: Final = Lens((0.09, -0.27, 0.0, 0.0, 0.09))
 """About that of the devices whose parameters are published."""
 _LARGEST_P0: Final = 0xFFFF
@@ -44,19 +41,17 @@ def build_kinect2(
     Raises SceneError where a file that the scene names cannot be read.
     """
     sensor = replace(scene.sensor, bits=BITS, gain_e_per_dn=GAIN_E_PER_DN, dark_dn=float(ZERO_DN))
-    field_deg = FIELD_OF_VIEW_DEG if scene.camera is None else scene.camera.field_of_view_deg
-    as_seen = partial(through_lens, field_deg=field_deg)
-    scene = as_seen(replace(scene, sensor=sensor))
+    scene = replace(scene, sensor=sensor)
     world, prepare = world_before(
         scene,
         width=WIDTH,
         height=HEIGHT,
         seed=seed,
         readout_s=IMAGE_PERIOD_S - EXPOSURE_S,
-        seen_by=as_seen,
+        lens=LENS,
     )
     serial = f"SIM-{scene.device.name}-{scene.device.seed}"[:32]
-    parameters, tables = reported_lens(field_deg), p0_tables(scene.device.seed)
+    parameters, tables = reported_lens(field_deg_of(scene)), p0_tables(scene.device.seed)
     answers = parameters.pack(), tables.pack()
 
     def power_on() -> EmulatedFirmware:
@@ -65,13 +60,6 @@ def build_kinect2(
     pixels = DifferencePixels(world, tables.gains(), seed=scene.seed if seed is None else seed)
     device = EmulatedKinect2(power_on, pixels, clock=clock)
     return device, SimulationHandle(scene, world, device, prepare=prepare)
-
-
-def through_lens(scene: Scene, *, field_deg: float) -> Scene:
-    """Return a scene as the device's lens shows it; the light stays where the scene has it."""
-    if scene.camera is None:
-        return scene
-    return replace(scene, camera=replace(scene.camera, field_of_view_deg=field_deg, lens=LENS))
 
 
 def reported_lens(field_deg: float) -> DepthParameters:

@@ -1,7 +1,10 @@
 """From a scene to an emulated TOFcam660 in front of it."""
 
+from typing import Final
+
 from transientcam_driver.cameras.tofcam660 import COLUMNS, DATA_PORT, READOUT_S, ROWS, SATURATED
 from transientcam_driver.clock import Clock
+from transientcam_simulation.base import Lens
 from transientcam_simulation.emulated._build import world_before
 from transientcam_simulation.emulated._handle import SimulationHandle
 from transientcam_simulation.emulated._tofcam660.firmware import EmulatedFirmware
@@ -10,6 +13,8 @@ from transientcam_simulation.emulated._two_taps import DifferentialPixels, with_
 from transientcam_simulation.scene import Scene
 
 _BITS = 12
+LENS: Final = Lens((-0.16, 0.03, 0.0, 0.0, 0.0))
+"""Chosen: a wide lens, which draws the corners in."""
 
 
 def build_tofcam660(
@@ -28,7 +33,9 @@ def build_tofcam660(
     cannot be had.
     """
     scene = with_bits(scene, _BITS)
-    world, prepare = world_before(scene, width=COLUMNS, height=ROWS, seed=seed, readout_s=READOUT_S)
+    world, prepare = world_before(
+        scene, width=COLUMNS, height=ROWS, seed=seed, readout_s=READOUT_S, lens=LENS
+    )
 
     def power_on() -> EmulatedFirmware:
         begin_s = clock.now_s()

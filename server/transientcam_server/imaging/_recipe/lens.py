@@ -137,11 +137,12 @@ def known_intrinsics(
     """Return the best that is known.
 
     Settings go before what the camera reports, then scene, recording or origin, then a guess.
-    Where the light of a simulated scene is, the scene knows best.
+    Where the light of a simulated camera is, and how its lens bends, its simulation knows best.
     """
     if reported is not None and scene is not None:
         x, y, z = scene.light_m
-        reported = replace(reported, light_x_m=x, light_y_m=y, light_z_m=z)
+        bent = scene.distortion
+        reported = replace(reported, distortion=bent, light_x_m=x, light_y_m=y, light_z_m=z)
     found = Intrinsics.of_field(ASSUMED_FIELD_OF_VIEW_DEG, width=width, height=height)
     if reported is not None:
         found = Intrinsics.of_lens(reported, width=width, height=height, source="camera")

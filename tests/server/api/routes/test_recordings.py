@@ -112,7 +112,7 @@ def test_what_just_happened_can_be_saved(
     assert started["history_frames"] >= 6
     assert document["frames"] >= started["history_frames"] + 1
     with Recording(directory / f"{document['id']}.h5") as recording:
-        numbers = recording.series("frame")
+        numbers = recording.series("device_frame")
         # every frame that was captured, and none twice; a busy machine loses some before that
         known = [raw.number for raw in captured if raw.number <= numbers[-1]]
         assert [each for each in numbers if each >= known[0]] == known

@@ -14,6 +14,7 @@ from transientcam_simulation.emulated import find_scene
 from transientcam_simulation.light._rays import camera_rays
 
 SIZE: dict[str, Any] = {"width": 163, "height": 120}
+BENT = (0.1, -0.2, 0.01, 0.0, 0.0)
 SCENE = Intrinsics.of_field(40.0, **SIZE, source="scene")
 
 
@@ -152,12 +153,12 @@ def test_a_camera_reports_its_lens_and_settings_go_before_it() -> None:
     lens = Lens(200.0, 210.0, 80.0, 60.0, (0.09, -0.27, 0.0, 0.0, 0.095), 0.045)
 
     found = known_intrinsics(
-        LensSettings(), **SIZE, reported=lens, scene=Lens(1.0, 1.0, 0.0, 0.0, light_x_m=0.05)
+        LensSettings(), **SIZE, reported=lens, scene=Lens(1.0, 1.0, 0.0, 0.0, BENT, 0.05)
     )
 
     assert found.source == "camera"
     assert (found.fx, found.fy, found.cx, found.cy) == (200.0, 210.0, 80.0, 60.0)
-    assert (found.distortion, found.light_x_m) == (lens.distortion, 0.05)
+    assert (found.distortion, found.light_x_m) == (BENT, 0.05)
     given = LensSettings(field_of_view_deg=90.0)
     assert known_intrinsics(given, **SIZE, reported=lens).source == "settings"
     assert replace(found, source="recording") == known_intrinsics(

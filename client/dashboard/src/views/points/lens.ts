@@ -5,7 +5,7 @@ import { aNumber, type Setting } from "../../store/settings";
 import type { Store } from "../../store/store";
 import type { IntrinsicsDocument } from "../../stream/documents";
 import { fillCloud, makeCloud, pinholeOf } from "./cloud";
-import type { Lens } from "./rays";
+import { type Lens, movedBy } from "./rays";
 
 /** What the service knows of the lens; null where it only assumes. */
 export function knownLens({ camera }: Store): IntrinsicsDocument | null {
@@ -38,9 +38,10 @@ export function distanceOf(lens: Lens, a: Ranged, b: Ranged): { readonly distanc
   const between = from.map((value, axis) => value - to[axis]);
   const distance_m = Math.hypot(...between);
   // A range moves its point along its ray: only what of that lies along the distance changes it.
-  const share = (point: readonly number[]): number =>
+  const share = (point: readonly number[], range_m: number): number =>
+    movedBy(lens, range_m, Math.hypot(...point)) *
     point.reduce((sum, value, axis) => sum + (value / Math.hypot(...point)) * (between[axis] / distance_m), 0);
-  return { distance_m, error_m: Math.hypot(share(from) * a.error_m, share(to) * b.error_m) };
+  return { distance_m, error_m: Math.hypot(share(from, a.range_m) * a.error_m, share(to, b.range_m) * b.error_m) };
 }
 
 /** The point that a pixel sees, in m, as `fillCloud` has it. */

@@ -71,8 +71,14 @@ export function alongRay(
   y: number,
   unit: number,
 ): number {
-  const square = light_x_m * light_x_m + light_y_m * light_y_m + light_z_m * light_z_m;
+  const square = light_x_m ** 2 + light_y_m ** 2 + light_z_m ** 2;
   if (square === 0) return range_m;
   const around = 4 * range_m * range_m - square;
   return around > 0 ? around / (2 * (2 * range_m - unit * (light_x_m * x + light_y_m * y + light_z_m))) : NaN;
+}
+
+/** How much a point `along_m` along its ray moves with its range: 1 where the light stands at the lens. */
+export function movedBy({ light_x_m = 0, light_y_m = 0, light_z_m = 0 }: Lens, range_m: number, along_m: number): number {
+  const square = light_x_m ** 2 + light_y_m ** 2 + light_z_m ** 2;
+  return (4 * along_m * (2 * range_m - along_m)) / (4 * range_m * range_m - square);
 }
