@@ -5,9 +5,10 @@ What is heavy is imported when the verb runs, so that ``transientcam --help`` st
 
 import json
 import os
+import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -15,7 +16,11 @@ from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import Terminal, Text, echo
 
 if TYPE_CHECKING:
+    from transientcam_driver import Camera
     from transientcam_server.settings import Settings
+
+_HANDED_OVER_S: Final = 10.0
+"""The supervisor of a daemon that has ended holds the camera until its light is off, or so long."""
 
 
 def serve(
@@ -85,7 +90,6 @@ def serve(
 
 def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
     """Serve a camera until a signal; ``on_listening`` is given the address."""
-    from transientcam_driver import open_camera
     from transientcam_server.api import build_app
     from transientcam_server.camera import start_with
     from transientcam_server.daemon import (
@@ -104,7 +108,7 @@ def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
         listen(settings.host, settings.port) as listener,
     ):
         url = address(listener, tls=settings.tls_certificate is not None)
-        with open_camera(settings.camera) as opened:
+        with open_after_others(settings.camera) as opened:
             start_with(opened, settings.sequence)
             app = build_app(opened, settings)
             service = app.state.service
@@ -115,6 +119,25 @@ def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
                 service.planning.prepare()
 
             serve_app(app, settings, listener, on_listening=listening)
+
+
+def open_after_others(
+    spec: str,
+    *,
+    pause: Callable[[float], None] = time.sleep,
+    clock: Callable[[], float] = time.monotonic,
+) -> "Camera":
+    """Open a camera; wait while another program holds it, which may be about to end."""
+    from transientcam_driver import CameraBusy, open_camera
+
+    end_s = clock() + _HANDED_OVER_S
+    while True:
+        try:
+            return open_camera(spec)
+        except CameraBusy:
+            if clock() >= end_s:
+                raise
+            pause(0.1)
 
 
 def _camera_names() -> list[str]:

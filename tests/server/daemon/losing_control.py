@@ -100,6 +100,7 @@ class Control:
         self._client: httpx.Client | None = None
         self.url = ""
         self.process: psutil.Process | None = None
+        self.supervisor: psutil.Process | None = None
 
     def light(self) -> None:
         """Have the light on."""
@@ -115,7 +116,11 @@ class Control:
         assert self.process is not None
         self._client.put("/api/v1/acquisition", json={"running": True}).raise_for_status()
         # some light for moments only: the camera is asked to wait for one
-        return self.camera.signal(self.process.pid, 0)
+        lit = self.camera.signal(self.process.pid, 0)
+        family = self.process.children()
+        watching = [each for each in family if "transientcam_supervisor" in _command(each)]
+        self.supervisor = watching[0] if watching else None
+        return lit and self.supervisor is not None
 
     def start(self) -> None:
         self.close()
@@ -143,16 +148,6 @@ class Control:
         assert self.process is not None
         while not self.camera.signal(self.process.pid, int(number)):
             self.light()
-
-    @property
-    def supervisor(self) -> psutil.Process:
-        """The supervisor of the daemon."""
-        assert self.process is not None
-        return next(
-            each
-            for each in self.process.children()
-            if "transientcam_supervisor" in " ".join(each.cmdline())
-        )
 
     @contextmanager
     def stuck(self, where: str) -> Iterator[None]:
@@ -197,11 +192,14 @@ class Control:
         return lit_s - begin_s
 
     def end(self) -> None:
-        """End the daemon, however it is."""
+        """End the daemon, however it is, and see its supervisor end, as systemd does."""
         if self.process is not None:
             with suppress(psutil.NoSuchProcess):
                 self.process.kill()
             self.process.wait(PATIENCE_S)
+        watching, self.supervisor = self.supervisor, None
+        if watching is not None:
+            wait_until(lambda: not _command(watching))
 
     def close(self) -> None:
         if self._client is not None:
@@ -209,6 +207,14 @@ class Control:
             self._client = None
         self.end()
         self.process = None
+
+
+def _command(process: psutil.Process) -> list[str]:
+    """Return the command of a process; of one that has ended there is none."""
+    try:
+        return process.cmdline()
+    except psutil.Error:
+        return []
 
 
 def _killed(control: Control) -> float:
@@ -232,7 +238,7 @@ def _out_of_memory(control: Control) -> float:
         if chosen == daemon:
             return _killed(control)
         victim = children.pop(chosen)
-        assert "transientcam_supervisor" not in victim.cmdline()
+        assert victim != control.supervisor
         victim.kill()
 
 
@@ -275,11 +281,13 @@ def _restarted(control: Control) -> float:
 
 
 def _supervisor_ended(control: Control) -> float:
+    assert control.supervisor is not None
     control.supervisor.terminate()
     return control.goes_off()
 
 
 def _supervisor_killed(control: Control) -> float:
+    assert control.supervisor is not None
     control.supervisor.kill()
     return control.goes_off()
 
