@@ -167,12 +167,12 @@ class Control:
     def stays_off(self) -> bool:
         """Return whether it is dark, and is so after a restart, until somebody starts."""
         assert self.process is not None
-        running = self.process.is_running() and self.process.status() != psutil.STATUS_STOPPED
-        before = not running or self.state()[0] == "stopped"
+        if self.process.is_running() and self.process.status() != psutil.STATUS_STOPPED:
+            wait_until(lambda: self.state()[0] == "stopped")  # it may only now run again
         self.start()
-        dark = before and self.goes_off() == 0.0 and self.state()[0] == "stopped"
+        lit_s, (state, _) = self.goes_off(), self.state()
         self.light()
-        return dark
+        return lit_s == 0.0 and state == "stopped"
 
     def goes_off(self) -> float:
         """Wait until the camera says that its light stays off; return when it was on last, in s.
