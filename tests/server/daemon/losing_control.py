@@ -50,7 +50,6 @@ class Zygote:
             [sys.executable, Path(__file__).with_name("zygote.py")],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
             text=True,
             env=os.environ | LIGHT | {"LD_PRELOAD": "libumockdev-preload.so.0"},
         )
@@ -271,7 +270,9 @@ def _stalled(control: Control) -> float:
     begin_s = time.monotonic()
     control.safe_off()
     asked_s = time.monotonic() - begin_s
-    return asked_s + control.goes_off()
+    took_s = asked_s + control.goes_off()
+    control.camera.do("stall", 0)  # the next daemon could not open it
+    return took_s
 
 
 def _restarted(control: Control) -> float:
