@@ -7,6 +7,7 @@ import json
 import os
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from transientcam_driver import Camera
     from transientcam_server.settings import Settings
 
+_AGAIN_S: Final = 0.1
 _HANDED_OVER_S: Final = 10.0
 """The supervisor of a daemon that has ended holds the camera until its light is off, or so long."""
 
@@ -121,23 +123,15 @@ def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
             serve_app(app, settings, listener, on_listening=listening)
 
 
-def open_after_others(
-    spec: str,
-    *,
-    pause: Callable[[float], None] = time.sleep,
-    clock: Callable[[], float] = time.monotonic,
-) -> "Camera":
-    """Open a camera; wait while another program holds it, which may be about to end."""
+def open_after_others(spec: str, *, pause: Callable[[float], None] = time.sleep) -> "Camera":
+    """Open a camera; wait for another program that holds it, which may be about to end."""
     from transientcam_driver import CameraBusy, open_camera
 
-    end_s = clock() + _HANDED_OVER_S
-    while True:
-        try:
+    for _ in range(round(_HANDED_OVER_S / _AGAIN_S)):
+        with suppress(CameraBusy):
             return open_camera(spec)
-        except CameraBusy:
-            if clock() >= end_s:
-                raise
-            pause(0.1)
+        pause(_AGAIN_S)
+    return open_camera(spec)
 
 
 def _camera_names() -> list[str]:

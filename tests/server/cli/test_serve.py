@@ -26,7 +26,7 @@ class Held:
 
 def opened(held: Held, monkeypatch: pytest.MonkeyPatch) -> object:
     monkeypatch.setattr(transientcam_driver, "open_camera", held.open)
-    return open_after_others("kinect2", pause=held.pause, clock=lambda: held.now_s)
+    return open_after_others("kinect2", pause=held.pause)
 
 
 def test_a_supervisor_that_still_switches_off_is_waited_for(
