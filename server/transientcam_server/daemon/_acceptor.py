@@ -114,20 +114,12 @@ class Admission:
 
 
 class Acceptor:
-    """Accepts the connections of a listening socket from `open` to `close`.
+    """Accepts the connections of a listening socket, which stays the caller's.
 
-    Parameters
-    ----------
-    listener
-        It stays the caller's.
-    protocol
-        Makes the protocol of a connection.
-    watched
-        Whether frames are sent or recorded at present, for which time has to be left.
-    tls
-        With what connections are encrypted; None for not at all.
-    offs
-        As `ReadLimiter` has it.
+    ``protocol``: makes the protocol of a connection.
+    ``watched``: whether frames are sent or recorded, for which time has to be left.
+    ``tls``: with what connections are encrypted; None for not at all.
+    ``offs``: as `ReadLimiter` has it.
     """
 
     def __init__(

@@ -37,18 +37,10 @@ def arrived(connection: socket.socket) -> bytes | None:
 
 
 class Candidate:
-    """A connection beyond a limit.
+    """A connection beyond a limit; ``refused``: as soon as it is read.
 
-    Attributes
-    ----------
-    connection, host
-        Its socket, and the address of its client.
-    problem
-        Why it is refused unless it switches the light off.
-    limiter
-        What reads it, as soon as there is a protocol.
-    refused
-        Whether it is to be refused as soon as it is read.
+    ``problem``: why it is refused unless it switches the light off.
+    ``limiter``: what reads it, as soon as there is a protocol.
     """
 
     def __init__(self, connection: socket.socket, host: str, problem: Problem) -> None:
@@ -69,16 +61,10 @@ class Candidate:
 class Reserve:
     """Holds connections beyond a limit until it is known what they ask for.
 
-    Parameters
-    ----------
-    loop
-        That connections are read on.
-    connect
-        Begins to hand a connection to a protocol within `LOOK_S`; calls `release` when that ended.
-    refuse
-        Answers a connection that has no protocol with a problem, and closes it.
-    tls
-        Whether connections are encrypted, so that it takes a handshake to know what they ask.
+    ``connect``: begins to hand a connection to a protocol within `LOOK_S`; `release` is called
+    when that has ended.
+    ``refuse``: answers a connection that has no protocol with a problem, and closes it.
+    ``tls``: whether connections are encrypted, so that it takes a handshake to know what they ask.
     """
 
     def __init__(
