@@ -35,6 +35,12 @@ _ANSWERS_S: Final = 5.0
 _MOST_BYTES: Final = 4096
 
 
+def since_boot_s() -> float:
+    """Return a time that goes on while the machine sleeps, where the system has one (Linux)."""
+    boot: int | None = getattr(time, "CLOCK_BOOTTIME", None)
+    return time.monotonic() if boot is None else time.clock_gettime(boot)
+
+
 class SupervisorEnded(OSError):  # noqa: N818 - says what has happened
     """The process cannot be started, is gone, or cannot reach the camera."""
 
@@ -45,7 +51,7 @@ class Supervisor:
     ``program``: the Python to start; None where there is none to start.
     ``silence_s``: after so long without a word while the light may be on. It is given up where it
     says nothing for twice as long.
-    ``clock``: monotonic time in s.
+    ``clock``: monotonic time in s, of the machine's sleep too.
     """
 
     def __init__(
@@ -53,7 +59,7 @@ class Supervisor:
         program: str | None,
         *,
         silence_s: float,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = since_boot_s,
     ) -> None:
         self._program = program
         self._silence_s = silence_s

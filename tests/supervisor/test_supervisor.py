@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -246,6 +247,21 @@ def test_a_pause_of_both_is_noticed_by_the_owner(light: Light) -> None:
     assert supervisor.alive() == "the light was out of control for 100.5 s"
     assert supervisor.dark() is None
     assert supervisor.alive() is None
+    supervisor.close(dark=True)
+
+
+def test_sleep_of_the_machine_is_such_a_pause(
+    light: Light, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slept_s = {time.CLOCK_BOOTTIME: 0.0}
+    now = time.clock_gettime
+    monkeypatch.setattr(time, "clock_gettime", lambda id_: now(id_) + slept_s.get(id_, 0.0))
+    supervisor = Supervisor(sys.executable, silence_s=1e4)
+    supervisor.watch(light.switch)
+    assert supervisor.alive() is None
+    slept_s[time.CLOCK_BOOTTIME] = 1.5e4  # before it would be taken for gone
+
+    assert "the light was out of control for 1500" in str(supervisor.alive())
     supervisor.close(dark=True)
 
 

@@ -695,7 +695,8 @@ class World:
         """Require it to be off where it has to be."""
         now_s = self.clock()
         self._again(0.3, self._check_light)
-        since_s = self._unserved_since_s
+        # a daemon that is dead serves nobody either: then it is the device's heartbeat
+        since_s = self._unserved_since_s if self._dead_since_s is None else None
         if since_s is not None and now_s - since_s > UNSERVED_S + OFF_WITHIN_S:
             self.dark_since_s = self.dark_since_s or now_s  # until somebody starts
         if not self.device.lit:

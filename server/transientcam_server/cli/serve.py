@@ -2,9 +2,11 @@
 
 import json
 import os
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -12,7 +14,12 @@ from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import Terminal, Text, echo
 
 if TYPE_CHECKING:
+    from transientcam_driver import Camera
     from transientcam_server.settings import Settings
+
+_AGAIN_S: Final = 0.1
+_HANDED_OVER_S: Final = 10.0
+"""The supervisor of a daemon that has ended holds the camera until its light is off, or so long."""
 
 
 def serve(
@@ -82,7 +89,6 @@ def serve(
 
 def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
     """Serve a camera until a signal; ``on_listening`` is given the address."""
-    from transientcam_driver import open_camera
     from transientcam_server.api import build_app
     from transientcam_server.camera import start_with
     from transientcam_server.daemon import (
@@ -101,7 +107,7 @@ def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
         listen(settings.host, settings.port) as listener,
     ):
         url = address(listener, tls=settings.tls_certificate is not None)
-        with open_camera(settings.camera) as opened:
+        with open_after_others(settings.camera) as opened:
             start_with(opened, settings.sequence)
             app = build_app(opened, settings)
             service = app.state.service
@@ -112,6 +118,17 @@ def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
                 service.planning.prepare()
 
             serve_app(app, settings, listener, on_listening=listening)
+
+
+def open_after_others(spec: str, *, pause: Callable[[float], None] = time.sleep) -> "Camera":
+    """Open a camera; wait for another program that holds it, which may be about to end."""
+    from transientcam_driver import CameraBusy, open_camera
+
+    for _ in range(round(_HANDED_OVER_S / _AGAIN_S)):
+        with suppress(CameraBusy):
+            return open_camera(spec)
+        pause(_AGAIN_S)
+    return open_camera(spec)
 
 
 def _camera_names() -> list[str]:

@@ -114,11 +114,10 @@ class Admission:
 
 
 class Acceptor:
-    """Accepts the connections of a listening socket from `open` to `close`.
+    """Accepts the connections of a listening socket, which stays the caller's.
 
-    ``listener``: it stays the caller's.
     ``protocol``: makes the protocol of a connection.
-    ``watched``: whether frames are sent or recorded at present, for which time has to be left.
+    ``watched``: whether frames are sent or recorded, for which time has to be left.
     ``tls``: with what connections are encrypted; None for not at all.
     ``offs``: as `ReadLimiter` has it.
     """

@@ -14,9 +14,7 @@ _TARGETS: Final = {
     b"DELETE": b"/api/v1/lease",
     b"PUT": b"/api/v1/acquisition",  # where its body stops the capture
 }
-_BEGINS: Final = tuple(
-    method + b" " + target for method, path in _TARGETS.items() for target in (path, b"http")
-)
+_BEGINS: Final = tuple(method + b" " for method in _TARGETS)
 _LINE: Final = re.compile(rb"([A-Z]+) (?:https?://[^/\s]+)?(/[^?\s]*)(?:\?\S*)? HTTP/1\.[01]\r?")
 _LENGTH: Final = re.compile(rb"\ncontent-length:[ \t]*(\d{1,4})[ \t]*\r?(?=\n|$)", re.IGNORECASE)
 _IN_CHUNKS: Final = re.compile(rb"\ntransfer-encoding:", re.IGNORECASE)
@@ -25,7 +23,8 @@ _IN_CHUNKS: Final = re.compile(rb"\ntransfer-encoding:", re.IGNORECASE)
 def switches_off(begin: bytes) -> bool | None:
     """Return whether a request switches the light off; None while that cannot be known.
 
-    It does once it is complete: what pretends to be one gains nothing by its first line.
+    It does once it is complete: what pretends to be one gains nothing by its first line. A proxy
+    may have left any path of its own before that of the request.
 
     ``begin``: what has arrived of it, from its first byte on.
     """
@@ -37,7 +36,7 @@ def switches_off(begin: bytes) -> bool | None:
     if not end:
         return unknown
     found = _LINE.fullmatch(line)
-    if found is None or _TARGETS.get(found[1]) != found[2]:
+    if found is None or not found[2].endswith(_TARGETS.get(found[1], b" ")):
         return False
     head, end, body = begin.partition(b"\r\n\r\n")
     if not end:

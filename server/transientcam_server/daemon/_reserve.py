@@ -37,12 +37,10 @@ def arrived(connection: socket.socket) -> bytes | None:
 
 
 class Candidate:
-    """A connection beyond a limit.
+    """A connection beyond a limit; ``refused``: as soon as it is read.
 
-    ``connection``, ``host``: its socket, and the address of its client.
     ``problem``: why it is refused unless it switches the light off.
     ``limiter``: what reads it, as soon as there is a protocol.
-    ``refused``: whether it is to be refused as soon as it is read.
     """
 
     def __init__(self, connection: socket.socket, host: str, problem: Problem) -> None:
@@ -63,9 +61,8 @@ class Candidate:
 class Reserve:
     """Holds connections beyond a limit until it is known what they ask for.
 
-    ``loop``: that connections are read on.
-    ``connect``: begins to hand a connection to a protocol within `LOOK_S`; calls `release` when
-    that ended.
+    ``connect``: begins to hand a connection to a protocol within `LOOK_S`; `release` is called
+    when that has ended.
     ``refuse``: answers a connection that has no protocol with a problem, and closes it.
     ``tls``: whether connections are encrypted, so that it takes a handshake to know what they ask.
     """

@@ -50,7 +50,6 @@ class Zygote:
             [sys.executable, Path(__file__).with_name("zygote.py")],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
             text=True,
             env=os.environ | LIGHT | {"LD_PRELOAD": "libumockdev-preload.so.0"},
         )
@@ -100,6 +99,7 @@ class Control:
         self._client: httpx.Client | None = None
         self.url = ""
         self.process: psutil.Process | None = None
+        self.supervisor: psutil.Process | None = None
 
     def light(self) -> None:
         """Have the light on."""
@@ -115,7 +115,11 @@ class Control:
         assert self.process is not None
         self._client.put("/api/v1/acquisition", json={"running": True}).raise_for_status()
         # some light for moments only: the camera is asked to wait for one
-        return self.camera.signal(self.process.pid, 0)
+        lit = self.camera.signal(self.process.pid, 0)
+        family = self.process.children()
+        watching = [each for each in family if "transientcam_supervisor" in _command(each)]
+        self.supervisor = watching[0] if watching else None
+        return lit and self.supervisor is not None
 
     def start(self) -> None:
         self.close()
@@ -144,16 +148,6 @@ class Control:
         while not self.camera.signal(self.process.pid, int(number)):
             self.light()
 
-    @property
-    def supervisor(self) -> psutil.Process:
-        """The supervisor of the daemon."""
-        assert self.process is not None
-        return next(
-            each
-            for each in self.process.children()
-            if "transientcam_supervisor" in " ".join(each.cmdline())
-        )
-
     @contextmanager
     def stuck(self, where: str) -> Iterator[None]:
         """Let threads wait to the end of the block."""
@@ -172,12 +166,12 @@ class Control:
     def stays_off(self) -> bool:
         """Return whether it is dark, and is so after a restart, until somebody starts."""
         assert self.process is not None
-        running = self.process.is_running() and self.process.status() != psutil.STATUS_STOPPED
-        before = not running or self.state()[0] == "stopped"
+        if self.process.is_running() and self.process.status() != psutil.STATUS_STOPPED:
+            wait_until(lambda: self.state()[0] == "stopped")  # it may only now run again
         self.start()
-        dark = before and self.goes_off() == 0.0 and self.state()[0] == "stopped"
+        lit_s, (state, _) = self.goes_off(), self.state()
         self.light()
-        return dark
+        return lit_s == 0.0 and state == "stopped"
 
     def goes_off(self) -> float:
         """Wait until the camera says that its light stays off; return when it was on last, in s.
@@ -197,11 +191,14 @@ class Control:
         return lit_s - begin_s
 
     def end(self) -> None:
-        """End the daemon, however it is."""
+        """End the daemon, however it is, and see its supervisor end, as systemd does."""
         if self.process is not None:
             with suppress(psutil.NoSuchProcess):
                 self.process.kill()
             self.process.wait(PATIENCE_S)
+        watching, self.supervisor = self.supervisor, None
+        if watching is not None:
+            wait_until(lambda: not _command(watching))
 
     def close(self) -> None:
         if self._client is not None:
@@ -209,6 +206,14 @@ class Control:
             self._client = None
         self.end()
         self.process = None
+
+
+def _command(process: psutil.Process) -> list[str]:
+    """Return the command of a process; of one that has ended there is none."""
+    try:
+        return process.cmdline()
+    except psutil.Error:
+        return []
 
 
 def _killed(control: Control) -> float:
@@ -232,7 +237,7 @@ def _out_of_memory(control: Control) -> float:
         if chosen == daemon:
             return _killed(control)
         victim = children.pop(chosen)
-        assert "transientcam_supervisor" not in victim.cmdline()
+        assert victim != control.supervisor
         victim.kill()
 
 
@@ -265,7 +270,9 @@ def _stalled(control: Control) -> float:
     begin_s = time.monotonic()
     control.safe_off()
     asked_s = time.monotonic() - begin_s
-    return asked_s + control.goes_off()
+    took_s = asked_s + control.goes_off()
+    control.camera.do("stall", 0)  # the next daemon could not open it
+    return took_s
 
 
 def _restarted(control: Control) -> float:
@@ -275,11 +282,13 @@ def _restarted(control: Control) -> float:
 
 
 def _supervisor_ended(control: Control) -> float:
+    assert control.supervisor is not None
     control.supervisor.terminate()
     return control.goes_off()
 
 
 def _supervisor_killed(control: Control) -> float:
+    assert control.supervisor is not None
     control.supervisor.kill()
     return control.goes_off()
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from tests.driver.cameras.open_usb.usbfs.processes import missing_libraries, skip_or_fail
-from tests.server.daemon.losing_control import ENDING, EVENTS, Control, Zygote, controlled, lose
+from tests.server.daemon.losing_control import EVENTS, KINDS, Control, Zygote, controlled, lose
 from tests.waiting import wait_until
 
 FEWER = "stuck camera thread", "USB stall", "supervisor SIGKILL", "SIGSTOP", "SIGKILL"
@@ -51,17 +51,9 @@ def test_the_prototype_goes_dark(usb: Control, event: str) -> None:
     lose(usb, event)
 
 
-@pytest.mark.parametrize("event", [each for each in FEWER if each not in ENDING])
+@pytest.mark.parametrize("event", FEWER)
 def test_a_kinect_goes_dark_which_has_no_watchdog(kinect2: Control, event: str) -> None:
     lose(kinect2, event)
-
-
-# each with an emulation of its own: on a laden machine its bus may not come back for a next daemon
-@pytest.mark.parametrize("event", [each for each in FEWER if each in ENDING])
-def test_a_kinect_goes_dark_at_the_end_of_its_daemon(zygote: Zygote, event: str) -> None:
-    pytest.importorskip("usb1", reason="the package libusb1 is missing")
-    with controlled(zygote, "kinect2", silence_s=5.0) as control:
-        lose(control, event)
 
 
 @pytest.mark.parametrize("event", FEWER)
@@ -69,8 +61,7 @@ def test_an_opt8241_goes_dark_which_has_no_watchdog(opt8241: Control, event: str
     lose(opt8241, event)
 
 
-# not kinect2, for the same reason; `losing_control` tries it
-@pytest.mark.parametrize("kind", ["usb", "opt8241"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_after_a_restart_it_stays_dark_until_somebody_starts(
     request: pytest.FixtureRequest, kind: str
 ) -> None:

@@ -23,6 +23,9 @@ def with_body(head: bytes, body: bytes, *, length: bytes = b"Content-Length") ->
         SAFE_OFF.replace(b"1.1", b"1.0") + b"\r\n",
         SAFE_OFF.replace(b" HTTP", b"?from=page HTTP") + b"\r\n",
         SAFE_OFF.replace(b" /api", b" http://lab:8000/api") + b"\r\n",
+        SAFE_OFF.replace(b" /api", b" /of/a-proxy/api") + b"\r\n",
+        SET.replace(b" /api", b" http://lab/lidar/api")
+        + b'Content-Length: 17\r\n\r\n{"running":false}',
         with_body(SAFE_OFF, b"{}"),
         BACK + b"Transientcam-Lease: secret\r\n\r\n",
         with_body(SET, b'{"running": false}'),
@@ -43,6 +46,7 @@ def test_they_do_once_they_are_complete_and_not_before(request_: bytes) -> None:
         b"\x16\x03\x01",
         b"POST /api/v1/acquisition/safe-offs HTTP/1.1\r\n",
         b"POST /api/v1/acquisition/safe-off\r\n",
+        b"POST /x?/api/v1/acquisition/safe-off HTTP/1.1\r\n",
         b"GET /api/v1/acquisition/safe-off HTTP/1.1\r\n",
         b"DELETE /api/v1/recordings/1 HTTP/1.1\r\n",
         b"POST /api/v1/lease HTTP/1.1\r\n",

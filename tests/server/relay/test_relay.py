@@ -1,7 +1,7 @@
 """A relay before a real origin, both with their own ports: what its clients see and may do."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -209,26 +209,50 @@ def test_a_recording_of_the_relay_has_the_origins_range_to_the_bit(
             assert opened[index].range_m.tobytes() == theirs.array.tobytes()
 
 
-def test_a_viewers_token_watches_and_changes_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("role", "may_light", "change", "light"),
+    [
+        (Role.VIEWER, True, "role-too-low", "role-too-low"),
+        (Role.OPERATOR, False, None, "may-not-light"),
+        (Role.OPERATOR, True, None, None),
+    ],
+)
+def test_a_relay_lends_what_its_token_may_and_nothing_else(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    role: Role,
+    may_light: bool,
+    change: str | None,
+    light: str | None,
 ) -> None:
     file = TokenFile(tmp_path / "tokens.json")
-    _, viewer = file.create("relay", Role.VIEWER, now=utc_now())
+    _, token = file.create("relay", role, now=utc_now(), may_light=may_light)
     given = tmp_path / "token"
-    given.write_text(viewer + "\n", encoding="utf-8")
+    given.write_text(token + "\n", encoding="utf-8")
     with serving(ORIGIN, sequence=VIDEO, require_token=True, tokens_file=file.path) as origin:
         with pytest.raises(CameraLost, match="token"):
             RelayCamera(Origin(origin.url, None, timeout_s=PATIENCE_S))
         monkeypatch.setenv(TOKEN_VARIABLE, "of another service")
         name = f"relay:{origin.url}?timeout_s={PATIENCE_S:g}&token_file={given}"
         with serving(name) as relay, transientcam.Camera(relay.url) as camera:
-            camera.latest(wait_s=10.0)
-            assert camera.camera["origin"]["role"] == "viewer"
-            for change in (camera.stop, lambda: camera.configure(harmonics=2)):
-                with pytest.raises(transientcam.ProblemError, match="refuses") as refused:
-                    change()
-                assert refused.value.type == "/problems/role-too-low"
-            assert camera.acquisition["running"]
+            assert camera.camera["origin"]["role"] == str(role)
+            for wanted, refusal in (
+                (lambda: camera.configure(harmonics=2), change),
+                (camera.stop, change),
+                (camera.safe_off, None),
+                (camera.start, light),
+            ):
+                assert refused(wanted) == refusal
+            assert origin.service.acquisition.status().running is (light is None)
+
+
+def refused(wanted: Callable[[], Any]) -> str | None:
+    """Return the origin's reason, None where it was done."""
+    try:
+        wanted()
+    except transientcam.ProblemError as problem:
+        return problem.type.removeprefix("/problems/")
+    return None
 
 
 def test_a_cut_connection_is_resumed_and_what_is_missing_is_counted(origin: Served) -> None:

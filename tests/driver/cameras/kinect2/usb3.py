@@ -107,16 +107,20 @@ class Usb3Mount(UsbfsMount):
 
     def set_streaming(self, streaming: bool) -> None:
         """Let packets come, or none; the light is another matter."""
-        with self.device.changed:
-            self.streaming = streaming
-            self.packets.clear()
-            self.device.changed.notify_all()
         with self._switching:
+            self._take(False)  # else what waits in `push` would go on to do so
             link = self.linked()
             link.set_stream_enabled(streaming)
             link.stop_images()
             if streaming:
+                self._take(True)
                 link.start_images(self.push, lambda error: None)
+
+    def _take(self, packets: bool) -> None:
+        with self.device.changed:
+            self.streaming = packets
+            self.packets.clear()
+            self.device.changed.notify_all()
 
     def close(self) -> None:
         if self.link is not None and self.device.plugged:

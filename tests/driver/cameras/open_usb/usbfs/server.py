@@ -42,7 +42,10 @@ class Prototype:
         self.device: EmulatedDevice
         self.device, _ = build(scene, width=163, height=120, seed=1, clock=RealClock())
         self.mount = UsbfsMount(self.device, root)
-        self.stall = self.device.stall_next
+
+    def stall(self, requests: int) -> None:
+        with self.device.changed:
+            self.device._requests_to_stall = requests
 
     def status(self) -> Status:
         with self.device.changed:  # past the bus, which may stall
