@@ -164,7 +164,7 @@ def nothing_left_behind() -> Iterator[None]:
         and not isinstance(thread, threading._DummyThread)
     ]
     for thread in left:
-        thread.join(timeout=2.0)
+        thread.join(timeout=60.0)
     alive = [thread.name for thread in left if thread.is_alive()]
     assert not alive, f"threads left behind: {alive}"
     gc.collect(0)  # unclosed resources warn when collected, and warnings are errors

@@ -12,12 +12,17 @@ from typing import Any
 import uvicorn.server
 from fastapi import FastAPI
 
+import transientcam
+from transientcam.opening import remote_recording
+from transientcam.remote_file import RemoteFile
 from transientcam_driver import Camera, open_camera
 from transientcam_driver.clock import Clock
 from transientcam_server.api import build_app
+from transientcam_server.broadcast import Hub
 from transientcam_server.camera import _acquisition as acquisition
 from transientcam_server.daemon._server import Server, address, listen
 from transientcam_server.service import Service
+from transientcam_server.imaging import Frame
 from transientcam_server.settings import Settings
 
 START_S = 60.0
@@ -27,6 +32,27 @@ UNSERVED_S = 60.0
 
 # a camera that is to stop or to be set is read on for so long, which hundreds of tests wait for
 acquisition.READ_TIMEOUT_S = 0.03  # type: ignore[misc]
+
+# nor does it keep a client waiting for longer than the client would: whoever asks for as long a wait
+# for a frame as there is has longer, and the default patience of a client is longer, too
+_PATIENT_S = 60.0
+_LONGEST_WAIT_S = 10.0
+_newest = Hub.newest
+
+
+async def _patiently(hub: Hub, *, after: int, wait_s: float) -> Frame:
+    longer_s = _PATIENT_S if wait_s == _LONGEST_WAIT_S else wait_s
+    return await _newest(hub, after=after, wait_s=longer_s)
+
+
+Hub.newest = _patiently  # type: ignore[method-assign]
+_PATIENT: tuple[Callable[..., Any], ...] = (
+    *(transientcam.Camera.__init__, transientcam.AsyncCamera.__init__, RemoteFile.__init__),
+    *(transientcam.open, remote_recording),
+)
+for _each in _PATIENT:
+    assert _each.__kwdefaults__["timeout_s"] < _PATIENT_S
+    _each.__kwdefaults__["timeout_s"] = _PATIENT_S
 
 
 class PromptServer(Server):

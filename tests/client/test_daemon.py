@@ -16,7 +16,7 @@ from transientcam.errors import ProblemError, StreamClosed
 
 _VIDEO: dict[str, Any] = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
 _STILL: dict[str, Any] = {"harmonics": 3, "zeroth": "low-frequency", "exposure_s": 0.0005}
-_LONG_S = 30.0
+_LONG_S = 60.0
 
 
 @pytest.fixture

@@ -474,9 +474,9 @@ def test_stop_from_another_thread_ends_a_read_that_is_waiting() -> None:
 
         reader = threading.Thread(target=read)
         reader.start()
-        assert reading.wait(10)
+        assert reading.wait(60.0)
         camera.stop()
-        reader.join(10)
+        reader.join(60.0)
 
         assert not reader.is_alive()
         assert len(ended) == 1

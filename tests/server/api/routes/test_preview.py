@@ -15,7 +15,7 @@ from PIL import Image
 from tests.serving import Served, serving
 
 PREVIEW = "/api/v1/preview.mjpeg"
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 def parts(response: httpx.Response) -> Iterator[tuple[dict[str, str], bytes]]:

@@ -307,7 +307,7 @@ def test_a_changed_sequence_is_reported_before_its_first_frame(served: Served) -
     with streaming(served.stream_url) as client:
         client.subscribe("moments")
         client.frame()
-        applied = served.service.acquisition.configure(Sequence(harmonics=4)).result(10.0)
+        applied = served.service.acquisition.configure(Sequence(harmonics=4)).result(60.0)
         notice = client.notice("sequence-changed")
         frame = client.frame()
         while frame.meta["sequence_id"] != applied.epoch:
@@ -321,7 +321,7 @@ def test_a_changed_sequence_is_reported_before_its_first_frame(served: Served) -
 def test_frames_come_at_the_rate_of_the_camera_and_every_missing_one_is_reported(
     served: Served,
 ) -> None:
-    served.service.acquisition.configure(Sequence.from_document(VIDEO)).result(10.0)
+    served.service.acquisition.configure(Sequence.from_document(VIDEO)).result(60.0)
     with streaming(served.stream_url) as client:
         client.subscribe("flags")
         messages = [client.receive() for _ in range(25)]

@@ -93,7 +93,7 @@ def test_frames_travel_from_the_usb_endpoint_to_a_clients_array(
             assert usb_camera.lit
 
         process.send_signal(signal.SIGTERM)
-        assert process.wait(30) == 0
+        assert process.wait(60.0) == 0
         assert not usb_camera.lit
 
 
