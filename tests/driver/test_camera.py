@@ -486,7 +486,7 @@ def test_real_time_frames_arrive_when_they_are_due() -> None:
     with open_camera("sim:mirrors") as camera:
         camera.configure(VIDEO)
         camera.start()
-        frames = [camera.read_frame(timeout_s=30) for _ in range(3)]
+        frames = [camera.read_frame(timeout_s=60.0) for _ in range(3)]
 
         for frame in frames:  # no frame before its last image was read out
             exposed_s = frame.device_time_s + frame.capture_s

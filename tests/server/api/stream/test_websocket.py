@@ -57,7 +57,7 @@ def test_the_stream_sends_what_rest_answers(served: Served) -> None:
 def test_data_starts_at_a_multiple_of_eight_bytes(served: Served) -> None:
     with streaming(served.stream_url) as client:
         client.subscribe("coefficients")
-        data = client.connection.recv(timeout=10.0)
+        data = client.connection.recv(timeout=60.0)
 
     assert isinstance(data, bytes)
     size = wire.parse_frame(data).array.nbytes

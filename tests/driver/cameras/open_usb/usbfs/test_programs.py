@@ -101,7 +101,7 @@ def test_the_light_goes_off_when_the_program_dies(usb_camera: EmulatedCamera) ->
     program = Program(usb_camera.environment)
     camera = program.open()
     camera.start()
-    camera.read_frame(timeout_s=30)
+    camera.read_frame(timeout_s=60.0)
     assert usb_camera.lit
 
     program.kill()
