@@ -21,8 +21,8 @@ from transientcam_server.api import build_app
 from transientcam_server.broadcast import Hub
 from transientcam_server.camera import _acquisition as acquisition
 from transientcam_server.daemon._server import Server, address, listen
-from transientcam_server.service import Service
 from transientcam_server.imaging import Frame
+from transientcam_server.service import Service
 from transientcam_server.settings import Settings
 
 START_S = 60.0
@@ -33,8 +33,8 @@ UNSERVED_S = 60.0
 # a camera that is to stop or to be set is read on for so long, which hundreds of tests wait for
 acquisition.READ_TIMEOUT_S = 0.03  # type: ignore[misc]
 
-# nor does it keep a client waiting for longer than the client would: whoever asks for as long a wait
-# for a frame as there is has longer, and the default patience of a client is longer, too
+# whoever asks for the longest wait for a frame that there is waits longer in tests, and the default
+# patience of a client is longer, too: a laden machine takes its time
 _PATIENT_S = 60.0
 _LONGEST_WAIT_S = 10.0
 _newest = Hub.newest
