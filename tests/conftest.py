@@ -73,7 +73,7 @@ def pytest_xdist_auto_num_workers() -> int:
     return cores + max(1, cores // 2)
 
 
-# Those of more than half a minute: begun last, one of them would keep one worker alone at the end.
+# Those of more than a quarter of a minute: begun last, one would keep one worker alone at the end.
 _LONGEST_FIRST = (
     "tests/server/fuzzing/test_interface.py",
     "tests/browser/test_recordings.py",
@@ -92,6 +92,21 @@ _LONGEST_FIRST = (
     "tests/browser/test_accessibility.py",
     "tests/server/fuzzing/test_recordings.py",
     "tests/moments/kernels/test_kernels_reconstruct.py",
+    "tests/server/recording/test_disk.py",
+    "tests/browser/test_transient.py",
+    "tests/browser/test_accuracy.py",
+    "tests/browser/test_large_frames.py",
+    "tests/world/test_world.py",
+    "tests/stability/test_density.py",
+    "tests/surroundings/test_matrix.py",
+    "tests/moments/kernels/test_kernels_likelihood.py",
+    "tests/moments/kernels/test_kernels_peaks.py",
+    "tests/moments/arrays/test_namespaces.py",
+    "tests/notebooks/test_notebooks.py",
+    "tests/experiments/test_commands_interrupted.py",
+    "tests/server/api/routes/test_calibrations.py",
+    "tests/server/planning/process/test_process.py",
+    "tests/simulation/light/test_transport.py",
 )
 
 
@@ -164,7 +179,7 @@ def nothing_left_behind() -> Iterator[None]:
         and not isinstance(thread, threading._DummyThread)
     ]
     for thread in left:
-        thread.join(timeout=2.0)
+        thread.join(timeout=60.0)
     alive = [thread.name for thread in left if thread.is_alive()]
     assert not alive, f"threads left behind: {alive}"
     gc.collect(0)  # unclosed resources warn when collected, and warnings are errors

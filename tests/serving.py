@@ -8,15 +8,21 @@ from dataclasses import dataclass
 from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Any
+from unittest import mock
 
 import uvicorn.server
 from fastapi import FastAPI
 
+import transientcam
+from transientcam.opening import remote_recording
+from transientcam.remote_file import RemoteFile
 from transientcam_driver import Camera, open_camera
 from transientcam_driver.clock import Clock
 from transientcam_server.api import build_app
+from transientcam_server.broadcast import Hub
 from transientcam_server.camera import _acquisition as acquisition
 from transientcam_server.daemon._server import Server, address, listen
+from transientcam_server.imaging import Frame
 from transientcam_server.service import Service
 from transientcam_server.settings import Settings
 
@@ -25,8 +31,29 @@ UNSERVED_S = 60.0
 """A laden machine does not turn the light off in tests that are about something else."""
 
 
-# a camera that is to stop or to be set is read on for so long, which hundreds of tests wait for
+# A camera that is to stop or to be set is read on for so long, which hundreds of tests wait for
 acquisition.READ_TIMEOUT_S = 0.03  # type: ignore[misc]
+
+# Whoever asks for the longest wait for a frame that there is waits longer in tests, and the default
+# patience of a client is longer, too: a laden machine takes its time.
+_PATIENT_S = 60.0
+_LONGEST_WAIT_S = 10.0
+_newest = Hub.newest
+
+
+async def _patiently(hub: Hub, *, after: int, wait_s: float) -> Frame:
+    longer_s = _PATIENT_S if wait_s == _LONGEST_WAIT_S else wait_s
+    return await _newest(hub, after=after, wait_s=longer_s)
+
+
+Hub.newest = _patiently  # type: ignore[method-assign]
+_PATIENT: tuple[Callable[..., Any], ...] = (
+    *(transientcam.Camera.__init__, transientcam.AsyncCamera.__init__, RemoteFile.__init__),
+    *(transientcam.open, remote_recording),
+)
+for _each in _PATIENT:
+    assert _each.__kwdefaults__["timeout_s"] < _PATIENT_S
+    _each.__kwdefaults__["timeout_s"] = _PATIENT_S
 
 
 class PromptServer(Server):
@@ -95,10 +122,17 @@ def serving(
 
     ``prepare`` is given the application before it starts; ``clock`` is that of a simulated camera.
     """
-    with open_camera(camera, clock=clock) as opened, TemporaryDirectory() as state:
+    with (
+        open_camera(camera, clock=clock) as opened,
+        TemporaryDirectory() as state,
+        # nor is a camera taken for stalled that a laden machine leaves waiting for two seconds
+        mock.patch.object(acquisition, "STALLED_MIN_S", _PATIENT_S),
+    ):
         usual: dict[str, Any] = {"port": 0, "log_level": "warning", "capture_at_start": True}
         usual |= {"calibrations": {"directory": state}}
         usual |= {"light": {"directory": f"{state}/light", "delay_s": 0.0, "unused_s": 0.0}}
+        # a laden machine may take longer to ask for a frame than a service keeps it
+        usual |= {"history": {"seconds": 3600.0}}
         # "automatic" depends on the kernels that other tests of this process have compiled
         usual |= {"reconstruction": {"estimator": "pisarenko"}}
         chosen = _patient(Settings(camera=camera, **{**usual, **settings}))

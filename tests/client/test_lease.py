@@ -24,13 +24,13 @@ def daemon() -> Iterator[Served]:
 
 @pytest.fixture
 def camera(daemon: Served) -> Iterator[Camera]:
-    with Camera(daemon.url, timeout_s=20.0) as client:
+    with Camera(daemon.url, timeout_s=60.0) as client:
         yield client
 
 
 @pytest.fixture
 def other(daemon: Served) -> Iterator[Camera]:
-    with Camera(daemon.url, timeout_s=20.0) as client:
+    with Camera(daemon.url, timeout_s=60.0) as client:
         yield client
 
 
@@ -94,8 +94,8 @@ def test_the_light_goes_off_whichever_client_holds_the_lease(camera: Camera, oth
 def test_asyncio_has_it_all_too(daemon: Served) -> None:
     async def run() -> tuple[Any, ...]:
         async with (
-            AsyncCamera(daemon.url, timeout_s=20.0) as camera,
-            AsyncCamera(daemon.url, timeout_s=20.0) as other,
+            AsyncCamera(daemon.url, timeout_s=60.0) as camera,
+            AsyncCamera(daemon.url, timeout_s=60.0) as other,
         ):
             async with camera.lease("anna", duration_s=1.0) as lease:
                 await camera.configure(**OTHER)

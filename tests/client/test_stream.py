@@ -30,7 +30,7 @@ class _Sync:
     """Drives `Camera.stream`."""
 
     def __init__(self, url: str, *products: str, **options: Any) -> None:
-        self._camera = Camera(url, timeout_s=5.0)
+        self._camera = Camera(url, timeout_s=60.0)
         self.stream = self._camera.stream(*products, **options)
 
     def receive(self, **options: Any) -> Frame:
@@ -54,7 +54,7 @@ class _Async:
 
     def __init__(self, url: str, *products: str, **options: Any) -> None:
         self._runner = asyncio.Runner()
-        self._camera = AsyncCamera(url, timeout_s=5.0)
+        self._camera = AsyncCamera(url, timeout_s=60.0)
         self.stream = self._camera.stream(*products, **options)
 
     def receive(self, **options: Any) -> Frame:
@@ -126,7 +126,7 @@ def test_a_subscription_is_answered_with_frames(
     server = replay(handler)
     client = connect(server.url, "range", credits=3, max_rate_hz=5.0)
 
-    frame = client.receive(timeout_s=5.0)
+    frame = client.receive(timeout_s=60.0)
 
     assert (frame.frame, frame.product, frame.unit) == (17, "range", "m")
     assert wire.parse_client_message(first[0]) == wire.Subscribe(
@@ -169,7 +169,7 @@ def test_a_frame_far_longer_than_the_usual_limit_of_a_message_arrives(
 
     client = connect(replay(handler).url)
 
-    frame = client.receive(timeout_s=20.0)
+    frame = client.receive(timeout_s=60.0)
 
     assert frame.array.shape == (2200, 2000)
     assert (frame.array == 1.0).all()
@@ -187,7 +187,7 @@ def test_notices_are_delivered_while_frames_are_waited_for(
     passed: list[Notice] = []
     client = connect(replay(handler).url, on_notice=passed.append)
 
-    client.receive(timeout_s=5.0)
+    client.receive(timeout_s=60.0)
 
     assert [notice.kind for notice in passed] == ["dropped"]
     assert list(client.stream.notices) == passed
@@ -201,7 +201,7 @@ def test_no_frame_in_time_is_an_error_and_the_stream_stays(
     def handler(connection: ServerConnection) -> None:
         connection.recv()
         connection.send(recorded["hello"].data)
-        more.wait(10.0)
+        more.wait(60.0)
         connection.send(_frame(1))
         _until_gone(connection)
 
@@ -211,7 +211,7 @@ def test_no_frame_in_time_is_an_error_and_the_stream_stays(
         client.receive(timeout_s=0.05)
     more.set()
 
-    assert client.receive(timeout_s=5.0).frame == 1
+    assert client.receive(timeout_s=60.0).frame == 1
 
 
 def test_a_refused_subscription_is_raised_with_its_reason(
@@ -225,9 +225,9 @@ def test_a_refused_subscription_is_raised_with_its_reason(
     client = connect(replay(handler).url, reconnect=_QUICK)
 
     with pytest.raises(ProblemError, match="/problems/bad-message"):
-        client.receive(timeout_s=5.0)
+        client.receive(timeout_s=60.0)
     with pytest.raises(StreamClosed) as caught:
-        client.receive(timeout_s=5.0)
+        client.receive(timeout_s=60.0)
     assert caught.value.code == 4001
 
 
@@ -243,14 +243,14 @@ def test_bytes_that_are_no_message_are_one_error(
     client = connect(replay(handler).url)
 
     with pytest.raises(ProtocolError):
-        client.receive(timeout_s=5.0)
+        client.receive(timeout_s=60.0)
 
 
 def test_a_server_without_the_subprotocol_is_refused(connect: _Connect, replay: _Start) -> None:
     client = connect(replay(_until_gone, subprotocols=None).url)
 
     with pytest.raises(ProtocolError, match="subprotocol is None"):
-        client.receive(timeout_s=5.0)
+        client.receive(timeout_s=60.0)
 
 
 def test_a_redirect_is_not_followed_and_no_token_goes_there(
@@ -301,7 +301,7 @@ def test_a_connection_that_just_breaks_is_reported(
     client = connect(replay(handler).url)
 
     with pytest.raises(StreamClosed) as caught:
-        client.receive(timeout_s=5.0)
+        client.receive(timeout_s=60.0)
     assert caught.value.code == 1006
 
 
@@ -332,8 +332,8 @@ def test_a_stream_comes_back_after_the_server_did(
 
     client = connect(server.url, reconnect=_QUICK, on_notice=on_notice)
 
-    assert client.receive(timeout_s=5.0).frame == 41
-    assert client.receive(timeout_s=10.0).frame == 1
+    assert client.receive(timeout_s=60.0).frame == 41
+    assert client.receive(timeout_s=60.0).frame == 1
 
     assert [notice.kind for notice in client.stream.notices] == ["connection-lost", "reconnected"]
     assert "the service shuts down" in client.stream.notices[0].details["reason"]
@@ -371,7 +371,7 @@ def test_a_deadline_holds_while_the_server_is_away(
     )
 
     with pytest.raises(FrameTimeout):
-        client.receive(timeout_s=5.0)
+        client.receive(timeout_s=60.0)
 
 
 def test_another_subscription_can_be_asked_for_at_any_time(
@@ -387,10 +387,10 @@ def test_another_subscription_can_be_asked_for_at_any_time(
                 connection.send(_frame(len(received)))
 
     client = connect(replay(handler).url, "range")
-    client.receive(timeout_s=5.0)
+    client.receive(timeout_s=60.0)
 
     client.subscribe("coefficients")
-    frame = client.receive(timeout_s=5.0)
+    frame = client.receive(timeout_s=60.0)
 
     assert frame.frame == 2
     assert isinstance(received[1], wire.Subscribe)
@@ -407,7 +407,7 @@ def test_a_closed_stream_gives_no_frames(
         _until_gone(connection)
 
     client = connect(replay(handler).url)
-    client.receive(timeout_s=5.0)
+    client.receive(timeout_s=60.0)
 
     client.close()
 
@@ -445,7 +445,7 @@ def test_leaving_a_loop_keeps_a_stream_that_was_entered(
         for _ in stream:
             break
         assert not stream.closed
-        assert stream.receive(timeout_s=5.0).frame == 2
+        assert stream.receive(timeout_s=60.0).frame == 2
 
 
 def test_an_asynchronous_stream_is_a_context_manager_too(
@@ -479,10 +479,10 @@ def test_another_thread_can_close_a_stream_that_waits(
         frames: list[Frame] = []
         thread = threading.Thread(target=lambda: frames.extend(stream))
         thread.start()
-        assert waiting.wait(5.0)
+        assert waiting.wait(60.0)
 
         stream.close()
-        thread.join(5.0)
+        thread.join(60.0)
 
         assert not thread.is_alive()
         assert frames == []
@@ -506,9 +506,9 @@ def test_another_task_can_close_a_stream_that_waits(
                 return [frame async for frame in stream]
 
             task = asyncio.create_task(collect())
-            await asyncio.wait_for(waiting.wait(), 5.0)
+            await asyncio.wait_for(waiting.wait(), 60.0)
             await stream.close()
-            return await asyncio.wait_for(task, 5.0)
+            return await asyncio.wait_for(task, 60.0)
 
     assert asyncio.run(run(replay(handler).url)) == []
 
@@ -530,10 +530,10 @@ def test_closing_ends_a_wait_for_a_server_that_is_away(
         )
         thread = threading.Thread(target=lambda: list(stream))
         thread.start()
-        assert lost.wait(5.0)
+        assert lost.wait(60.0)
 
         stream.close()
-        thread.join(5.0)
+        thread.join(60.0)
 
         assert not thread.is_alive()
 
@@ -545,7 +545,7 @@ def test_closing_while_a_connection_is_made_leaves_no_connection(
 
     def hesitate(connection: ServerConnection, request: object) -> None:
         handshaking.set()
-        go_on.wait(10.0)
+        go_on.wait(60.0)
 
     def handler(connection: ServerConnection) -> None:
         _until_gone(connection)
@@ -555,11 +555,11 @@ def test_closing_while_a_connection_is_made_leaves_no_connection(
         stream = camera.stream("range")
         thread = threading.Thread(target=lambda: list(stream))
         thread.start()
-        assert handshaking.wait(5.0)
+        assert handshaking.wait(60.0)
 
         stream.close()
         go_on.set()
 
-        thread.join(5.0)
+        thread.join(60.0)
         assert not thread.is_alive()
-        assert gone.wait(5.0)
+        assert gone.wait(60.0)

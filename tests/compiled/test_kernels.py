@@ -121,7 +121,7 @@ class Slow:
 
     def __call__(self, key: str) -> str:
         self.begun.set()
-        assert self.go_on.wait(10)
+        assert self.go_on.wait(60.0)
         self.keys.append(key)
         return key
 
@@ -130,7 +130,7 @@ def test_what_is_preferred_goes_first_and_what_calls_wanted_before_is_dropped() 
     slow = Slow()
     kernels = Kernels[str]({}, Cache("transientcam_compiled._spread", environ={}), slow)
     kernels.want("begun")
-    assert slow.begun.wait(10)
+    assert slow.begun.wait(60.0)
     kernels.want("before")
     kernels.prefer(["x", "y"])
     kernels.want("meanwhile")
@@ -157,7 +157,7 @@ def test_how_long_it_takes_is_expected_from_what_is_known_and_has_passed() -> No
     )
     assert kernels.left("abc", 0.0) == ([], 0.0)
     thread = kernels.prefer(["a", "b", "c"])
-    assert slow.begun.wait(10)
+    assert slow.begun.wait(60.0)
 
     assert kernels.left("abc", 100.0) == (["a", "b", "c"], 14.0)
     assert kernels.left(["b"], 104.0) == (["b"], 8.0)

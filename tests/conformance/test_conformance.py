@@ -30,7 +30,7 @@ from transientcam_conformance._rate import Rate, measured_rate
 from transientcam_server.api import Role, utc_now
 from transientcam_server.api._auth.tokens import TokenFile
 
-LONG_S = 20.0
+LONG_S = 60.0
 SHORT_S = 2.5
 SILENCES = ("within", "no hello", "no notice", "no problem")
 KEPT, HALF = Rate(10.0, 10.0), Rate(5.0, 10.0)

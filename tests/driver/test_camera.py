@@ -474,9 +474,9 @@ def test_stop_from_another_thread_ends_a_read_that_is_waiting() -> None:
 
         reader = threading.Thread(target=read)
         reader.start()
-        assert reading.wait(10)
+        assert reading.wait(60.0)
         camera.stop()
-        reader.join(10)
+        reader.join(60.0)
 
         assert not reader.is_alive()
         assert len(ended) == 1
@@ -486,7 +486,7 @@ def test_real_time_frames_arrive_when_they_are_due() -> None:
     with open_camera("sim:mirrors") as camera:
         camera.configure(VIDEO)
         camera.start()
-        frames = [camera.read_frame(timeout_s=30) for _ in range(3)]
+        frames = [camera.read_frame(timeout_s=60.0) for _ in range(3)]
 
         for frame in frames:  # no frame before its last image was read out
             exposed_s = frame.device_time_s + frame.capture_s

@@ -52,7 +52,7 @@ def read(bench: Bench, camera: Camera) -> Callable[[], RawFrame]:
     """Read a frame and hold it against what was sent."""
 
     def read_frame() -> RawFrame:
-        frame = camera.read_frame(timeout_s=5.0)
+        frame = camera.read_frame(timeout_s=60.0)
         bench.require_whole_and_right(frame)
         return frame
 

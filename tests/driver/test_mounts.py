@@ -30,7 +30,7 @@ from transientcam_driver import (
 from transientcam_driver.clock import VirtualClock
 
 QUICK = Sequence(harmonics=1, zeroth="estimated", exposure_s=0.5e-3)
-READ_S = 30.0
+READ_S = 60.0
 MOUNTS: dict[str, Callable[[], Mount]] = {
     "pyusb": PyusbMount,
     "usbfs": UsbfsMount,

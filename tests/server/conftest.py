@@ -12,6 +12,17 @@ from zarr.core.sync import cleanup_resources, loop
 
 from tests.server.contract import client_of
 from tests.serving import Served, serving
+from transientcam_server import offline
+from transientcam_server.offline import _job as job
+
+
+@pytest.fixture(scope="module", autouse=True)
+def nothing_compiled_for_a_verb() -> Iterator[None]:
+    """Let no verb that computes a recording compile a dozen kernels for a few small frames."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (offline, job):
+            patch.setattr(module, "load_kernels", lambda recipe: None)
+        yield
 
 
 @pytest.fixture

@@ -78,6 +78,7 @@ def streaming(url: str, **options: Any) -> Iterator[Client]:
         "subprotocols": [wire.SUBPROTOCOL],
         "compression": None,
         "max_size": None,
+        "open_timeout": PATIENCE_S,
         "close_timeout": 1.0,
     }
     with connect(url, **(chosen | options)) as connection:

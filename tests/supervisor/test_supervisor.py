@@ -142,13 +142,21 @@ def test_silence_switches_the_light_off_again_and_again_until_the_owner_knows(li
 
 
 def test_nothing_is_expected_of_an_owner_whose_light_is_off(light: Light) -> None:
+    other = Light()
     supervisor = watching(light, silence_s=SOON_S)
+    process = psutil.Process(supervisor.pid)
+    process.suspend()  # or the silence could end between both
     supervisor.alive()
     supervisor.dark()
-    os.kill(supervisor.pid or 0, 0)
-    supervisor.close(dark=True)
+    process.resume()
+    later = watching(other, silence_s=SOON_S)
+    later.alive()
 
+    other.goes_off()  # by then the time of the first is over, too
     assert not light.asked
+    later.end()
+    supervisor.close(dark=True)
+    other.close()
 
 
 def test_a_start_may_take_its_time(light: Light) -> None:

@@ -31,7 +31,7 @@ def daemon() -> Iterator[Served]:
 
 def test_a_camera_measures_uses_and_moves_a_calibration(daemon: Served) -> None:
     progress: list[float] = []
-    with Camera(daemon.url, timeout_s=30) as camera:
+    with Camera(daemon.url, timeout_s=60.0) as camera:
         job = camera.calibrations.measure(name="warm", frames=3)
         done = camera.wait_for(
             job["id"], on_progress=lambda each: progress.append(each["progress"])
@@ -54,7 +54,7 @@ def test_a_camera_measures_uses_and_moves_a_calibration(daemon: Served) -> None:
 
 def test_an_async_camera_does_the_same(daemon: Served) -> None:
     async def main() -> None:
-        async with AsyncCamera(daemon.url, timeout_s=30) as camera:
+        async with AsyncCamera(daemon.url, timeout_s=60.0) as camera:
             job = await camera.calibrations.measure(frames=2)
             done = await camera.wait_for(job["id"], on_progress=lambda each: None)
             identity = done["result"]["calibration"]
@@ -66,7 +66,7 @@ def test_an_async_camera_does_the_same(daemon: Served) -> None:
 
 
 def test_a_failed_job_is_raised_and_a_cancelled_one_returned(daemon: Served) -> None:
-    with Camera(daemon.url, timeout_s=30) as camera:
+    with Camera(daemon.url, timeout_s=60.0) as camera:
         job = camera.calibrations.measure(frames=2000)
         camera.jobs.cancel(job["id"])
         assert camera.wait_for(job["id"])["state"] == "cancelled"
@@ -80,11 +80,11 @@ def test_a_failed_job_is_raised_and_a_cancelled_one_returned(daemon: Served) -> 
 
 def test_the_reconstruction_is_read_and_changed(daemon: Served) -> None:
     async def main() -> None:
-        async with AsyncCamera(daemon.url, timeout_s=30) as camera:
+        async with AsyncCamera(daemon.url, timeout_s=60.0) as camera:
             await camera.set_reconstruction({"bias": 0.02})
             assert (await camera.reconstruction())["bias"] == 0.02
 
-    with Camera(daemon.url, timeout_s=30) as camera:
+    with Camera(daemon.url, timeout_s=60.0) as camera:
         camera.reconstruction = {**camera.reconstruction, "bias": 0.01}
         assert camera.reconstruction["bias"] == 0.01
         names = [each["name"] for each in camera.parameters["parameters"]]

@@ -13,7 +13,7 @@ import trustme
 
 from transientcam.transport._tls import SharedSocket, shared_context
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 MEGABYTE = bytes(range(256)) * 4096
 
 

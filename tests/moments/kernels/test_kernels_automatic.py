@@ -44,7 +44,7 @@ class Compiler:
         self.keys: list[Key] = []
 
     def __call__(self, key: Key, *, elsewhere: bool = False) -> None:
-        assert self.go_on.wait(10)
+        assert self.go_on.wait(60)
         self.keys.append(key)
 
     def finish(self) -> list[Key]:
@@ -170,7 +170,7 @@ def test_loading_begins_when_the_first_call_has_returned(
 
     @accelerated("levinson")
     def planar(b: NDArray[np.complex64]) -> NDArray[np.complex64]:
-        assert waits.wait(10)
+        assert waits.wait(60)
         loaded_meanwhile.extend(compiler.keys)
         return b
 
@@ -187,7 +187,7 @@ def test_memory_for_the_results_of_the_next_call_is_there_with_its_kernel(
     pool, loaded = Pool(), threading.Event()
 
     def load(key: Key) -> Callable[..., object]:
-        assert loaded.wait(10)
+        assert loaded.wait(60)
         return lambda *planes: None  # leaves everything to NumPy
 
     monkeypatch.setattr(_kernels, "POOL", pool)

@@ -21,7 +21,7 @@ from transientcam_moments._kernels import density as density_module, phase_group
 from transientcam_moments.moment_problem._levinson import _levinson
 from transientcam_moments.moment_problem._polishing import residual, size
 
-ORDERS = [3, 4, 8]
+ORDERS = [3, 8]
 LANES = tuple(name for name in FEW if name != "reconstruct")
 TYPES = [np.complex64, np.complex128]
 Array = NDArray[Any]
@@ -346,7 +346,7 @@ def test_well_separated_returns_are_those_of_the_planar_statement(m: int, dtype:
 
 @pytest.mark.parametrize("dtype", TYPES)
 @pytest.mark.parametrize("returns", [1, 2])
-@pytest.mark.parametrize("m", [4, 8])
+@pytest.mark.parametrize("m", ORDERS)
 def test_fewer_returns_than_harmonics_are_counted(m: int, returns: int, dtype: type) -> None:
     phase, weight = oracles.random_returns(
         np.random.default_rng(m), returns=returns, pixels=300, apart_rad=1.0
@@ -404,11 +404,11 @@ def test_a_known_eigenvalue_is_taken(m: int) -> None:
 
 
 def test_pixels_that_single_precision_is_not_enough_for_are_redone() -> None:
-    b = varied_moments(4, np.complex64, pixels=4001)
+    b = varied_moments(3, np.complex64, pixels=4001)
     phase, weight, uniform, _ = kernel("pisarenko", b)(b)
 
     wide = (part.astype(float) for part in (phase, weight, uniform))
-    assert size(residual(b.astype(complex), *wide), b).max() < 32 * 5 * eps(b)
+    assert size(residual(b.astype(complex), *wide), b).max() < 32 * 4 * eps(b)
 
 
 @pytest.mark.parametrize("name", ["smallest_eigenvalue", "levinson", "pisarenko"])

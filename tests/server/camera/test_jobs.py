@@ -12,7 +12,7 @@ from transientcam_server.camera._jobs import MAX_UNFINISHED, REMEMBERED
 from transientcam_server.errors import Problem, kinds
 
 Work = Callable[[Job], Awaitable[dict[str, Any]]]
-LONG_S = 10.0
+LONG_S = 60.0
 
 
 async def nothing(job: Job) -> dict[str, Any]:

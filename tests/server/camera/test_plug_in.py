@@ -39,7 +39,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 def check_groups(daemon: Served, *groups: str) -> Report:
-    with Device(daemon.url, timeout_s=20.0) as device:
+    with Device(daemon.url, timeout_s=60.0) as device:
         return check(device, chosen(groups, quick=True))
 
 
@@ -195,7 +195,7 @@ def test_what_they_cannot_give_is_absent_with_the_reason(
             client.reconstruction = {"estimator": "pisarenko"}
         estimator = client.reconstruction["estimator"]
 
-    with Device(fixed.url, timeout_s=20.0) as device:
+    with Device(fixed.url, timeout_s=60.0) as device:
         refused = device.send("POST", "/api/v1/plan", json={"target": {"range_error_m": 0.01}})
         problem = device.refusal(refused, 409, "target-unreachable")
         front = device.refusal(device.send("GET", "/api/v1/tradeoff"), 409, "target-unreachable")

@@ -68,7 +68,7 @@ def jobs_of(daemon: Served) -> list[dict[str, Any]]:
 def test_a_daemon_plans_for_the_scene_before_its_camera(
     daemon: Served, shown: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    goal = ["--capture-s", "0.05", *FEW]
+    goal = ["--capture-s", "0.05", *FEW, "--estimator", "single-frequency"]
 
     assert run(["plan", "--daemon", daemon.url, *goal, "--json"]) == 0
 

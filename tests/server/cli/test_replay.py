@@ -29,7 +29,7 @@ def test_replay_serves_a_recording(tmp_path: Path) -> None:
             announced = json.loads(daemon.stdout.readline())
             assert announced["pid"] == daemon.pid
             url = announced["url"]
-            answer = httpx.get(f"{url}/api/v1/frames/latest", params={"wait_s": 10}, timeout=30)
+            answer = httpx.get(f"{url}/api/v1/frames/latest", params={"wait_s": 10}, timeout=60.0)
             assert answer.json()["width"] == 16
         finally:
             daemon.send_signal(signal.SIGTERM)

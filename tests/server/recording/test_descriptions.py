@@ -173,4 +173,4 @@ def test_a_recording_that_runs_is_described_by_its_progress(tmp_path: Path) -> N
         "problem": None,
     }
     recorder.start()
-    assert recorder.wait(30.0)
+    assert recorder.wait(60.0)

@@ -192,7 +192,7 @@ def test_a_directory_that_was_removed_while_recording_is_said(tmp_path: Path) ->
     )
     running = library.start(RecordingOptions())["id"]
     shutil.rmtree(directory)
-    assert ended.wait(30.0)
+    assert ended.wait(60.0)
 
     (listed,) = library.describe_all()
     assert (listed["id"], listed["state"], listed["reason"]) == (running, "damaged", "failed")
@@ -329,7 +329,7 @@ def test_a_recording_whose_disk_hangs_says_so_and_ends_without_it(
     wait_until(lambda: library.totals.frames == 1)
     hanging.free.clear()
     library.offer(frame(1), APPLIED)
-    assert hanging.waits.wait(30.0)
+    assert hanging.waits.wait(60.0)
 
     wait_until(lambda: library.disk_waiting_s > 0.1)
     for _ in range(2):

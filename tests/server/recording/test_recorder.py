@@ -13,7 +13,7 @@ from transientcam_driver import Sequence
 from transientcam_server.recording import Limits, Recording, RecordingWriter, recover
 from transientcam_server.recording._recorder import Progress, Recorder, Totals
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 PLENTY = 10**15
 Start = Callable[..., Recorder]
 

@@ -146,7 +146,7 @@ class _SlowWorld:
     def prepare(self) -> None:
         self.prepared_for.append(self.sequence)
         self.preparing.set()
-        assert self.go_on.wait(10)
+        assert self.go_on.wait(60.0)
 
 
 def test_a_sequence_set_while_a_world_is_prepared_is_prepared_for_as_well() -> None:
@@ -157,7 +157,7 @@ def test_a_sequence_set_while_a_world_is_prepared_is_prepared_for_as_well() -> N
     switchable.configure(first, ())
     changing = threading.Thread(target=switchable.change, args=(coming,))
     changing.start()
-    assert coming.preparing.wait(10)
+    assert coming.preparing.wait(60.0)
 
     switchable.configure(second, ())
     assert switchable.world is cast(World, present)

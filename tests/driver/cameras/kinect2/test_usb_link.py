@@ -46,7 +46,7 @@ class Program:
         self.process.stdin.write(f"{step}\n")
         self.process.stdin.flush()
         line = self.process.stdout.readline()
-        assert line, f"the program ended with {self.process.wait(10)}"
+        assert line, f"the program ended with {self.process.wait(60.0)}"
         return json.loads(line)
 
     def close(self) -> None:

@@ -71,7 +71,7 @@ def ours(theirs: dict[str, Any], camera: Emulation) -> dict[float, NDArray[Any]]
             )
             driver.configure(sequence)
             driver.start()
-            frame = driver.read_frame(timeout_s=30.0)
+            frame = driver.read_frame(timeout_s=60.0)
             for group in range(harmonics):
                 dcs = frame.images[4 * group : 4 * group + 4].astype(float)
                 frequency_hz = frame.labels[4 * group].frequency_hz

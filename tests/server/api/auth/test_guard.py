@@ -155,7 +155,7 @@ def test_an_operator_does_not_take_the_lease_from_an_admin(
 
 
 def test_the_client_shows_its_token(daemon: Served, tokens: dict[str, str]) -> None:
-    with Camera(daemon.url, token=tokens["viewer"], timeout_s=30.0) as camera:
+    with Camera(daemon.url, token=tokens["viewer"], timeout_s=60.0) as camera:
         assert camera.info["name"] == "transientcam"
         with camera.stream("flags") as stream:
             assert stream.receive().product == "flags"

@@ -84,11 +84,11 @@ def test_what_the_daemon_sends_is_as_described(served: Served) -> None:
     with streaming(served.stream_url) as client:
         client.send({"type": "subscribe", "v": 1, "subscriptions": chosen})
         while missing:  # some take long, and quick ones come again and again meanwhile
-            message = unpacked(client.connection.recv(timeout=30.0))
+            message = unpacked(client.connection.recv(timeout=60.0))
             check(message["type"], message)
             missing.discard((message.get("product"), message.get("encoding", "f32")))
         client.send({"type": "dance"})
-        while (message := unpacked(client.connection.recv(timeout=30.0)))["type"] != "error":
+        while (message := unpacked(client.connection.recv(timeout=60.0)))["type"] != "error":
             pass
         check("error", message)
 

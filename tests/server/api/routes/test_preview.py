@@ -15,7 +15,7 @@ from PIL import Image
 from tests.serving import Served, serving
 
 PREVIEW = "/api/v1/preview.mjpeg"
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 def parts(response: httpx.Response) -> Iterator[tuple[dict[str, str], bytes]]:
@@ -36,7 +36,7 @@ def parts(response: httpx.Response) -> Iterator[tuple[dict[str, str], bytes]]:
 
 @pytest.fixture
 def http(served: Served) -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=served.url, timeout=30.0) as client:
+    with httpx.Client(base_url=served.url, timeout=60.0) as client:
         yield client
 
 
@@ -108,7 +108,7 @@ def test_a_viewer_that_leaves_while_the_capture_is_stopped_is_noticed_at_once(
 
 def test_a_film_ends_with_the_service() -> None:
     with serving("sim:mirrors?noise=off") as daemon:
-        client = httpx.Client(base_url=daemon.url, timeout=30.0)
+        client = httpx.Client(base_url=daemon.url, timeout=60.0)
         request = client.build_request("GET", PREVIEW)
         response = client.send(request, stream=True)
         film = parts(response)
@@ -122,7 +122,7 @@ def test_a_film_ends_with_the_service() -> None:
 def test_viewers_of_the_preview_count_among_the_clients_of_the_stream() -> None:
     with (
         serving("sim:mirrors?noise=off", stream={"max_clients": 1}) as daemon,
-        httpx.Client(base_url=daemon.url, timeout=30.0) as http,
+        httpx.Client(base_url=daemon.url, timeout=60.0) as http,
     ):
         with http.stream("GET", PREVIEW) as response:
             film = parts(response)  # held, or the response is closed

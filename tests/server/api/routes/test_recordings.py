@@ -25,7 +25,7 @@ from transientcam_server.camera import Captured
 from transientcam_server.recording import Recording
 
 RECORDINGS = "/api/v1/recordings"
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 @pytest.fixture

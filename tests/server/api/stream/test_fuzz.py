@@ -22,7 +22,7 @@ from tests.waiting import wait_until
 from transientcam import wire
 from transientcam_server.daemon._streams import BoundedStream
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 MASK = b"\x01\x02\x03\x04"
 SUBSCRIBE = wire.pack(wire.Subscribe((wire.Subscription("flags"),)).to_document())

@@ -315,7 +315,7 @@ def test_long_answers_leave_a_worker_to_everything_else(camera: Camera, raw: Raw
     gate = threading.Event()
 
     def wait_at_the_gate(*_: Any) -> Any:
-        assert gate.wait(20.0)
+        assert gate.wait(60.0)
         return np.zeros((1, 120, 163), dtype=np.float32)
 
     async def test(pipeline: Pipeline, frame: Frame) -> None:
@@ -336,7 +336,7 @@ def test_former_frames_leave_a_worker_to_the_newest(camera: Camera, raw: RawFram
     gate = threading.Event()
 
     def wait_at_the_gate(*_: Any) -> Any:
-        assert gate.wait(20.0)
+        assert gate.wait(60.0)
         return np.zeros((120, 163), dtype=np.float32)
 
     async def test(pipeline: Pipeline, frame: Frame) -> None:
@@ -434,7 +434,7 @@ def test_a_large_frame_takes_all_cores_unless_another_is_computed(
     def noting(*arguments: Any, spread: tm.kernels.Spread, **given: Any) -> tm.Reconstruction:
         spreads.append(spread)
         if len(spreads) <= 2:
-            two_at_once.wait(10)
+            two_at_once.wait(60.0)
         return reconstruct(*arguments, **given)
 
     monkeypatch.setattr(module, "spread_of", lambda raw: all_cores)

@@ -102,7 +102,7 @@ def test_where_averaging_does_not_keep_up_a_frame_stands_alone(
     average = Recipe.average
 
     def waits(self: Recipe, *arguments: object) -> object:
-        ended.wait(30.0)
+        ended.wait(60.0)
         return average(self, *arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(Recipe, "average", waits)

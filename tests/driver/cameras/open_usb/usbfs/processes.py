@@ -89,7 +89,7 @@ class EmulatedCamera:
     def _hear(self) -> Any:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
-        assert line, f"the process ended with {self._process.wait(10)}"
+        assert line, f"the process ended with {self._process.wait(60.0)}"
         return json.loads(line)
 
 
@@ -203,7 +203,7 @@ def _end(process: "subprocess.Popen[Any]") -> None:
     with suppress(BrokenPipeError):  # it is gone already
         process.stdin.close()
     try:
-        process.wait(30)
+        process.wait(60.0)
     finally:
         process.kill()
         process.wait()

@@ -20,6 +20,7 @@ from tests.driver.cameras.open_usb.usbfs.processes import (
     emulated_camera,
     skip_or_fail,
 )
+from tests.waiting import wait_until
 
 QUICK = {"harmonics": 1, "zeroth": "estimated", "exposure_s": 0.0005}
 
@@ -76,7 +77,7 @@ def test_frames_travel_from_the_usb_endpoint_to_a_clients_array(
             assert raw.array.shape == (4, 120, 163)
             assert raw.array.dtype == np.uint16
             assert np.isfinite(depth.array).mean() > 0.9
-            assert usb_camera.lit
+            wait_until(lambda: usb_camera.lit)  # a laden machine leaves it to its watchdog at times
 
             usb_camera.do("unplug")
             while camera.camera["state"] != "lost":
@@ -90,10 +91,10 @@ def test_frames_travel_from_the_usb_endpoint_to_a_clients_array(
                     break
 
             assert kinds.index("camera-lost") < kinds.index("camera-back")
-            assert usb_camera.lit
+            wait_until(lambda: usb_camera.lit)  # a laden machine leaves it to its watchdog at times
 
         process.send_signal(signal.SIGTERM)
-        assert process.wait(30) == 0
+        assert process.wait(60.0) == 0
         assert not usb_camera.lit
 
 
@@ -101,7 +102,7 @@ def test_the_light_goes_off_when_the_program_dies(usb_camera: EmulatedCamera) ->
     program = Program(usb_camera.environment)
     camera = program.open()
     camera.start()
-    camera.read_frame(timeout_s=30)
+    camera.read_frame(timeout_s=60.0)
     assert usb_camera.lit
 
     program.kill()
