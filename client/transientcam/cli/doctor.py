@@ -78,7 +78,8 @@ def _tell_as_json(found: Iterable[Finding]) -> list[Finding]:
     levels = [each.level for each in seen]
     worst = next(level for level in ("fault", "warning", "ok") if level in levels)
     untried = [each.check for each in seen if each.level == "not tried"]
-    document = {"verdict": worst, "not_tried": untried, "findings": [each.to_document() for each in seen]}
+    listed = [each.to_document() for each in seen]
+    document = {"verdict": worst, "not_tried": untried, "findings": listed}
     echo(json.dumps(document, indent=2))
     return seen
 

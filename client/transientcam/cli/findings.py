@@ -68,7 +68,8 @@ def _installed(group: str, argument: object) -> Iterator[Finding]:
             checks = point.load()
         except ModuleNotFoundError as error:
             message = f"not installed ({error.name} is missing)"
-            yield Finding("not tried", point.name, message, f"pip install 'transientcam[{point.name}]'")
+            remedy = f"pip install 'transientcam[{point.name}]'"
+            yield Finding("not tried", point.name, message, remedy)
             continue
         yield from guarded(point.name, partial(checks, argument))
 
