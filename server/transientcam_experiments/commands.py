@@ -1,4 +1,4 @@
-"""The verbs ``paper`` and ``tradeoff`` of the ``transientcam`` command.
+"""The verbs ``paper``, ``tradeoff`` and ``compare`` of the ``transientcam`` command.
 
 What is heavy is imported when a verb runs, so that ``transientcam --help`` stays quick.
 """
@@ -6,16 +6,18 @@ What is heavy is imported when a verb runs, so that ``transientcam --help`` stay
 import json
 from collections.abc import Callable, Generator, Mapping
 from contextlib import ExitStack, closing
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from transientcam.cli.options import require_suffix
 from transientcam.cli.terminal import Terminal, echo, progress_bars
 from transientcam_server.cli.cluster import DaskOption, WorkersOption, cluster_client
 
 if TYPE_CHECKING:
-    from transientcam_experiments.tradeoff import Grid, Point, Records
+    from transientcam_experiments.tradeoff import Compared, Grid, Point, Records
 
 
 def paper(
@@ -234,3 +236,75 @@ def _measure_here(
                 seed=seed,
                 progress=_steps(progress, task),
             )
+
+
+def compare(
+    estimators: Annotated[
+        list[str],
+        typer.Argument(help="Names: those of docs/estimators.md, or of another package's."),
+    ],
+    against: Annotated[
+        list[str] | None,
+        typer.Option(help="What to hold them against; may be repeated.  [default: all fast ones]"),
+    ] = None,
+    scene: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A scene of `transientcam scenes`, a .toml or measured:FILE.npz; may be repeated."
+            "  [default: five of them]"
+        ),
+    ] = None,
+    harmonics: Annotated[int, typer.Option(min=1, max=32, help="m, of the sequence.")] = 4,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")] = 1,
+    plot: Annotated[Path | None, typer.Option(help="Also draw the errors into this .png.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print all numbers as JSON.")] = False,
+) -> None:
+    """Hold estimators against the built-in ones on scenes whose truth is known.
+
+    All see the same moments, with the noise of the simulated camera. Exits with 1 where one of
+    ESTIMATORS fails on a scene.
+    """
+    from transientcam_experiments import tradeoff as experiment
+    from transientcam_moments.comparisons import TECHNIQUES, plugged_names
+    from transientcam_server.offline import plot as pictures
+
+    if plot is not None:
+        require_suffix(plot, ".png", hint="--plot")
+        pictures.require("--plot")
+    names = list(dict.fromkeys((*estimators, *(against or experiment.rivals(harmonics)))))
+    known = [each.name for each in TECHNIQUES.values() if each.measures == "moments"]
+    for name in names:
+        if name not in (*known, *plugged_names()):
+            every = ", ".join((*known, *plugged_names()))
+            raise typer.BadParameter(f"{name!r} is none of {every}", param_hint="ESTIMATORS")
+    scenes = scene or list(experiment.SCENES)
+    found = []
+    with progress_bars(console=Terminal(stderr=True), counted=True) as progress:
+        task = progress.add_task("estimators before scenes", total=len(scenes) * len(names))
+        for each in experiment.compare(names, scenes, harmonics=harmonics, seed=seed):
+            found.append(each)
+            progress.advance(task)
+    echo(json.dumps([asdict(each) for each in found]) if as_json else _compared(found))
+    if plot is not None:
+        experiment.draw(plot, found)
+    if any(each.failed is not None and each.estimator in estimators for each in found):
+        raise typer.Exit(code=1)
+
+
+def _compared(found: "list[Compared]") -> str:
+    """Return a table: a block a scene, a line an estimator, the smallest errors first."""
+    lines = []
+    for scene in dict.fromkeys(each.scene for each in found):
+        head = "error of the range, mm: median, p90; % off by > 10 cm; % without; ms a frame"
+        lines += [f"{scene}: {head}"]
+        here = [each for each in found if each.scene == scene]
+        for each in sorted(here, key=lambda one: one.values.get("range_median_m") or 1e9):
+            v = each.values
+            scaled = (("range_median_m", 1e3), ("range_p90_m", 1e3), ("range_outliers", 100))
+            scaled = (*scaled, ("range_missing", 100), ("seconds", 1e3))
+            figures = " ".join(
+                f"{'-':>8}" if v.get(key) is None else f"{(v[key] or 0.0) * factor:8.3g}"
+                for key, factor in scaled
+            )
+            lines.append(f"  {each.estimator:<18} {each.failed or figures}")
+    return "\n".join(lines)

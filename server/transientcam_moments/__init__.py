@@ -14,6 +14,7 @@ of pixels after them, single or double precision, NumPy, JAX or CuPy. ::
 
 from transientcam_moments import comparisons, kernels, noise
 from transientcam_moments.errors import (
+    EstimatorFailed,
     MomentsError,
     ParameterError,
     ShapeError,
@@ -94,6 +95,7 @@ __all__ = [
     "Biased",
     "Coefficients",
     "Corrected",
+    "EstimatorFailed",
     "Flags",
     "HarmonicCorrection",
     "Labels",

@@ -3,6 +3,7 @@
 MomentsError
 ├── ShapeError (also a ValueError)
 ├── ParameterError (also a ValueError)
+├── EstimatorFailed (also a RuntimeError)
 └── UnlabelledImages (also a ValueError)
 """
 
@@ -52,6 +53,18 @@ class ParameterError(MomentsError, ValueError):
     def __str__(self) -> str:
         """Name the argument, its value and the limit."""
         return f"{self.field} = {self.value!r} is outside of its limit: {self.limit}"
+
+
+@dataclass(eq=False)
+class EstimatorFailed(MomentsError, RuntimeError):  # noqa: N818 - says what has happened
+    """The estimator ``name`` of another package cannot be used, for a ``reason``."""
+
+    name: str
+    reason: str
+
+    def __str__(self) -> str:
+        """Name the estimator and what is wrong with it."""
+        return f"the estimator {self.name} of another package failed: {self.reason}"
 
 
 @dataclass(eq=False)

@@ -23,6 +23,8 @@ from pydantic import (
     Field,
     TypeAdapter,
     ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
     field_validator,
     model_validator,
 )
@@ -31,7 +33,7 @@ from pydantic_core import PydanticCustomError
 import transientcam_moments as tm
 from transientcam.wire import FIRST_MESSAGE_WITHIN_S, MAX_SUBSCRIPTIONS
 from transientcam_compiled import cores
-from transientcam_moments.comparisons import TECHNIQUES
+from transientcam_moments.comparisons import TECHNIQUES, plugged_names
 from transientcam_moments.reconstruction import ESTIMATORS, least_harmonics
 
 _DEFAULTS = tm.Settings()
@@ -93,6 +95,17 @@ else:
             *(name for name in ESTIMATORS if name not in TECHNIQUES or TECHNIQUES[name].planar),
         )
     ]
+
+
+def _or_plugged(name: Any, known: ValidatorFunctionWrapHandler) -> Any:
+    """Take the name of another package's estimator, too."""
+    return name if isinstance(name, str) and name in plugged_names() else known(name)
+
+
+def _with_plugged(schema: dict[str, Any]) -> None:
+    schema["enum"] = [*schema["enum"], *plugged_names()]
+
+
 Neighbours = Literal["edge-preserving", "gaussian", "none"]
 CorruptImages = Literal["keep", "repair", "fill"]
 
@@ -139,13 +152,16 @@ class ReconstructionSettings(_Group):
     least_range_m: _Finite = Field(default=_DEFAULTS.least_range_m, ge=-1000.0, le=1000.0)
     """The sensor's: what is nearer is taken for what is one unambiguous range farther. For 0 strong
     light in the last 64th of that is below 0: noise puts nothing at 0 m to the far end."""
-    estimator: Estimator = "automatic"
+    estimator: Annotated[Estimator, WrapValidator(_or_plugged)] = Field(
+        default="automatic", json_schema_extra=_with_plugged
+    )
     """What range, direct and indirect light are taken from. `automatic` is `likelihood`, which errs
     least over the scenes of docs/likelihood.md together; each frame names its `estimator`. The
     paper's are `pisarenko` and `maximum-entropy`. `likelihood`, `two-returns` and `unwrapped-phase`
     serve any set of frequencies; for those with gaps `automatic` is `two-returns`, or
-    `unwrapped-phase` where there are but two. The others are there for comparison. Until its kernel
-    is compiled the same estimator runs in NumPy, more slowly."""
+    `unwrapped-phase` where there are but two. The others are there for comparison; what those of
+    other packages state of themselves is in `estimators` of `GET /api/v1/info`. Until its kernel is
+    compiled the same estimator runs in NumPy, more slowly."""
     minimum_brightness_dn: _Finite = Field(default=0.0, ge=0.0)
     """Pixels with no more light than this have no range."""
     spoilt_images: CorruptImages = "repair"
@@ -347,6 +363,8 @@ class LimitSettings(_Group):
     process of its own, ends it. A camera that shines at nobody (sim:) goes on."""
     plan_s: _Finite = Field(default=300.0, gt=0.0, le=86400.0)
     """Time for a plan, or a look at the scene, to be computed; then it is given up."""
+    estimator_s: _Finite = Field(default=2.0, gt=0.0, le=3600.0)
+    """Time for an estimator of another package to compute a frame; then its process is ended."""
     head_s: _Finite = Field(default=10.0, gt=0.0, le=3600.0)
     """Time for the head of a request to arrive, and for a handshake of TLS."""
     body_s: _Finite = Field(default=30.0, gt=0.0, le=3600.0)

@@ -15,7 +15,12 @@ from transientcam.cli.findings import Finding, Level
 from transientcam.cli.options import JsonOption, TokenOption
 from transientcam.cli.terminal import Terminal, Text, echo
 
-_STYLES: Final[dict[Level, str]] = {"ok": "green", "warning": "yellow", "fault": "bold red"}
+_STYLES: Final[dict[Level, str]] = {
+    "ok": "green",
+    "warning": "yellow",
+    "fault": "bold red",
+    "not tried": "dim",
+}
 _WIDTH = 12
 
 
@@ -72,7 +77,9 @@ def _tell_as_json(found: Iterable[Finding]) -> list[Finding]:
     seen = list(found)
     levels = [each.level for each in seen]
     worst = next(level for level in ("fault", "warning", "ok") if level in levels)
-    document = {"verdict": worst, "findings": [each.to_document() for each in seen]}
+    untried = [each.check for each in seen if each.level == "not tried"]
+    listed = [each.to_document() for each in seen]
+    document = {"verdict": worst, "not_tried": untried, "findings": listed}
     echo(json.dumps(document, indent=2))
     return seen
 
@@ -83,15 +90,12 @@ def _tell(found: Iterable[Finding]) -> list[Finding]:
     seen = []
     for each in found:
         seen.append(each)
-        line = Text.assemble((f"{each.level:<8}", _STYLES[each.level]), f"{each.check:<{_WIDTH}} ")
+        line = Text.assemble((f"{each.level:<10}", _STYLES[each.level]), f"{each.check:<{_WIDTH}} ")
         console.print(line + Text(each.message))
         if each.remedy is not None:
-            indent = " " * (8 + _WIDTH + 1)
+            indent = " " * (10 + _WIDTH + 1)
             for remedy in each.remedy.splitlines():
                 console.print(Text(f"{indent}{remedy}", style="dim"))
-    console.print(f"Faults: {_count(seen, 'fault')}, warnings: {_count(seen, 'warning')}.")
+    counts = (f"{level}: {sum(each.level == level for each in seen)}" for level in _STYLES)
+    console.print(f"{', '.join(counts)}.")
     return seen
-
-
-def _count(seen: Iterable[Finding], level: Level) -> int:
-    return sum(each.level == level for each in seen)

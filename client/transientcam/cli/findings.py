@@ -16,7 +16,7 @@ from typing import Any, Final, Literal
 GROUP: Final = "transientcam.checks"
 CAMERA_GROUP: Final = "transientcam.camera-checks"
 
-Level = Literal["ok", "warning", "fault"]
+Level = Literal["ok", "warning", "fault", "not tried"]
 Reported = tuple[str, str, str, str | None]
 """A finding as a plain tuple, which other packages yield without importing this one."""
 Checks = Callable[[], Iterable[Reported]]
@@ -27,7 +27,8 @@ class Finding:
     """The result of one check."""
 
     level: Level
-    """``fault``: a part will not work; ``warning``: it will, but not fully or not as well."""
+    """``fault``: a part will not work; ``warning``: it will, but not fully or not as well;
+    ``not tried``: nobody knows, for the reason in the message."""
     check: str
     """What was checked."""
     message: str
@@ -67,7 +68,8 @@ def _installed(group: str, argument: object) -> Iterator[Finding]:
             checks = point.load()
         except ModuleNotFoundError as error:
             message = f"not installed ({error.name} is missing)"
-            yield Finding("ok", point.name, message, f"pip install 'transientcam[{point.name}]'")
+            remedy = f"pip install 'transientcam[{point.name}]'"
+            yield Finding("not tried", point.name, message, remedy)
             continue
         yield from guarded(point.name, partial(checks, argument))
 
@@ -84,7 +86,7 @@ def guarded(name: str, checks: Checks) -> Iterator[Finding]:
 
 def _level(text: str) -> Level:
     match text:
-        case "ok" | "warning" | "fault":
+        case "ok" | "warning" | "fault" | "not tried":
             return text
         case _:
             raise ValueError(text)

@@ -6,6 +6,7 @@ each result into the output folder before it begins the next; `report` makes tab
 page of the results so far.
 """
 
+from transientcam_experiments.tradeoff.comparing import SCENES, Compared, compare, draw, rivals
 from transientcam_experiments.tradeoff.grid import Grid, load_grid
 from transientcam_experiments.tradeoff.measuring import (
     Point,

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_experiments.tradeoff.capture import OUTLIER_M
-from transientcam_moments.comparisons import TECHNIQUES, Technique
+from transientcam_moments.comparisons import TECHNIQUES, Technique, separated, statements
+from transientcam_moments.moment_problem import DIRECT_THRESHOLD
 
 _Array = NDArray[Any]
 _Clock = Callable[[], float]
@@ -40,11 +41,14 @@ class Scene:
     """Of the moments."""
     truth_m: _Array
     """(H, W) range of the first return, NaN where no light is."""
+    variance: _Array | None = None
+    """(m + 1, H, W) of the moments, where it is known."""
 
 
 def points(harmonics: int) -> Iterator[tuple[Technique, Mapping[str, Any]]]:
     """Yield the techniques that a number of harmonics is enough for, as points."""
-    for technique in TECHNIQUES.values():
+    others = (each for each in statements().values() if isinstance(each, Technique))
+    for technique in (*TECHNIQUES.values(), *others):
         if technique.measures == "moments" and technique.least_harmonics <= harmonics:
             yield (
                 technique,
@@ -68,21 +72,29 @@ def measure(
     """Return the `QUANTITIES` of a technique, and the spread of its time.
 
     A technique that looks at neighbours has none in the sample.
+    Raises EstimatorFailed where one of another package does.
     """
     lit = np.flatnonzero(np.isfinite(scene.truth_m))
     chosen = np.random.default_rng(seed).permutation(lit)[:SAMPLE_PIXELS]
     flat = scene.moments.reshape((scene.moments.shape[0], -1))
     sample = np.ascontiguousarray(flat[:, chosen])
+    variance, of_sample = scene.variance, None
+    if variance is not None:
+        of_sample = variance.reshape(flat.shape)[:, chosen]
+    frequencies_hz = scene.base_frequency_hz * np.arange(len(flat))
 
-    def first_rad(b: _Array) -> _Array:
-        return np.asarray(technique.estimate(b).first_phase_rad())
+    def first_rad(b: _Array, variance: _Array | None) -> _Array:
+        name = technique.name
+        if name in TECHNIQUES:
+            return np.asarray(technique.estimate(b).first_phase_rad())
+        return separated(name, b, variance, frequencies_hz, DIRECT_THRESHOLD).phase_rad
 
-    phase = first_rad(sample)  # fills caches, too
-    whole = scene.moments if technique.planar else sample
+    phase = first_rad(sample, of_sample)  # fills caches, too
+    whole, known = (scene.moments, variance) if technique.planar else (sample, of_sample)
     times = []
     for _ in range(repetitions if technique.planar else 1):
         begin_s = clock()
-        first_rad(whole)
+        first_rad(whole, known)
         taken_s = clock() - begin_s
         times.append(taken_s * flat.shape[1] / whole[0].size)
         if taken_s > ENOUGH_S:
@@ -92,6 +104,17 @@ def measure(
     spread: dict[str, float | None] = dict.fromkeys(values)
     spread["seconds"] = float(np.std(times, ddof=1)) if len(times) > 1 else None
     return values, spread
+
+
+def measure_any(
+    technique: Technique, scene: Scene, *, repetitions: int, seed: int
+) -> tuple[dict[str, float | None], dict[str, float | None]]:
+    """Do as `measure`; of another package's technique that fails no range is there."""
+    try:
+        return measure(technique, scene, repetitions=repetitions, seed=seed)
+    except tm.EstimatorFailed:
+        nothing: dict[str, float | None] = dict.fromkeys(QUANTITIES)
+        return nothing | {"range_missing": 1.0}, nothing
 
 
 def _errors(range_m: _Array, truth_m: _Array) -> dict[str, float | None]:

@@ -76,7 +76,7 @@ def points_of(grid: Grid, *, scene: str, repetitions: int, seed: int) -> list[Po
         return point(
             "estimating",
             settings,
-            lambda bench: estimating.measure(
+            lambda bench: estimating.measure_any(
                 technique,
                 bench.scene(settings["harmonics"]),
                 repetitions=repetitions,
@@ -192,13 +192,15 @@ class Bench:
                 applied = camera.configure(sequence)
                 (frame,) = capture.capture(camera, 1)
                 recipe = Recipe(applied, self._settings, 2.0**camera.capabilities.bits - 1.0)
-            b = recipe.reconstruct(frame.raw).moments.astype(np.complex128)
+            found = recipe.reconstruct(frame.raw)
+            b, noise = found.moments.astype(np.complex128), found.noise
+            variance = None if noise is None else np.broadcast_to(noise.variance, b.shape)
             # rounding to single precision reduced the bias that was added
             biased = tm.bias(b, self._settings.bias).moments
             truth = frame.truth
             truth_m = np.where(truth.brightness > 0, truth.range_m, np.nan)
             base_hz = applied.sequence.base_frequency_hz
-            self._scenes[harmonics] = estimating.Scene(biased, base_hz, truth_m)
+            self._scenes[harmonics] = estimating.Scene(biased, base_hz, truth_m, variance)
         return self._scenes[harmonics]
 
     def range_m(self, harmonics: int) -> Any:

@@ -10,6 +10,9 @@ precision with NumPy. ::
     for technique in comparisons.TECHNIQUES.values():
         print(technique.label, technique.estimate(b).cumulative(phase_rad))
 
+`transientcam_moments.comparisons.technique_of` also finds those of other packages, entries of the
+group ``transientcam.estimators`` (docs/add-an-estimator.md).
+
 "After ..." in a label says that the technique follows what is known of a publication whose text
 was not at hand; no label claims to be the authors' implementation.
 """
@@ -46,7 +49,17 @@ from transientcam_moments.comparisons._estimate import (
     grid_rad,
 )
 from transientcam_moments.comparisons._pixels import check_order
-from transientcam_moments.comparisons._technique import Technique
+from transientcam_moments.comparisons._plugins import (
+    SEPARATORS,
+    import_there,
+    load,
+    loaded,
+    plugged,
+    separated,
+    separated_there,
+)
+from transientcam_moments.comparisons._technique import Technique, from_first, from_zeroth
+from transientcam_moments.errors import EstimatorFailed
 
 TECHNIQUES: dict[str, Technique] = {
     technique.name: technique
@@ -73,7 +86,32 @@ TECHNIQUES: dict[str, Technique] = {
 }
 """Every technique by its name; the paper's first."""
 
+
+def plugged_names() -> tuple[str, ...]:
+    """Return the names of the estimators of other packages; ours cannot be taken."""
+    return tuple(name for name in plugged() if name not in TECHNIQUES)
+
+
+def technique_of(name: str) -> Technique:
+    """Return a technique, ours or another package's.
+
+    Raises
+    ------
+    EstimatorFailed
+        Where another package's cannot be used.
+    KeyError
+        Where there is none of that name.
+    """
+    return TECHNIQUES[name] if name in TECHNIQUES else load(name)
+
+
+def statements() -> dict[str, Technique | EstimatorFailed]:
+    """Return each estimator of other packages by its name, or why it cannot be used."""
+    return {name: loaded(name) for name in plugged_names()}
+
+
 __all__ = [
+    "SEPARATORS",
     "TECHNIQUES",
     "Code",
     "Estimate",
@@ -85,6 +123,14 @@ __all__ = [
     "check_order",
     "coded",
     "equal_shifts_rad",
+    "from_first",
+    "from_zeroth",
     "grid_rad",
+    "import_there",
     "maximum_length_code",
+    "plugged_names",
+    "separated",
+    "separated_there",
+    "statements",
+    "technique_of",
 ]

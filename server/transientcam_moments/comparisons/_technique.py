@@ -4,7 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from transientcam_moments.arrays import Array
 from transientcam_moments.comparisons._estimate import Estimate
+from transientcam_moments.noise import MomentNoise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +34,9 @@ class Technique:
     estimate
         From calibrated moments (m + 1, ...) to an `Estimate`, or from the samples (N, ...) of a
         code's correlation; options are keywords.
+    informed
+        Whether ``estimate`` also takes the keywords ``noise``, a `noise.MomentNoise` or None, and
+        ``frequencies_hz`` (m + 1,) of the moments.
     measures
         "moments" of equidistant frequencies, or samples of a "code".
     planar
@@ -51,6 +56,14 @@ class Technique:
     estimate: Callable[..., Estimate]
     measures: Literal["moments", "code"] = "moments"
     planar: bool = True
+    informed: bool = False
+
+    def of(
+        self, b: Array, noise: MomentNoise | None = None, frequencies_hz: Array | None = None
+    ) -> Estimate:
+        """Return the estimate of moments (m + 1, ...), told what it asks for beside them."""
+        told = {"noise": noise, "frequencies_hz": frequencies_hz} if self.informed else {}
+        return self.estimate(b, **told)
 
     def frequencies_hz(self, base_frequency_hz: float, m: int | None = None) -> tuple[float, ...]:
         """Return the frequencies that it looks at, of a sequence of order m or of its smallest."""

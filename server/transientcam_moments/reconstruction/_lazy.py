@@ -9,7 +9,13 @@ import numpy as np
 
 from transientcam_compiled import Spread, at_once
 from transientcam_moments.arrays import Array, in_turn, map_html, namespace
-from transientcam_moments.comparisons import TECHNIQUES, Technique, check_order
+from transientcam_moments.comparisons import (
+    SEPARATORS,
+    TECHNIQUES,
+    Technique,
+    check_order,
+    technique_of,
+)
 from transientcam_moments.errors import ParameterError, UnlabelledImages
 from transientcam_moments.images import HarmonicCorrection, Repair
 from transientcam_moments.likelihood import (
@@ -51,7 +57,12 @@ from transientcam_moments.reconstruction._detection import undetected, undetecte
 from transientcam_moments.reconstruction._flags import INVALID, Flags, flags
 from transientcam_moments.reconstruction._neighbours import over_neighbours, sensor_noise
 from transientcam_moments.reconstruction._ranging import range_m
-from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, OWN, Settings
+from transientcam_moments.reconstruction._settings import (
+    ESTIMATORS,
+    OF_ANY_MULTIPLES,
+    OWN,
+    Settings,
+)
 from transientcam_moments.reconstruction._turns import beginning_at, begun, turned
 
 _SHOWN = ("smoothed", "flags", "coefficients", "returns", "range_m")
@@ -233,8 +244,8 @@ class Reconstruction:
         """Flags of every pixel, uint8 of `Flags`."""
         xp = namespace(self.smoothed)
         found = self._flags_of_moments
-        if self._turned is not None:
-            open_ = self._turned[1] & self._has_phase
+        if self._open is not None:
+            open_ = self._open & self._has_phase
             found = found | xp.where(open_, int(Flags.CONTRADICTORY), 0).astype(xp.uint8)
         if self.settings.technique not in OF_ANY_MULTIPLES or self.noise is None:
             return found
@@ -300,7 +311,14 @@ class Reconstruction:
         """Where there is light, more than noise where that is known, all moments are finite, and a
         low frequency does not leave open which turn a range is in.
         """
-        return self._has_phase if self._turned is None else self._has_phase & ~self._turned[1]
+        return self._has_phase if self._open is None else self._has_phase & ~self._open
+
+    @property
+    def _open(self) -> Array | None:
+        """Where a low frequency leaves open which turn a range is in; None where none tells."""
+        # other packages' estimators can fail, which is no reason to have no flags
+        own = self.settings.technique in ESTIMATORS
+        return self._turned[1] if own and self._turned is not None else None
 
     @property
     def _has_phase(self) -> Array:
@@ -490,7 +508,11 @@ class Reconstruction:
             b = np.asarray(self.smoothed)
             check_order(b.shape[0] - 1, least=technique.least_harmonics, name=technique.name)
             # as measured: none of them needs biased moments
-            parts = technique.estimate(b).separate(at)
+            if technique.name in TECHNIQUES:
+                parts = technique.estimate(b).separate(at)
+            else:
+                told = self._variance, self._frequencies_hz
+                parts = SEPARATORS[-1](technique.name, b, *told, at)
             return self._lone(Separation(*(xp.asarray(part) for part in parts)))
         if self.settings.technique == "unwrapped-phase":
             return self._lone(self.unwrapped.separate())
@@ -511,7 +533,17 @@ class Reconstruction:
     def _technique(self) -> Technique | None:
         """The technique of the settings where this class does not implement it itself."""
         name = self.settings.technique
-        return None if name in OWN else TECHNIQUES[name]
+        return None if name in OWN else technique_of(name)
+
+    @property
+    def _variance(self) -> Array | None:
+        """Variance (m + 1, ...) of the moments, of each pixel, where it is known."""
+        noise = self.noise
+        return None if noise is None else np.broadcast_to(noise.variance, self.smoothed.shape)
+
+    @property
+    def _frequencies_hz(self) -> Array:
+        return (self.settings.base_frequency_hz or np.nan) * np.arange(len(self.smoothed))
 
     @cached_property
     def brightness(self) -> Array:
@@ -546,8 +578,10 @@ class Reconstruction:
         Raises ParameterError, as `direct` does, where the estimator needs more harmonics.
         """
         xp = namespace(self.moments)
-        phase = (self._in_turn if self._turned is None else self._turned[0]).phase_rad
-        return xp.where(self.has_range, phase, np.nan).astype(self.brightness.dtype)
+        found, there = self._in_turn, self.has_range
+        if self._turned is not None:
+            found, there = self._turned[0], there & ~self._turned[1]
+        return xp.where(there, found.phase_rad, np.nan).astype(self.brightness.dtype)
 
     @property
     def _placed(self) -> Separation:

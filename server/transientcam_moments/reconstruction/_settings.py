@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from transientcam_moments.arrays import MAX_HARMONICS, chosen, in_range
-from transientcam_moments.comparisons import TECHNIQUES
-from transientcam_moments.errors import ParameterError
+from transientcam_moments.comparisons import TECHNIQUES, plugged_names, technique_of
+from transientcam_moments.errors import EstimatorFailed, ParameterError
 from transientcam_moments.images import FOUR_PHASES_RAD, SIGMA_PX, ZEROTH_IMAGES, phase_weights
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, EPSILON
 from transientcam_moments.noise import MOST_FRAMES, Sensor
@@ -52,8 +52,11 @@ def automatic(multiples: tuple[int, ...] | None) -> str:
 
 
 def least_harmonics(estimator: str) -> int:
-    """Return the smallest m that an estimator gives a range of."""
-    return TECHNIQUES[estimator].least_harmonics if estimator in TECHNIQUES else 1
+    """Return the smallest m that an estimator gives a range of; 1 where it cannot be used."""
+    try:
+        return technique_of(estimator).least_harmonics
+    except (KeyError, EstimatorFailed):
+        return 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +106,7 @@ class Settings:
         multiples have gaps ("unwrapped-phase" of two). By name also "pisarenko" as the paper has
         it, "pisarenko-merged" (see `merge_returns`), "maximum-entropy", "two-returns" (see
         `two_returns`), "unwrapped-phase" (see `unwrap`), "single-frequency", which is the usual
-        arg b_1, or another of the `comparisons` of moments.
+        arg b_1, or another of the `comparisons` of moments, or that of another package.
     minimum_brightness : float
         Pixels with b_0 at or below it have no signal, in the unit of the moments.
     full_scale : float
@@ -160,7 +163,8 @@ class Settings:
         in_range("smoothing_sigma_px", self.smoothing_sigma_px, 0.0, 100.0, "0 to 100 pixels")
         in_range("least_range_m", self.least_range_m, -1000.0, 1000.0, "-1000 to 1000 m")
         in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
-        chosen("estimator", self.estimator, ("automatic", *ESTIMATORS))
+        if self.estimator not in ESTIMATORS:
+            chosen("estimator", self.estimator, ("automatic", *ESTIMATORS, *plugged_names()))
         chosen("spoilt_images", self.spoilt_images, CORRUPT_IMAGES)
 
     @property

@@ -28,6 +28,7 @@ from transientcam_server.imaging._frames.bands import BAND_BYTES, STREAMED_BYTES
 from transientcam_server.imaging._frames.frame import Frame
 from transientcam_server.imaging._frames.history import History
 from transientcam_server.imaging._frames.meta import frame_meta
+from transientcam_server.imaging._frames.other_estimators import OtherEstimators
 from transientcam_server.imaging._frames.pipeline import Pipeline
 from transientcam_server.imaging._frames.stages import FIRST, Computed, compute
 from transientcam_server.imaging._frames.workers import Workers

@@ -89,7 +89,7 @@ def test_each_finding_is_a_line_and_each_remedy_below_it(
         "fault udev rule [there] is none",
         "first line",
         "second line",
-        "Faults: 1, warnings: 0.",
+        "ok: 2, warning: 0, fault: 1, not tried: 0.",
     ]
 
 
@@ -117,7 +117,7 @@ def test_a_package_that_is_not_installed_is_no_fault(
 
     code, document = report(capsys)
 
-    assert code == 0
+    assert (code, document["not_tried"]) == (0, ["server"])
     assert "transientcam[server]" in of(document, "server")["remedy"]
 
 

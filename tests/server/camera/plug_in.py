@@ -1,4 +1,4 @@
-"""The plug-in of docs/add-a-camera.md, installed by pip as a distribution of its own."""
+"""Plug-ins of the documentation, installed by pip as distributions of their own."""
 
 import subprocess
 import sys
@@ -16,7 +16,12 @@ def block(language: str) -> str:
 
 def install(directory: Path) -> Path:
     """Install what the page shows below a directory, without a network; return where."""
-    project = tomllib.loads(block("toml"))["project"]
+    return install_package(directory, block("toml"), {"wall_camera.py": block("python")})
+
+
+def install_package(directory: Path, described: str, modules: dict[str, str]) -> Path:
+    """Install modules, as their pyproject.toml describes them, below a directory; return where."""
+    project = tomllib.loads(described)["project"]
     groups = project["entry-points"].items()
     points = "".join(
         f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in entries.items())
@@ -24,7 +29,7 @@ def install(directory: Path) -> Path:
     )
     about = project["name"].replace("-", "_") + "-" + project["version"]
     files = {
-        "wall_camera.py": block("python"),
+        **modules,
         f"{about}.dist-info/METADATA": (
             f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
         ),

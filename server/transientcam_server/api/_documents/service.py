@@ -40,6 +40,22 @@ class InfoDocument(Document):
         name: str
         reason: str
 
+    class EstimatorDocument(Document):
+        """An estimator of another package, and what it states of itself."""
+
+        name: str
+        """The value of `reconstruction.estimator`."""
+        label: str | None
+        """Where it comes from; this and what follows is null where it cannot be used."""
+        frequencies: str | None = Field(description="what it needs to be measured")
+        least_harmonics: int | None
+        assumptions: str | None
+        cost: str | None
+        failure: str | None
+        """What happens where its assumptions do not hold."""
+        unusable: str | None
+        """Why it cannot be used; null where it can."""
+
     class StreamDocument(Document):
         """Where the stream is."""
 
@@ -65,6 +81,9 @@ class InfoDocument(Document):
     products: list[ProductDocument]
     absent_products: list[AbsentDocument]
     """What other cameras have, and why this one does not."""
+    estimators: list[EstimatorDocument]
+    """Those of other packages; what is offered is `reconstruction.estimator` of `GET
+    /parameters`."""
     caller: CallerDocument
     history: HistoryDocument
     """Which frames can be had, as in `GET /frames`."""

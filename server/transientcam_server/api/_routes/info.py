@@ -6,6 +6,7 @@ from fastapi import APIRouter
 
 import transientcam_moments as tm
 from transientcam import wire
+from transientcam_moments import comparisons
 from transientcam_server.api._auth.permissions import PrincipalOf
 from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._docs import asyncapi
@@ -14,6 +15,7 @@ from transientcam_server.api._documents.service import InfoDocument, VersionsDoc
 from transientcam_server.imaging import ENCODINGS, Product, Recipe
 from transientcam_server.service import VERSION
 
+_STATED = ("label", "frequencies", "least_harmonics", "assumptions", "cost", "failure")
 router = APIRouter(tags=["info"])
 versions = APIRouter(tags=["info"])
 
@@ -45,6 +47,7 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
             InfoDocument.AbsentDocument(name=name, reason=reason)
             for name, reason in service.pipeline.absent.items()
         ],
+        estimators=[_estimator(*each) for each in comparisons.statements().items()],
         caller=InfoDocument.CallerDocument.model_validate(
             {
                 "name": principal.name,
@@ -63,6 +66,16 @@ def _kernels(recipe: Recipe) -> InfoDocument.KernelsDocument | None:
     now_s, order = asyncio.get_running_loop().time(), recipe.applied.sequence.multiples[-1]
     preparing, left_s = tm.kernels.preparing(recipe.kernels, order, now_s)
     return InfoDocument.KernelsDocument(preparing=preparing, left_s=left_s) if preparing else None
+
+
+def _estimator(
+    name: str, found: comparisons.Technique | tm.EstimatorFailed
+) -> InfoDocument.EstimatorDocument:
+    failed = isinstance(found, tm.EstimatorFailed)
+    stated = {each: None if failed else getattr(found, each) for each in _STATED}
+    return InfoDocument.EstimatorDocument.model_validate(
+        {"name": name, "unusable": found.reason if failed else None} | stated
+    )
 
 
 def _product(product: Product) -> InfoDocument.ProductDocument:

@@ -31,7 +31,13 @@ from transientcam_server.imaging._errors_of_range.accuracy import (
 )
 from transientcam_server.imaging._frames.bands import STREAMED_BYTES, Banded, computed
 from transientcam_server.imaging._frames.meta import frame_meta
-from transientcam_server.imaging._frames.stages import STAGES, Computed, compute, spread_of
+from transientcam_server.imaging._frames.stages import (
+    OF_ESTIMATOR,
+    STAGES,
+    Computed,
+    compute,
+    spread_of,
+)
 from transientcam_server.imaging._frames.workers import Workers
 from transientcam_server.imaging._products.products import PRODUCTS, Product
 from transientcam_server.imaging._products.view import EVERYTHING, View
@@ -203,8 +209,14 @@ class Frame:
             while self._requested:
                 averaged = None if self.averaged is None else await _shared(self.averaged)
                 requested, self._requested = self._requested, set()
+                run = self._run
+                if self.recipe.of_another_package and OF_ESTIMATOR in requested:
+                    # it may fail, end or hang: all else goes before it, and new frames beside it
+                    self._requested = {OF_ESTIMATOR} if len(requested) > 1 else set()
+                    requested -= self._requested
+                    run = self._run if self._requested else self._workers.run_long
                 with self._workers.one_more_frame() as alone:
-                    self._computed, elapsed_s = await self._run(
+                    self._computed, elapsed_s = await run(
                         compute,
                         self._computed,
                         self.recipe,
@@ -435,6 +447,14 @@ def _failure_of(workers: Workers, number: int, name: str) -> Iterator[None]:
             field=error.field,
             value=error.value,
             limit=error.limit,
+        ) from error
+    except tm.EstimatorFailed as error:
+        workers.note_failure(name, number)
+        raise Problem(
+            kinds.PRODUCT_FAILED,
+            f"There is no {name} of frame {number}: {error}.",
+            product=name,
+            frame=number,
         ) from error
     except Exception as error:
         workers.note_failure(name, number)

@@ -28,6 +28,8 @@ STAGES: Final[dict[str, tuple[str, ...]]] = {
 _BITS: Final = {str(flag.name).lower(): np.uint8(flag) for flag in tm.Flags if flag}
 LEAST_SPREAD_PIXELS: Final = 1 << 16
 """Of a frame that one core computes for much longer than its parts take to begin and to end."""
+OF_ESTIMATOR: Final = "returns"
+"""The stage that the settings' estimator computes."""
 FIRST: Final = "light"
 """The stage that all others build on."""
 

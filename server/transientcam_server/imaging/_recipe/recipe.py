@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import AppliedSequence, RawFrame, Sampling, Sequence
 from transientcam_driver.camera import Lamp
+from transientcam_moments.comparisons import plugged_names, statements
 from transientcam_moments.reconstruction import OF_ANY_MULTIPLES, automatic
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging._recipe.calibration import FACTORY_ID, Gains, nominal_gains
@@ -58,6 +59,11 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
             value=settings.estimator,
             limit=f"one of {', '.join(OF_ANY_MULTIPLES)}",
         )
+    failed = statements().get(settings.estimator)
+    if isinstance(failed, tm.EstimatorFailed):
+        limit = "one that can be used"
+        at, value = "estimator", settings.estimator
+        raise Problem(kinds.ESTIMATOR_MISFIT, f"{failed}.", field=at, value=value, limit=limit)
     least, harmonics = settings.least_harmonics, sequence.harmonics
     if harmonics >= least:
         return
@@ -124,6 +130,11 @@ class Recipe:
         if self.settings.estimator == "automatic" or not _serves(self.settings, sampling):
             return automatic(sampling.multiples)
         return self.settings.estimator
+
+    @property
+    def of_another_package(self) -> bool:
+        """Whether that estimator is another package's, which may do anything."""
+        return self.technique in plugged_names()
 
     @property
     def kernels(self) -> tuple[str, ...]:

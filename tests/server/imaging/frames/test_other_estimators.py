@@ -1,0 +1,203 @@
+"""Estimators of other packages: offered everywhere, and no harm to others whatever they do."""
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+import transientcam_moments as tm
+from tests.conftest import ROOT
+from tests.server.camera.plug_in import install_package
+from tests.serving import serving
+from transientcam import Camera
+from transientcam.cli import run as command
+from transientcam.errors import ProblemError
+from transientcam_moments import comparisons
+from transientcam_moments.comparisons import _plugins as plugins
+from transientcam_server.api import _parameters as parameters
+from transientcam_server.imaging import OtherEstimators
+
+EXAMPLE = ROOT / "examples" / "matched_filter"
+PAGE = ROOT / "docs" / "add-an-estimator.md"
+FAULTY = """
+import os, threading
+from dataclasses import replace
+from pathlib import Path
+from matched_filter import ESTIMATOR, matched_filter
+
+BEGUN = Path(__file__).with_name("begun")
+
+def raises(b, **_):
+    raise ZeroDivisionError("by hand")
+
+def hangs_once(b, **_):
+    if not BEGUN.exists():
+        BEGUN.touch()
+        threading.Event().wait()
+    return matched_filter(b)
+
+def ends(b, **_):
+    os._exit(3)
+
+RAISES, HANGS, ENDS = (
+    replace(ESTIMATOR, name=each.__name__.replace("_", "-"), estimate=each)
+    for each in (raises, hangs_once, ends)
+)
+"""
+FAULTY_POINTS = """
+[transientcam.estimators]
+raises = faulty:RAISES
+hangs-once = faulty:HANGS
+ends = faulty:ENDS
+absent = package_that_is_not_there:ESTIMATOR
+"""
+PHASE_RAD = np.array([0.4, 2.0])
+MOMENTS = np.exp(1j * np.arange(5)[:, None] * PHASE_RAD)
+GIVEN = (MOMENTS, None, 20e6 * np.arange(5), 0.1)
+
+
+def forget() -> None:
+    for each in (plugins.plugged, plugins.loaded, parameters._properties):
+        each.cache_clear()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Two packages of others."""
+    directory = tmp_path_factory.mktemp("estimators")
+    modules = {"matched_filter.py": (EXAMPLE / "matched_filter.py").read_text("utf-8")}
+    described = (EXAMPLE / "pyproject.toml").read_text("utf-8")
+    found = install_package(directory, described, modules)
+    (found / "faulty.py").write_text(FAULTY)
+    about = found / "faulty-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: faulty\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(FAULTY_POINTS)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(found))
+        forget()
+        yield found
+        for name in ("matched_filter", "faulty"):
+            sys.modules.pop(name, None)
+    forget()
+
+
+@dataclass
+class ClockOfHanging:
+    """Seconds: 0 until the estimator hangs, very late from then on."""
+
+    begun: Path
+    more_s: float = field(default=0.0)
+
+    def __call__(self) -> float:
+        return self.more_s + (1e6 if self.begun.exists() else 0.0)
+
+
+@pytest.fixture
+def others(site: Path) -> Iterator[OtherEstimators]:
+    clock = ClockOfHanging(site / "begun")
+    found = OtherEstimators(10.0, clock=clock)
+    found.open()
+    yield found
+    found.close()
+    assert [comparisons.separated] == comparisons.SEPARATORS
+
+
+def test_one_that_hangs_is_ended_left_alone_for_a_while_and_asked_again(
+    others: OtherEstimators,
+) -> None:
+    with pytest.raises(tm.EstimatorFailed, match=r"hangs-once .*longer than 10 s"):
+        others("hangs-once", *GIVEN)
+    with pytest.raises(tm.EstimatorFailed, match="longer than 10 s; it is asked again in"):
+        others("hangs-once", *GIVEN)
+
+    clock = others._clock
+    assert isinstance(clock, ClockOfHanging)
+    clock.more_s = 1e8
+
+    assert others("hangs-once", *GIVEN).phase_rad == pytest.approx(PHASE_RAD)
+
+
+def test_one_that_ends_its_process_costs_its_own_range_alone(others: OtherEstimators) -> None:
+    with pytest.raises(tm.EstimatorFailed, match=r"ends .*its process has ended"):
+        others("ends", *GIVEN)
+    with pytest.raises(tm.EstimatorFailed, match=r"raises .*ZeroDivisionError: by hand"):
+        others("raises", *GIVEN)
+
+
+def test_a_daemon_offers_them_and_its_other_products_go_on() -> None:
+    limits = {"estimator_s": 600.0}
+    with (
+        serving("sim:wall?noise=off", limits=limits) as served,
+        httpx.Client(base_url=f"{served.url}/api/v1", timeout=60) as http,
+        Camera(served.url, timeout_s=600.0) as camera,
+    ):
+        described = http.get("/parameters").json()["parameters"]
+        info = {each["name"]: each for each in http.get("/info").json()["estimators"]}
+        camera.reconstruction = {"estimator": "matched-filter"}
+        with camera.stream("range") as frames:
+            frame = next(each for each in frames if each.meta["estimator"] == "matched-filter")
+        truth_m = camera.frame("truth").array
+
+        camera.reconstruction = {"estimator": "raises"}
+        with camera.stream("brightness") as frames:
+            first = next(each for each in frames if each.meta["estimator"] == "raises")
+            with pytest.raises(
+                ProblemError, match=r"raises of another .*ZeroDivisionError: by hand"
+            ):
+                camera.frame("range")
+            later = next(iter(frames))
+        refused = http.put("/reconstruction", json={"estimator": "absent"})
+
+    (allowed,) = (e["allowed"] for e in described if e["name"] == "reconstruction.estimator")
+    assert {"matched-filter", "raises", "ends", "hangs-once", "likelihood"} <= set(allowed)
+    assert "absent" not in allowed
+    assert info["matched-filter"]["failure"] == "Other light pulls the range to it."
+    assert "not_there" in info["absent"]["unusable"]
+    assert np.nanmedian(np.abs(frame.array - truth_m)) < 1e-3
+    assert later.meta["frame"] > first.meta["frame"]
+    assert refused.status_code == 409
+    assert "package_that_is_not_there" in refused.json()["detail"]
+
+
+def test_a_recording_is_reconstructed_by_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, output = tmp_path / "moments.npz", tmp_path / "out.npz"
+    np.savez(file, moments=MOMENTS.reshape(5, 1, 2), base_frequency_hz=20e6)
+
+    code = command(["reconstruct", str(file), "-o", str(output), "--estimator", "matched-filter"])
+
+    assert code == 0, capsys.readouterr().err
+    with np.load(output) as found:
+        assert found["range_m"].ravel() == pytest.approx(tm.range_m(PHASE_RAD, 20e6), abs=1e-4)
+
+
+def test_they_are_held_against_built_in_ones_by_one_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture = tmp_path / "errors.png"
+    against = ["--against", "single-frequency", "--scene", "wall", "--harmonics", "2"]
+
+    code = command(["compare", "raises", "matched-filter", *against, "--plot", str(picture)])
+
+    scene, *lines = capsys.readouterr().out.splitlines()
+    assert code == 1  # one of those it was asked about failed
+    assert scene.startswith("wall: ")
+    assert [line.split()[0] for line in lines] == ["matched-filter", "single-frequency", "raises"]
+    assert 0 < float(lines[0].split()[1]) < float(lines[1].split()[1]) < 100
+    assert "ZeroDivisionError: by hand" in lines[2]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert command(["compare", "nonsense"]) == 2
+
+
+def test_the_page_shows_the_package_that_is_tested() -> None:
+    page = PAGE.read_text("utf-8")
+
+    for name, language in (("pyproject.toml", "toml"), ("matched_filter.py", "python")):
+        assert f"```{language}\n{(EXAMPLE / name).read_text('utf-8')}```" in page
+    assert len((EXAMPLE / "matched_filter.py").read_text("utf-8").splitlines()) <= 40
