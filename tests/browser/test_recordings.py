@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 
-from tests.browser.conftest import Watch
+from tests.browser.conftest import Watch, put
 from tests.browser.dashboard import (
     LIVE,
     choose,
@@ -20,6 +20,7 @@ from tests.browser.dashboard import (
     map_pixels,
     open_page,
     point_at,
+    shows_frame,
 )
 from tests.serving import Served
 
@@ -57,6 +58,73 @@ def recorded(served: Served, recording: str, frame: int, product: str) -> NDArra
 
 def shows_recorded(page: Page, frame: int) -> None:
     expect(page.locator(".replay")).to_have_attribute("data-frame", str(frame))
+
+
+def test_now_is_compared_with_a_recording_by_two_clicks_and_with_a_kept_frame(
+    page: Page, served: Served
+) -> None:
+    recording = record(served, frames=2, name="yesterday")
+    open_page(page)
+    put(served, "acquisition", {"running": False})
+    number: int = httpx.get(f"{served.url}/api/v1/frames/latest").json()["frame"]
+    shows_frame(page, number)
+    page.keyboard.press("h")  # its errors are of this very frame then
+    panel, canvas = page.locator(".panel-map"), map_canvas(page)
+    panel.get_by_role("button", name="Compare the map").click()
+    panel.get_by_role("button", name="yesterday").click()
+    page.locator("canvas[data-product=range-difference]").wait_for()
+    panel.locator("[data-field=beyond]").wait_for()
+    point_at(page, "map", 80, 60, click=True)
+
+    def numbers(frame: str, product: str) -> NDArray[Any]:
+        url = f"{served.url}/api/v1{frame.replace('?', f'/{product}.npy?')}"
+        answer = httpx.get(url, timeout=60).raise_for_status()
+        array: NDArray[Any] = np.load(io.BytesIO(answer.content))
+        return array
+
+    now, then = f"/frames/{number}?", f"/recordings/{recording}/frames/1?reconstruction=current"
+    (a, b), (error_a, error_b), (trust_a, trust_b) = (
+        [numbers(frame, product) for frame in (now, then)]
+        for product in ("range", "range_error", "trust")
+    )
+    difference = a - b
+    low, high = (float(canvas.get_attribute(f"data-{end}") or "") for end in ("low", "high"))
+    assert low == -high
+    trusted = (trust_a == 0) & (trust_b == 0)
+    meant = trusted & (np.abs(difference) > np.hypot(error_a, error_b))
+    expected = map_colours(difference, low, high, "coolwarm")
+    expected[~meant & np.isfinite(difference)] = (0x7D, 0x7D, 0x7D, 255)
+    np.testing.assert_allclose(map_pixels(page).astype(int), expected, atol=6)
+    share = meant.sum() / (trusted & np.isfinite(difference + error_a + error_b)).sum()
+    expect(panel.locator("[data-field=beyond]")).to_have_text(f"{100 * share:.0f}\u202f%")
+    expect(panel.locator("[data-field=b]")).to_have_text(f"{b[60, 80]:.3f}\u202fm")
+
+    # both under the limits of both
+    panel.get_by_role("tab", name="B", exact=True).click()
+    page.locator("canvas[data-product=range]").wait_for()
+    low, high = (float(canvas.get_attribute(f"data-{end}") or "") for end in ("low", "high"))
+    expected = map_colours(b, low, high, "viridis")
+    np.testing.assert_allclose(map_pixels(page).astype(int), expected, atol=6)
+    other = canvas.get_attribute("data-frame")
+    panel.get_by_role("tab", name="Blink").click()
+    for frame in (number, other, number):
+        page.locator(f".panel-map canvas[data-frame='{frame}']").wait_for()
+    panel.get_by_label("Frame of B").press("End")
+    expect(panel.locator("[data-field=source]")).to_contain_text("yesterday, frame 2")
+
+    # a frame that is kept outlives the page
+    panel.get_by_role("button", name="Compare the map").click()
+    panel.get_by_label("Name").fill("before lunch")
+    panel.get_by_role("button", name="Keep this frame").click()
+    expect(panel.locator("[data-field=source]")).to_contain_text("before lunch")
+    open_page(page)
+    panel.get_by_role("button", name="Compare the map").click()
+    panel.get_by_role("button", name="before lunch", exact=True).click()
+    point_at(page, "map", 80, 60)
+    expect(panel.locator("[data-field=difference]")).to_have_text(re.compile("^0\u202fm"))
+    panel.get_by_role("button", name="Compare the map").click()
+    panel.get_by_role("button", name="Remove before lunch").click()
+    expect(panel.get_by_role("button", name="before lunch")).to_have_count(0)
 
 
 def test_a_recording_is_started_watched_and_stopped(page: Page, served: Served) -> None:

@@ -2,13 +2,14 @@ import { signal } from "@preact/signals";
 import { describe, expect, test } from "vitest";
 
 import { beyond, colourTable } from "../../../client/dashboard/src/scales/colourMaps";
+import type { Comparison } from "../../../client/dashboard/src/store/comparison";
 import { type Frame, Frames } from "../../../client/dashboard/src/store/frames";
 import { Look, Looks } from "../../../client/dashboard/src/store/looks";
 import { MAP_PRODUCTS } from "../../../client/dashboard/src/store/mapCatalogue";
 import { Settings } from "../../../client/dashboard/src/store/settings";
 import { drawn, onBar } from "../../../client/dashboard/src/ui/ColourBar";
 import { typed } from "../../../client/dashboard/src/ui/LimitFields";
-import { paint } from "../../../client/dashboard/src/ui/paint";
+import { grey, paint } from "../../../client/dashboard/src/ui/paint";
 
 describe("a painted map", () => {
   test("has the colour of each value, another beyond either end, and none where there is no value", () => {
@@ -21,6 +22,20 @@ describe("a painted map", () => {
     const { under, over } = beyond("viridis");
     expect([...new Uint32Array(rgba.buffer, 16)]).toEqual([over, under]);
     expect(new Set([over, under, ...new Uint32Array(table.buffer)]).size).toBe(new Set(new Uint32Array(table.buffer)).size + 2);
+  });
+});
+
+describe("a painted difference", () => {
+  test("is grey where it lies within its error or has none, and stays clear without a value", () => {
+    const rgba = new Uint8ClampedArray(20);
+    const values = [2, -2, 0.5, 2, NaN];
+    paint(values, { low: -2, high: 2, kind: "linear" }, "coolwarm", rgba);
+    const before = [...new Uint32Array(rgba.buffer)];
+    grey(values, [1, 1, 1, NaN, 1], rgba);
+    const after = [...new Uint32Array(rgba.buffer)];
+    expect(after.slice(0, 2)).toEqual(before.slice(0, 2));
+    expect(new Set(after.slice(2, 4))).toEqual(new Set([0xff7d7d7d]));
+    expect(after[4]).toBe(0);
   });
 });
 
@@ -41,6 +56,16 @@ describe("the look of a map", () => {
     expect(look.scale.value.high).toBeGreaterThanOrEqual(6);
   });
 
+  test("spans both frames that are compared", () => {
+    const beside = signal<Frame | null>(null);
+    const look = new Look(MAP_PRODUCTS[0], signal<Frame | null>(frame(2, 3)), new Settings(null), beside);
+    beside.value = frame(NaN, NaN); // nothing in it has a value
+    expect(look.scale.value.high).toBeLessThan(4);
+    beside.value = frame(1, 9);
+    expect(look.scale.value.low).toBeLessThanOrEqual(1);
+    expect(look.scale.value.high).toBeGreaterThanOrEqual(9);
+  });
+
   test("is the same value for a frame like the last", () => {
     const newest = signal<Frame | null>(frame(1, 4));
     const look = new Look(MAP_PRODUCTS[0], newest, new Settings(null));
@@ -53,7 +78,8 @@ describe("the look of a map", () => {
 describe("looks", () => {
   const looks = (): Looks => {
     const frames = new Frames();
-    return new Looks(frames, new Settings(null));
+    const beside = { b: () => signal(null), difference: () => signal(null) } as unknown as Comparison;
+    return new Looks(frames, new Settings(null), beside);
   };
 
   test("that are locked keep the same limits within a unit, and each its own again afterwards", () => {

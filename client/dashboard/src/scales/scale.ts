@@ -92,6 +92,13 @@ export function symmetric({ low, high }: Span): Span {
   return { low: -reach, high: reach };
 }
 
+/** The span that holds all those of which something is known; null where there is none. */
+export function joined(...spans: readonly (Span | null)[]): Span | null {
+  const known = spans.filter((span) => span !== null && span.high >= span.low) as Span[];
+  if (known.length === 0) return null;
+  return { low: Math.min(...known.map(({ low }) => low)), high: Math.max(...known.map(({ high }) => high)) };
+}
+
 /** Counts of values in `bins` even places of a scale from `first` to `last`; what lies beyond counts in the outermost. */
 export function histogram(values: ArrayLike<number>, scale: Scale, bins: number, first = 0, last = 1, most = 20_000): Uint32Array {
   const counts = new Uint32Array(bins);

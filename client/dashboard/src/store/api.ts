@@ -64,6 +64,9 @@ export interface Tagged<T> {
 /** Where the newest frame of the camera is; frames of recordings are elsewhere. */
 export const LIVE = "/frames/latest";
 
+/** Where what the page made or keeps is: nowhere at the service. */
+export const MADE = "";
+
 /** Where one of the camera's last frames is. */
 export const liveFrame = (number: number): string => `/frames/${number}`;
 

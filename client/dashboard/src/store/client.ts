@@ -47,7 +47,7 @@ export class StreamClient {
       for (const take of this.#brought.splice(0)) take();
       return this.#count();
     });
-    store.replay.loader = store.rangeErrors.loader = (path, products) => this.#bring(path, products);
+    store.replay.loader = store.rangeErrors.loader = store.comparison.loader = (path, products) => this.#bring(path, products);
   }
 
   /** Connects, and keeps streaming what the store's views need. */
@@ -239,6 +239,7 @@ export class StreamClient {
     "lease-changed": () => void this.store.lease.look(),
     "reconstruction-changed": () => {
       this.store.replay.recompute();
+      this.store.comparison.recompute();
       void this.store.caller.look();
       void this.store.reconstruction.keepUp();
     },

@@ -2,9 +2,10 @@
 import { computed, type ReadonlySignal, type Signal, signal } from "@preact/signals";
 
 import { COLOUR_MAPS, type ColourMapName } from "../scales/colourMaps";
-import { autoLimits, type Scale, type ScaleKind, type Span, symmetric } from "../scales/scale";
+import { autoLimits, joined, type Scale, type ScaleKind, type Span, symmetric } from "../scales/scale";
+import type { Comparison } from "./comparison";
 import type { Frame, Frames } from "./frames";
-import { MAP_PRODUCTS, type MapProduct } from "./mapCatalogue";
+import { differenceMap, MAP_PRODUCTS, type MapProduct } from "./mapCatalogue";
 import { type Kind, oneOf, type Setting, type Settings } from "./settings";
 
 /** Where the ends of a scale stand before anything was measured. */
@@ -24,6 +25,8 @@ export class Look {
     readonly product: MapProduct,
     readonly frame: ReadonlySignal<Frame | null>,
     settings: Settings,
+    /** What has the same limits. */
+    beside: ReadonlySignal<Frame | null> = signal(null),
   ) {
     const key = (what: string): string => `map.${product.product}.${what}`;
     const colours: Setting<ColourMapName> = { key: key("colours"), initial: product.colours, ...oneOf(COLOUR_MAPS) };
@@ -36,7 +39,7 @@ export class Look {
     settings.together("look", [colours, kind, manual], { of: product.product });
     [this.colours, this.kind, this.manual] = [settings.of(colours), settings.of(kind), settings.of(manual)];
     this.scale = computed(() => {
-      const { low, high } = this.manual.value ?? this.#follow(frame.value?.map ?? null);
+      const { low, high } = this.manual.value ?? this.#follow(joined(frame.value?.map ?? null, beside.value?.map ?? null));
       const kind = this.kind.value;
       const last = this.#last;
       // The same scale is the same value, so that a new frame alone does not draw the bar again.
@@ -57,8 +60,12 @@ export class Looks {
   readonly locked = signal(false);
   readonly #all: ReadonlyMap<string, Look>;
 
-  constructor(frames: Frames, settings: Settings) {
-    this.#all = new Map(MAP_PRODUCTS.map((shown) => [shown.product, new Look(shown, frames.of(shown.product), settings)]));
+  constructor(frames: Frames, settings: Settings, comparison: Comparison) {
+    const looks = MAP_PRODUCTS.flatMap((map) => [
+      new Look(map, frames.of(map.product), settings, comparison.b(map.product)),
+      new Look(differenceMap(map), comparison.difference(map.product), settings),
+    ]);
+    this.#all = new Map(looks.map((look) => [look.product.product, look]));
   }
 
   of(product: string): Look {
@@ -79,8 +86,8 @@ export class Looks {
     this.locked.value = locked;
   }
 
-  #kin({ product: { unit } }: Look): Look[] {
-    return [...this.#all.values()].filter(({ product }) => product.unit === unit);
+  #kin({ product: { unit, signed } }: Look): Look[] {
+    return [...this.#all.values()].filter(({ product }) => product.unit === unit && product.signed === signed);
   }
 }
 

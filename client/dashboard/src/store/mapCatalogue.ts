@@ -41,5 +41,10 @@ export const MAP_PRODUCTS: readonly MapProduct[] = [
   },
 ];
 
+/** The map of A - B where two frames are compared. */
+export function differenceMap({ scale, ...map }: MapProduct): MapProduct {
+  return { ...map, product: `${map.product}-difference`, name: `${map.name}, A − B`, colours: "coolwarm", signed: true };
+}
+
 /** What the hover line says beside the map's own value. */
 export const AMPLITUDE = "brightness";

@@ -7,7 +7,9 @@ import { Accuracy } from "./accuracy";
 import { Api, kindOf } from "./api";
 import { Calibrations } from "./calibrations";
 import { Caller } from "./caller";
+import { Comparison } from "./comparison";
 import { Credentials } from "./credentials";
+import { browserCupboard } from "./cupboard";
 import { Details } from "./details";
 import { Events } from "./events";
 import { Frames } from "./frames";
@@ -133,8 +135,10 @@ export class Store extends Ground {
   readonly layout: Signal<Layout> = this.settings.of(LAYOUT);
   /** Layouts under names, and the way back from changes of it. */
   readonly layouts = new Layouts(this.settings, this.layout);
+  /** What the maps are compared with. */
+  readonly comparison = new Comparison(this.frames, this.rangeErrors, this.settings, browserCupboard());
   /** How maps are shown. */
-  readonly looks = new Looks(this.frames, this.settings);
+  readonly looks = new Looks(this.frames, this.settings, this.comparison);
   /** How light in flight is shown. */
   readonly light = new TransientLook(this.frames.of("coefficients"), this.settings);
   /** Pixels that are kept, and a region. */

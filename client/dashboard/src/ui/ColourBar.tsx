@@ -106,7 +106,7 @@ export function ColourBar({ scale, colours, unit, values, marked, onLimit }: Col
 }
 
 /** The colour bar of a map, which sets its limits; as wide without one. */
-export function MapBar({ look, marked }: { look: Look | null; marked?: ReadonlySignal<number> }) {
+export function MapBar({ look, marked, values }: { look: Look | null; marked?: ReadonlySignal<number>; values?: Look["frame"] }) {
   const { looks } = useStore();
   if (look === null) return <div class="colour-bar" />;
   return (
@@ -114,7 +114,7 @@ export function MapBar({ look, marked }: { look: Look | null; marked?: ReadonlyS
       scale={look.scale.value}
       colours={look.colours.value}
       unit={look.product.unit}
-      values={look.frame}
+      values={values ?? look.frame}
       {...(marked === undefined ? {} : { marked })}
       onLimit={(limits) => looks.limit(look, limits)}
     />

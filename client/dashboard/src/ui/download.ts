@@ -1,5 +1,5 @@
 /** Files made in the page: what is on screen, as it is on screen; and files of the service. */
-import { type Api, LIVE, liveFrame, refusalIn } from "../store/api";
+import { type Api, LIVE, liveFrame, MADE, refusalIn } from "../store/api";
 import type { Frame } from "../store/frames";
 import { frameUrl } from "../stream/frameUrl";
 
@@ -48,11 +48,13 @@ export async function saveNumbers(api: Api, frame: Frame | null): Promise<void> 
   const { product, meta, origin, values, shape } = frame;
   const name = `${product}-${meta.frame}.npy`;
   const path = origin === LIVE ? liveFrame(meta.frame) : origin;
+  const here = (): void => save(name, new Blob([npy(values, shape)]));
+  if (origin === MADE) return here();
   try {
     save(name, await api.file(frameUrl(path, `${product}.npy`)));
   } catch (error) {
     refusalIn(error);
-    save(name, new Blob([npy(values, shape)]));
+    here();
   }
 }
 

@@ -1,4 +1,4 @@
-import { beyond, type ColourMapName, colourTable, levelOf } from "../scales/colourMaps";
+import { beyond, type ColourMapName, colourTable, levelOf, rgbaOf } from "../scales/colourMaps";
 import { fraction, type Scale } from "../scales/scale";
 
 /** Draws a picture on a canvas, its pixels as `write` makes them of clear RGBA bytes. */
@@ -16,6 +16,15 @@ export function paint(values: ArrayLike<number>, scale: Scale, colours: ColourMa
   const pick = picker(scale, colours);
   const pixels = new Uint32Array(rgba.buffer, rgba.byteOffset, rgba.byteLength / 4);
   for (let pixel = 0; pixel < pixels.length; pixel++) pixels[pixel] = pick(values[pixel]);
+}
+
+/** What is not known to differ: distinct from all of a diverging scale. */
+const DOUBTFUL = rgbaOf("7d7d7d");
+
+/** Greys the pixels whose values lie within their errors, or have none. */
+export function grey(values: ArrayLike<number>, errors: ArrayLike<number>, rgba: Uint8ClampedArray): void {
+  const pixels = new Uint32Array(rgba.buffer, rgba.byteOffset, rgba.byteLength / 4);
+  for (let at = 0; at < pixels.length; at++) if (pixels[at] !== 0 && !(Math.abs(values[at]) > errors[at])) pixels[at] = DOUBTFUL;
 }
 
 const [DARK, LIGHT] = [0xa0000000, 0xa0ffffff];

@@ -1,18 +1,10 @@
 import type { ComponentType } from "preact";
 import type { ViewName } from "../store/viewNames";
-import { CalibrationView } from "./calibration/CalibrationView";
-import { EventsView } from "./events/EventsView";
+import { later } from "./later";
 import { MapView, SecondMapView } from "./map/MapView";
-import { PlotsView } from "./plots/PlotsView";
-import { PointsView } from "./points/PointsView";
-import { ReconstructionView } from "./reconstruction/ReconstructionView";
-import { RecordingsView } from "./recordings/RecordingsView";
 import { ResponseView } from "./response/ResponseView";
 import { SequenceView } from "./sequence/SequenceView";
-import { SimulationView } from "./simulation/SimulationView";
-import { StreakView } from "./streak/StreakView";
 import { TransientView } from "./transient/TransientView";
-import { ValidityView } from "./validity/ValidityView";
 
 interface View {
   readonly name: ViewName;
@@ -31,14 +23,18 @@ export const VIEWS: readonly View[] = [
   { name: "second-map", title: "Second map", view: SecondMapView },
   { name: "transient", title: "Light in flight", view: TransientView, needs: "coefficients" },
   { name: "response", title: "Impulse response", view: ResponseView },
-  { name: "plots", title: "Values", view: PlotsView },
-  { name: "streak", title: "Streak", view: StreakView, needs: "coefficients" },
-  { name: "points", title: "Points in space", view: PointsView },
-  { name: "validity", title: "Validity", view: ValidityView },
+  { name: "plots", title: "Values", view: later(async () => (await import("./plots/PlotsView")).PlotsView) },
+  { name: "streak", title: "Streak", view: later(async () => (await import("./streak/StreakView")).StreakView), needs: "coefficients" },
+  { name: "points", title: "Points in space", view: later(async () => (await import("./points/PointsView")).PointsView) },
+  { name: "validity", title: "Validity", view: later(async () => (await import("./validity/ValidityView")).ValidityView) },
   { name: "sequence", title: "Sequence and accuracy", view: SequenceView },
-  { name: "recordings", title: "Recordings", view: RecordingsView },
-  { name: "reconstruction", title: "Reconstruction", view: ReconstructionView },
-  { name: "calibration", title: "Calibration", view: CalibrationView },
-  { name: "simulation", title: "Simulated scene", view: SimulationView },
-  { name: "events", title: "What happened", view: EventsView },
+  { name: "recordings", title: "Recordings", view: later(async () => (await import("./recordings/RecordingsView")).RecordingsView) },
+  {
+    name: "reconstruction",
+    title: "Reconstruction",
+    view: later(async () => (await import("./reconstruction/ReconstructionView")).ReconstructionView),
+  },
+  { name: "calibration", title: "Calibration", view: later(async () => (await import("./calibration/CalibrationView")).CalibrationView) },
+  { name: "simulation", title: "Simulated scene", view: later(async () => (await import("./simulation/SimulationView")).SimulationView) },
+  { name: "events", title: "What happened", view: later(async () => (await import("./events/EventsView")).EventsView) },
 ];

@@ -1,4 +1,5 @@
 import asyncio
+import gzip
 import re
 from pathlib import Path
 
@@ -78,11 +79,14 @@ def _app(static: Path, monkeypatch: pytest.MonkeyPatch) -> FastAPI:
     return app
 
 
-def _get(app: FastAPI, path: str, method: str = "GET") -> httpx.Response:
+def _get(
+    app: FastAPI, path: str, method: str = "GET", accept_encoding: str = "identity"
+) -> httpx.Response:
     async def request() -> httpx.Response:
         transport = httpx.ASGITransport(app)
         async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
-            return await client.request(method, path, headers={"Accept": "text/html"})
+            headers = {"Accept": "text/html", "Accept-Encoding": accept_encoding}
+            return await client.request(method, path, headers=headers)
 
     return asyncio.run(request())
 
@@ -109,6 +113,70 @@ def test_a_built_dashboard_is_served_beside_the_interface(
     assert _get(app, "/").text == "<p>dashboard</p>"
     assert _get(app, "/assets/a.js").text == "1;"
     assert _get(app, "/api/v1/known").json() == {"known": True}
+
+
+@pytest.mark.parametrize(
+    ("accepted", "compressed"),
+    [
+        ("gzip, deflate, br", True),
+        ("br;q=1.0, GZIP ; q=0.8", True),
+        ("gzip;q=0", False),
+        ("gzip;q=0.000, br", False),
+        ("identity", False),
+        ("xgzip", False),
+    ],
+)
+def test_an_asset_is_sent_as_the_build_compressed_it_and_kept_for_good(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, accepted: str, *, compressed: bool
+) -> None:
+    script = b"const light = 299792458;" * 50
+    (tmp_path / "assets").mkdir()
+    (tmp_path / "index.html").write_text("<p>dashboard</p>")
+    (tmp_path / "assets" / "a.js").write_bytes(script)
+    (tmp_path / "assets" / "a.js.gz").write_bytes(gzip.compress(script))
+    app = _app(tmp_path, monkeypatch)
+
+    response = _get(app, "/assets/a.js", accept_encoding=accepted)
+
+    assert response.content == script
+    assert response.headers.get("content-encoding") == ("gzip" if compressed else None)
+    assert response.headers["content-type"].startswith("text/javascript")
+    assert response.headers["vary"] == "Accept-Encoding"
+    assert "immutable" in response.headers["cache-control"]
+    head = _get(app, "/assets/a.js", "HEAD", accept_encoding=accepted)
+    assert head.headers["content-length"] == response.headers["content-length"]
+    assert _get(app, "/assets/a.js.gz").status_code == 404
+    assert _get(app, "/assets/b.js").headers["content-type"] == "application/problem+json"
+    # the page itself is asked for anew each time, and knows its version
+    assert "cache-control" not in _get(app, "/").headers
+    assert _get(app, "/").headers["etag"]
+
+
+def test_what_the_first_visit_takes_is_at_most_190_kb(steady: httpx.Client) -> None:
+    page = steady.get("/")
+    if 'src="./assets/' not in page.text:
+        pytest.skip("the dashboard was not built")
+    first = re.findall(r'(?:src|href)="\./(assets/[^"]+)"', page.text)
+    texts = [steady.get(f"/{path}") for path in first]
+    # what these name: the worker by the script, the type of Latin letters by the styles
+    named = re.findall(
+        r"(?:worker|inter-latin-wght-normal)-[\w-]+\.(?:js|woff2)",
+        "".join(each.text for each in texts),
+    )
+    answers = [page, *texts, *(steady.get(f"/assets/{name}") for name in set(named))]
+    for answer in answers:
+        answer.raise_for_status()
+
+    assert len(set(named)) == 2
+    assert sum(int(answer.headers["content-length"]) for answer in answers) <= 190_000
+
+
+@pytest.mark.parametrize("path", ["/frames/latest/range.npy", "/frames/latest/raw.msgpack"])
+def test_arrays_are_not_compressed(steady: httpx.Client, path: str) -> None:
+    response = steady.get(f"/api/v1{path}")
+
+    response.raise_for_status()
+    assert "content-encoding" not in response.headers
 
 
 @pytest.mark.parametrize("path", ["/api/v1/nothing", "/assets/b.js", "/somewhere", "/%2e%2e/x"])

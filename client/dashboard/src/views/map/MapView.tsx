@@ -1,7 +1,8 @@
-import type { Signal } from "@preact/signals";
+import { type ReadonlySignal, type Signal, useSignal } from "@preact/signals";
 import type { RefObject } from "preact";
-import { useRef } from "preact/hooks";
-import { drawnOf } from "../../store/frames";
+import { useEffect, useRef } from "preact/hooks";
+import { type Way, wiped } from "../../store/comparison";
+import { drawnOf, type Frame } from "../../store/frames";
 import type { Look } from "../../store/looks";
 import { MAP_PRODUCTS, type MapProduct } from "../../store/mapCatalogue";
 import { useStore } from "../../store/store";
@@ -16,8 +17,9 @@ import { LimitFields } from "../../ui/LimitFields";
 import { ColourChoice } from "../../ui/LookChoices";
 import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
-import { draw, hatch, paint } from "../../ui/paint";
+import { draw, grey, hatch, paint } from "../../ui/paint";
 import { Stage } from "../../ui/Stage";
+import { Compared, CompareMenu, sourceWords } from "./Compared";
 import { Measured } from "./Measured";
 import { Readout, valueAtPixel } from "./Readout";
 
@@ -36,13 +38,19 @@ function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) 
   const absent = store.frames.absent.value;
   const obstacleOf = ({ product }: MapProduct): string | undefined => absent[product];
   const shown = MAP_PRODUCTS.find((each) => each.product === choice.value && obstacleOf(each) === undefined) ?? MAP_PRODUCTS[0];
-  const look = store.looks.of(shown.product);
+  const base = store.looks.of(shown.product);
+  const [b, way] = [store.comparison.b(shown.product), store.comparison.ways[name]];
+  const now = b.value === null ? "A" : way.value;
+  const look = now === "difference" ? store.looks.of(`${shown.product}-difference`) : base;
+  const split = useSignal(0.5);
+  const picture = usePicture(now, look, b, split);
   const canvas = useRef<HTMLCanvasElement>(null);
+  const compared = (): string => (now === "A" ? "" : ` ${now === "difference" ? "minus" : `(${now})`} ${sourceWords(store)}`);
   const parts = (): FigureParts | null => {
-    const meta = look.frame.peek()?.meta;
+    const meta = picture.peek()?.meta;
     if (meta === undefined) return null;
     return {
-      title: shown.name,
+      title: look.product.name + compared(),
       caption: captionOf(meta, store.sequence.peek()),
       scale: look.scale.peek(),
       colours: look.colours.peek(),
@@ -55,11 +63,11 @@ function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) 
       name={name}
       downloads={[
         ...pictureFiles(
-          () => `${shown.product}-${look.frame.peek()?.meta.frame ?? 0}`,
+          () => `${look.product.product}-${picture.peek()?.meta.frame ?? 0}`,
           () => canvas.current,
           parts,
         ),
-        { text: `${shown.name} in ${shown.unit} (NPY)`, run: () => saveNumbers(store.api, look.frame.peek()) },
+        { text: `${look.product.name} in ${shown.unit} (NPY)`, run: () => saveNumbers(store.api, picture.peek()) },
       ]}
       title={
         <Tabs
@@ -69,9 +77,14 @@ function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) 
           onChange={(product) => (choice.value = product)}
         />
       }
-      tools={<MapLookMenu key={shown.product} look={look} name={name} />}
+      tools={
+        <>
+          <CompareMenu look={base} name={name} way={way} />
+          <MapLookMenu key={look.product.product} look={look} name={name} />
+        </>
+      }
     >
-      <MapPicture look={look} canvas={canvas} />
+      <MapPicture base={base} look={look} picture={picture} canvas={canvas} way={way} split={split} />
     </Panel>
   );
 }
@@ -93,13 +106,44 @@ function MapLookMenu({ look, name }: { look: Look; name: ViewName }) {
   );
 }
 
+/** Of blinking: slow enough for everybody. */
+const BLINK_MS = 700;
+
+/** What is drawn of A and B: one of them, their difference, both beside a line, or both in turn. */
+function usePicture(way: Way, look: Look, b: ReadonlySignal<Frame | null>, split: ReadonlySignal<number>): ReadonlySignal<Frame | null> {
+  const turn = useSignal(false);
+  useEffect(() => {
+    if (way !== "blink") return undefined;
+    const timer = setInterval(() => (turn.value = !turn.peek()), BLINK_MS);
+    return () => clearInterval(timer);
+  }, [way, turn]);
+  return useComputedOf([way, look, b], () => {
+    const [one, other] = [look.frame.value, b.value];
+    if (way === "wipe" && one !== null && other !== null) return wiped(one, other, split.value);
+    return way === "B" || (way === "blink" && turn.value) ? other : one;
+  });
+}
+
+interface MapPictureProps {
+  /** The look of A, and that of what is drawn. */
+  readonly base: Look;
+  readonly look: Look;
+  readonly picture: ReadonlySignal<Frame | null>;
+  readonly canvas: RefObject<HTMLCanvasElement | null>;
+  readonly way: Signal<Way>;
+  readonly split: Signal<number>;
+}
+
 /** Nothing but the figures is keyed by the product: another map must not take the focus from the picture. */
-function MapPicture({ look, canvas }: { look: Look; canvas: RefObject<HTMLCanvasElement | null> }) {
+function MapPicture({ base, look, picture: frame, canvas, way, split }: MapPictureProps) {
   const store = useStore();
-  const { product: shown, frame } = look;
-  useProducts([shown.product, store.frames.amplitude.value]);
-  const waiting = useComputedOf([look], () => frame.value === null);
-  const marked = useComputedOf([look, store], () => valueAtPixel(frame.value, store.pointed.value ?? store.selected.value));
+  const shown = look.product;
+  const source = store.comparison.source.value;
+  useProducts([base.product.product, store.frames.amplitude.value]);
+  const waiting = useComputedOf([frame], () => frame.value === null);
+  const marked = useComputedOf([frame, store], () => valueAtPixel(frame.value, store.pointed.value ?? store.selected.value));
+  const ofRange = base.product.product === "range";
+  const doubtful = look !== base && ofRange ? store.comparison.error_m : null;
 
   useDrawing(() => {
     const newest = frame.value;
@@ -115,22 +159,27 @@ function MapPicture({ look, canvas }: { look: Look; canvas: RefObject<HTMLCanvas
       return;
     }
     const [rows, columns] = newest.shape;
-    draw(target, columns, rows, (rgba) => paint(drawnOf(newest), scale, colours, rgba));
+    const errors = doubtful?.value ?? null;
+    draw(target, columns, rows, (rgba) => {
+      paint(drawnOf(newest), scale, colours, rgba);
+      if (errors !== null) grey(newest.values, errors, rgba);
+    });
     // What the picture shows, for tests and for scripts that read the page.
     Object.assign(target.dataset, { product: shown.product, frame: newest.meta.frame, low: scale.low, high: scale.high, colours });
-  }, [look]);
+  }, [look, frame, doubtful]);
 
   return (
     <>
       <div class="picture grow spaced">
         <Stage frame={frame} label={`${shown.name} map`}>
           <canvas ref={canvas} />
-          {shown.unit === "m" && <Hatch />}
+          {shown.unit === "m" && doubtful === null && <Hatch />}
         </Stage>
-        <MapBar look={waiting.value ? null : look} marked={marked} />
+        <MapBar look={waiting.value ? null : look} marked={marked} values={frame} />
       </div>
       <footer class="panel-foot column spaced">
-        <Readout key={shown.product} look={look} />
+        <Readout key={base.product.product} look={base} />
+        {source !== null && <Compared source={source} look={base} way={way} split={split} />}
         <Measured look={look} />
       </footer>
     </>

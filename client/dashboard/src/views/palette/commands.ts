@@ -21,7 +21,6 @@ export interface Command {
 /** What people call what the views show. */
 const ALSO: Readonly<Partial<Record<ViewName, string>>> = {
   map: "distance depth histogram roi region measure",
-  "second-map": "compare",
   plots: "profile roi region time chart",
   points: "3d cloud distance measure",
   sequence: "exposure frequency plan",
@@ -56,6 +55,7 @@ export function commandsOf(store: Store): Command[] {
       also: "screenshot export download csv npy png svg",
       run: () => press(".actions-button"),
     },
+    { words: "Panel: compare its map, or keep this frame…", also: "difference reference", run: () => press(".compare-button") },
     { words: "Panel: colours, limits and exposure of its picture…", also: "colormap look scale", run: () => press(".look-button") },
     ...(applied === null
       ? []

@@ -1,0 +1,161 @@
+import { type Signal, useSignal } from "@preact/signals";
+import { useRef } from "preact/hooks";
+
+import { deviation, engineering, fixed } from "../../scales/format";
+import { beyondShare, differing, type Source, WAYS, type Way } from "../../store/comparison";
+import type { Look } from "../../store/looks";
+import { type Store, useStore } from "../../store/store";
+import { Button, Form, Tabs, TextField } from "../../ui/controls";
+import { PopoverButton } from "../../ui/PopoverButton";
+import { useTask } from "../../ui/useTask";
+import { clock, duration } from "../replay/words";
+import { valueAtPixel } from "./Readout";
+import "./Compared.css";
+
+/** How many recordings are offered: the rest is found by their panel's search. */
+const OFFERED = 8;
+
+const WAY_WORDS: Readonly<Record<Way, readonly [text: string, hint: string]>> = {
+  A: ["A", "What is on screen"],
+  B: ["B", "What it is compared with"],
+  difference: ["A − B", "The difference; grey where it lies within the errors of both"],
+  wipe: ["Wipe", "A at the left, B at the right"],
+  blink: ["Blink", "A and B in turn"],
+};
+
+/** What B is, in words. */
+export function sourceWords({ comparison, recordings }: Store): string {
+  const source = comparison.source.value;
+  if (source === null) return "";
+  if (source.frame === null) return source.of;
+  return `${recordings.document.value?.recordings.find(({ id }) => id === source.of)?.name ?? source.of}, frame ${source.frame}`;
+}
+
+/** What a map is compared with, behind a button. */
+export function CompareMenu({ look, name, way }: { look: Look; name: string; way: Signal<Way> }) {
+  const { comparison, recordings } = useStore();
+  const [task, typed, popover] = [useTask(), useSignal(""), useRef<HTMLDivElement>(null)];
+  const choose = async (work: () => Promise<unknown>): Promise<void> => {
+    if (!(await task.run("Opening…", work))) return;
+    if (way.value === "A") way.value = "difference";
+    popover.current?.hidePopover();
+  };
+  const keep = async (): Promise<void> => {
+    const frame = look.frame.peek();
+    if (frame !== null) await comparison.keep(frame, typed.peek().trim() || `Frame ${frame.meta.frame}, ${clock(frame.meta.host_time_s)}`);
+  };
+  const source = (chosen: Source) => () => void choose(async () => (comparison.source.value = chosen));
+  const recorded = (recordings.document.value?.recordings ?? []).filter(({ frames }) => frames > 0).slice(0, OFFERED);
+  return (
+    <PopoverButton
+      face="Compare"
+      label={`Compare the ${name}`}
+      title="Hold what is on screen (A) against a frame that is kept or recorded (B)"
+      kind="compare"
+      popover={popover}
+      onOpened={() => void task.run("Reading what is kept…", () => comparison.look())}
+    >
+      <Form class="row at-end" onSubmit={() => void choose(keep)}>
+        <TextField label="Name" text={typed} />
+        <Button type="submit" class="primary" task={task} disabled={look.frame.value === null}>
+          Keep this frame
+        </Button>
+      </Form>
+      {comparison.kept.value.map((kept) => (
+        <p key={kept} class="row">
+          <Button task={task} class="grow clipped" onClick={source({ of: kept, frame: null })}>
+            {kept}
+          </Button>
+          <Button
+            class="remove"
+            aria-label={`Remove ${kept}`}
+            title="Keep it no longer"
+            onClick={() => void task.run("Removing…", () => comparison.remove(kept))}
+          >
+            ✕
+          </Button>
+        </p>
+      ))}
+      {recorded.map(({ id, name, started_s }) => (
+        <Button key={id} task={task} onClick={source({ of: id, frame: 1 })}>
+          {name} <span class="small quiet">{clock(started_s)}</span>
+        </Button>
+      ))}
+      {task.refusal.value !== null && <p class="refusal">{task.refusal.value}</p>}
+    </PopoverButton>
+  );
+}
+
+/** A, B and their difference at a pixel, and in how much of the picture it means something. */
+export function Compared({ source, look, way, split }: { source: Source; look: Look; way: Signal<Way>; split: Signal<number> }) {
+  const store = useStore();
+  const { comparison, recordings } = store;
+  const { product, unit, decimals } = look.product;
+  const [a, b, apart] = [look.frame, comparison.b(product), comparison.difference(product)].map((frame) => frame.value);
+  const pixel = store.pointed.value ?? store.selected.value;
+  const difference = valueAtPixel(apart, pixel);
+  const errors = product === "range" ? comparison.error_m.value : null;
+  const error = apart === null || pixel === null ? NaN : errors?.[pixel.y * apart.shape[1] + pixel.x];
+  const unlike = a === null || b === null ? [] : differing(a.meta, b.meta);
+  const older_s = a === null || b === null ? NaN : a.meta.host_time_s - b.meta.host_time_s;
+  const recording = recordings.document.value?.recordings.find(({ id }) => id === source.of);
+  const slider = (label: string, least: number, most: number, step: number, value: number, set: (value: number) => void) => (
+    <input
+      type="range"
+      class="grow"
+      aria-label={label}
+      min={least}
+      max={most}
+      step={step}
+      value={value}
+      onInput={(event) => set(event.currentTarget.valueAsNumber)}
+    />
+  );
+  return (
+    <div class="panel-row compared" role="group" aria-label="Compared">
+      <div class="row">
+        <Tabs
+          label="A and B"
+          value={way.value}
+          options={WAYS.map((value) => ({ value, text: WAY_WORDS[value][0], hint: WAY_WORDS[value][1] }))}
+          onChange={(chosen) => (way.value = chosen)}
+        />
+        {way.value === "wipe" && slider("Place of the line between A and B", 0, 1, 0.01, split.value, (value) => (split.value = value))}
+        <Button class="remove" aria-label="Compare no longer" title="Compare no longer" onClick={() => (comparison.source.value = null)}>
+          ✕
+        </Button>
+      </div>
+      <div class="row">
+        <span class="clipped" data-field="source">
+          <span class="quiet">B:</span> {sourceWords(store)}
+          {Number.isFinite(older_s) && `, ${duration(Math.abs(older_s))} ${older_s < 0 ? "later" : "earlier"}`}
+        </span>
+        {source.frame !== null &&
+          recording !== undefined &&
+          slider("Frame of B", 1, recording.frames, 1, source.frame, (frame) => (comparison.source.value = { ...source, frame }))}
+      </div>
+      <p class="line">
+        <span>
+          <span class="quiet">B</span> <span data-field="b">{fixed(valueAtPixel(b, pixel), decimals, unit)}</span>
+        </span>
+        <span title="With half of its 90 % interval, from those of both ranges">
+          <span class="quiet">A − B</span>{" "}
+          <span class={Math.abs(difference) > (error ?? NaN) ? "strong" : ""} data-field="difference">
+            {unit === "m" ? engineering(difference, unit) : fixed(difference, decimals, unit)} {deviation(error, unit)}
+          </span>
+        </span>
+        {errors !== null && apart !== null && (
+          <span
+            class="quiet"
+            title="Of the trusted pixels, beyond the 90 % intervals of both: up to a tenth is chance. The others are grey"
+          >
+            <span data-field="beyond">{fixed(100 * beyondShare(apart, errors), 0, "%")}</span> differ by more than their errors
+          </span>
+        )}
+        {b !== null && apart === null && <span class="waiting">A and B are of different sizes.</span>}
+        {unlike.length > 0 && <span class="waiting">Not measured alike: {unlike.join(", ")}</span>}
+        {comparison.trouble.value !== null && <span class="refusal">{comparison.trouble.value}</span>}
+      </p>
+    </div>
+  );
+}
