@@ -112,6 +112,8 @@ class FrameDocument(TypedDict):
     """Counts the settings of the reconstruction; those that it was computed with."""
     estimator: str
     """What its range, direct and indirect light are taken from."""
+    neighbours: str | None
+    """How its moments were averaged over pixels, once they were."""
     device_time_s: float
     """Start of the first exposure, by the camera's clock."""
     host_time_s: float

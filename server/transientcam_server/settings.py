@@ -135,9 +135,9 @@ class ReconstructionSettings(_Group):
     neighbours: Neighbours = "gaussian"
     """How moments are averaged over neighbouring pixels. `gaussian` is the paper's.
     `edge-preserving` averages up to 69 pixels that differ by no more than noise, and none across
-    an edge: the noise falls two to four times further. It needs the noise of the sensor and, in
-    the daemon, a compiled kernel, of at most 8 harmonics; until then it is `gaussian`, as it is in
-    plans."""
+    an edge: the noise falls two to four times further. Where the noise is not known, as of moments
+    alone, it is `gaussian`, as it is in plans; each frame names the one applied. Beyond 8 harmonics
+    and until its kernel is compiled it runs in NumPy, more slowly."""
     still_frames: int = Field(default=1, ge=1, le=tm.noise.MOST_FRAMES)
     """How many frames of a stream are averaged, at most, in each pixel that stands still; 1 for
     none. A pixel begins anew in the frame in which it changes by more than noise, or has drifted:

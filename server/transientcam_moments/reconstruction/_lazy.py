@@ -55,7 +55,11 @@ from transientcam_moments.noise import (
 )
 from transientcam_moments.reconstruction._detection import undetected, undetected_pixels
 from transientcam_moments.reconstruction._flags import INVALID, Flags, flags
-from transientcam_moments.reconstruction._neighbours import over_neighbours, sensor_noise
+from transientcam_moments.reconstruction._neighbours import (
+    applicable,
+    over_neighbours,
+    sensor_noise,
+)
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import (
     ESTIMATORS,
@@ -103,6 +107,8 @@ class Reconstruction:
         Light at the low frequency of b_0, whose phase tells turns; within one, when left out.
     frames : array, shape (H, W), optional
         How many frames each pixel of the moments is the mean of; one, when left out.
+    known_noise : Sensor or ImageNoise, optional
+        Of the images, where it was looked for before; that of the settings, when left out.
 
     Raises
     ------
@@ -127,10 +133,14 @@ class Reconstruction:
         images: CapturedImages | None = None,
         low: Array | None = None,
         frames: Array | None = None,
+        known_noise: Sensor | ImageNoise | None = None,
     ) -> None:
         if not (settings.consecutive or self._of_any_multiples):
             raise ParameterError("multiples", settings.multiples, "1 to m")
-        self.settings = settings
+        known = settings.sensor if known_noise is None else known_noise
+        self.settings = applicable(settings, known)
+        if known is not None:
+            self.image_noise = known
         self._correction = correction
         self._spread = spread
         self._measured = moments
@@ -175,7 +185,8 @@ class Reconstruction:
         """Moments averaged over neighbours, and `variance_share`."""
         left_out, gains = (self._saturated, self._bad), self._calibration
         how = self._images, self._spread, self.frames_averaged
-        return over_neighbours(self._measured, self.settings, gains, left_out, *how)
+        known = self.image_noise if self.settings.neighbours == "edge-preserving" else None
+        return over_neighbours(self._measured, self.settings, known, gains, left_out, *how)
 
     @property
     def variance_share(self) -> Array | None:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial, reduce
 from operator import or_
 
@@ -16,14 +17,31 @@ from transientcam_moments.noise import (
     MomentNoise,
     Sensor,
     average_neighbours,
+    image_noise,
     moment_noise,
 )
 from transientcam_moments.reconstruction._settings import Settings
 
 
+def known_noise(
+    moments: Array, settings: Settings, images: CapturedImages | None
+) -> Sensor | ImageNoise | None:
+    """Return the noise of images as it is stated, or shown by them; nothing is smoothed yet."""
+    if settings.sensor is not None or images is None:
+        return settings.sensor
+    return image_noise(images, measured_brightness(moments, settings))
+
+
+def applicable(settings: Settings, known: Sensor | ImageNoise | None) -> Settings:
+    """Return the settings with an average that the known noise allows."""
+    blind = settings.neighbours == "edge-preserving" and known is None
+    return replace(settings, neighbours="gaussian") if blind else settings
+
+
 def over_neighbours(
     moments: Array,
     settings: Settings,
+    known: Sensor | ImageNoise | None,
     calibration: Array | None,
     left_out: Sequence[Array | None],
     images: CapturedImages | None,
@@ -32,13 +50,14 @@ def over_neighbours(
 ) -> tuple[Array, Array | None]:
     """Average calibrated moments (m + 1, ...) over neighbours.
 
-    Pixels of the masks ``left_out`` count for no other one, but to a Gaussian; ``frames`` are how
-    many frames (H, W) each is the mean of. Returns the share (H, W) that is left of the variance
+    By settings that are `applicable` with the known noise of the images. Pixels of the masks
+    ``left_out`` count for no other one, but to a Gaussian; ``frames`` are how many frames (H, W)
+    each is the mean of. Returns the share (H, W) that is left of the variance
     that one frame has by itself, or after the Gaussian, too; None of one frame and a Gaussian.
     """
     noise = None
-    if moments.ndim == 3 and settings.keeps_edges:
-        noise = measured_noise(moments, settings, settings.sensor, calibration, images)
+    if moments.ndim == 3 and settings.neighbours == "edge-preserving":
+        noise = measured_noise(moments, settings, known, calibration, images)
     if noise is None:
         px = settings.gaussian_px if moments.ndim == 3 else 0.0
         share = None if frames is None else 1 / frames

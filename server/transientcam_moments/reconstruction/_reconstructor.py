@@ -39,7 +39,7 @@ from transientcam_moments.images import (
 from transientcam_moments.noise import CapturedImages
 from transientcam_moments.reconstruction._labels import Labels
 from transientcam_moments.reconstruction._lazy import Reconstruction
-from transientcam_moments.reconstruction._neighbours import over_neighbours
+from transientcam_moments.reconstruction._neighbours import applicable, known_noise, over_neighbours
 from transientcam_moments.reconstruction._one_pass import PassedReconstruction
 from transientcam_moments.reconstruction._ranging import range_m
 from transientcam_moments.reconstruction._settings import OF_ANY_MULTIPLES, Settings
@@ -97,7 +97,7 @@ class Reconstructor:
         self._waveform = waveform if waveform is not None and matters(waveform) else None
         self._lock = threading.Lock()
         self._prepared: dict[tuple[Any, ...], OnePass] = {}
-        self._corrections: dict[tuple[int, ...], HarmonicCorrection] = {}
+        self._corrections: dict[tuple[Any, ...], HarmonicCorrection] = {}
 
     def __call__(
         self,
@@ -143,7 +143,8 @@ class Reconstructor:
             return self._of_frame(self.measure(data, saturated_pixels=saturated_pixels), spread)
         takes, repaired, recovered, images = self._prepare(data, previous)
         # behind the smoothing, where a waveform is known: harmonics are taken out there
-        behind = self._waveform is not None or self.settings.keeps_edges
+        keeps_edges = self.settings.neighbours == "edge-preserving"
+        behind = self._waveform is not None or keeps_edges
         one_pass = None if behind else self._pass_of_images(takes)
         if one_pass is not None:
             planes = one_pass.images(takes[0], saturated_pixels, spread)
@@ -262,6 +263,10 @@ class Reconstructor:
         if frame.still is not None:
             moments, frames = frame.still.moments, frame.still.frames
         gains, correction = self._calibration, None
+        settings, known = self.settings, frame.image_noise
+        if known is None and moments.ndim == 3 and settings.neighbours == "edge-preserving":
+            known = known_noise(moments, settings, frame.images)
+        settings = applicable(settings, known)
         given: dict[str, Any] = {
             "kept": frame.kept,
             "repaired": frame.repaired,
@@ -270,49 +275,49 @@ class Reconstructor:
             "images": frame.images,
             "low": frame.low,
             "frames": frames,
+            "known_noise": known,
         }
-        if self.settings.consecutive:
-            correction = self._correction(moments)
-        if self.settings.consecutive and (one_pass := self._pass_of_moments(moments)) is not None:
+        if settings.consecutive:
+            correction = self._correction(moments, settings.gaussian_px)
+        if settings.consecutive and (one_pass := self._pass_of_moments(moments)) is not None:
             left_out = frame.saturated, self._bad
             how = frame.images, spread, frames
-            smoothed, share = over_neighbours(moments, self.settings, gains, left_out, *how)
+            smoothed, share = over_neighbours(moments, settings, known, gains, left_out, *how)
             corrected = None
             if correction is not None:
                 smoothed, corrected = correction(smoothed, spread=spread)
             planes = one_pass.moments(smoothed, frame.saturated, spread)
             given |= {"corrected": corrected, "share": share}
             found: Reconstruction = PassedReconstruction(
-                planes, self.settings, lambda: frame.moments, **given
+                planes, settings, lambda: frame.moments, **given
             )
         else:
-            kind = Reconstruction if self.settings.consecutive else GappedReconstruction
+            kind = Reconstruction if settings.consecutive else GappedReconstruction
             given |= {"bad_pixels": self._bad, "correction": correction}
-            found = kind(moments, self.settings, frame.saturated, **given)
+            found = kind(moments, settings, frame.saturated, **given)
             found.measured = frame.moments
-        if frame.image_noise is not None:
-            found.image_noise = frame.image_noise
         if frame.ambient_dn > 0:
             found.ambient = np.full(moments.shape[1:], frame.ambient_dn, moments.real.dtype)
         return found
 
-    def _correction(self, moments: Array) -> HarmonicCorrection | None:
+    def _correction(self, moments: Array, sigma_px: float) -> HarmonicCorrection | None:
         """Return what takes the harmonics of the waveform out of these moments, if any is known."""
         if self._waveform is None:
             return None
         shape = tuple(moments.shape[1:])
+        key = shape, sigma_px
         with self._lock:
-            if shape not in self._corrections:
-                self._corrections[shape] = HarmonicCorrection(
+            if key not in self._corrections:
+                self._corrections[key] = HarmonicCorrection(
                     self._waveform,
                     self._calibration,
                     shape,
-                    smoothing_sigma_px=self.settings.gaussian_px,
+                    smoothing_sigma_px=sigma_px,
                     estimated=self.settings.zeroth == "estimated",
                 )
                 while len(self._corrections) > _SHAPES:
                     self._corrections.pop(next(iter(self._corrections)))
-            return self._corrections[shape]
+            return self._corrections[key]
 
     def _repaired(self, takes: Array, previous: Array | None) -> Repair | None:
         """Return the images after repair; None for other arrays than NumPy's, or by the settings.

@@ -88,8 +88,9 @@ class Settings:
         What biasing leaves as it is.
     neighbours : {"gaussian", "edge-preserving", "none"}
         How moments are averaged over neighbouring pixels: "gaussian" is the paper's (Sec. 6),
-        "edge-preserving" is `average_neighbours`, which needs a sensor and is the Gaussian without
-        one. There is none without two image axes.
+        "edge-preserving" is `average_neighbours`, and the Gaussian where the noise is neither
+        stated nor told by images; those of a reconstruction say which was applied. There is none
+        without two image axes.
     still_frames : int
         How many frames of a stream `Reconstructor.average` averages where nothing changes, at most;
         1 to `noise.MOST_FRAMES`. A frame by itself never uses others.
@@ -200,14 +201,9 @@ class Settings:
         return FOUR_PHASES_RAD if self.phases_rad is None else self.phases_rad
 
     @property
-    def keeps_edges(self) -> bool:
-        """Whether neighbours are averaged by `average_neighbours`."""
-        return self.neighbours == "edge-preserving" and self.sensor is not None
-
-    @property
     def gaussian_px(self) -> float:
         """Standard deviation of the Gaussian that moments are smoothed with; 0 for none."""
-        return 0.0 if self.keeps_edges or self.neighbours == "none" else self.smoothing_sigma_px
+        return self.smoothing_sigma_px if self.neighbours == "gaussian" else 0.0
 
     @property
     def consecutive(self) -> bool:

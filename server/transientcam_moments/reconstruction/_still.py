@@ -13,9 +13,8 @@ from transientcam_moments.noise import (
     Sensor,
     Still,
     average_frames,
-    image_noise,
 )
-from transientcam_moments.reconstruction._neighbours import measured_brightness, measured_noise
+from transientcam_moments.reconstruction._neighbours import known_noise, measured_noise
 from transientcam_moments.reconstruction._settings import Settings
 
 
@@ -78,9 +77,7 @@ def over_frames(
     frame: Measured, before: Measured | None, settings: Settings, calibration: Array | None
 ) -> Measured:
     """Average a frame with the one before; it stays as it is where no one knows its noise."""
-    known: Sensor | ImageNoise | None = settings.sensor
-    if known is None and frame.images is not None:
-        known = image_noise(frame.images, measured_brightness(frame.moments, settings))
+    known = known_noise(frame.moments, settings, frame.images)
     how = frame.images, frame.ambient_dn
     noise = measured_noise(frame.moments, settings, known, calibration, *how)
     if noise is None or frame.moments.ndim != 3:

@@ -47,11 +47,29 @@ def test_moments_are_averaged_by_the_noise_of_the_sensor(zeroth: str) -> None:
     assert np.median(found.range_std_m) < np.median(reconstructed(raw, own).range_std_m) / 2
 
 
-def test_without_a_sensor_it_is_the_gaussian() -> None:
+def test_without_a_sensor_the_images_tell_the_noise() -> None:
     raw = captured(halves(900.0, 700.0), "low-frequency")
 
     found = reconstructed(raw, replace(SETTINGS, sensor=None))
 
+    stated = reconstructed(raw)
+    assert found.settings.neighbours == "edge-preserving"
+    assert isinstance(found.image_noise, tm.noise.ImageNoise)
+    assert found.variance_share is not None
+    assert np.median(found.variance_share) == pytest.approx(
+        np.median(stated.variance_share), rel=0.1
+    )
+    assert np.median(abs(found.smoothed - stated.smoothed)) < 0.5
+
+
+@pytest.mark.parametrize("pixels", ["image", "few"])
+def test_where_nothing_tells_the_noise_it_is_the_gaussian(pixels: str) -> None:
+    raw = captured(halves(900.0, 700.0), "low-frequency")
+    data = tm.measure(raw, zeroth="low-frequency") if pixels == "image" else raw[:, :7, :9]
+
+    found = reconstructed(data, replace(SETTINGS, sensor=None))
+
+    assert found.settings.neighbours == "gaussian"
     assert np.array_equal(found.smoothed, tm.smooth(found.measured))
     assert found.variance_share is None
 

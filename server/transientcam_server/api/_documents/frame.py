@@ -3,6 +3,7 @@
 from pydantic import AliasPath, Field
 
 from transientcam_server.api._documents.document import Document
+from transientcam_server.settings import Neighbours
 
 
 class PixelCountsDocument(Document):
@@ -111,6 +112,8 @@ class FrameDocument(Document):
     """Counts the settings of the reconstruction; those that it was computed with."""
     estimator: str
     """What its range, direct and indirect light are taken from."""
+    neighbours: Neighbours | None = None
+    """How its moments were averaged over pixels, once they were."""
     device_time_s: float
     """Start of the first exposure, by the camera's clock."""
     host_time_s: float

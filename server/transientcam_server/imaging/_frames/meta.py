@@ -28,6 +28,7 @@ def frame_meta(
         "calibration_id": calibration_id(recipe.gains),
         "reconstruction_id": recipe.settings_version,
         "estimator": recipe.technique,
+        "neighbours": None if found is None else found.settings.neighbours,
         "device_time_s": raw.device_time_s,
         "host_time_s": raw.host_time_s,
         "captured_unix_s": raw.captured_unix_s,

@@ -140,7 +140,8 @@ class Recipe:
     def kernels(self) -> tuple[str, ...]:
         """Names of the kernels that its frames take longest without, the most urgent first."""
         harmonics = () if self.waveform is None else ("harmonics",)
-        return (*_KERNELS_OF.get(self.technique, ()), "reconstruct", *harmonics)
+        averaging = ("neighbours",) if self.settings.neighbours == "edge-preserving" else ()
+        return (*_KERNELS_OF.get(self.technique, ()), *averaging, "reconstruct", *harmonics)
 
     @property
     def waveform(self) -> NDArray[Any] | None:
