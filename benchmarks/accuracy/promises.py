@@ -1,120 +1,326 @@
-"""Plans held to what they promise: predicted against measured noise, bias and error.
+"""Plans held to what they promise, by the camera that they are for.
 
-Every scene is looked at once; every goal is planned, and what is recommended is captured by another
-sample of noise and compared with the truth of the simulation.
+A scene is looked at, or one frame of it is taken; each target is planned for 90 % of the pixels,
+and captured with other noise and a calibration of its own sequence. A grid of sequences, with every
+estimator, is captured beside it: the quickest of it that truly reaches a target.
 """
 
+import math
 import os
-import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from benchmarks.accuracy.capturing import OUTLIER_ERRORS, dimmest_dn_per_s, looked, measured
-from benchmarks.accuracy.kept import PlanOutcome, Refused, expectations, table
-from benchmarks.accuracy.prices import SCENES as BUILT_IN
-from benchmarks.common.measured_scenes import data_folder
-from benchmarks.common.tables import Table
+import numpy as np
+from numpy.typing import NDArray
+
+import transientcam_moments as tm
+from benchmarks.accuracy.capturing import CAPTURE_SEED, LOOK_SEED, PIXELS, SETTINGS
+from benchmarks.accuracy.held import SHARE, Outcome, tables_of
+from benchmarks.common.tables import Table, heads
+from transientcam_driver import Camera, Sequence, capture_calibration, open_camera
+from transientcam_driver.clock import Clock, RealClock, VirtualClock
+from transientcam_experiments.tradeoff.capture import capture
+from transientcam_server.camera import sensor_of, start_with
 from transientcam_server.errors import Problem
-from transientcam_server.planning import Goal
-from transientcam_server.planning._search.choice import Choice
+from transientcam_server.imaging import (
+    Gains,
+    Recipe,
+    evaluate,
+    factory_gains,
+    ranges_m,
+    typical_deviation,
+)
+from transientcam_server.imaging._errors_of_range.noise import moment_noise
+from transientcam_server.planning import (
+    ESTIMATORS,
+    Goal,
+    Planner,
+    SceneStatistics,
+    takes_of,
+)
+from transientcam_server.planning._scene.look import look_of_frame
+from transientcam_server.planning._search.families import FREQUENCY_FACTORS, HARMONICS
+from transientcam_server.settings import SensorSettings, SequenceSettings
 
-OWN = Path(__file__).parent / "scenes"
-GOALS: Final = {
-    "20 mm": Goal(range_error_m=0.020, share=None),
-    "5 mm": Goal(range_error_m=0.005, share=None),
-    "2 mm": Goal(range_error_m=0.002, share=None),
-    "15 Hz": Goal(frame_rate_hz=15.0, share=None),
-    "0.2 s": Goal(capture_s=0.2, share=None),
+OWN: Final = Path(__file__).parent / "scenes"
+CAPTURES: Final = 8
+_COLD_S: Final = 5.0
+_WARM_S: Final = 1500.0
+_WARMS_S: Final = 20.0
+_CALIBRATION_TAKES: Final = 16
+_FILLED: Final = 0.6
+
+
+@dataclass(frozen=True)
+class Device:
+    """A camera before a scene, and how it is planned for."""
+
+    spec: str
+    scenes: tuple[str, ...]
+    targets_m: tuple[float, ...]
+    one_frame: bool = False
+    ideal: bool = False
+    warmer_c: float = 0.0
+    """Than at its calibration."""
+
+
+_OWN_SCENES: Final = ("wall", "corner", "mirrors", str(OWN / "yard.toml"), str(OWN / "alcove.toml"))
+_FEW: Final = ("wall", "corner", "mirrors")
+_PROTOTYPE: Final = "sim:{scene}?device=prototype&seed={seed}"
+DEVICES: Final = {
+    "ideal": Device("sim:{scene}?seed={seed}", _OWN_SCENES, (0.05, 0.02, 0.005), ideal=True),
+    "prototype": Device(_PROTOTYPE, _OWN_SCENES, (0.05, 0.02, 0.01)),
+    "prototype, 10 °C warmer": Device(_PROTOTYPE, _OWN_SCENES, (0.05, 0.02, 0.01), warmer_c=10.0),
+    "relay": Device("sim:{scene}?seed={seed}", _FEW, (0.05, 0.02, 0.005), True, True),
+    "TOFcam660": Device(
+        "tofcam660:emulated?scene={scene}&settle_s=0&seed={seed}", _FEW, (0.1, 0.05, 0.02), True
+    ),
+    "OPT8241": Device("opt8241:emulated?scene={scene}&seed={seed}", _FEW, (0.1, 0.05, 0.02), True),
 }
-
-
-def all_scenes() -> list[str]:
-    """Return all scenes there are: built in, of the tests' data, and of this folder."""
-    folders = [(data_folder() or OWN) / "scenes", OWN]
-    return [*BUILT_IN, *(str(path) for each in folders for path in sorted(each.glob("*.toml")))]
+KINECT: Final = Device("kinect2:emulated?scene={scene}&seed={seed}", _FEW, (), True)
 
 
 def tables(
-    *,
-    scenes: tuple[str, ...] = (),
-    quick: bool = False,
-    captures: int = 30,
-    processes: int = os.cpu_count() or 1,
+    *, devices: tuple[str, ...] = (), processes: int = os.cpu_count() or 1
 ) -> Iterator[Table]:
-    """Plan and capture on all scenes, or those named; ``quick``: two goals."""
-    goals = {name: GOALS[name] for name in ("5 mm", "0.2 s")} if quick else GOALS
-    rows, refused = all_kept(scenes or all_scenes(), goals, captures, processes=processes)
-    yield Table("What to expect", text=expectations(rows))
-    yield table(rows, refused)
-
-
-def kept(scene: str, goals: dict[str, Goal], captures: int) -> Iterator[PlanOutcome | Refused]:
-    """Plan all goals on a scene, and measure what is recommended."""
-    name = Path(scene).stem
-    try:
-        planner, statistics = looked(scene)
-    except Problem as problem:
-        yield Refused(name, "look", problem.detail)
-        return
-    for wanted, goal in goals.items():
-        begin_s = time.process_time()
-        try:
-            best = planner.plan(goal, statistics).recommended
-        except Problem as problem:
-            yield Refused(name, wanted, problem.detail)
-            continue
-        planned_in_s = time.process_time() - begin_s
-        values, device_s, full = measured(
-            scene, best.applied.sequence, best.estimator, captures, dimmest_dn_per_s(statistics)
-        )
-        yield PlanOutcome(
-            name,
-            wanted,
-            goal.range_error_m,
-            best.in_words(),
-            best.applied.capture_s,
-            device_s,
-            _predicted(best),
-            (best.predicted.range_error.low, best.predicted.range_error.high),
-            values,
-            full,
-            planned_in_s,
-            best.predicted.bias_known,
-        )
-
-
-def _predicted(choice: Choice) -> dict[str, float]:
-    predicted = choice.predicted
-    return {
-        "std": predicted.range_std.median,
-        "bias": predicted.range_bias_m,
-        "error": predicted.range_error.median,
-        "outliers": 1 - predicted.share_within(OUTLIER_ERRORS * predicted.range_error.median),
-    }
-
-
-def all_kept(
-    names: Iterable[str], goals: dict[str, Goal], captures: int, *, processes: int
-) -> tuple[list[PlanOutcome], list[Refused]]:
-    """Measure scenes, several at once, and print each plan as soon as its scene is done."""
-    rows: list[PlanOutcome] = []
-    refused: list[Refused] = []
-    of_scene = partial(_listed, goals=goals, captures=captures)
+    """Plan and capture with all cameras, or those named."""
+    work = [(name, scene) for name in devices or DEVICES for scene in DEVICES[name].scenes]
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        for found in pool.map(of_scene, names):
-            for each in found:
-                if isinstance(each, PlanOutcome):
-                    rows.append(each)
-                    print(*each.row(), f"{each.planned_in_s:.1f} s", flush=True)
-                else:
-                    refused.append(each)
-                    print(f"{each.scene}, {each.goal}: {each.why}", flush=True)
-    return rows, refused
+        found = [each for kept in pool.map(held, *zip(*work, strict=True)) for each in kept]
+        yield from tables_of(found)
+        if not devices:
+            rows = [each for kept in pool.map(held_takes, KINECT.scenes) for each in kept]
+            columns = heads("scene | takes | predicted, mm:.2f | captured, mm:.2f")
+            yield Table("What takes give: Kinect v2", columns, rows)
 
 
-def _listed(scene: str, goals: dict[str, Goal], captures: int) -> list[PlanOutcome | Refused]:
-    return list(kept(scene, goals, captures))
+@contextmanager
+def opened(device: Device, scene: str, seed: int) -> Iterator[tuple[Camera, Clock]]:
+    """Open a camera some seconds after power-up, with the sequence that a daemon begins with."""
+    simulated = device.spec.startswith("sim:")  # what is emulated answers over real sockets
+    clock = VirtualClock() if simulated else RealClock()
+    with open_camera(device.spec.format(scene=scene, seed=seed), clock=clock) as camera:
+        start_with(camera, SequenceSettings())
+        if simulated:
+            clock.sleep(_COLD_S if device.ideal or device.warmer_c else _WARM_S)
+        yield camera, clock
+
+
+def held(name: str, scene: str) -> list[Outcome]:
+    """Plan all targets before a scene, and capture what is recommended, and the grid."""
+    device, word = DEVICES[name], Path(scene).stem
+    plans: list[tuple[float, Any]] = []
+    with opened(device, scene, LOOK_SEED) as (camera, clock):
+        planner = Planner(camera.capabilities, _sensor(camera), SETTINGS)
+        statistics = _seen(device, planner, camera, clock)
+        base = camera.applied.sequence if device.one_frame else Sequence()
+        for target_m in device.targets_m:
+            try:
+                goal = Goal(range_error_m=target_m, share=SHARE, base=base)
+                plans.append((target_m, planner.plan(goal, statistics).recommended))
+            except Problem as problem:
+                plans.append((target_m, problem))
+        longest_s = _sensor(camera).brightest / statistics.brightest_dn_per_s
+        grid = list(_grid(camera, base, 0.9 * longest_s))
+    dimmest = float(statistics.brightness_dn_per_s.min())
+    chosen = [each for _, each in plans if not isinstance(each, Problem)]
+    sequences = [*(each.applied.sequence for each in chosen), *grid]
+    captured = list(_captured(device, scene, sequences, dimmest))
+    of_grid = [found for each in captured[len(chosen) :] for found in each.every()]
+    outcomes, of_plans = [], iter(captured)
+    for target_m, plan in plans:
+        reaching = [each_s for each_s, off_m in of_grid if (off_m <= target_m).mean() >= SHARE]
+        quickest_s = min(reaching, default=math.inf)
+        if isinstance(plan, Problem):
+            refused = bool(plan.extensions.get("decided", True))
+            best = f"best {1e3 * plan.extensions['limit']:.3g} mm"
+            said = f"{'refused' if refused else 'undecided'}: {best}"
+            outcomes.append(
+                Outcome(name, word, target_m, said, quickest_s=quickest_s, refused=refused)
+            )
+            continue
+        off_m = next(of_plans).off_m(plan.estimator)
+        within = plan.predicted.within
+        outcomes.append(
+            Outcome(
+                name,
+                word,
+                target_m,
+                plan.in_words(),
+                plan.applied.capture_s,
+                (within.median, within.low, within.high),
+                float(np.quantile(off_m, SHARE, method="higher")),
+                float((off_m <= target_m).mean()),
+                plan.predicted.bias_known,
+                quickest_s,
+            )
+        )
+    for each in outcomes:
+        print(*each.row(), flush=True)
+    return outcomes
+
+
+def held_takes(scene: str) -> list[tuple[Any, ...]]:
+    """Predict by one frame what takes give, and capture them."""
+    rows = []
+    with opened(KINECT, scene, CAPTURE_SEED) as (camera, _):
+        camera.configure(replace(camera.applied.sequence, takes=1))
+        recipe = _recipe(camera, factory_gains(camera.factory))
+        (frame,) = capture(camera, 1)
+        for each in takes_of(frame.raw, recipe, camera.capabilities, takes=(1, 4, 16)):
+            camera.configure(replace(camera.applied.sequence, takes=each.takes))
+            plain = replace(recipe, applied=camera.applied)
+            plain = replace(plain, settings=SETTINGS.model_copy(update={"neighbours": "none"}))
+            found = np.stack([plain.reconstruct(each.raw).range_m for each in capture(camera, 4)])
+            std_m = typical_deviation(found.reshape((len(found), -1)))
+            std_m = std_m[np.isfinite(std_m) & (std_m > 0)]
+            rows.append((scene, each.takes, 1e3 * each.range_std_m, 1e3 * float(np.median(std_m))))
+    return rows
+
+
+def _sensor(camera: Camera) -> tm.noise.Sensor:
+    return sensor_of(camera, SensorSettings())
+
+
+def _recipe(camera: Camera, gains: Gains | None) -> Recipe:
+    sensor = _sensor(camera)
+    return Recipe(camera.applied, SETTINGS, float(sensor.highest_dn), gains, sensor=sensor)
+
+
+def _seen(device: Device, planner: Planner, camera: Camera, clock: Clock) -> SceneStatistics:
+    if not device.one_frame:
+        calibrated_c = _temperature_c(camera)
+        _warm(device, camera, clock)
+        return planner.look(camera, Sequence(), calibrated_c=calibrated_c)
+    recipe = _recipe(camera, None if device.ideal else _calibrated(camera))
+    (frame,) = capture(camera, 1)
+    return look_of_frame(recipe, recipe.reconstruct(frame.raw), frame.raw, None)
+
+
+def _temperature_c(camera: Camera) -> float:
+    (frame,) = capture(camera, 1)
+    return frame.raw.temperature_c or 0.0
+
+
+def _warm(device: Device, camera: Camera, clock: Clock) -> None:
+    """Wait until the device is so much warmer."""
+    if device.warmer_c:
+        until_c = _temperature_c(camera) + device.warmer_c
+        while _temperature_c(camera) < until_c:
+            clock.sleep(_WARMS_S)
+
+
+def _calibrated(camera: Camera) -> Gains:
+    """Calibrate the present sequence through the simulation's diffuser."""
+    before, about, sensor = camera.applied.sequence, camera.capabilities, _sensor(camera)
+    assert camera.simulation is not None
+    camera.simulation.change(diffuser=True)
+    camera.configure(about.nearest(replace(before, exposure_s=about.min_exposure_s, takes=1)))
+    (frame,) = capture(camera, 1)
+    light_dn = float(frame.raw.images.max()) - sensor.dark_dn
+    fills_s = camera.applied.sequence.exposure_s * _FILLED * sensor.brightest / max(light_dn, 1.0)
+    exposure_s = min(max(fills_s, about.min_exposure_s), about.max_exposure_s, 0.02)
+    camera.configure(about.nearest(replace(before, exposure_s=exposure_s, takes=1)))
+    measured = capture_calibration(camera, takes=_CALIBRATION_TAKES, average=tm.average_takes)
+    camera.simulation.change(diffuser=False)
+    camera.configure(before)
+    return evaluate(measured).gains
+
+
+def _grid(camera: Camera, base: Sequence, longest_s: float) -> Iterator[Sequence]:
+    """Yield sequences of the most harmonics: the others are parts of them."""
+    about = camera.capabilities
+    shortest_s = max(2e-4, about.min_exposure_s)
+    longest_s = max(min(longest_s, about.max_exposure_s), shortest_s)
+    for factor in FREQUENCY_FACTORS:
+        frequency_hz = factor * base.base_frequency_hz
+        most = [m for m in HARMONICS if m * frequency_hz <= about.max_frequency_hz]
+        if not most or frequency_hz < about.min_frequency_hz:
+            continue
+        for exposure_s, takes in (
+            (shortest_s, 1),
+            (math.sqrt(shortest_s * longest_s), 1),
+            (longest_s, 1),
+            (longest_s, 4),
+        ):
+            yield about.nearest(
+                replace(
+                    base,
+                    base_frequency_hz=frequency_hz,
+                    harmonics=most[-1],
+                    exposure_s=exposure_s,
+                    takes=takes,
+                    zeroth="estimated",
+                )
+            )
+
+
+@dataclass(frozen=True)
+class Captured:
+    """Smoothed moments and their variance (m + 1, K P) of captures, and the truth (K P) in m."""
+
+    camera: Any
+    sequence: Sequence
+    moments: NDArray[Any]
+    variance: NDArray[Any]
+    true_m: NDArray[Any]
+
+    def off_m(self, estimator: str, harmonics: int | None = None) -> NDArray[Any]:
+        """Return how far ranges (K P) are off, by the first harmonics; infinite without one."""
+        m = len(self.moments) if harmonics is None else harmonics + 1
+        frequency_hz = self.sequence.base_frequency_hz
+        found = self.moments[:m], self.variance[:m]
+        range_m = ranges_m(*found, estimator, frequency_hz, SETTINGS)
+        return np.nan_to_num(np.abs(range_m - self.true_m), nan=math.inf)
+
+    def every(self) -> Iterator[tuple[float, NDArray[Any]]]:
+        """Yield time and errors (K P) in m of each part with each estimator."""
+        for m in HARMONICS:
+            if m < len(self.moments):
+                taken_s = self.camera.apply(replace(self.sequence, harmonics=m)).capture_s
+                for estimator in ESTIMATORS if m > 1 else ("single-frequency",):
+                    if m > 1 or estimator == "single-frequency":
+                        yield taken_s, self.off_m(estimator, m)
+
+
+def _captured(
+    device: Device, scene: str, sequences: list[Sequence], dimmest: float
+) -> Iterator[Captured]:
+    """Calibrate for all sequences, and capture each."""
+    pixels = None
+    with opened(device, scene, CAPTURE_SEED) as (camera, clock):
+        gains: dict[tuple[float, int], Gains | None] = {}
+        for each in sequences:
+            key = each.base_frequency_hz, each.harmonics
+            if key not in gains:
+                camera.configure(each)
+                gains[key] = None if device.ideal else _calibrated(camera)
+        _warm(device, camera, clock)
+        for sequence in sequences:
+            applied = camera.configure(sequence)
+            recipe = _recipe(camera, gains[sequence.base_frequency_hz, sequence.harmonics])
+            parts = []
+            for frame in capture(camera, CAPTURES, middle=True):
+                truth = frame.truth
+                if pixels is None:
+                    enough = truth.brightness >= max(1e-12, dimmest * sequence.exposure_s)
+                    lit = np.flatnonzero(truth.lit & enough)
+                    random = np.random.default_rng(1)
+                    pixels = random.choice(lit, min(PIXELS // 2, lit.size), replace=False)
+                found = recipe.reconstruct(frame.raw)
+                b = tm.smooth(np.asarray(found.measured), SETTINGS.smoothing_px)
+                variance = np.asarray(moment_noise(recipe, found).variance)
+                of_pixels = (
+                    np.broadcast_to(each, b.shape).reshape((len(b), -1))[:, pixels]
+                    for each in (b, variance)
+                )
+                parts.append((*of_pixels, truth.range_m.ravel()[pixels]))
+            b, variance, true_m = (
+                np.concatenate(each, axis=-1) for each in zip(*parts, strict=True)
+            )
+            yield Captured(camera.capabilities, applied.sequence, b, variance, true_m)

@@ -419,12 +419,13 @@ def _out_of_step(b: _Array, share: float, takes: int, random: np.random.Generato
     """Return moments (m + 1, draws, P) of captures of which images lost their synchronisation.
 
     Nothing tells such an image among the four of one frequency: for a part of the exposure, taken
-    as uniform from 0 to 1, its phase is a random one.
+    as uniform from 0 to 1, its phase is a random one. Losses of each pixel are drawn by
+    themselves: few draws of whole images would miss how many there are.
     """
-    shape = takes, b.shape[1], len(FOUR_PHASES)
+    shape = takes, *b.shape[1:], len(FOUR_PHASES)
     part = random.uniform(size=shape) * (random.uniform(size=shape) < share)
     turned = 1 - part + part * np.exp(2j * np.pi * random.uniform(size=shape))
-    seen = np.real(b[1][..., None] * turned.mean(axis=0)[:, None] / FOUR_PHASES)
+    seen = np.real(b[1][..., None] * turned.mean(axis=0) / FOUR_PHASES)
     out: _Array = b.copy()
     out[1] = (seen * FOUR_PHASES).sum(axis=-1) / 2
     return out

@@ -250,9 +250,13 @@ def look_at(
     )
     gains, lost_share = calibrated(fine_sequence)
     exposure_s = filling_s(coarse_sequence)
-    coarse_sequence = replace(coarse_sequence, exposure_s=exposure_s, takes=TAKES)
+    # one frequency alone does not tell which image lost its synchronisation
+    takes, several = (2 * TAKES, 2) if lost_share else (TAKES, 1)
+    coarse_sequence = replace(coarse_sequence, exposure_s=exposure_s, takes=takes)
     fine_sequence = replace(fine_sequence, exposure_s=exposure_s)
-    quick_sequence = replace(fine_sequence, base_frequency_hz=2 * fine_hz, harmonics=1, takes=1)
+    quick_sequence = replace(
+        fine_sequence, base_frequency_hz=2 * fine_hz, harmonics=several, takes=1
+    )
     quick = [captured(quick_sequence, 2, "motion").averages()]
     coarse = captured(coarse_sequence, 1, "coarse range")
     sums = captured(fine_sequence, 1, "all frequencies", gains=gains)

@@ -10,7 +10,7 @@ from transientcam_driver import AppliedSequence, Capabilities, Sequence, Sequenc
 from transientcam_moments.comparisons import TECHNIQUES
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging import listed
-from transientcam_server.planning._prediction.prediction import Predictor
+from transientcam_server.planning._prediction.prediction import OUTVOTED, Predictor
 from transientcam_server.planning._scene.estimation import MOST_HARMONICS, SEARCHED
 from transientcam_server.planning._search.goal import Goal
 from transientcam_server.planning._search.pareto import front
@@ -105,9 +105,11 @@ def families(goal: Goal, predictor: Predictor, capabilities: Capabilities) -> li
         for each_s in exposures_s
         for zeroth in _zeroths(goal)
     }
+    steady = _steady_takes(goal, scene.lost_share)
     found = [
-        Family(estimator, sequence, _members(goal, sequence, scales, capabilities), capabilities)
+        Family(estimator, sequence, members, capabilities)
         for sequence, estimator in clear
+        if (members := _members(goal, sequence, scales, capabilities, steady))
     ]
     # short captures first: what they reach rules out most of the longer ones
     return sorted(found, key=lambda family: family.members[0].capture_s)
@@ -165,15 +167,29 @@ def _frequencies(goal: Goal) -> Iterator[tuple[Sequence, str]]:
         yield replace(base, harmonics=m, base_frequency_hz=frequency_hz, zeroth=zeroth), estimator
 
 
+def _steady_takes(goal: Goal, lost_share: float) -> tuple[int, ...]:
+    """Return how many takes of one frequency suit a camera that loses so many of its images.
+
+    Fewer than `OUTVOTED` are spoilt by each: not where more captures hold one than may miss a goal.
+    """
+    whole = [(1 - lost_share) ** (4 * each) for each in TAKES]
+    least = 0.5 if goal.share is None else goal.share
+    return tuple(
+        each for each, of in zip(TAKES, whole, strict=True) if each >= OUTVOTED or of >= least
+    )
+
+
 def _members(
     goal: Goal,
     sequence: Sequence,
     scales: dict[tuple[float, str], float],
     capabilities: Capabilities,
+    steady: tuple[int, ...],
 ) -> tuple[Member, ...]:
-    takes = (goal.base.takes,) if "takes" in goal.fixed else TAKES
     images = sequence.images_per_take
     most_takes = min(capabilities.max_takes, capabilities.max_images // images)
+    takes = steady if sequence.harmonics == 1 and steady[0] <= most_takes else TAKES
+    takes = (goal.base.takes,) if "takes" in goal.fixed else takes
     settling_s = {
         each: capabilities.settle_s * replace(sequence, takes=each).frequency_changes
         for each in takes
