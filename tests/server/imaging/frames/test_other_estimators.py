@@ -151,6 +151,7 @@ def test_a_daemon_offers_them_and_its_other_products_go_on() -> None:
             ):
                 camera.frame("range")
             later = next(iter(frames))
+        pixel = http.get("/frames/latest/pixel", params={"x": 80, "y": 60}).json()
         refused = http.put("/reconstruction", json={"estimator": "absent"})
 
     (allowed,) = (e["allowed"] for e in described if e["name"] == "reconstruction.estimator")
@@ -160,6 +161,8 @@ def test_a_daemon_offers_them_and_its_other_products_go_on() -> None:
     assert "not_there" in info["absent"]["unusable"]
     assert np.nanmedian(np.abs(frame.array - truth_m)) < 1e-3
     assert later.meta["frame"] > first.meta["frame"]
+    assert pixel["range_m"] is None
+    assert max(pixel["cumulative"]) > 0
     assert refused.status_code == 409
     assert "package_that_is_not_there" in refused.json()["detail"]
 
