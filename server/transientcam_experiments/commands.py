@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -291,6 +291,15 @@ def compare(
         raise typer.Exit(code=1)
 
 
+_COLUMNS: Final = {
+    "range_median_m": 1e3,
+    "range_p90_m": 1e3,
+    "range_outliers": 100.0,
+    "range_missing": 100.0,
+    "seconds": 1e3,
+}
+
+
 def _compared(found: "list[Compared]") -> str:
     """Return a table: a block a scene, a line an estimator, the smallest errors first."""
     lines = []
@@ -300,11 +309,9 @@ def _compared(found: "list[Compared]") -> str:
         here = [each for each in found if each.scene == scene]
         for each in sorted(here, key=lambda one: one.values.get("range_median_m") or 1e9):
             v = each.values
-            scaled = (("range_median_m", 1e3), ("range_p90_m", 1e3), ("range_outliers", 100))
-            scaled = (*scaled, ("range_missing", 100), ("seconds", 1e3))
             figures = " ".join(
                 f"{'-':>8}" if v.get(key) is None else f"{(v[key] or 0.0) * factor:8.3g}"
-                for key, factor in scaled
+                for key, factor in _COLUMNS.items()
             )
             lines.append(f"  {each.estimator:<18} {each.failed or figures}")
     return "\n".join(lines)

@@ -87,7 +87,8 @@ def measure(
         name = technique.name
         if name in TECHNIQUES:
             return np.asarray(technique.estimate(b).first_phase_rad())
-        return separated(name, b, variance, frequencies_hz, DIRECT_THRESHOLD).phase_rad
+        found = separated(name, b, variance, frequencies_hz, DIRECT_THRESHOLD)
+        return np.asarray(found.phase_rad)
 
     phase = first_rad(sample, of_sample)  # fills caches, too
     whole, known = (scene.moments, variance) if technique.planar else (sample, of_sample)

@@ -96,8 +96,8 @@ def separated(
     there = np.isfinite(direct) & np.isfinite(indirect) & np.isfinite(phase)
     if (b[0].real > 0).any() and not there.any():
         raise EstimatorFailed(name, "it has no finite phase and light in any pixel")
-    lit = (np.where(there, part, 0) for part in (direct, indirect))
-    return Separation(*lit, np.remainder(np.where(there, phase, np.nan), 2 * np.pi))
+    direct, indirect = np.where(there, direct, 0), np.where(there, indirect, 0)
+    return Separation(direct, indirect, np.remainder(np.where(there, phase, np.nan), 2 * np.pi))
 
 
 SEPARATORS: list[Separate] = [separated]

@@ -39,6 +39,7 @@ def checks(config: Path | None = None) -> Iterator[Reported]:
     yield from _libraries()
     yield _kernels()
     yield _supervisor()
+    yield from _estimators()
     try:
         settings = load_settings({}, file=config, environment=os.environ)
     except SettingsError as error:
@@ -74,6 +75,14 @@ def _libraries() -> Iterator[Reported]:
         else:
             found.append(f"{name} {version(name)}")
     yield "ok", "packages", ", ".join(found), None
+
+
+def _estimators() -> Iterator[Reported]:
+    for name, found in tm.comparisons.statements().items():
+        if isinstance(found, tm.EstimatorFailed):
+            yield "warning", "estimators", str(found), "docs/add-an-estimator.md"
+        else:
+            yield "ok", "estimators", f"{name}, of another package: {found.label}", None
 
 
 def _kernels() -> Reported:

@@ -71,10 +71,10 @@ def _kernels(recipe: Recipe) -> InfoDocument.KernelsDocument | None:
 def _estimator(
     name: str, found: comparisons.Technique | tm.EstimatorFailed
 ) -> InfoDocument.EstimatorDocument:
-    failed = isinstance(found, tm.EstimatorFailed)
-    stated = {each: None if failed else getattr(found, each) for each in _STATED}
+    stated = {each: getattr(found, each, None) for each in _STATED}  # a failure states nothing
+    unusable = found.reason if isinstance(found, tm.EstimatorFailed) else None
     return InfoDocument.EstimatorDocument.model_validate(
-        {"name": name, "unusable": found.reason if failed else None} | stated
+        {"name": name, "unusable": unusable} | stated
     )
 
 

@@ -77,11 +77,8 @@ def describe_pixel(
     return {
         "x": x,
         "y": y,
-        "range_m": None if flags & tm.INVALID else _number(image.range_m[at]),
-        "direct": _number(image.direct[at]) or 0.0,
-        "indirect": _number(image.indirect[at]) or 0.0,
+        **_separated(image, at, flags),
         "brightness": _number(image.brightness[at]) or 0.0,
-        "uniform": _number(image.uniform[at]) or 0.0,
         "validity": _number(image.validity[y, x]),
         "flags": [str(flag.name).lower() for flag in tm.Flags if flag and flag in flags],
         "moments": [
@@ -103,6 +100,17 @@ def describe_pixel(
         },
         "truth": None if truth is None else _describe_truth(truth, x, y),
     }
+
+
+def _separated(image: tm.Reconstruction, at: tuple[Any, ...], flags: tm.Flags) -> dict[str, Any]:
+    """Return what the estimator finds; as of a pixel without a range where it fails."""
+    light = ("direct", "indirect", "uniform")
+    try:
+        found: dict[str, Any] = {each: _number(getattr(image, each)[at]) or 0.0 for each in light}
+        range_m = None if flags & tm.INVALID else _number(image.range_m[at])
+    except tm.EstimatorFailed:
+        return {"range_m": None, **dict.fromkeys(light, 0.0)}
+    return {"range_m": range_m, **found}
 
 
 def _describe_truth(truth: Truth, x: int, y: int) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from transientcam.errors import ProblemError
 from transientcam_moments import comparisons
 from transientcam_moments.comparisons import _plugins as plugins
 from transientcam_server.api import _parameters as parameters
+from transientcam_server.daemon import _doctor as doctor
 from transientcam_server.imaging import OtherEstimators
 
 EXAMPLE = ROOT / "examples" / "matched_filter"
@@ -151,6 +152,7 @@ def test_a_daemon_offers_them_and_its_other_products_go_on() -> None:
             ):
                 camera.frame("range")
             later = next(iter(frames))
+        pixel = http.get("/frames/latest/pixel", params={"x": 80, "y": 60}).json()
         refused = http.put("/reconstruction", json={"estimator": "absent"})
 
     (allowed,) = (e["allowed"] for e in described if e["name"] == "reconstruction.estimator")
@@ -160,8 +162,18 @@ def test_a_daemon_offers_them_and_its_other_products_go_on() -> None:
     assert "not_there" in info["absent"]["unusable"]
     assert np.nanmedian(np.abs(frame.array - truth_m)) < 1e-3
     assert later.meta["frame"] > first.meta["frame"]
+    assert pixel["range_m"] is None
+    assert max(pixel["cumulative"]) > 0
     assert refused.status_code == 409
     assert "package_that_is_not_there" in refused.json()["detail"]
+
+
+def test_the_doctor_says_which_can_be_used() -> None:
+    found = {message: level for level, _, message, _ in doctor._estimators()}
+
+    assert found["matched-filter, of another package: matched filter"] == "ok"
+    (why,) = (each for each in found if "package_that_is_not_there" in each)
+    assert found[why] == "warning"
 
 
 def test_a_recording_is_reconstructed_by_it(
