@@ -47,7 +47,7 @@ async def _patiently(hub: Hub, *, after: int, wait_s: float) -> Frame:
 
 
 Hub.newest = _patiently  # type: ignore[method-assign]
-_PATIENT: tuple[Callable[..., Any], ...] = (
+_PATIENT: tuple[Any, ...] = (
     *(transientcam.Camera.__init__, transientcam.AsyncCamera.__init__, RemoteFile.__init__),
     *(transientcam.open, remote_recording),
 )
