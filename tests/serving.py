@@ -18,6 +18,7 @@ from transientcam.opening import remote_recording
 from transientcam.remote_file import RemoteFile
 from transientcam_driver import Camera, open_camera
 from transientcam_driver.clock import Clock
+from transientcam_server import service
 from transientcam_server.api import build_app
 from transientcam_server.broadcast import Hub
 from transientcam_server.camera import _acquisition as acquisition
@@ -47,7 +48,7 @@ async def _patiently(hub: Hub, *, after: int, wait_s: float) -> Frame:
 
 
 Hub.newest = _patiently  # type: ignore[method-assign]
-_PATIENT: tuple[Callable[..., Any], ...] = (
+_PATIENT: tuple[Any, ...] = (
     *(transientcam.Camera.__init__, transientcam.AsyncCamera.__init__, RemoteFile.__init__),
     *(transientcam.open, remote_recording),
 )
@@ -127,6 +128,8 @@ def serving(
         TemporaryDirectory() as state,
         # nor is a camera taken for stalled that a laden machine leaves waiting for two seconds
         mock.patch.object(acquisition, "STALLED_MIN_S", _PATIENT_S),
+        # nor are streams cut at the end before their clients have the reason
+        mock.patch.object(service, "_CLOSING_S", _PATIENT_S),
     ):
         usual: dict[str, Any] = {"port": 0, "log_level": "warning", "capture_at_start": True}
         usual |= {"calibrations": {"directory": state}}

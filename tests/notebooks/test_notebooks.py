@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import marimo
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from matplotlib import pyplot as plt
 
 from tests.conftest import ROOT
+from tests.server.planning.calls import Here
 from tests.serving import Served, serving
 from tests.waiting import wait_until
 from transientcam import Camera
@@ -28,7 +30,9 @@ def served() -> Iterator[Served]:
         camera.sequence = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
         with camera.stream("range") as stream:
             stream.receive()
-        yield daemon
+        # its own process has the lowest priority, and waits for all that a laden machine does
+        with mock.patch.object(daemon.service.planning, "_process", Here()):
+            yield daemon
 
 
 @pytest.fixture(autouse=True)

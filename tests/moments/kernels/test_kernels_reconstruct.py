@@ -259,7 +259,7 @@ def test_a_measured_scan_is_reconstructed_alike(data_dir: Path, smoothing_px: fl
     with np.load(data_dir / "measured" / "scene_letter_s.npz") as file:
         counts, bin_s = file["meas"].astype(float), float(file["bin_s"])
     time_s = bin_s * np.arange(counts.shape[-1])
-    turn = np.exp(2j * np.pi * 100e6 * np.arange(5)[:, None] * time_s)
+    turn = np.exp(2j * np.pi * 100e6 * np.arange(M + 1)[:, None] * time_s)
     b = np.einsum("yxt,jt->jyx", counts, turn) * (2000 / counts.sum(axis=-1).max())
     settings = settings_of(base_frequency_hz=100e6, smoothing_sigma_px=smoothing_px)
     images = digitised(b, str(settings.zeroth))

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
+from unittest import mock
 
 import httpx
 import pytest
@@ -24,7 +25,9 @@ FEW = ["--fix", "harmonics=1", "--fix", "base_frequency_hz=23e6"]
 def daemon() -> Iterator[Served]:
     with serving("sim:wall?seed=2") as served:
         served.start_all_workers()
-        yield served
+        # its own process has the lowest priority, and waits for all that a laden machine does
+        with mock.patch.object(served.service.planning, "_process", Here()):
+            yield served
 
 
 @pytest.fixture
@@ -40,9 +43,8 @@ def kept(daemon: Served, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.fixture
 def few_families(daemon: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Search one family in this process, so that a front takes a second."""
+    """Search one family, so that a front takes a second."""
     families = import_module("transientcam_server.planning._search.families")  # not the function
-    monkeypatch.setattr(daemon.service.planning, "_process", Here())
     monkeypatch.setattr(families, "HARMONICS", (1,))
 
 
@@ -131,7 +133,6 @@ def test_an_interrupt_cancels_the_job_of_the_daemon(
     what: str, daemon: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     work = Endless()
-    monkeypatch.setattr(daemon.service.planning, "_process", Here())
     monkeypatch.setattr(daemon.service.planner, f"{what}_document", work)
     monkeypatch.setattr(daemon.service.planner, "look", lambda *_, **__: None)
 
@@ -159,7 +160,6 @@ def test_a_command_that_is_ended_cancels_the_job_and_the_next_is_not_held_up(
     daemon: Served, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     work = Endless()
-    monkeypatch.setattr(daemon.service.planning, "_process", Here())
     monkeypatch.setattr(daemon.service.planner, "look", lambda *_, **__: None)
     main = "from transientcam.cli import main; main()"
     command = [sys.executable, "-c", main, "plan", "--daemon", daemon.url]

@@ -17,7 +17,6 @@ from tests.serving import serving
 
 CONFIG = Path(__file__).with_name("schemathesis.toml")
 PROGRAM = "from schemathesis.cli import schemathesis; schemathesis()"
-CAMERA = "sim:wall?noise=off&width=112&height=80"  # so large as the regions of examples need
 ENDLESS = "mjpeg"
 NOT_RECORDINGS = "mjpeg|calibrations|jobs|frames"
 STILL_THERE = "Deleted resource still available"
@@ -63,7 +62,7 @@ def in_its_own_process(*arguments: str, directory: Path) -> "subprocess.Complete
 
 def test_every_answer_is_a_documented_one(tmp_path: Path) -> None:
     recordings = {"directory": tmp_path / "recordings", "min_free_bytes": 0}
-    with serving(CAMERA, recordings=recordings) as daemon:
+    with serving("sim:wall?noise=off", recordings=recordings) as daemon:
         result = fuzz(daemon.url, tmp_path, "--exclude-path", "/api/v1/simulation/faults")
         with httpx.Client(base_url=daemon.url) as client:
             alive = client.get("/livez").status_code
@@ -80,7 +79,7 @@ def test_every_answer_is_a_documented_one(tmp_path: Path) -> None:
 
 def test_a_camera_that_is_unplugged_answers_with_documented_problems(tmp_path: Path) -> None:
     recordings = {"directory": tmp_path / "recordings", "min_free_bytes": 0}
-    with serving(CAMERA, recordings=recordings) as daemon:
+    with serving("sim:wall?noise=off", recordings=recordings) as daemon:
         with httpx.Client(base_url=daemon.url) as client:
             client.get("/api/v1/frames/latest", params={"wait_s": 10.0})
             client.post("/api/v1/simulation/faults", json={"fault": "unplug"})
@@ -108,7 +107,7 @@ def test_an_answer_that_is_not_documented_is_found(tmp_path: Path) -> None:
 
 def test_what_was_made_is_there_until_it_is_deleted(tmp_path: Path) -> None:
     recordings = {"directory": tmp_path / "recordings", "min_free_bytes": 0}
-    with serving(CAMERA, recordings=recordings) as daemon:
+    with serving("sim:wall?noise=off", recordings=recordings) as daemon:
         result = tell_stories(daemon.url, tmp_path)
 
     assert result.returncode == 0, result.stderr
@@ -139,7 +138,7 @@ def said_to_be_deleted(answer: Answer) -> Answer:
 def test_something_deleted_that_can_still_be_had_is_found(tmp_path: Path) -> None:
     recordings = {"directory": tmp_path / "recordings", "min_free_bytes": 0}
     breaker = Breaker()
-    with serving(CAMERA, prepare=breaker.install, recordings=recordings) as daemon:
+    with serving("sim:wall?noise=off", prepare=breaker.install, recordings=recordings) as daemon:
         breaker.current = Breaking(answer=said_to_be_deleted)
         result = tell_stories(daemon.url, tmp_path, NOT_RECORDINGS, STILL_THERE)
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from http.client import HTTPConnection
 from importlib import import_module
 from typing import Any
+from unittest import mock
 from urllib.parse import urlsplit
 
 import httpx
@@ -27,7 +28,9 @@ SCENE = {"brightness_dn_per_s": 8e5, "returns": [{"range_m": 1.5}, {"range_m": 3
 def noisy_daemon() -> Iterator[Served]:
     with serving("sim:mirrors?seed=2") as daemon:
         daemon.start_all_workers()
-        yield daemon
+        # its own process has the lowest priority, and waits for all that a laden machine does
+        with mock.patch.object(daemon.service.planning, "_process", Here()):
+            yield daemon
 
 
 @pytest.fixture(scope="module")
@@ -129,9 +132,8 @@ def test_a_request_that_cannot_be_meant_is_refused_by_name(
 
 
 def test_the_front_falls_and_the_current_frame_says_where_it_stands(
-    noisy: httpx.Client, noisy_daemon: Served, monkeypatch: pytest.MonkeyPatch
+    noisy: httpx.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(noisy_daemon.service.planning, "_process", Here())
     families = import_module("transientcam_server.planning._search.families")  # not the function
     monkeypatch.setattr(families, "HARMONICS", (3,))
     monkeypatch.setattr(families, "SEARCHED", ("maximum-entropy",))
@@ -171,7 +173,6 @@ def endless(
 ) -> Iterator[tuple[str, Endless]]:
     """What a plan or a front is computed by, and which; no scene is looked at for it."""
     planner, work = noisy_daemon.service.planner, Endless()
-    monkeypatch.setattr(noisy_daemon.service.planning, "_process", Here())
     monkeypatch.setattr(planner, f"{request.param}_document", work)
     monkeypatch.setattr(planner, "look", lambda *_, **__: None)
     noisy_daemon.service.fronts.forget()
@@ -224,9 +225,8 @@ def test_a_job_makes_the_plan_that_a_request_waits_for(noisy: httpx.Client) -> N
 
 
 def test_a_job_maps_the_error_of_each_pixel_and_says_who_is_within_a_region(
-    noisy: httpx.Client, noisy_daemon: Served, monkeypatch: pytest.MonkeyPatch
+    noisy: httpx.Client,
 ) -> None:
-    monkeypatch.setattr(noisy_daemon.service.planning, "_process", Here())
     goal = {"budget": {"capture_s": 0.2}, "estimator": "single-frequency", "map": True}
     fixed = {"base_frequency_hz": 23e6, "harmonics": 1, "exposure_s": 5e-4, "takes": 1}
 
