@@ -119,12 +119,20 @@ def point_at(page: Page, picture: str, x: int, y: int, *, click: bool = False) -
         page.mouse.click(*at)
 
 
-def read_at(page: Page, x: int, y: int) -> None:
-    """Point at a pixel of the map until it is read: what moves under the pointer takes it away."""
-    pixel = page.locator(".panel-map [data-field=pixel]")
-    point_at(page, "map", x, y)
-    while pixel.text_content() != f"{x}, {y}":
+def read_at(page: Page, x: int, y: int, *names: str) -> list[str]:
+    """Point at a pixel of the map until it is read, and return figures of the same moment.
+
+    What moves under the pointer takes the pixel away.
+    """
+    readout = page.locator(".panel-map")
+    while True:
         point_at(page, "map", x, y)
+        pixel, *figures = readout.evaluate(
+            "(map, names) => names.map((n) => map.querySelector(`[data-field=${n}]`).textContent)",
+            ["pixel", *names],
+        )
+        if pixel == f"{x}, {y}" and "–" not in figures:
+            return [_plain(each) for each in figures]
 
 
 def drop(page: Page, name: str, content: str | bytes) -> None:
@@ -144,7 +152,11 @@ def drop(page: Page, name: str, content: str | bytes) -> None:
 def text(page: Page, panel: str, name: str) -> str:
     """A figure of a view, without the thin spaces before its unit and between thousands."""
     shown = page.locator(f"{panel} [data-field={name}]").first.text_content()
-    return (shown or "").replace("\u202f", " ").replace("\u2212", "-")
+    return _plain(shown or "")
+
+
+def _plain(shown: str) -> str:
+    return shown.replace("\u202f", " ").replace("\u2212", "-")
 
 
 # what the page paints below and above a scale

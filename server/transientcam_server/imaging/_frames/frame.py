@@ -79,7 +79,7 @@ class Frame:
         *,
         previous: RawFrame | None = None,
         averaged: "asyncio.Future[tm.Measured | None] | None" = None,
-        truth: Callable[[float | None], Truth] | None = None,
+        truth: Callable[[float], Truth] | None = None,
         past: bool = False,
     ) -> None:
         self.number = number
@@ -237,8 +237,7 @@ class Frame:
 
     async def _compute_truth(self) -> Truth:
         assert self._truth is not None  # noqa: S101 - other cameras have no product of it
-        # of the newest frame, now is near enough
-        middle_s = self.raw.device_time_s + 0.5 * self.raw.capture_s if self.past else None
+        middle_s = self.raw.device_time_s + 0.5 * self.raw.capture_s
         truth, _ = await self._run(self._truth, middle_s)
         return truth
 

@@ -189,7 +189,7 @@ class Pipeline:
             ) from None
 
 
-def _truth_of(simulation: Simulation | None) -> Callable[[float | None], Truth] | None:
+def _truth_of(simulation: Simulation | None) -> Callable[[float], Truth] | None:
     if simulation is None:
         return None
     return lambda device_time_s: simulation.truth(device_time_s=device_time_s)

@@ -177,12 +177,16 @@ def test_what_is_kept_no_more_is_reported_as_a_gap() -> None:
         while client.frame().meta["frame"] < 12:
             pass
         client.subscribe("flags", start=2)
-        gap = client.notice("gap")
-        frame = client.frame()
+        gaps: list[wire.Notice] = []
+        while not isinstance(message := client.receive(), wire.Frame):
+            gaps += [message] if isinstance(message, wire.Notice) and message.kind == "gap" else []
 
-    assert gap.details["from"] == 2
-    assert gap.details["to"] == frame.meta["frame"] - 1
-    assert gap.details["reason"] == "not kept any more"
+    missing = 2  # once more where the next one went between the notice and its turn
+    for gap in gaps:
+        assert gap.details["from"] == missing
+        assert gap.details["reason"] == "not kept any more"
+        missing = gap.details["to"] + 1
+    assert 2 < missing == message.meta["frame"]
 
 
 def test_no_client_waits_for_a_start_that_is_not_captured_yet(served: Served) -> None:
@@ -194,7 +198,7 @@ def test_no_client_waits_for_a_start_that_is_not_captured_yet(served: Served) ->
         frame = client.frame()
 
     assert gap.details["to"] == latest + 1_000_000 - 1
-    assert gap.details["from"] == frame.meta["frame"]
+    assert latest < gap.details["from"] <= frame.meta["frame"]  # more may be dropped
     assert gap.details["reason"] == "not captured yet"
 
 
