@@ -77,20 +77,10 @@ class Account:
 class FairQueue:
     """Shares a part of the time of an event loop between those who ask for it.
 
-    Parameters
-    ----------
-    loop
-        Whose time is shared.
-    share
-        How much of its thread's processor time there is to share at present, in the long run.
-    share_of_one
-        How much of it one address may have.
-    clock
-        Real time in s.
-    spent
-        Processor time of this thread in s.
-    goes_before
-        Queues of the same loop that begin nothing while something of this one is under way.
+    ``share``: how much of its thread's processor time there is to share now, in the long run.
+    ``share_of_one``: how much of it one address may have.
+    ``clock``, ``spent``: real time, and processor time of this thread, in s.
+    ``goes_before``: queues of the same loop that begin nothing while one of this is under way.
     """
 
     def __init__(
