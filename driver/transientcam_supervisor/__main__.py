@@ -68,7 +68,8 @@ class Watch:
             left_s = None if self._due_s is None else max(0.0, self._due_s - time.monotonic())
             ready = dict(waiting.poll(None if left_s is None else left_s * 1e3 + 1))
             if wake in ready:
-                self._hold_off("the supervisor was ended")
+                if self._hold_off("the supervisor was ended") is not None:
+                    self._off_without_owner()  # it may have ended, too
                 return
             if self._owner.fileno() in ready:
                 if not self._hear():
@@ -125,14 +126,15 @@ class Watch:
         else:
             self._tell(READY)
 
-    def _hold_off(self, reason: str) -> None:
-        """Switch off, and again and again until the owner says that it is dark."""
+    def _hold_off(self, reason: str) -> str | None:
+        """Switch off, again and again until the owner knows; return why it may be on."""
         problem = None if self._device is None else self._device.switch_off()
         if not self._held:
             said = reason if problem is None else f"{reason}; it may be on: {problem}"
             self._tell(SWITCHED_OFF + said.encode())
         self._held = True
         self._due_s = time.monotonic() + AGAIN_S
+        return problem
 
     def _off(self) -> None:
         """Switch off for an owner that cannot tell, and again until that has worked."""

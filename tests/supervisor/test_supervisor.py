@@ -191,6 +191,18 @@ def test_at_its_own_end_it_switches_the_light_off_and_says_so(
     assert said == ["the supervisor was ended"]
 
 
+def test_ended_while_the_light_may_be_on_it_first_switches_it_off(
+    light: Light, supervisor: Supervisor
+) -> None:
+    process = supervisor._process
+    assert process is not None
+    process.terminate()
+
+    light.goes_off(answer=b"")
+    light.goes_off()  # again, since the first was not answered
+    assert process.wait(PATIENCE_S) == 0
+
+
 def test_it_outlives_its_owner_until_the_light_is_off(light: Light, supervisor: Supervisor) -> None:
     supervisor.alive()
     supervisor._link.close()  # as the kernel does at the owner's end

@@ -77,14 +77,10 @@ class Account:
 class FairQueue:
     """Shares a part of the time of an event loop between those who ask for it.
 
-    ``loop``: whose time is shared.
-    ``share``: how much of its thread's processor time there is to share at present, in the long
-    run.
+    ``share``: how much of its thread's processor time there is to share now, in the long run.
     ``share_of_one``: how much of it one address may have.
-    ``clock``: real time in s.
-    ``spent``: processor time of this thread in s.
-    ``goes_before``: queues of the same loop that begin nothing while something of this one is under
-    way.
+    ``clock``, ``spent``: real time, and processor time of this thread, in s.
+    ``goes_before``: queues of the same loop that begin nothing while one of this is under way.
     """
 
     def __init__(

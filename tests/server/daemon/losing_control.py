@@ -29,10 +29,13 @@ from tests.driver.cameras.open_usb.usbfs.processes import EmulatedCamera, emulat
 from tests.server.relay.forwarder import Forwarder, forwarding
 from tests.serving import Served, serving
 from tests.waiting import wait_until
+from transientcam_driver.errors import CameraLost
 
 KINDS: Final = ("usb", "kinect2", "opt8241")
 LIMIT_S: Final = 2.0
 DARK_S: Final = 0.3
+SURELY_DARK_S: Final = 1.5
+"""Where it is counted: a laden machine requests no frame for a while, and then again."""
 PATIENCE_S: Final = 60.0
 STALLED_REQUESTS: Final = 12
 LIGHT: Final = {
@@ -89,12 +92,18 @@ class Control:
     """A daemon before a camera, both of which are there as soon as they are needed."""
 
     def __init__(
-        self, zygote: Zygote, camera: EmulatedCamera, folder: Path, silence_s: float
+        self,
+        zygote: Zygote,
+        camera: EmulatedCamera,
+        folder: Path,
+        silence_s: float,
+        dark_s: float,
     ) -> None:
         self.camera = camera
         self._zygote = zygote
         self._folder = folder
         self._silence_s = silence_s
+        self._dark_s = dark_s
         self._fifos = 0
         self._client: httpx.Client | None = None
         self.url = ""
@@ -185,7 +194,7 @@ class Control:
             asked_s = time.monotonic()
             if self.camera.lit:
                 lit_s = asked_s
-            return time.monotonic() - lit_s > DARK_S
+            return time.monotonic() - lit_s > self._dark_s
 
         wait_until(dark)
         return lit_s - begin_s
@@ -369,10 +378,12 @@ class Relays:
 
 
 @contextmanager
-def controlled(zygote: Zygote, kind: str, *, silence_s: float = 1.0) -> Iterator[Control]:
+def controlled(
+    zygote: Zygote, kind: str, *, silence_s: float = 1.0, dark_s: float = DARK_S
+) -> Iterator[Control]:
     """Have a camera of a kind, and daemons before it."""
     with emulated_camera(kind) as camera, tempfile.TemporaryDirectory() as folder:
-        control = Control(zygote, camera, Path(folder), silence_s)
+        control = Control(zygote, camera, Path(folder), silence_s, dark_s)
         try:
             yield control
         finally:
@@ -391,13 +402,17 @@ def main() -> None:
         print(kind, event, "dark" if dark else "NOT DARK", took_s, file=sys.stderr, flush=True)
 
     for kind in kinds:
-        with controlled(zygote, kind) as control:
+        with controlled(zygote, kind, dark_s=SURELY_DARK_S) as control:
             for _ in range(times):
                 for event in EVENTS:
                     took_s = lose(control, event)
                     note(event, kind, control.stays_off(), took_s)
             with ExitStack() as stack:
-                relays = Relays(control, stack)
+                try:
+                    relays = Relays(control, stack)
+                except CameraLost as error:  # a Kinect is not relayed yet
+                    print(kind, error, file=sys.stderr)
+                    continue
                 for _ in range(times):
                     for hop in range(1, HOPS + 1):
                         for network, delay_s in NETWORKS.items():
@@ -409,7 +424,9 @@ def main() -> None:
         cells = (
             f"{sum(dark and took_s < LIMIT_S for dark, took_s in tries)} of {len(tries)}, "
             f"{max(took_s for _, took_s in tries):.2f} s"
-            for tries in each.values()
+            if (tries := each.get(kind))
+            else "-"
+            for kind in kinds
         )
         print(f"| {event} | " + " | ".join(cells) + " |")
 

@@ -118,6 +118,19 @@ def test_each_client_is_refused_what_it_may_not(
     assert wrong == []
 
 
+def test_a_page_of_another_origin_changes_and_lights_nothing_with_any_right(
+    daemon: Served, http: httpx.Client, headers: dict[str, dict[str, str]]
+) -> None:
+    asked = [(method, path) for method, path in operations(daemon) if method != "GET"]
+    for method, path in asked:
+        foreign = headers["admin"] | {"Origin": "https://evil.example"}
+        answer = http.request(method, PREFIX + path, headers=foreign)
+        refused = answer.status_code, answer.json()["type"]
+        assert refused == (403, "/problems/origin-not-allowed"), (method, path)
+        assert "access-control-allow-origin" not in answer.headers
+    assert len(asked) == len(KINDS)
+
+
 @pytest.mark.parametrize("who", REFUSED)
 def test_starting_takes_the_right_to_light_and_stopping_does_not(
     http: httpx.Client, headers: dict[str, dict[str, str]], who: str
