@@ -95,27 +95,11 @@ class ComputedFrame:
         region: Sequence[int] | None = None,
         decimation: int | None = None,
     ) -> ProductFrame:
-        """Return a product with unit, axes and metadata.
+        """Return a product with unit, axes and metadata; parameters as of `Camera.frame`.
 
-        Parameters
-        ----------
-        name
-            `KNOWN` has them.
-        time_s, bins
-            Times of flight of a product over time in s, or how many, evenly over one period.
-        y
-            Row of a streak.
-        region, decimation
-            Column, row, width and height of the part; every so many of its pixels.
-
-        Raises
-        ------
-        ParameterError
-            If there is no such product, or not of these frequencies, or it has no times or rows.
-        Problem
-            If region or decimation do not fit the frame.
-        MomentsError
-            If the estimator of the settings cannot work with this sequence.
+        Raises ParameterError if there is no such product, not of these frequencies, or without
+        times or rows; Problem if region or decimation do not fit; MomentsError if the estimator
+        cannot work with this sequence.
         """
         product = known_product(name)
         sequence = self.recipe.applied.sequence

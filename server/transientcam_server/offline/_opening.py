@@ -40,29 +40,10 @@ def open_recording(
     settings: Mapping[str, Any] | None = None,
     timeout_s: float = 10.0,
 ) -> "OpenedRecording":
-    """Open the recording at a path, or a daemon's by its address.
+    """Open the recording at a path, or a daemon's by its address; see `transientcam.open`.
 
-    Parameters
-    ----------
-    place
-        Path of the file, or ``URL/api/v1/recordings/ID``.
-    token
-        Bearer token, where the daemon requires one.
-    settings
-        Of the reconstruction, in place of the recorded ones.
-    timeout_s
-        How long to wait for a connection and for each answer.
-
-    Raises
-    ------
-    NotARecording
-        If it cannot be read as one.
-    InputError
-        If its settings cannot be used.
-    TransientcamError
-        If the daemon does not have it.
-    OSError
-        If there is no such file, or it may not be read.
+    Raises NotARecording if it cannot be read as one; InputError if its settings cannot be used;
+    TransientcamError if the daemon does not have it; OSError if there is no such file.
     """
     recording = recording_at(place, token=token, timeout_s=timeout_s)
     try:
@@ -128,26 +109,14 @@ class OpenedRecording(Sequence[ComputedFrame]):
         return self._recording.annotations
 
     def series(self, name: str) -> NDArray[Any]:
-        """Return one value a frame: ``device_time_s``, ``temperature_c`` ... (docs/recordings.md).
-
-        Raises
-        ------
-        KeyError
-            If there is none of that name.
-        """
+        """Return one value a frame: ``device_time_s`` ... (docs/recordings.md); or a KeyError."""
         return self._recording.series(name)
 
     def to_xarray(self, *products: str) -> "xarray.Dataset":
         """Return an xarray.Dataset of images, labels and series, and of these products.
 
         Images are read, and products computed, when they are indexed.
-
-        Raises
-        ------
-        MissingExtra
-            If xarray is not installed.
-        ParameterError
-            If a recording has no such product.
+        Raises MissingExtra without xarray; ParameterError for what is no product.
         """
         from transientcam_server.offline._in_xarray import dataset
 
@@ -157,21 +126,9 @@ class OpenedRecording(Sequence[ComputedFrame]):
         """Return an xarray.Dataset of these products as Dask arrays, in blocks of 64 frames.
 
         Nothing is computed before Dask does it, here or on a cluster: workers open the recording by
-        its path or address, and no frame goes through a scheduler.
-
-        Parameters
-        ----------
-        products
-            Names; those of `transientcam reconstruct` when left out.
-        bins
-            Times of flight of products over time.
-
-        Raises
-        ------
-        MissingExtra
-            If Dask or xarray are not installed.
-        ParameterError
-            If a recording has no such product.
+        its path or address, and no frame goes through a scheduler. Without names it has those of
+        `transientcam reconstruct`.
+        Raises MissingExtra without Dask or xarray; ParameterError for what is no product.
         """
         from transientcam_server.offline._in_dask import dataset
         from transientcam_server.offline._job import Job
