@@ -168,7 +168,7 @@ def test_a_chunk_of_a_series_keeps_its_size_while_a_recording_grows(source: Path
         chunk = ZarrKeys(recording).value("frame/0")
 
     assert len(chunk) == 1024 * 8
-    np.testing.assert_array_equal(np.frombuffer(chunk, "<u8")[: FRAMES + 1], [0, 1, 2, 0])
+    np.testing.assert_array_equal(np.frombuffer(chunk, "<u8")[: FRAMES + 1], [1, 2, 3, 0])
 
 
 @pytest.mark.parametrize(
