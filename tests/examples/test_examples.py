@@ -7,12 +7,14 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import httpx
 import numpy as np
 import pytest
 from PIL import Image
+from plyfile import PlyData
 
 import transientcam_moments as tm
 from tests.conftest import ROOT
@@ -48,7 +50,7 @@ def test_every_example_is_run_here() -> None:
 
     assert files == {
         *("range_map.py", "transient_video.py", "curl.sh", "frame.mjs", "stream.mjs"),
-        *("transientcam_frame.m", "make_measurement.py", "measurement.npz"),
+        *("transientcam_frame.m", "make_measurement.py", "measurement.npz", "open3d_cloud.py"),
     }
 
 
@@ -145,6 +147,24 @@ def _websocket_flag() -> list[str]:
     """Return what Node 20 needs to have WebSocket; Node 22 has it."""
     has = subprocess.run(["node", "-p", "typeof WebSocket"], capture_output=True, text=True)
     return [] if has.stdout.strip() == "function" else ["--experimental-websocket"]
+
+
+@pytest.mark.skipif(find_spec("open3d") is None, reason="Open3D is not installed")
+def test_open3d_takes_points_and_reads_the_services_file(served: Served, tmp_path: Path) -> None:
+    path, ours = tmp_path / "cloud.ply", tmp_path / "pointcloud.ply"
+    printed = _run(sys.executable, _EXAMPLES / "open3d_cloud.py", served.url, path)
+    with httpx.Client(base_url=served.url, timeout=60.0) as http:
+        ours.write_bytes(http.get("/api/v1/frames/latest/pointcloud.ply").content)
+    script = "import open3d, sys; print(len(open3d.io.read_point_cloud(sys.argv[1]).points))"
+    counted = int(_run(sys.executable, "-c", script, ours))
+
+    vertices = PlyData.read(path)["vertex"]
+    assert f"{len(vertices)} of {120 * 163} points" in printed
+    assert abs(len(vertices) - counted) < 0.01 * counted
+    normals = np.stack([vertices[name] for name in ("nx", "ny", "nz")])
+    points = np.stack([vertices[name] for name in "xyz"])
+    assert np.median(np.linalg.norm(normals, axis=0)) == pytest.approx(1.0, abs=1e-3)
+    assert ((normals * points).sum(axis=0) <= 1e-6).mean() > 0.99  # they look at the camera
 
 
 @needs_octave

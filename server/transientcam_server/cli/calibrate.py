@@ -15,7 +15,7 @@ from transientcam_driver.texts import in_celsius, read_text
 
 if TYPE_CHECKING:
     from transientcam import Camera as Client
-    from transientcam_driver import Camera, Lens
+    from transientcam_driver import Camera
     from transientcam_server.imaging import Calibration
 
 
@@ -123,11 +123,8 @@ def calibrate(
             raise typer.BadParameter("needs the URL of a daemon", param_hint="--lens")
         if board is not None:
             _refuse({"--second": second}, "needs walls, not a --board")
-            _measure_by_board(url, board, views=views, takes=takes, token=token, as_json=as_json)
-            return
-        _measure_lens(
-            [url, *filter(None, [second])], views=views, takes=takes, token=token, as_json=as_json
-        )
+        urls = [url, *filter(None, [second])]
+        _measure_lens(urls, board, views=views, takes=takes, token=token, as_json=as_json)
         return
     _refuse({"--board": board, "--second": second}, "is for --lens")
     if undo:
@@ -167,60 +164,42 @@ def calibrate(
 
 
 def _measure_lens(
-    urls: Sequence[str], *, views: int, takes: int, token: str | None, as_json: bool
+    urls: Sequence[str],
+    board_name: str | None,
+    *,
+    views: int,
+    takes: int,
+    token: str | None,
+    as_json: bool,
 ) -> None:
     from transientcam import Camera
-    from transientcam_server.imaging import Intrinsics, lens_of_walls, second_in_first
+    from transientcam_server.imaging import Board, Intrinsics, lens_of_walls, second_in_first
 
+    board = None if board_name is None else Board(board_name)
+    what, product = ("wall", "range") if board is None else ("board", "brightness")
     with ExitStack() as opened:
         cameras = [opened.enter_context(Camera(url, token=token)) for url in urls]
         known = [Intrinsics.of_document(each.camera["intrinsics"]) for each in cameras]
-        ranges: list[list[Any]] = [[] for _ in cameras]
+        seen: list[list[Any]] = [[] for _ in cameras]
         for view in range(views):
-            _ask_for(f"the wall from side {view + 1} of {views}")
-            for each, own in zip(cameras, ranges, strict=True):
-                own.append(_mean(each, "range", takes))
-    lenses, off_m, walls = zip(*map(lens_of_walls, ranges, known), strict=True)
-    beside = {"deviation_m": off_m[0], "walls": walls[0].tolist()}
-    if len(urls) > 1:
-        beside["second_in_first"] = second_in_first(*walls).tolist()
-    _print_lens(lenses[0], beside, as_json=as_json)
-
-
-def _measure_by_board(
-    url: str, text: str, *, views: int, takes: int, token: str | None, as_json: bool
-) -> None:
-    from transientcam import Camera
-    from transientcam_server.imaging import Board, Intrinsics
-
-    board = Board(text)
-    with Camera(url, token=token) as camera:
-        known = Intrinsics.of_document(camera.camera["intrinsics"])
-        found = []
-        for view in range(views):
-            _ask_for(f"the board from side {view + 1} of {views}")
-            picture = _mean(camera, "brightness", takes)
-            height, width = picture.shape
-            seen = board.corners(picture)
-            if seen is None:
-                echo("no board was found: nearer, whole, in even light", err=True)
-            else:
-                found.append(seen)
-    lens, off_px, deviations = board.lens(found, known.lens, width=width, height=height)
-    beside = {"pictures": len(found), "deviation_px": off_px, "standard_deviation_px": deviations}
-    _print_lens(lens, beside, as_json=as_json)
-
-
-def _ask_for(what: str) -> None:
-    typer.prompt(f"{what}, then Enter", default="", show_default=False, err=True)
-
-
-def _print_lens(lens: "Lens", beside: Mapping[str, Any], *, as_json: bool) -> None:
-    found = {f"{name}_px": round(getattr(lens, name), 3) for name in ("fx", "fy", "cx", "cy")}
-    found["distortion"] = [round(each, 5) for each in lens.distortion]
-    lines = [f"{name} = {value}" for name, value in found.items()]
+            asked = f"the {what} from side {view + 1} of {views}, then Enter"
+            typer.prompt(asked, default="", show_default=False, err=True)
+            for each, own in zip(cameras, seen, strict=True):
+                own.append(_mean(each, product, takes))
+            if board is not None and board.corners(seen[0][-1]) is None:
+                echo(f"no {board_name} was found: show it whole, nearer, in even light", err=True)
+    if board is not None:
+        found, beside = board.lens(seen[0], known[0].lens)
+    else:
+        lenses, off_m, walls = zip(*map(lens_of_walls, seen, known), strict=True)
+        found, beside = lenses[0], {"deviation_m": off_m[0], "walls": walls[0].tolist()}
+        if len(urls) > 1:
+            beside["second_in_first"] = second_in_first(*walls).tolist()
+    lens = {f"{name}_px": round(getattr(found, name), 3) for name in ("fx", "fy", "cx", "cy")}
+    lens["distortion"] = [round(each, 5) for each in found.distortion]
+    lines = [f"{name} = {value}" for name, value in lens.items()]
     lines += [f"# {name} = {value}" for name, value in beside.items()]
-    echo(json.dumps({"lens": found} | dict(beside)) if as_json else "\n".join(["[lens]", *lines]))
+    echo(json.dumps({"lens": lens} | beside) if as_json else "\n".join(["[lens]", *lines]))
 
 
 def _mean(camera: "Client", product: str, takes: int) -> Any:

@@ -95,11 +95,11 @@ class ComputedFrame:
         region: Sequence[int] | None = None,
         decimation: int | None = None,
     ) -> ProductFrame:
-        """Return a product with unit, axes and metadata; parameters of `Camera.frame`.
+        """Return a product with unit, axes and metadata; parameters as of `Camera.frame`.
 
-        Raises ParameterError if there is no such product, or not of these frequencies, or it has no
-        times or rows; Problem if region or decimation do not fit the frame; MomentsError if the
-        estimator of the settings cannot work with this sequence.
+        Raises ParameterError if there is no such product, not of these frequencies, or without
+        times or rows; Problem if region or decimation do not fit; MomentsError if the estimator
+        cannot work with this sequence.
         """
         product = known_product(name)
         sequence = self.recipe.applied.sequence

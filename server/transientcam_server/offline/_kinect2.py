@@ -60,6 +60,8 @@ def import_kinect2(
     written.
     """
     began_s = source.stat().st_mtime
+    size: Any = {"width": WIDTH, "height": HEIGHT}
+    seen = None if lens is None else Intrinsics.of_lens(lens, **size, source="camera")
     with _opened(source) as file:
         tables = _tables(file, source)
         numbers = _frames(file, source)
@@ -73,7 +75,7 @@ def import_kinect2(
             applied=applied,
             capabilities=capabilities,
             camera={"spec": f"import-kinect2 {source.name}", "scene": None}
-            | ({} if lens is None else {"intrinsics": asdict(_intrinsics(lens))}),
+            | ({} if seen is None else {"intrinsics": asdict(seen)}),
             calibration={"id": FACTORY_ID},
             calibration_planes=tables.gains(),
             reconstruction=SETTINGS.model_dump(),
@@ -178,7 +180,3 @@ def _sub_images(file: Any, path: Path, number: int) -> NDArray[np.uint8]:
         expected = f"{MEASURED} or {SUB_IMAGES} sub-images of {SUB_IMAGE_BYTES} bytes"
         raise InputError(str(path), name, f"{len(data)} bytes", expected)
     return data.reshape((-1, SUB_IMAGE_BYTES))
-
-
-def _intrinsics(lens: Lens) -> Intrinsics:
-    return Intrinsics.of_lens(lens, width=WIDTH, height=HEIGHT, source="camera")

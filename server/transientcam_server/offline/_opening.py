@@ -40,10 +40,10 @@ def open_recording(
     settings: Mapping[str, Any] | None = None,
     timeout_s: float = 10.0,
 ) -> "OpenedRecording":
-    """Open the recording at a path, or a daemon's by its address, as `transientcam.open` does.
+    """Open the recording at a path, or a daemon's by its address; see `transientcam.open`.
 
-    Raises NotARecording if it cannot be read as one, InputError if its settings cannot be used,
-    TransientcamError if the daemon does not have it, OSError if the file cannot be read.
+    Raises NotARecording if it cannot be read as one; InputError if its settings cannot be used;
+    TransientcamError if the daemon does not have it; OSError if there is no such file.
     """
     recording = recording_at(place, token=token, timeout_s=timeout_s)
     try:
@@ -109,17 +109,14 @@ class OpenedRecording(Sequence[ComputedFrame]):
         return self._recording.annotations
 
     def series(self, name: str) -> NDArray[Any]:
-        """Return one value a frame: ``device_time_s``, ``temperature_c`` ... (docs/recordings.md).
-
-        Raises KeyError if there is none of that name.
-        """
+        """Return one value a frame: ``device_time_s`` ... (docs/recordings.md); or a KeyError."""
         return self._recording.series(name)
 
     def to_xarray(self, *products: str) -> "xarray.Dataset":
         """Return an xarray.Dataset of images, labels and series, and of these products.
 
-        Images are read, and products computed, when they are indexed. Raises MissingExtra without
-        xarray, ParameterError if a recording has no such product.
+        Images are read, and products computed, when they are indexed.
+        Raises MissingExtra without xarray; ParameterError for what is no product.
         """
         from transientcam_server.offline._in_xarray import dataset
 
@@ -128,9 +125,10 @@ class OpenedRecording(Sequence[ComputedFrame]):
     def reconstruct(self, *products: str, bins: int = 256) -> "xarray.Dataset":
         """Return an xarray.Dataset of these products as Dask arrays, in blocks of 64 frames.
 
-        Without names those of `transientcam reconstruct`. Nothing is computed before Dask does it,
-        here or on a cluster: workers open the recording by its path or address, and no frame goes
-        through a scheduler. Raises as `to_xarray`.
+        Nothing is computed before Dask does it, here or on a cluster: workers open the recording by
+        its path or address, and no frame goes through a scheduler. Without names it has those of
+        `transientcam reconstruct`.
+        Raises MissingExtra without Dask or xarray; ParameterError for what is no product.
         """
         from transientcam_server.offline._in_dask import dataset
         from transientcam_server.offline._job import Job

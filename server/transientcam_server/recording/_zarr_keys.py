@@ -25,7 +25,6 @@ from transientcam_server.recording._reader import Recording
 from transientcam_server.recording._storage import is_shuffled, place_of_chunk
 
 CONSOLIDATED: Final = ".zmetadata"
-GROUP_KEYS: Final = (".zgroup", ".zattrs", CONSOLIDATED)
 _SERIES_ROWS: Final = 1024
 """Of a chunk of what grows by a value a frame: who read an older shape still gets whole chunks."""
 _NUMBERS: Final = re.compile(r"(0|[1-9]\d{0,9})(\.(0|[1-9]\d{0,9}))*", re.ASCII)

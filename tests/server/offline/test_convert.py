@@ -91,7 +91,7 @@ def test_npz_has_images_labels_and_documents(source: Path, tmp_path: Path) -> No
     with np.load(tmp_path / "a.npz") as archive:
         for number in range(FRAMES):
             np.testing.assert_array_equal(archive["raw"][number], frame(number).images)
-        assert archive["frame"].tolist() == [0, 1, 2]
+        assert archive["frame"].tolist() == [1, 2, 3]
         assert archive["harmonic"].tolist() == [label.harmonic for label in APPLIED.labels]
         assert json.loads(str(archive["annotations"])) == {"a": 1}
         assert archive["kind"].tolist() == ["modulated"] * len(APPLIED.labels)
@@ -125,7 +125,7 @@ def test_zarr_opens_in_zarr_and_xarray(source: Path, tmp_path: Path) -> None:
     with xarray.open_zarr(tmp_path / "a.zarr", consolidated=True, chunks=None) as dataset:
         assert_images_make_moments(dataset, frame(1).images)
         assert dataset["raw"].dims == ("frame", "image", "y", "x")
-        np.testing.assert_array_equal(dataset["frame"], np.arange(FRAMES))
+        np.testing.assert_array_equal(dataset["frame"], np.arange(1, FRAMES + 1))
 
 
 def test_mcap_has_an_image_a_topic_with_its_label_and_time(source: Path, tmp_path: Path) -> None:

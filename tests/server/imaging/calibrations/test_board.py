@@ -67,16 +67,16 @@ def picture(paint: Any, about_x: float, about_y: float) -> NDArray[np.float32]:
 
 @pytest.mark.parametrize(("name", "paint"), [("9x6", chessboard), ("charuco:10x7", charuco)])
 def test_pictures_of_a_board_give_the_lens_they_were_taken_through(name: str, paint: Any) -> None:
-    board = Board(name)
-    found = [board.corners(picture(paint, *side)) for side in SIDES]
+    pictures = [picture(paint, *side) for side in SIDES]
 
-    shown = [each for each in found if each is not None]
-    assert len(shown) == len(SIDES)
-    lens, off_px, deviations = board.lens(shown, START, width=WIDTH, height=HEIGHT)
-    assert off_px < 0.25
-    for field in ("fx", "fy", "cx", "cy"):
+    lens, figures = Board(name).lens([*pictures, 0 * pictures[0]], START)
+
+    assert figures["pictures"] == len(SIDES)
+    assert figures["deviation_px"] < 0.25
+    deviations = figures["standard_deviation_px"]
+    for field, deviation in zip(("fx", "fy", "cx", "cy"), deviations, strict=True):
         assert abs(getattr(lens, field) - getattr(LENS, field)) < 1.5
-        assert 0.0 < deviations[field] < 1.0
+        assert 0.0 < deviation < 1.0
     assert lens.distortion[0] == pytest.approx(-0.12, abs=0.02)
     assert lens.light_m == START.light_m
     across, down = lens.slopes(WIDTH, HEIGHT)
@@ -91,15 +91,40 @@ def test_a_picture_without_a_board_has_no_corners(name: str, empty: float) -> No
     assert Board(name).corners(np.full((HEIGHT, WIDTH), empty, np.float32)) is None
 
 
-@pytest.mark.parametrize("text", ["", "9", "2x6", "9x6x3", "9X6", "aruco:9x6", "-9x6", "100x9"])
+@pytest.mark.parametrize(
+    "text", ["", "9", "2x6", "9x6x3", "9X6", "aruco:9x6", "-9x6", "41x9", "charuco:9x99"]
+)
 def test_what_is_no_board_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="--board"):
         Board(text)
 
 
 def test_too_few_pictures_are_refused() -> None:
-    with pytest.raises(InputError, match="3 or more"):
-        Board("9x6").lens([], START, width=WIDTH, height=HEIGHT)
+    empty = np.zeros((HEIGHT, WIDTH))
+
+    with pytest.raises(InputError, match=r"in 0 pictures.*3 or more"):
+        Board("9x6").lens([empty] * 4, START)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.3])
+def test_boards_that_stand_alike_are_refused(tilt: float) -> None:
+    pictures = [picture(chessboard, tilt, 0.0)] * 4
+
+    with pytest.raises(InputError, match="in 4 pictures, within 0 degrees"):
+        Board("9x6").lens(pictures, START)
+
+
+def test_corners_on_one_line_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    line = np.stack([np.arange(9.0), np.zeros(9), np.zeros(9)], axis=1)
+    board = Board("9x6")
+    monkeypatch.setattr(board, "corners", lambda _: (line, 20 * line[:, :2]))
+
+    with pytest.raises(InputError, match="--board"):
+        board.lens([np.zeros((HEIGHT, WIDTH))] * 3, START)
+
+
+def test_the_largest_board_has_markers_enough() -> None:
+    Board("charuco:40x40")
 
 
 def test_without_opencv_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -166,6 +166,28 @@ def test_a_camera_reports_its_lens_and_settings_go_before_it() -> None:
     )
 
 
+@pytest.mark.parametrize("distortion", ["auto", "off"])
+@pytest.mark.parametrize("device", ["kinect2", "tofcam660", "opt8241"])
+def test_a_wall_is_flat_through_the_lens_that_an_emulated_device_states(
+    device: str, distortion: str
+) -> None:
+    with open_camera(f"{device}:emulated?scene=wall&distortion={distortion}") as camera:
+        size: Any = {"width": camera.capabilities.width, "height": camera.capabilities.height}
+        assert camera.simulation is not None
+        assert camera.factory is not None
+        found = known_intrinsics(
+            LensSettings(),
+            **size,
+            reported=camera.factory.lens,
+            scene=camera.simulation.lens(**size),
+        )
+        points = found.points(camera.simulation.truth().range_m)
+
+    assert found.source == "camera"
+    assert any(found.distortion) == (distortion == "auto")
+    assert np.ptp(points[2]) < 1e-4
+
+
 def test_a_recorded_lens_with_part_of_a_distortion_is_not_used() -> None:
     document = asdict(SCENE) | {"distortion": [0.1, 0.2]}
 
