@@ -73,7 +73,7 @@ def test_now_is_compared_with_a_recording_by_two_clicks_and_with_a_kept_frame(
     panel.get_by_role("button", name="Compare the map").click()
     panel.get_by_role("button", name="yesterday").click()
     page.locator("canvas[data-product=range-difference]").wait_for()
-    panel.locator("[data-field=beyond]").wait_for()
+    expect(panel.locator("[data-field=beyond]")).to_contain_text("%")
     point_at(page, "map", 80, 60, click=True)
 
     def numbers(frame: str, product: str) -> NDArray[Any]:

@@ -161,6 +161,7 @@ def test_what_the_first_visit_takes_is_at_most_190_kb(steady: httpx.Client) -> N
         get(f"/assets/{name}")
 
     assert len(named) == 2
+    assert 0 < texts.index("canvas.cover") < texts.index(".colour-bar"), "the base's rules first"
     assert sum(sizes) <= 190_000
     assert sum(sizes) > 100_000, "all of it was counted"
 

@@ -117,11 +117,11 @@ export function Compared({ source, look, way }: { source: Source; look: Look; wa
         <span data-field="difference" title="With half of its 90 % interval, from those of both ranges">
           A − B {unit === "m" ? engineering(difference, unit) : fixed(difference, decimals, unit)} {deviation(error, unit)}
         </span>
-        {errors !== null && apart !== null && (
-          <span class="quiet" data-field="beyond" title="Beyond the 90 % intervals of both: up to a tenth is chance. The others are grey">
-            {fixed(100 * beyondShare(apart, errors), 0, "%")} of the trusted differ by more than their errors
-          </span>
-        )}
+        <span class="quiet" data-field="beyond" title="Beyond the 90 % intervals of both: up to a tenth is chance. The others are grey">
+          {errors === null || apart === null
+            ? "errors not known"
+            : `${fixed(100 * beyondShare(apart, errors), 0, "%")} of the trusted differ by more`}
+        </span>
         {b !== null && apart === null && <span class="waiting">A and B are of different sizes.</span>}
         {unlike.length > 0 && <span class="waiting">Not measured alike: {unlike.join(", ")}</span>}
         {comparison.trouble.value !== null && <span class="refusal">{comparison.trouble.value}</span>}
