@@ -1,23 +1,10 @@
 /// <reference types="vitest/config" />
-import { readdirSync, readFileSync, writeFileSync } from "node:fs";
-import { gzipSync } from "node:zlib";
-import { defineConfig, type Plugin } from "vite";
+import { defineConfig } from "vite";
 
 // The daemon a developer's page talks to while Vite serves the sources.
 const DAEMON = process.env.TRANSIENTCAM_URL ?? "http://127.0.0.1:8000";
 
-/** Beside each text of the build what the daemon sends of it. */
-const compressed: Plugin = {
-  name: "compressed",
-  writeBundle: ({ dir }) => {
-    const assets = `${dir}/assets`;
-    for (const file of readdirSync(assets).filter((name) => /\.(js|css)$/.test(name)))
-      writeFileSync(`${assets}/${file}.gz`, gzipSync(readFileSync(`${assets}/${file}`), { level: 9 }));
-  },
-};
-
 export default defineConfig({
-  plugins: [compressed],
   // The service may stand below a path of a proxy.
   base: "./",
   build: {
@@ -30,8 +17,8 @@ export default defineConfig({
     // A data: URL would need its own line in the Content-Security-Policy.
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
-    // What the views share comes with the first of them, in one file.
-    rolldownOptions: { output: { codeSplitting: { groups: [{ name: "page", test: /src.(scales|store|stream|ui)|preact|uplot/ }] } } },
+    // What the views share comes first, in one file: rules of a component come after the base's.
+    rolldownOptions: { output: { codeSplitting: { groups: [{ name: "page", test: /src.(base|scales|store|stream|ui)|preact|uplot/ }] } } },
     // three, which is loaded when points in space are first shown
     chunkSizeWarningLimit: 800,
   },

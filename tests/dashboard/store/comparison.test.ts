@@ -1,9 +1,8 @@
 import { signal } from "@preact/signals";
-import { beforeEach, describe, expect, test } from "vitest";
+import { beforeEach, describe, expect, test, vi } from "vitest";
 
 import { RequestError } from "../../../client/dashboard/src/store/api";
 import { beyondShare, Comparison, differing, wiped } from "../../../client/dashboard/src/store/comparison";
-import type { Cupboard } from "../../../client/dashboard/src/store/cupboard";
 import { type Frame, Frames, frameOf } from "../../../client/dashboard/src/store/frames";
 import type { RangeErrors } from "../../../client/dashboard/src/store/rangeErrors";
 import { Settings } from "../../../client/dashboard/src/store/settings";
@@ -25,21 +24,15 @@ const report = (product: string, number: number, values: readonly number[], regi
 class Page {
   readonly frames = new Frames();
   readonly errors = { range_error: signal<Frame | null>(null), trust: signal<Frame | null>(null) };
-  readonly kept = new Map<string, readonly Frame[]>();
   readonly asked: string[] = [];
   refusal: RequestError | null = null;
   readonly settings = new Settings(null);
   readonly comparison: Comparison;
+  readonly release: () => void;
 
   constructor() {
-    const cupboard: Cupboard = {
-      names: async () => [...this.kept.keys()],
-      get: async (name) => this.kept.get(name),
-      put: async (name, frames) => this.kept.set(name, frames),
-      remove: async (name) => this.kept.delete(name),
-    };
     const errors = { of: (product: keyof Page["errors"]) => this.errors[product] } as unknown as RangeErrors;
-    this.comparison = new Comparison(this.frames, errors, this.settings, cupboard);
+    this.comparison = new Comparison(this.frames, errors, this.settings);
     this.comparison.loader = async (path, products) => {
       this.asked.push(`${path} ${products.join()}`);
       if (this.refusal !== null) throw this.refusal;
@@ -48,7 +41,7 @@ class Page {
         report(product, number, { range_error: [3, 3, 3], trust: [0, 0, 5] }[product] ?? [number, number, number]),
       );
     };
-    this.frames.claim(["range"]);
+    this.release = this.frames.claim(["range"]);
     this.show(9, [10, 4, 8]);
   }
 
@@ -61,15 +54,28 @@ class Page {
   }
 
   difference(): readonly number[] {
-    return [...(this.comparison.difference("range").value?.values ?? [])];
+    return [...(this.comparison.maps.range.difference.value?.values ?? [])];
   }
 }
 
 /** All that was begun is done: every answer is there already. */
 const settled = (): Promise<void> => new Promise((done) => setTimeout(done));
 
+/** What the browser keeps. */
+const KEPT = new Map<string, unknown>();
+vi.mock("idb-keyval", () => ({
+  keys: async () => [...KEPT.keys()],
+  get: async (name: string) => KEPT.get(name),
+  set: async (name: string, value: unknown) => {
+    if (name === "too large") throw new DOMException("no room");
+    KEPT.set(name, value);
+  },
+  del: async (name: string) => KEPT.delete(name),
+}));
+
 let page: Page;
 beforeEach(() => {
+  KEPT.clear();
   page = new Page();
 });
 
@@ -84,13 +90,20 @@ describe("a frame of a recording as B", () => {
     expect(page.difference()).toEqual([0, 0, NaN]);
   });
 
+  test("is not asked for maps that no view shows", async () => {
+    page.release();
+    page.comparison.source.value = { of: "rec", frame: 5 };
+    await settled();
+    expect(page.asked[0]).toBe("/recordings/rec/frames/5?reconstruction=current ");
+  });
+
   test("gives way to the one that was chosen meanwhile", async () => {
     page.comparison.source.value = { of: "rec", frame: 5 };
     page.comparison.source.value = { of: "rec", frame: 6 };
     page.comparison.source.value = { of: "rec", frame: 7 };
     await settled();
-    expect(page.comparison.b("range").value?.meta.frame).toBe(7);
-    expect(page.asked.some((each) => each.includes("/6?"))).toBe(false);
+    expect(page.comparison.maps.range.b.value?.meta.frame).toBe(7);
+    expect(page.asked.filter((each) => each.endsWith("trust"))).toHaveLength(1);
   });
 
   test("that cannot be had says why, and leaves no other in its place", async () => {
@@ -100,15 +113,15 @@ describe("a frame of a recording as B", () => {
     page.comparison.source.value = { of: "rec", frame: 6 };
     await settled();
     expect(page.comparison.trouble.value).toBe("It was deleted.");
-    expect(page.comparison.b("range").value).toBeNull();
+    expect(page.comparison.maps.range.b.value).toBeNull();
   });
 
   test("has no difference from a picture of another size", async () => {
     page.show(9, [1, 2]);
     page.comparison.source.value = { of: "rec", frame: 5 };
     await settled();
-    expect(page.comparison.b("range").value).not.toBeNull();
-    expect(page.comparison.difference("range").value).toBeNull();
+    expect(page.comparison.maps.range.b.value).not.toBeNull();
+    expect(page.comparison.maps.range.difference.value).toBeNull();
   });
 
   test("is what a link says, and nothing else is", () => {
@@ -126,19 +139,21 @@ describe("a frame that is kept", () => {
     await page.comparison.keep(page.shown, "before");
     await settled();
     expect(page.asked[0]).toBe("/frames/9 range,direct,indirect,brightness,validity,range_error,trust");
+    await page.comparison.look();
     expect(page.comparison.kept.value).toEqual(["before"]);
     expect(page.difference()).toEqual([1, -5, -1]); // from 9 m, as the service has it
     expect(page.settings.hash(true)).not.toContain("before");
   });
 
-  test("is what the page shows where the service has it no more, but never a part of it", async () => {
+  test("is not kept where the service has it no more", async () => {
     page.refusal = new RequestError({ title: "It is gone." });
-    await page.comparison.keep(page.shown, "held");
-    await settled();
-    expect(page.difference()).toEqual([0, 0, 0]);
-    page.frames.put(frameOf(report("range", 11, [1, 1, 1], [0, 0, 1, 1])));
-    await expect(page.comparison.keep(page.shown, "part")).rejects.toThrow("It is gone.");
-    expect([...page.kept.keys()]).toEqual(["held"]);
+    await expect(page.comparison.keep(page.shown, "held")).rejects.toThrow("It is gone.");
+    expect(KEPT.size).toBe(0);
+  });
+
+  test("is refused in words where the browser has no room", async () => {
+    await expect(page.comparison.keep(page.shown, "too large")).rejects.toThrow("This browser keeps no frames: Error: no room.");
+    expect(page.comparison.source.value).toBeNull();
   });
 
   test("replaces the one under its name, and says so once it was removed elsewhere", async () => {
@@ -148,7 +163,7 @@ describe("a frame that is kept", () => {
     await page.comparison.keep(page.shown, "same");
     await settled();
     expect(page.difference()).toEqual([0, 0, 1]);
-    await page.comparison.remove("same");
+    await page.comparison.look("same");
     page.comparison.recompute();
     await settled();
     expect(page.comparison.trouble.value).toBe("This browser keeps no frame “same”.");
@@ -182,7 +197,7 @@ test("a wipe has A left of its line and B right of it, in each row", () => {
   const frame = (values: readonly number[]): Frame =>
     ({ product: "range", shape: [2, 4], values: Float32Array.from(values) }) as unknown as Frame;
   const [a, b] = [frame([1, 2, 3, 4, 5, 6, 7, 8]), frame([0, 0, 0, 0, 0, 0, 0, 0])];
-  expect([...wiped(a, b, 0.5).values]).toEqual([1, 2, 0, 0, 5, 6, 0, 0]);
+  expect([...wiped(a, b, 2).values]).toEqual([1, 2, 0, 0, 5, 6, 0, 0]);
   expect([...wiped(a, b, 0).values]).toEqual([...b.values]);
-  expect([...wiped(a, b, 1).values]).toEqual([...a.values]);
+  expect([...wiped(a, b, 4).values]).toEqual([...a.values]);
 });

@@ -78,7 +78,9 @@ describe("the look of a map", () => {
 describe("looks", () => {
   const looks = (): Looks => {
     const frames = new Frames();
-    const beside = { b: () => signal(null), difference: () => signal(null) } as unknown as Comparison;
+    const beside = {
+      maps: Object.fromEntries(MAP_PRODUCTS.map(({ product }) => [product, { b: signal(null), difference: signal(null) }])),
+    } as unknown as Comparison;
     return new Looks(frames, new Settings(null), beside);
   };
 

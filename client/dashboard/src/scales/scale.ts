@@ -92,11 +92,10 @@ export function symmetric({ low, high }: Span): Span {
   return { low: -reach, high: reach };
 }
 
-/** The span that holds all those of which something is known; null where there is none. */
-export function joined(...spans: readonly (Span | null)[]): Span | null {
-  const known = spans.filter((span) => span !== null && span.high >= span.low) as Span[];
-  if (known.length === 0) return null;
-  return { low: Math.min(...known.map(({ low }) => low)), high: Math.max(...known.map(({ high }) => high)) };
+/** The span that holds both; the one where nothing of the other has a value. */
+export function joined(one: Span | null, other: Span | null): Span | null {
+  if (one === null || other === null || !(other.high >= other.low)) return one;
+  return { low: Math.min(one.low, other.low), high: Math.max(one.high, other.high) };
 }
 
 /** Counts of values in `bins` even places of a scale from `first` to `last`; what lies beyond counts in the outermost. */

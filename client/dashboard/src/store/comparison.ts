@@ -1,35 +1,37 @@
 /** What the maps are compared with: B, a frame that was kept or one of a recording; A is what is on screen. */
 import { batch, computed, effect, type ReadonlySignal, type Signal, signal, untracked } from "@preact/signals";
+import { del, get, keys, set } from "idb-keyval";
 
 import type { FrameMeta } from "../stream/documents";
 import { summariseMap } from "../stream/summary";
 import { LIVE, liveFrame, MADE, RequestError, recordingPath, refusalIn } from "./api";
-import type { Cupboard } from "./cupboard";
-import { type Frame, type Frames, frameOf, isWhole } from "./frames";
+import { type Frame, type Frames, frameOf } from "./frames";
 import { MAP_PRODUCTS } from "./mapCatalogue";
 import type { RangeErrors } from "./rangeErrors";
 import type { FrameLoader } from "./replay";
 import { oneOf, type Settings } from "./settings";
 
 /** A frame of a recording, by its id; or one that was kept, by its name, without a number. */
-export interface Source {
-  readonly of: string;
-  readonly frame: number | null;
-}
+export type Source = Readonly<{ of: string; frame: number | null }>;
 
 /** What a map panel shows of two frames. */
-export const WAYS = ["A", "B", "difference", "wipe", "blink"] as const;
+export const WAYS = ["A", "B", "difference", "wipe"] as const;
 export type Way = (typeof WAYS)[number];
 
 /** What says which differences of ranges mean something. */
 const ERRORS = ["range_error", "trust"] as const;
 const MAPS: readonly string[] = MAP_PRODUCTS.map(({ product }) => product);
 
+/** A map of B, and A - B: null where there is none yet, or the two are not of the same size. */
+type ComparedMap = Readonly<Record<"b" | "difference", ReadonlySignal<Frame | null>>>;
+
 export class Comparison {
   /** B; null while nothing is compared. */
   readonly source: Signal<Source | null>;
   /** What the map panels show, by their views. */
   readonly ways: Readonly<Record<string, Signal<Way>>>;
+  /** By their products. */
+  readonly maps: Readonly<Record<string, ComparedMap>>;
   /** Names of the frames that this browser keeps. */
   readonly kept = signal<readonly string[]>([]);
   /** Why B cannot be had; null if it can. */
@@ -39,16 +41,13 @@ export class Comparison {
   /** Set by what talks to the worker. */
   loader: FrameLoader | null = null;
   readonly #b = signal<readonly Frame[]>([]);
-  readonly #maps: ReadonlyMap<string, readonly [b: ReadonlySignal<Frame | null>, difference: ReadonlySignal<Frame | null>]>;
-  readonly #computed = signal(0);
-  #loaded = "";
-  #loading = false;
+  readonly #changes = signal(0);
+  #asked = 0;
 
   constructor(
     private readonly frames: Frames,
     errors: RangeErrors,
     settings: Settings,
-    private readonly cupboard: Cupboard,
   ) {
     this.source = settings.of<Source | null>({
       link: "b",
@@ -60,13 +59,14 @@ export class Comparison {
         return of === undefined ? undefined : { of, frame: Number(frame) };
       },
     });
-    const way = (link: string): Signal<Way> =>
-      settings.of<Way>({ link, initial: "A", ...oneOf(WAYS), text: (way) => (way === "A" ? "" : way) });
+    const way = (link: string) => settings.of<Way>({ link, initial: "A", ...oneOf(WAYS), text: (now) => (now === "A" ? "" : now) });
     this.ways = { map: way("way"), "second-map": way("way2") };
     const of = (product: string): Frame | null => this.#b.value.find((each) => each.product === product) ?? null;
-    this.#maps = new Map(
-      MAPS.map((product) => [product, [computed(() => of(product)), computed(() => minus(frames.of(product).value, of(product)))]]),
-    );
+    const compared = (product: string): ComparedMap => ({
+      b: computed(() => of(product)),
+      difference: computed(() => minus(frames.of(product).value, of(product))),
+    });
+    this.maps = Object.fromEntries(MAPS.map((product) => [product, compared(product)]));
     this.error_m = computed(() => {
       const maps = [...ERRORS.map((product) => errors.of(product).value), ...ERRORS.map(of)].flatMap((map) => map ?? []);
       const [error_a, trust_a, error_b, trust_b] = maps.map(({ values }) => values);
@@ -74,104 +74,66 @@ export class Comparison {
       const known = (at: number): boolean => trust_a[at] === 0 && trust_b[at] === 0;
       return Float32Array.from(error_a).map((error, at) => (known(at) ? Math.hypot(error, error_b[at]) : NaN));
     });
+    const shown = computed(() => frames.wanted.value.filter((product) => MAPS.includes(product)).join());
     effect(() => {
-      void [this.source.value, frames.wanted.value, this.#computed.value];
-      untracked(() => void this.#load());
+      void this.#changes.value;
+      const [source, maps] = [this.source.value, shown.value.match(/\w+/g) ?? []];
+      untracked(() => void this.#load(source, maps));
     });
-  }
-
-  /** A map of B; null where it has none, or it is not there yet. */
-  b(product: string): ReadonlySignal<Frame | null> {
-    return this.#of(product)[0];
-  }
-
-  /** A - B of a map; null where the two have no such map of the same size. */
-  difference(product: string): ReadonlySignal<Frame | null> {
-    return this.#of(product)[1];
   }
 
   /** Keeps all maps of the frame that is shown under a name, and compares with it. Raises RequestError. */
   async keep(shown: Frame, name: string): Promise<void> {
-    await this.cupboard.put(name, await this.#whole(shown));
-    await this.look();
+    const path = shown.origin === LIVE ? liveFrame(shown.meta.frame) : shown.origin;
+    const wanted = [...MAPS, "trust"].filter((product) => this.frames.absent.peek()[product] === undefined);
+    const frames = ((await this.loader?.(path, wanted)) ?? []).map((report) => frameOf(report, MADE));
+    await stored(() => set(name, frames));
     this.source.value = { of: name, frame: null };
     this.recompute(); // another frame may have had the name
   }
 
-  /** Reads which frames are kept. Raises RequestError. */
-  async look(): Promise<void> {
-    this.kept.value = await this.cupboard.names();
-  }
-
-  async remove(name: string): Promise<void> {
-    await this.cupboard.remove(name);
-    await this.look();
+  /** Reads which frames are kept, without one that is to be removed. Raises RequestError. */
+  async look(removed?: string): Promise<void> {
+    if (removed !== undefined) await stored(() => del(removed));
+    this.kept.value = await stored(() => keys<string>());
   }
 
   /** B is another now, or computed otherwise. */
   recompute(): void {
-    this.#computed.value += 1;
-  }
-
-  #of(product: string): readonly [ReadonlySignal<Frame | null>, ReadonlySignal<Frame | null>] {
-    const map = this.#maps.get(product);
-    if (map === undefined) throw new Error(`There is no map of ${product}.`);
-    return map;
-  }
-
-  /** All maps that the service has of a frame; where that is gone, those that the page shows. */
-  async #whole(shown: Frame): Promise<readonly Frame[]> {
-    const wanted = [...MAPS, "trust"].filter((product) => this.frames.absent.peek()[product] === undefined);
-    try {
-      const path = shown.origin === LIVE ? liveFrame(shown.meta.frame) : shown.origin;
-      return ((await this.loader?.(path, wanted)) ?? []).map((report) => frameOf(report, MADE));
-    } catch (error) {
-      const here = wanted.flatMap((product) => this.frames.of(product).peek() ?? []);
-      const whole = here.filter(({ origin, meta }) => origin === shown.origin && meta.frame === shown.meta.frame && isWhole(meta));
-      if (whole.length === 0) throw error;
-      return whole.map((frame) => ({ ...frame, origin: MADE }));
-    }
-  }
-
-  /** One frame at a time: what is chosen meanwhile comes after it. */
-  async #load(): Promise<void> {
-    if (this.#loading || this.loader === null) return;
-    this.#loading = true;
-    for (let wanted = this.#wanted(); wanted !== this.#loaded; wanted = this.#wanted()) {
-      this.#loaded = wanted;
-      try {
-        for await (const frames of this.#had(this.source.peek(), this.loader))
-          batch(() => ([this.#b.value, this.trouble.value] = [frames, null]));
-      } catch (error) {
-        batch(() => ([this.#b.value, this.trouble.value] = [[], refusalIn(error).message]));
-      }
-    }
-    this.#loading = false;
+    this.#changes.value += 1;
   }
 
   /** Maps of B as they are had; of a recording computed as A is, its errors last, as they take longest. */
-  async *#had(source: Source | null, loader: FrameLoader): AsyncGenerator<readonly Frame[]> {
-    if (source === null) yield [];
-    else if (source.frame === null) {
-      const frames = await this.cupboard.get(source.of);
-      if (frames === undefined) throw new RequestError({ title: `This browser keeps no frame “${source.of}”.` });
-      yield frames;
-    } else {
-      const path = `${recordingPath(source.of)}/frames/${source.frame}?reconstruction=current`;
-      const bring = async (products: readonly string[]) => (await loader(path, products)).map((report) => frameOf(report, path));
-      const maps = await bring(this.#shown());
-      yield maps;
-      if (source === this.source.peek()) yield [...(await bring(ERRORS)), ...maps];
+  async #load(source: Source | null, maps: readonly string[]): Promise<void> {
+    const asked = ++this.#asked;
+    const show = (frames: readonly Frame[], trouble: string | null = null): void => {
+      if (asked === this.#asked) batch(() => ([this.#b.value, this.trouble.value] = [frames, trouble]));
+    };
+    try {
+      if (source === null) show([]);
+      else if (source.frame === null) {
+        const frames = await stored(() => get<readonly Frame[]>(source.of));
+        show(frames ?? [], frames === undefined ? `This browser keeps no frame “${source.of}”.` : null);
+      } else {
+        const path = `${recordingPath(source.of)}/frames/${source.frame}?reconstruction=current`;
+        const bring = async (products: readonly string[]) =>
+          ((await this.loader?.(path, products)) ?? []).map((report) => frameOf(report, path));
+        const brought = await bring(maps);
+        show(brought);
+        if (asked === this.#asked) show([...(await bring(ERRORS)), ...brought]);
+      }
+    } catch (error) {
+      show([], refusalIn(error).message);
     }
   }
+}
 
-  /** The maps that views show. */
-  #shown(): string[] {
-    return this.frames.wanted.peek().filter((product) => MAPS.includes(product));
-  }
-
-  #wanted(): string {
-    return JSON.stringify([this.source.peek(), this.#shown(), this.#computed.peek()]);
+/** What the browser's storage answers; refused (private windows, policies) or full it raises RequestError. */
+async function stored<T>(ask: () => Promise<T>): Promise<T> {
+  try {
+    return await ask();
+  } catch (error) {
+    throw new RequestError({ title: `This browser keeps no frames: ${error}.` });
   }
 }
 
@@ -182,11 +144,11 @@ function minus(a: Frame | null, b: Frame | null): Frame | null {
   return { ...a, origin: MADE, product: `${a.product}-difference`, values, map: summariseMap(values) };
 }
 
-/** A left of a share of the width, and B right of it. */
-export function wiped(a: Frame, b: Frame, split: number): Frame {
+/** A left of a column, and B from it on. */
+export function wiped(a: Frame, b: Frame, column: number): Frame {
   if (a.shape.join() !== b.shape.join()) return a;
   const [values, columns] = [b.values.slice(), a.shape[1]];
-  for (let row = 0; row < values.length; row += columns) values.set(a.values.subarray(row, row + Math.round(split * columns)), row);
+  for (let row = 0; row < values.length; row += columns) values.set(a.values.subarray(row, row + column), row);
   return { ...a, origin: MADE, product: `${a.product}-wipe`, values };
 }
 
@@ -196,17 +158,9 @@ export function beyondShare({ values }: Frame, errors: Float32Array): number {
   return errors.filter((error, at) => Math.abs(values[at]) > error).length / known;
 }
 
-const CONDITIONS: Partial<Record<keyof FrameMeta, string>> = {
-  base_frequency_hz: "frequency",
-  harmonics: "m",
-  zeroth: "b₀",
-  exposure_s: "exposure",
-  takes: "takes",
-  calibration_id: "calibration",
-  estimator: "estimator",
-};
+const CONDITIONS = ["base_frequency_hz", "harmonics", "zeroth", "exposure_s", "takes", "calibration_id", "estimator"] as const;
 
 /** What two frames were not measured or computed alike with, in words. */
 export function differing(a: FrameMeta, b: FrameMeta): string[] {
-  return Object.entries(CONDITIONS).flatMap(([key, word]) => (a[key as keyof FrameMeta] === b[key as keyof FrameMeta] ? [] : [word]));
+  return CONDITIONS.filter((key) => a[key] !== b[key]).map((key) => key.replace(/_(hz|s|id)$/, "").replace("_", " "));
 }

@@ -62,8 +62,8 @@ export class Looks {
 
   constructor(frames: Frames, settings: Settings, comparison: Comparison) {
     const looks = MAP_PRODUCTS.flatMap((map) => [
-      new Look(map, frames.of(map.product), settings, comparison.b(map.product)),
-      new Look(differenceMap(map), comparison.difference(map.product), settings),
+      new Look(map, frames.of(map.product), settings, comparison.maps[map.product].b),
+      new Look(differenceMap(map), comparison.maps[map.product].difference, settings),
     ]);
     this.#all = new Map(looks.map((look) => [look.product.product, look]));
   }

@@ -9,7 +9,6 @@ import { Calibrations } from "./calibrations";
 import { Caller } from "./caller";
 import { Comparison } from "./comparison";
 import { Credentials } from "./credentials";
-import { browserCupboard } from "./cupboard";
 import { Details } from "./details";
 import { Events } from "./events";
 import { Frames } from "./frames";
@@ -136,7 +135,7 @@ export class Store extends Ground {
   /** Layouts under names, and the way back from changes of it. */
   readonly layouts = new Layouts(this.settings, this.layout);
   /** What the maps are compared with. */
-  readonly comparison = new Comparison(this.frames, this.rangeErrors, this.settings, browserCupboard());
+  readonly comparison = new Comparison(this.frames, this.rangeErrors, this.settings);
   /** How maps are shown. */
   readonly looks = new Looks(this.frames, this.settings, this.comparison);
   /** How light in flight is shown. */

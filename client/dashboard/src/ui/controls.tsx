@@ -15,6 +15,15 @@ export function Button({ task, disabled = false, ...button }: ButtonProps) {
   return <button type="button" {...button} disabled={disabled || (task !== undefined && task.busy.value !== null)} />;
 }
 
+/** A small button that takes something away. */
+export function Remove({ what, onClick }: { what: string; onClick: () => void }) {
+  return (
+    <Button class="remove" aria-label={what} title={what} onClick={onClick}>
+      ✕
+    </Button>
+  );
+}
+
 interface ChoiceProps<T extends string | number> {
   readonly label: string;
   /** What is chosen. */

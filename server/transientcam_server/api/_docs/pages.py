@@ -2,12 +2,13 @@
 
 from html import escape
 from importlib.resources import files
-from mimetypes import guess_type
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, FastAPI, Path as PathParameter, Request
+from fastapi.middleware.gzip import GZipMiddleware
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, Response
+from fastapi.staticfiles import StaticFiles
 
 from transientcam_server.api._docs import asyncapi
 from transientcam_server.errors import Problem, kinds
@@ -123,10 +124,8 @@ def add_dashboard(app: FastAPI) -> None:
     """Serve the built dashboard at ``/``, or a page that says how to build it."""
     if (STATIC / "index.html").is_file():
         app.get("/favicon.ico", include_in_schema=False)(_icon)
-        if (STATIC / "assets").is_dir():
-            app.api_route("/assets/{file}", methods=["GET", "HEAD"], include_in_schema=False)(
-                _asset
-            )
+        # frames are not compressed: they are noise, and what sends them has no time for it
+        app.mount("/assets", GZipMiddleware(_Assets(directory=STATIC / "assets", check_dir=False)))
         # without a fallback page an unknown path stays an error, also under /api
         app.frontend("/", directory=STATIC, fallback=None)
         return
@@ -141,26 +140,14 @@ def add_dashboard(app: FastAPI) -> None:
         )
 
 
-def _asset(file: Annotated[str, PathParameter()], request: Request) -> FileResponse:
-    """Serve a file whose name changes with its content: for good, and as the build compressed it.
+class _Assets(StaticFiles):
+    """Files whose names change with their content, so that browsers keep them for good."""
 
-    Frames are not compressed: they are noise, and what sends them has no time for it.
-    """
-    path = STATIC / "assets" / file
-    if not path.is_file() or path.suffix == ".gz":
-        raise Problem(kinds.NOT_FOUND, f"There is no {file[:64]!r}.")
-    headers = {"Cache-Control": "public, max-age=31536000, immutable", "Vary": "Accept-Encoding"}
-    packed = path.with_name(f"{file}.gz")
-    media_type, _ = guess_type(file)
-    if _takes_gzip(request.headers.get("accept-encoding", "")) and packed.is_file():
-        path, headers["Content-Encoding"] = packed, "gzip"
-    return FileResponse(path, headers=headers, media_type=media_type)
-
-
-def _takes_gzip(accepted: str) -> bool:
-    """Whether a client names gzip and does not weigh it with nothing (RFC 9110, 12.5.3)."""
-    codings = (each.replace(" ", "").lower().partition(";q=") for each in accepted.split(","))
-    return any(name == "gzip" and (weight or "1").strip("0.") != "" for name, _, weight in codings)
+    def file_response(self, *args: Any, **options: Any) -> Response:
+        """Serve a file, or say that it is as the client has it."""
+        response = super().file_response(*args, **options)
+        response.headers["Cache-Control"] = "public, max-age=31536000, immutable"
+        return response
 
 
 async def _icon() -> FileResponse:

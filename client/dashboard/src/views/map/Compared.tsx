@@ -5,29 +5,18 @@ import { deviation, engineering, fixed } from "../../scales/format";
 import { beyondShare, differing, type Source, WAYS, type Way } from "../../store/comparison";
 import type { Look } from "../../store/looks";
 import { type Store, useStore } from "../../store/store";
-import { Button, Form, Tabs, TextField } from "../../ui/controls";
+import { Button, Form, Remove, Tabs, TextField } from "../../ui/controls";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { useTask } from "../../ui/useTask";
 import { clock, duration } from "../replay/words";
 import { valueAtPixel } from "./Readout";
-import "./Compared.css";
 
-/** How many recordings are offered: the rest is found by their panel's search. */
-const OFFERED = 8;
-
-const WAY_WORDS: Readonly<Record<Way, readonly [text: string, hint: string]>> = {
-  A: ["A", "What is on screen"],
-  B: ["B", "What it is compared with"],
-  difference: ["A − B", "The difference; grey where it lies within the errors of both"],
-  wipe: ["Wipe", "A at the left, B at the right"],
-  blink: ["Blink", "A and B in turn"],
-};
+const WORDS: Readonly<Record<Way, string>> = { A: "A", B: "B", difference: "A − B", wipe: "Wipe" };
 
 /** What B is, in words. */
 export function sourceWords({ comparison, recordings }: Store): string {
   const source = comparison.source.value;
-  if (source === null) return "";
-  if (source.frame === null) return source.of;
+  if (source === null || source.frame === null) return source?.of ?? "";
   return `${recordings.document.value?.recordings.find(({ id }) => id === source.of)?.name ?? source.of}, frame ${source.frame}`;
 }
 
@@ -45,7 +34,8 @@ export function CompareMenu({ look, name, way }: { look: Look; name: string; way
     if (frame !== null) await comparison.keep(frame, typed.peek().trim() || `Frame ${frame.meta.frame}, ${clock(frame.meta.host_time_s)}`);
   };
   const source = (chosen: Source) => () => void choose(async () => (comparison.source.value = chosen));
-  const recorded = (recordings.document.value?.recordings ?? []).filter(({ frames }) => frames > 0).slice(0, OFFERED);
+  // The newest: the rest is found by the search of the recordings' panel.
+  const recorded = (recordings.document.value?.recordings ?? []).filter(({ frames }) => frames > 0).slice(0, 8);
   return (
     <PopoverButton
       face="Compare"
@@ -66,14 +56,7 @@ export function CompareMenu({ look, name, way }: { look: Look; name: string; way
           <Button task={task} class="grow clipped" onClick={source({ of: kept, frame: null })}>
             {kept}
           </Button>
-          <Button
-            class="remove"
-            aria-label={`Remove ${kept}`}
-            title="Keep it no longer"
-            onClick={() => void task.run("Removing…", () => comparison.remove(kept))}
-          >
-            ✕
-          </Button>
+          <Remove what={`Remove ${kept}`} onClick={() => void task.run("Removing…", () => comparison.look(kept))} />
         </p>
       ))}
       {recorded.map(({ id, name, started_s }) => (
@@ -87,11 +70,12 @@ export function CompareMenu({ look, name, way }: { look: Look; name: string; way
 }
 
 /** A, B and their difference at a pixel, and in how much of the picture it means something. */
-export function Compared({ source, look, way, split }: { source: Source; look: Look; way: Signal<Way>; split: Signal<number> }) {
+export function Compared({ source, look, way }: { source: Source; look: Look; way: Signal<Way> }) {
   const store = useStore();
   const { comparison, recordings } = store;
   const { product, unit, decimals } = look.product;
-  const [a, b, apart] = [look.frame, comparison.b(product), comparison.difference(product)].map((frame) => frame.value);
+  const compared = comparison.maps[product];
+  const [a, b, apart] = [look.frame.value, compared.b.value, compared.difference.value];
   const pixel = store.pointed.value ?? store.selected.value;
   const difference = valueAtPixel(apart, pixel);
   const errors = product === "range" ? comparison.error_m.value : null;
@@ -99,59 +83,45 @@ export function Compared({ source, look, way, split }: { source: Source; look: L
   const unlike = a === null || b === null ? [] : differing(a.meta, b.meta);
   const older_s = a === null || b === null ? NaN : a.meta.host_time_s - b.meta.host_time_s;
   const recording = recordings.document.value?.recordings.find(({ id }) => id === source.of);
-  const slider = (label: string, least: number, most: number, step: number, value: number, set: (value: number) => void) => (
-    <input
-      type="range"
-      class="grow"
-      aria-label={label}
-      min={least}
-      max={most}
-      step={step}
-      value={value}
-      onInput={(event) => set(event.currentTarget.valueAsNumber)}
-    />
-  );
   return (
     <div class="panel-row compared" role="group" aria-label="Compared">
       <div class="row">
         <Tabs
           label="A and B"
           value={way.value}
-          options={WAYS.map((value) => ({ value, text: WAY_WORDS[value][0], hint: WAY_WORDS[value][1] }))}
+          options={WAYS.map((value) => ({ value, text: WORDS[value] }))}
           onChange={(chosen) => (way.value = chosen)}
         />
-        {way.value === "wipe" && slider("Place of the line between A and B", 0, 1, 0.01, split.value, (value) => (split.value = value))}
-        <Button class="remove" aria-label="Compare no longer" title="Compare no longer" onClick={() => (comparison.source.value = null)}>
-          ✕
-        </Button>
+        <Remove what="Compare no longer" onClick={() => (comparison.source.value = null)} />
       </div>
       <div class="row">
         <span class="clipped" data-field="source">
           <span class="quiet">B:</span> {sourceWords(store)}
           {Number.isFinite(older_s) && `, ${duration(Math.abs(older_s))} ${older_s < 0 ? "later" : "earlier"}`}
         </span>
-        {source.frame !== null &&
-          recording !== undefined &&
-          slider("Frame of B", 1, recording.frames, 1, source.frame, (frame) => (comparison.source.value = { ...source, frame }))}
+        {source.frame !== null && recording !== undefined && (
+          <input
+            type="range"
+            class="grow"
+            aria-label="Frame of B"
+            min={1}
+            max={recording.frames}
+            value={source.frame}
+            onKeyDown={(event) => event.stopPropagation()} // they would move the light
+            onChange={(event) => (comparison.source.value = { ...source, frame: event.currentTarget.valueAsNumber })}
+          />
+        )}
       </div>
       <p class="line">
-        <span>
-          <span class="quiet">B</span> <span data-field="b">{fixed(valueAtPixel(b, pixel), decimals, unit)}</span>
+        <span data-field="b">B {fixed(valueAtPixel(b, pixel), decimals, unit)}</span>
+        <span data-field="difference" title="With half of its 90 % interval, from those of both ranges">
+          A − B {unit === "m" ? engineering(difference, unit) : fixed(difference, decimals, unit)} {deviation(error, unit)}
         </span>
-        <span title="With half of its 90 % interval, from those of both ranges">
-          <span class="quiet">A − B</span>{" "}
-          <span class={Math.abs(difference) > (error ?? NaN) ? "strong" : ""} data-field="difference">
-            {unit === "m" ? engineering(difference, unit) : fixed(difference, decimals, unit)} {deviation(error, unit)}
-          </span>
+        <span class="quiet" data-field="beyond" title="Beyond the 90 % intervals of both: up to a tenth is chance. The others are grey">
+          {errors === null || apart === null
+            ? "errors not known"
+            : `${fixed(100 * beyondShare(apart, errors), 0, "%")} of the trusted differ by more`}
         </span>
-        {errors !== null && apart !== null && (
-          <span
-            class="quiet"
-            title="Of the trusted pixels, beyond the 90 % intervals of both: up to a tenth is chance. The others are grey"
-          >
-            <span data-field="beyond">{fixed(100 * beyondShare(apart, errors), 0, "%")}</span> differ by more than their errors
-          </span>
-        )}
         {b !== null && apart === null && <span class="waiting">A and B are of different sizes.</span>}
         {unlike.length > 0 && <span class="waiting">Not measured alike: {unlike.join(", ")}</span>}
         {comparison.trouble.value !== null && <span class="refusal">{comparison.trouble.value}</span>}

@@ -1,6 +1,6 @@
-import { type ReadonlySignal, type Signal, useSignal } from "@preact/signals";
-import type { RefObject } from "preact";
-import { useEffect, useRef } from "preact/hooks";
+import type { ReadonlySignal, Signal } from "@preact/signals";
+import type { ComponentChildren, RefObject } from "preact";
+import { useRef } from "preact/hooks";
 import { type Way, wiped } from "../../store/comparison";
 import { drawnOf, type Frame } from "../../store/frames";
 import type { Look } from "../../store/looks";
@@ -39,11 +39,10 @@ function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) 
   const obstacleOf = ({ product }: MapProduct): string | undefined => absent[product];
   const shown = MAP_PRODUCTS.find((each) => each.product === choice.value && obstacleOf(each) === undefined) ?? MAP_PRODUCTS[0];
   const base = store.looks.of(shown.product);
-  const [b, way] = [store.comparison.b(shown.product), store.comparison.ways[name]];
+  const [{ b }, way, source] = [store.comparison.maps[shown.product], store.comparison.ways[name], store.comparison.source.value];
   const now = b.value === null ? "A" : way.value;
   const look = now === "difference" ? store.looks.of(`${shown.product}-difference`) : base;
-  const split = useSignal(0.5);
-  const picture = usePicture(now, look, b, split);
+  const picture = usePicture(now, look, b);
   const canvas = useRef<HTMLCanvasElement>(null);
   const compared = (): string => (now === "A" ? "" : ` ${now === "difference" ? "minus" : `(${now})`} ${sourceWords(store)}`);
   const parts = (): FigureParts | null => {
@@ -84,7 +83,11 @@ function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) 
         </>
       }
     >
-      <MapPicture base={base} look={look} picture={picture} canvas={canvas} way={way} split={split} />
+      <MapPicture look={look} picture={picture} canvas={canvas}>
+        <Readout key={shown.product} look={base} />
+        {source !== null && <Compared source={source} look={base} way={way} />}
+        <Measured look={look} />
+      </MapPicture>
     </Panel>
   );
 }
@@ -106,44 +109,31 @@ function MapLookMenu({ look, name }: { look: Look; name: ViewName }) {
   );
 }
 
-/** Of blinking: slow enough for everybody. */
-const BLINK_MS = 700;
-
-/** What is drawn of A and B: one of them, their difference, both beside a line, or both in turn. */
-function usePicture(way: Way, look: Look, b: ReadonlySignal<Frame | null>, split: ReadonlySignal<number>): ReadonlySignal<Frame | null> {
-  const turn = useSignal(false);
-  useEffect(() => {
-    if (way !== "blink") return undefined;
-    const timer = setInterval(() => (turn.value = !turn.peek()), BLINK_MS);
-    return () => clearInterval(timer);
-  }, [way, turn]);
+/** What is drawn of A and B: one of them, their difference, or both beside the column that is pointed at. */
+function usePicture(way: Way, look: Look, b: ReadonlySignal<Frame | null>): ReadonlySignal<Frame | null> {
+  const { pointed, selected } = useStore();
   return useComputedOf([way, look, b], () => {
     const [one, other] = [look.frame.value, b.value];
-    if (way === "wipe" && one !== null && other !== null) return wiped(one, other, split.value);
-    return way === "B" || (way === "blink" && turn.value) ? other : one;
+    if (way !== "wipe" || one === null || other === null) return way === "B" ? other : one;
+    return wiped(one, other, (pointed.value ?? selected.value)?.x ?? one.shape[1] >> 1);
   });
 }
 
 interface MapPictureProps {
-  /** The look of A, and that of what is drawn. */
-  readonly base: Look;
   readonly look: Look;
   readonly picture: ReadonlySignal<Frame | null>;
   readonly canvas: RefObject<HTMLCanvasElement | null>;
-  readonly way: Signal<Way>;
-  readonly split: Signal<number>;
+  readonly children: ComponentChildren;
 }
 
 /** Nothing but the figures is keyed by the product: another map must not take the focus from the picture. */
-function MapPicture({ base, look, picture: frame, canvas, way, split }: MapPictureProps) {
+function MapPicture({ look, picture: frame, canvas, children }: MapPictureProps) {
   const store = useStore();
   const shown = look.product;
-  const source = store.comparison.source.value;
-  useProducts([base.product.product, store.frames.amplitude.value]);
+  useProducts([shown.product.replace(/-difference$/, ""), store.frames.amplitude.value]);
   const waiting = useComputedOf([frame], () => frame.value === null);
   const marked = useComputedOf([frame, store], () => valueAtPixel(frame.value, store.pointed.value ?? store.selected.value));
-  const ofRange = base.product.product === "range";
-  const doubtful = look !== base && ofRange ? store.comparison.error_m : null;
+  const doubtful = shown.product === "range-difference" ? store.comparison.error_m : null;
 
   useDrawing(() => {
     const newest = frame.value;
@@ -177,11 +167,7 @@ function MapPicture({ base, look, picture: frame, canvas, way, split }: MapPictu
         </Stage>
         <MapBar look={waiting.value ? null : look} marked={marked} values={frame} />
       </div>
-      <footer class="panel-foot column spaced">
-        <Readout key={base.product.product} look={base} />
-        {source !== null && <Compared source={source} look={base} way={way} split={split} />}
-        <Measured look={look} />
-      </footer>
+      <footer class="panel-foot column spaced">{children}</footer>
     </>
   );
 }

@@ -7,7 +7,7 @@ import { histogram } from "../../scales/scale";
 import type { Look } from "../../store/looks";
 import { figuresOf, type RegionFigures } from "../../store/measures";
 import { useStore } from "../../store/store";
-import { Button } from "../../ui/controls";
+import { Remove } from "../../ui/controls";
 import { useComputedOf, useDrawing } from "../../ui/hooks";
 import { lensOf } from "../points/lens";
 import { PinsRow } from "./PinsRow";
@@ -67,9 +67,7 @@ function RegionRow({ look }: { look: Look }) {
         </span>
       )}
       <RegionHistogram look={look} figures={figures} />
-      <Button class="remove" aria-label="Remove region" title="Remove region" onClick={() => (measures.region.value = null)}>
-        ✕
-      </Button>
+      <Remove what="Remove region" onClick={() => (measures.region.value = null)} />
     </div>
   );
 }

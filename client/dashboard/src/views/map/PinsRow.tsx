@@ -2,7 +2,7 @@ import { deviation, fixed } from "../../scales/format";
 import type { Look } from "../../store/looks";
 import { PIN_COLOURS, type Pin } from "../../store/measures";
 import { useStore } from "../../store/store";
-import { Button } from "../../ui/controls";
+import { Remove } from "../../ui/controls";
 import { useProducts } from "../../ui/hooks";
 import { distanceOf, lensOf, type Ranged } from "../points/lens";
 import { valueAtPixel } from "./Readout";
@@ -47,9 +47,7 @@ export function PinsRow({ look }: { look: Look }) {
             </span>
           );
         })}
-      <Button class="remove" aria-label="Remove pins" title="Remove pins" onClick={() => (measures.pins.value = [])}>
-        ✕
-      </Button>
+      <Remove what="Remove pins" onClick={() => (measures.pins.value = [])} />
     </div>
   );
 }
