@@ -48,7 +48,7 @@ from transientcam_server.planning._search.families import FREQUENCY_FACTORS, HAR
 from transientcam_server.settings import SensorSettings, SequenceSettings
 
 OWN: Final = Path(__file__).parent / "scenes"
-CAPTURES: Final = 8
+CAPTURES: Final = 4
 _COLD_S: Final = 5.0
 _WARM_S: Final = 1500.0
 _WARMS_S: Final = 20.0
