@@ -109,7 +109,7 @@ def measure_photon_transfer(camera: Camera, *, frames: int) -> PhotonTransfer:
             exposures_s.append(camera.configure(sequence).sequence.exposure_s)
             *planes, level_dn = _captured(camera, frames, highest_dn)
             if about.dark_dn is not None:
-                planes, level_dn = _of_modulation(*planes, about), about.dark_dn
+                planes, level_dn = _of_modulation(planes, about), about.dark_dn
             levels_dn.append(level_dn)
             found.append(planes)
     finally:
@@ -149,10 +149,9 @@ def _captured(camera: Camera, frames: int, highest_dn: int) -> tuple[_Array, _Ar
     return mean, variance, clipped, float(np.median(mean if capture.dark is None else capture.dark))
 
 
-def _of_modulation(
-    mean: _Array, variance: _Array, clipped: _Array, about: Capabilities
-) -> list[_Array]:
+def _of_modulation(planes: list[_Array], about: Capabilities) -> list[_Array]:
     """Return half of the light (1, H, W) on the dark level, and the others of all N phases."""
+    mean, variance, clipped = planes
     turned = np.exp(1j * np.array(about.sampling.phases_rad))[:, None, None]
     signal = 2 * np.abs((mean[: len(turned)] * turned).mean(axis=0)) + (about.dark_dn or 0.0)
     return [each[None] for each in (signal, variance.mean(axis=0), clipped.max(axis=0))]
