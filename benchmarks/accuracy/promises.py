@@ -71,7 +71,7 @@ class Device:
     """Than at its calibration."""
 
 
-_OWN_SCENES: Final = ("wall", "corner", "mirrors", str(OWN / "yard.toml"), str(OWN / "alcove.toml"))
+_OWN_SCENES: Final = ("wall", "corner", "mirrors", str(OWN / "yard.toml"))
 _FEW: Final = ("wall", "corner", "mirrors")
 _PROTOTYPE: Final = "sim:{scene}?device=prototype&seed={seed}"
 DEVICES: Final = {
