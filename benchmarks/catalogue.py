@@ -123,11 +123,6 @@ _ALL: Final = (
     Measurement("accuracy.noise", "measured/accuracy", _TRADED),
     Measurement("accuracy.trust", "measured/accuracy", _IMAGING, by_hand=True),
     Measurement("accuracy.promises", "measured/plans", _PLANNED),
-    Measurement("accuracy.calibrating", "measured/plans", _PLANNED),
-    Measurement(
-        "accuracy.calibrating", "measured/plans", _PLANNED, 2, "checking", given={"seed": 8}
-    ),
-    Measurement("accuracy.regret", "measured/plans", _PLANNED),
     # -- Kinect v2
     *(
         Measurement(

@@ -19,7 +19,7 @@ class Outcome:
     target_m: float
     plan: str
     plan_s: float = math.nan
-    predicted_m: tuple[float, float, float] = (math.nan,) * 3
+    predicted_m: tuple[float, float, float] = (math.nan, math.nan, math.nan)
     """What 90 % of the ranges are within, and the ends of its interval."""
     measured_m: float = math.nan
     share: float = math.nan

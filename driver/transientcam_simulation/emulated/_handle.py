@@ -48,6 +48,7 @@ class SimulationHandle:
     ``world``, ``device``: the renderer of its images, and the device that sends them.
     ``prepare``: prepares another scene, or other effects.
     ``set_interlock``: closes or opens the safety interlock; None where the camera has none.
+    ``taps``: of a pixel; of two, half of their difference is an image.
     """
 
     def __init__(
@@ -58,7 +59,9 @@ class SimulationHandle:
         *,
         prepare: PrepareScene,
         set_interlock: Callable[[bool], None] | None = None,
+        taps: int = 1,
     ) -> None:
+        self._taps = taps
         self._chosen: Scene | str = scene  # without choices of effects
         self._definition: str | None = None
         self._scene = scene
@@ -97,7 +100,7 @@ class SimulationHandle:
         position = camera.axes @ (light.position_m - camera.position_m)
         axis = camera.axes @ (light.aim_at_m - light.position_m)
         axis = axis / np.linalg.norm(axis)
-        white = light.electrons_per_s / self.sensor.gain_e_per_dn
+        white = light.electrons_per_s / self._world.world.sensor.gain_e_per_dn
         return Lamp(tuple(position), tuple(axis), light.beam_exponent, white)
 
     @property
@@ -145,8 +148,13 @@ class SimulationHandle:
 
     @property
     def sensor(self) -> Sensor:
-        """The sensor of the scene it was built with."""
-        return self._world.world.sensor
+        """The sensor of the scene it was built with, or one of one tap that has its noise."""
+        sensor = self._world.world.sensor
+        return replace(
+            sensor,
+            gain_e_per_dn=self._taps * sensor.gain_e_per_dn,
+            read_noise_e=self._taps**0.5 * sensor.read_noise_e,
+        )
 
     @property
     def plugged(self) -> bool:

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver import Camera, Sequence, capture_calibration
+from transientcam_driver import Camera, Capabilities, Sequence, capture_calibration
 from transientcam_moments.noise import ROUNDING_VARIANCE, Sensor
 from transientcam_server.errors import Problem, kinds
 
@@ -85,25 +85,28 @@ def measure_photon_transfer(camera: Camera, *, frames: int) -> PhotonTransfer:
     """Measure the noise of a camera before a scene that stands still, at rising exposures.
 
     Differences of successive images tell it, so that neither pixels nor slow drift add to it;
-    images out of step and pixels that move are left out. The camera is idle, and has its sequence
-    of before afterwards. ``frames`` are those of each exposure.
+    images out of step and pixels that move are left out. Images that are differences of two taps
+    show their light by its modulation at the lowest frequency: before a scene without other light
+    they tell a sensor of one tap that has their noise. The camera is idle, and has its sequence of
+    before afterwards. ``frames`` are those of each exposure.
 
     Raises
     ------
     Problem
-        ``invalid-request`` where its frames do not tell the gain, or are differences of two taps.
+        ``invalid-request`` where its frames do not tell the gain.
     """
     before, about = camera.applied.sequence, camera.capabilities
-    if about.dark_dn is not None:
-        raise _untold("images that are differences do not show their light")
     zeroth = "on-off" if "on-off" in about.zeroths else about.zeroths[0]
-    any_s = (Sequence(harmonics=1, zeroth=zeroth, exposure_s=each_s) for each_s in EXPOSURES_S)
+    base_hz = Sequence().base_frequency_hz if about.dark_dn is None else about.min_frequency_hz
+    any_s = (Sequence(base_hz, 1, zeroth, exposure_s=each_s) for each_s in EXPOSURES_S)
     base = dict.fromkeys(map(about.nearest, any_s))  # in rising order
     highest_dn, found, levels_dn, exposures_s = (1 << about.bits) - 1, [], [], list[float]()
     try:
         for sequence in base:
             exposures_s.append(camera.configure(sequence).sequence.exposure_s)
             *planes, level_dn = _captured(camera, frames, highest_dn)
+            if about.dark_dn is not None:
+                planes, level_dn = _of_modulation(planes, about), about.dark_dn
             levels_dn.append(level_dn)
             found.append(planes)
     finally:
@@ -141,6 +144,14 @@ def _captured(camera: Camera, frames: int, highest_dn: int) -> tuple[_Array, _Ar
     capture = capture_calibration(camera, takes=frames, average=average)
     mean, variance, clipped = (np.stack(each) for each in zip(*found, strict=True))
     return mean, variance, clipped, float(np.median(mean if capture.dark is None else capture.dark))
+
+
+def _of_modulation(planes: list[_Array], about: Capabilities) -> list[_Array]:
+    """Return half of the light (1, H, W) on the dark level, and the others of all N phases."""
+    mean, variance, clipped = planes
+    turned = np.exp(1j * np.array(about.sampling.phases_rad))[:, None, None]
+    signal = 2 * np.abs((mean[: len(turned)] * turned).mean(axis=0)) + (about.dark_dn or 0.0)
+    return [each[None] for each in (signal, variance.mean(axis=0), clipped.max(axis=0))]
 
 
 def _points(*planes: _Array) -> _Array:

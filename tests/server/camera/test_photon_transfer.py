@@ -47,6 +47,21 @@ def test_a_hidden_sensor_is_found(
     assert sensor.full_well_e == pytest.approx(room_e, rel=0.08)
 
 
+def test_differences_of_two_taps_tell_a_sensor_that_has_their_noise(tmp_path: Path) -> None:
+    hidden = scene(tmp_path, gain_e_per_dn=5.0, read_noise_e=20.0).removeprefix("sim:")
+    with open_camera(f"opt8241:emulated?scene={hidden}", clock=VirtualClock()) as camera:
+        sensor = measure_photon_transfer(camera, frames=4).sensor
+        assert camera.simulation is not None
+        stated = camera.simulation.sensor
+
+    # each of both has its own noise, and half of their difference is what is seen
+    assert sensor.gain_e_per_dn == pytest.approx(2 * 5.0, rel=0.05)
+    assert sensor.read_noise_e == pytest.approx(2**0.5 * 20.0, rel=0.1)
+    assert sensor.dark_dn == pytest.approx(2048.0)
+    assert stated.gain_e_per_dn == 2 * 5.0
+    assert stated.read_noise_e == pytest.approx(2**0.5 * 20.0)
+
+
 def points(gain: float, dark: float, *, full: float = np.inf, seed: int = 0) -> np.ndarray:
     """Variances of 60 groups of 1000 values each, up to 3000 DN; beyond ``full`` hardly any."""
     random = np.random.default_rng(seed)

@@ -47,4 +47,4 @@ def build_tofcam660(
     device = EmulatedTofcam660(
         power_on, host=host, control_port=control_port, data_port=data_port, udp_port=udp_port
     )
-    return device, SimulationHandle(scene, world, device, prepare=prepare)
+    return device, SimulationHandle(scene, world, device, prepare=prepare, taps=2)

@@ -37,4 +37,4 @@ def build_opt8241(
     pixels.expose_for(MOST_DUTY * DUTY_S)
     serial = f"SIM-{scene.device.name}-{scene.device.seed}"[:32]
     device = EmulatedOpt8241(pixels, serial=serial, clock=clock)
-    return device, SimulationHandle(scene, world, device, prepare=prepare)
+    return device, SimulationHandle(scene, world, device, prepare=prepare, taps=2)

@@ -4,8 +4,8 @@ The interval of the noise covers the sampling of pixels and what the model is wr
 of an error has two ends of its own: the error with the least bias that may be expected, and that
 with the most. Where the moments tell the bias, these are shares of the predicted one (`KNOWN`).
 Where they do not, the light may begin at any range that they do not contradict (`plausible`), and
-what is predicted of the bias is worth less (`UNKNOWN`). On random scenes
-``python -m benchmarks calibrating`` measures what both hold.
+what is predicted of the bias is worth less (`UNKNOWN`). ``python -m benchmarks promises`` measures
+what both hold, with ``--seed`` on random scenes.
 """
 
 import math

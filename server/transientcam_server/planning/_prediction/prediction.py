@@ -458,8 +458,10 @@ def _error(
         figure(of_bias(bias_m), value, picks, reach.spread) for bias_m in (least_m, most_m)
     )
     found = between(expected, least, most)
-    # how much more than the least this look cannot tell
-    return found if farthest_m is None else replace(found, high=math.inf)
+    if farthest_m is not None:  # how much more than the least this look cannot tell
+        return replace(found, high=math.inf)
+    # with the most bias it is known as closely as intervals say
+    return replace(found, with_margin=min(found.with_margin, most.with_margin))
 
 
 def _within(

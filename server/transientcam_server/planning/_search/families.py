@@ -19,7 +19,7 @@ FREQUENCY_FACTORS: Final = (1.0, 2.0, 3.0, 0.5)
 """Base frequencies that are tried, over the one wanted."""
 HARMONICS: Final = (1, 2, 3, 4, 6, 8, 12)
 TAKES: Final = (1, 2, 3, 4, 6, 8, 12, 16, 20, 30, 40, 64, 100)
-EXPOSURES: Final = 12
+EXPOSURES: Final = 20
 """How many exposures are tried between the shortest and the longest sensible one."""
 SHORTEST_EXPOSURE_S: Final = 2e-4
 """Shorter ones save nothing beside a read-out of 4 ms."""

@@ -108,12 +108,31 @@ def test_how_the_zeroth_moment_is_measured_matters_to_bounds_alone(
     assert {each.first.zeroth for each in found(goal, capabilities)} == zeroths
 
 
-def test_twelve_exposures_at_equal_ratios_are_tried(capabilities: Capabilities) -> None:
+def test_twenty_exposures_at_equal_ratios_are_tried(capabilities: Capabilities) -> None:
     tried_s = exposures_s(found(Goal(base=BASE, capture_s=1.0), capabilities, saturating_s=0.02))
 
     # up to 90 % of what saturates
-    assert len(tried_s) == 12
-    assert tried_s == pytest.approx([2e-4 * 90 ** (k / 11) for k in range(12)], abs=1e-9)
+    assert len(tried_s) == 20
+    assert tried_s == pytest.approx([2e-4 * 90 ** (k / 19) for k in range(20)], abs=1e-9)
+
+
+def test_a_camera_that_loses_images_takes_one_frequency_so_often_that_one_is_outvoted(
+    capabilities: Capabilities,
+) -> None:
+    model = Light(0.004)
+
+    def takes(lost_share: float, goal: Goal) -> set[int]:
+        model.scene = dataclasses.replace(model.scene, lost_share=lost_share)
+        searched = families(goal, cast(Predictor, model), capabilities)
+        assert min(each.takes for of in searched if of.first.harmonics > 1 for each in of.members)
+        return {each.takes for of in searched if of.first.harmonics == 1 for each in of.members}
+
+    nine_in_ten = Goal(base=BASE, range_error_m=0.02, share=0.9)
+    assert {1, 2} < takes(0.01, nine_in_ten)  # 4 of 100 captures of one take hold a lost image
+    assert min(takes(0.07, nine_in_ten)) == 3  # 25 of 100
+    assert min(takes(0.07, dataclasses.replace(nine_in_ten, share=0.7))) == 1
+    fixed = dataclasses.replace(nine_in_ten, fixed=frozenset({"takes"}))
+    assert takes(0.07, fixed) == {BASE.takes}
 
 
 def test_exposures_are_those_that_the_camera_has(capabilities: Capabilities) -> None:
