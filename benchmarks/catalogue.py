@@ -107,7 +107,7 @@ _ALL: Final = (
     Measurement("likelihood.sparse", "measured/likelihood", _MOMENTS),
     Measurement("likelihood.captures", "measured/likelihood", _MOMENTS),
     Measurement("likelihood.shapes", "measured/likelihood", _MOMENTS),
-    Measurement("likelihood.neighbours", "measured/likelihood", _MOMENTS),
+    Measurement("likelihood.neighbours", "measured/neighbours", _MOMENTS),
     Measurement("likelihood.speed", "measured/likelihood", _MOMENTS, named="likelihood_speed"),
     # -- simulation
     Measurement("simulation.costs", "measured/simulation", ("driver",), 2, "simulation_costs"),

@@ -1,5 +1,6 @@
 """Averaging moments over neighbouring pixels, but not across edges: adaptive weights."""
 
+import math
 from functools import reduce
 from operator import add
 from typing import Final, NamedTuple
@@ -23,10 +24,19 @@ MOST_SHIFT: Final = 8.0
 MISFIT_OF_ONE: Final = 0.02
 SHIFT_OF_ONE: Final = 0.001
 """Weights of a neighbour alone beside those of its mean with its mirror image."""
-EXPECTED: Final = 4.0
+EXPECTED: Final = 5.0
 """Chi-square of the clearest line of residuals that noise explains."""
-LINES: Final = ((1, 0), (0, 1), (1, 1), (1, -1))
-"""Their directions."""
+CLEAR: Final = 12.0
+"""And from which it is taken back: noise exceeds it in one pixel of five thousand."""
+_SLOPES: Final = ((1, 0), (0, 1), (1, 1), (1, -1), (1, 0.5), (1, -0.5), (0.5, 1), (-0.5, 1))
+LINES: Final = tuple(
+    dict.fromkeys(
+        tuple((whole(by_row * i), whole(by_column * i)) for i in range(-REACH, REACH + 1))
+        for by_row, by_column in _SLOPES
+        for whole in (math.floor, math.ceil)
+    )
+)
+"""Rows and columns of their pixels, in eight directions."""
 
 
 class Averaged(NamedTuple):
@@ -93,7 +103,8 @@ def average_neighbours(
     weight falls with its distance and with misfit over noise. The mean of a neighbour and its
     mirror image is held against the pixel, so that slanted surfaces pass; a second misfit is the
     one in the direction d b_j = i j b_j, all light later, so that small steps in range show. What
-    is flattened leaves residuals of one sign along a line: their square counts as noise.
+    is flattened leaves residuals of one sign along a line of nine pixels: where they are clear the
+    pixel gets their mean back, with its variance; else their square counts as noise.
     """
     moments = as_array(moments)
     if moments.ndim != 3:
@@ -120,10 +131,9 @@ def average_neighbours(
     weight = (size**2 / xp.where(known & present, variance, np.inf)).astype(real)
     measured = weight.max(axis=(1, 2)) > 0
     numbers = xp.maximum((measured * np.array([2 if j else 1 for j in order])).sum(), 1)
-    raw = xp.where(present, moments, 0) / size
+    raw = xp.where(present, moments, 0) * (1 / size)
     there = present.astype(real) if frames is None else xp.where(present, frames, 0).astype(real)
     found, share = _averaged(raw, weight, there, order, numbers, spread=spread)
-    share = xp.minimum(share + _flattened(raw - found, found, weight, order), 1)
     averaged = xp.where(present, found * size, moments)
     return Averaged(averaged, MomentNoise((variance * share).astype(share.dtype)), share)
 
@@ -176,23 +186,24 @@ def _averaged(
                 total, square = total + counts, square + counts * agreement
         total = xp.maximum(total, least)
         current, share = mean / total, xp.where(there > 0, there * square / total**2, 1)
+    tangent = order * weight * current
+    late = (tangent.conj() * (raw - current)).imag.sum(0)
+    known = (order * (tangent.conj() * current).real).sum(0)
+    clearest, shift, part = (xp.zeros_like(known) for _ in range(3))
+    both = _padded(xp.stack([late, known]))
+    for line in LINES:
+        later, together = reduce(add, (_shifted(both, *offset) for offset in line))
+        together = xp.maximum(together, least)
+        clear = later**2 / together > clearest
+        clearest = xp.where(clear, later**2 / together, clearest)
+        shift, part = (
+            xp.where(clear, *each) for each in ((later / together, shift), (known / together, part))
+        )
+    back = (clearest > CLEAR) & (there > 0)
+    current = current * (1 + 1j * order * xp.where(back, shift, 0))
+    doubt = xp.where(back, part, xp.maximum(clearest - EXPECTED, 0) * part)
+    share = xp.where(there > 0, xp.minimum(share + doubt, 1), 1)
     return current.astype(raw.dtype), share.astype(weight.dtype)
-
-
-def _flattened(off: Array, current: Array, weight: Array, multiples: tuple[int, ...]) -> Array:
-    """Return the square of the clearest shift along lines of residuals, over a pixel's variance."""
-    xp = namespace(off)
-    order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
-    scaled = order * weight
-    late = (scaled * (current.real * off.imag - current.imag * off.real)).sum(0)
-    known = (order * scaled * squared(current)).sum(0)
-    found, both = xp.zeros_like(known), _padded(xp.stack([late, known]))
-    for row, column in LINES:
-        along = range(-REACH, REACH + 1)
-        shift, together = reduce(add, (_shifted(both, i * row, i * column) for i in along))
-        together = xp.maximum(together, np.finfo(weight.dtype).tiny)
-        found = xp.maximum(found, xp.maximum(shift**2 / together - EXPECTED, 0) * known / together)
-    return found
 
 
 def _padded(planes: Array) -> Array:
