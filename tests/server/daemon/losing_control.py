@@ -220,7 +220,7 @@ class Control:
 def _command(process: psutil.Process) -> list[str]:
     """Return the command of a process; of one that has ended there is none."""
     try:
-        return process.cmdline()
+        return list(process.cmdline())
     except psutil.Error:
         return []
 
