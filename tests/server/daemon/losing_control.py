@@ -220,7 +220,7 @@ class Control:
 def _command(process: psutil.Process) -> list[str]:
     """Return the command of a process; of one that has ended there is none."""
     try:
-        return process.cmdline()
+        return list(process.cmdline())
     except psutil.Error:
         return []
 
@@ -363,7 +363,7 @@ class Relays:
         where = f"{self._relays[hop - 1].url}/api/v1/acquisition/safe-off"
         httpx.post(where, headers={"Prefer": "wait=0"}, timeout=PATIENCE_S)
         if silent:
-            assert self._control.camera.lit
+            wait_until(lambda: self._control.camera.lit)  # of some cameras now and then
             begin_s = time.monotonic()
             for each in self._links:
                 each.speak()
