@@ -39,12 +39,11 @@ def _weighed(plane: RealPlane, a: int, wa: Plane, c: int, wc: Plane) -> Any:
 def _round(
     order: Length, multiples: RealPlane, raw: RealPlanes, current: RealPlanes, weight: RealPlanes,
     present: RealPlane, share: RealPlane, ahead: Places, places: RealPlane, misfit: float, shift:
-    float, following: RealPlanes, left: RealPlane, residual: RealPlanes, start: int, stop: int,
+    float, following: RealPlanes, left: RealPlane, start: int, stop: int,
 ) -> None:  # fmt: skip
-    """Write averages over one neighbourhood, what they leave of the variance, and residuals.
+    """Write averages over one neighbourhood, and what they leave of the variance.
 
-    These are how much later raw moments are, and what is known of that (2, P). Pictures lie flat
-    with a margin between rows; planes of moments hold real and imaginary parts.
+    Pictures lie flat with a margin between rows; planes of moments hold real and imaginary parts.
     """
     one = simd.ones(present, 1)
     size = len(order) + 1
@@ -95,54 +94,10 @@ def _round(
             total = total + (wa + wc)
             square = square + (wa * sa + wc * sc)
         inverse = 1.0 / larger(total, tiny(one))
-        late, known = 0.0 * one, 0.0 * one
         for j in range(size):
-            nr, ni = mr[j] * inverse, mi[j] * inverse
-            scaled = multiples[j] * w[j]
-            late = late + scaled * (
-                nr * simd.load(one, raw[2 * j + 1], p) - ni * simd.load(one, raw[2 * j], p)
-            )
-            known = known + multiples[j] * scaled * (nr * nr + ni * ni)
-            simd.store(following[2 * j], p, nr)
-            simd.store(following[2 * j + 1], p, ni)
-        simd.store(residual[0], p, late)
-        simd.store(residual[1], p, known)
+            simd.store(following[2 * j], p, mr[j] * inverse)
+            simd.store(following[2 * j + 1], p, mi[j] * inverse)
         simd.store(left, p, select(there > 0.0, there * square * inverse * inverse, one))
-
-
-@njit(nogil=True, error_model="numpy")
-def _take_back(
-    order: Length, multiples: RealPlane, present: RealPlane, residual: RealPlanes, along: Places,
-    current: RealPlanes, share: RealPlane, following: RealPlanes, left: RealPlane, start: int,
-    stop: int,
-) -> None:  # fmt: skip
-    """Give pixels back what averaging has clearly flattened along a line; else count it as noise.
-
-    ``along``: how far away the pixels of lines are, one line after another.
-    """
-    one = simd.ones(present, 1)
-    for p in range(start, stop, simd.width(one)):
-        clearest, shift, part = 0.0 * one, 0.0 * one, 0.0 * one
-        here, count = simd.load(one, residual[1], p), 2 * neighbours.REACH + 1
-        for line in range(len(along) // count):
-            later, together = 0.0 * one, 0.0 * one
-            for k in range(line * count, (line + 1) * count):
-                later = later + simd.load(one, residual[0], p + along[k])
-                together = together + simd.load(one, residual[1], p + along[k])
-            together = larger(together, tiny(one))
-            clear = later * later / together
-            better = clear > clearest
-            shift = select(better, later / together, shift)
-            part = select(better, here / together, part)
-            clearest = larger(clear, clearest)
-        back = clearest > neighbours.CLEAR
-        shift = select(back, shift, 0.0 * one)
-        doubt = part * select(back, one, larger(clearest - neighbours.EXPECTED, 0.0 * one))
-        simd.store(left, p, smaller(simd.load(one, share, p) + doubt, one))
-        for j in range(len(order) + 1):
-            re, im = simd.load(one, current[2 * j], p), simd.load(one, current[2 * j + 1], p)
-            simd.store(following[2 * j], p, re - multiples[j] * shift * im)
-            simd.store(following[2 * j + 1], p, im + multiples[j] * shift * re)
 
 
 def _by_rows(run: Callable[..., Any], first: int, row: int, top: int, end: int) -> None:
@@ -152,7 +107,7 @@ def _by_rows(run: Callable[..., Any], first: int, row: int, top: int, end: int) 
 def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
     """Compile averaging over neighbours of order m; see the table in ``_kernels``."""
     order = (0,) * m
-    average, take_back = (entry(each, m, precision) for each in (_round, _take_back))
+    average = entry(_round, m, precision)
 
     def kernel(
         raw: Complexes,
@@ -181,7 +136,7 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
         there, view = room(1)
         view[0] = present
         (other, _), (spare, _) = room(2 * len(raw)), room(2 * len(raw))
-        (share, _), (left, _), (residual, _) = room(1, 1.0), room(1, 1.0), room(2)
+        (share, _), (left, _) = room(1, 1.0), room(1, 1.0)
         current, orders = given, np.array(multiples, np.float32)
         for radius_px in neighbours.RADII_PX:
             near = neighbours.neighbourhood(radius_px)
@@ -189,18 +144,14 @@ def neighbours_kernel(m: int, precision: str) -> Callable[..., Any]:
             places = np.array([place for *_, place in near], np.float32)
             limits = 1 / (neighbours.MOST_MISFIT * float(numbers)), 2 / neighbours.MOST_SHIFT
             planes = given, current, weights, there[0], share[0], ahead, places
-            run = partial(average, order, orders, *planes, *limits, other, left[0], residual)
+            run = partial(average, order, orders, *planes, *limits, other, left[0])
             spread(partial(_by_rows, run, first, row), height, _ROWS)
             current, other = other, spare if current is given else current
             share, left = left, share
-        along = np.array([dy * row + dx for line in neighbours.LINES for dy, dx in line])
-        planes = there[0], residual, along, current, share[0], other, left[0]
-        run = partial(take_back, order, orders, *planes)
-        spread(partial(_by_rows, run, first, row), height, _ROWS)
         moments = np.empty(raw.shape, np.complex64)
-        view = other[:, first : first + height * row].reshape(-1, height, row)[..., :width]
+        view = current[:, first : first + height * row].reshape(-1, height, row)[..., :width]
         moments.real, moments.imag = view[0::2], view[1::2]
-        final = left[0, first : first + height * row].reshape(height, row)[:, :width]
+        final = share[0, first : first + height * row].reshape(height, row)[:, :width]
         return moments, np.ascontiguousarray(final)
 
     return kernel

@@ -134,6 +134,7 @@ def average_neighbours(
     raw = xp.where(present, moments, 0) * (1 / size)
     there = present.astype(real) if frames is None else xp.where(present, frames, 0).astype(real)
     found, share = _averaged(raw, weight, there, order, numbers, spread=spread)
+    found, share = _given_back(raw - found, found, share, weight, order)
     averaged = xp.where(present, found * size, moments)
     return Averaged(averaged, MomentNoise((variance * share).astype(share.dtype)), share)
 
@@ -186,24 +187,31 @@ def _averaged(
                 total, square = total + counts, square + counts * agreement
         total = xp.maximum(total, least)
         current, share = mean / total, xp.where(there > 0, there * square / total**2, 1)
-    tangent = order * weight * current
-    late = (tangent.conj() * (raw - current)).imag.sum(0)
-    known = (order * (tangent.conj() * current).real).sum(0)
+    return current.astype(raw.dtype), share.astype(weight.dtype)
+
+
+def _given_back(
+    off: Array, current: Array, share: Array, weight: Array, multiples: tuple[int, ...]
+) -> tuple[Array, Array]:
+    """Return averages and shares once the clearest lines of residuals are looked at."""
+    xp = namespace(off)
+    order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
+    scaled = order * weight
+    late = (scaled * (current.real * off.imag - current.imag * off.real)).sum(0)
+    known = (order * scaled * squared(current)).sum(0)
     clearest, shift, part = (xp.zeros_like(known) for _ in range(3))
     both = _padded(xp.stack([late, known]))
     for line in LINES:
         later, together = reduce(add, (_shifted(both, *offset) for offset in line))
-        together = xp.maximum(together, least)
-        clear = later**2 / together > clearest
-        clearest = xp.where(clear, later**2 / together, clearest)
-        shift, part = (
-            xp.where(clear, *each) for each in ((later / together, shift), (known / together, part))
-        )
-    back = (clearest > CLEAR) & (there > 0)
-    current = current * (1 + 1j * order * xp.where(back, shift, 0))
-    doubt = xp.where(back, part, xp.maximum(clearest - EXPECTED, 0) * part)
-    share = xp.where(there > 0, xp.minimum(share + doubt, 1), 1)
-    return current.astype(raw.dtype), share.astype(weight.dtype)
+        together = xp.maximum(together, np.finfo(weight.dtype).tiny)
+        clear = later**2 / together
+        shift = xp.where(clear > clearest, later / together, shift)
+        part = xp.where(clear > clearest, known / together, part)
+        clearest = xp.maximum(clear, clearest)
+    back = clearest > CLEAR
+    turned = (1j * order * xp.where(back, shift, 0)).astype(current.dtype)
+    doubt = xp.where(back, 1, xp.maximum(clearest - EXPECTED, 0)) * part
+    return current + turned * current, xp.minimum(share + doubt, 1).astype(share.dtype)
 
 
 def _padded(planes: Array) -> Array:
