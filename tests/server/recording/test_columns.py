@@ -14,7 +14,7 @@ def test_columns_are_series_axes_and_labels(tmp_path: Path) -> None:
     with Recording(record(tmp_path / "a.h5", 3)) as recording:
         columns = columns_of(recording)
 
-    assert columns["frame"].values.tolist() == [0, 1, 2]
+    assert columns["frame"].values.tolist() == [1, 2, 3]
     assert columns["host_time_s"].attributes["units"] == "s"
     for name, size in (("image", 8), ("y", 12), ("x", 16)):
         assert columns[name].axes == (name,)
