@@ -1,6 +1,7 @@
 """The estimator ``matched-filter``: the one return that explains the moments of all frequencies."""
 
 import numpy as np
+
 from transientcam_moments.comparisons import SparseEstimate, Technique, from_first
 
 PHASES, STEPS = 128, 4
