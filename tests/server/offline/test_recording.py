@@ -131,7 +131,7 @@ def test_products_are_those_the_service_computes(path: Path, tmp_path: Path) -> 
             np.testing.assert_array_equal(file[name][2], expected)
             assert file[name].attrs["units"] == product.description.unit
         assert len(file["range"]) == FRAMES
-        np.testing.assert_array_equal(file["frame"][()], np.arange(FRAMES))
+        np.testing.assert_array_equal(file["frame"][()], np.arange(1, FRAMES + 1))
 
 
 def test_a_transient_has_the_times_of_flight_asked_for(path: Path, tmp_path: Path) -> None:
