@@ -52,8 +52,8 @@ class Board:
         white = max(np.percentile(light, 99), np.finfo(np.float32).tiny)
         grey = (255 * np.clip(light / white, 0.0, 1.0)).astype(np.uint8)
         grey = self._cv2.resize(grey, None, fx=scale, fy=scale, interpolation=self._cv2.INTER_CUBIC)
+        known: Any = np.mgrid[: self._size[0], : self._size[1], :1].T
         if self._charuco is None:
-            known: Any = np.mgrid[: self._size[0], : self._size[1], :1].T
             _, seen = self._cv2.findChessboardCornersSB(grey, self._size)
         else:
             seen, ids, *_ = self._charuco.detectBoard(grey)
@@ -71,20 +71,21 @@ class Board:
         """
         height, width = pictures[0].shape
         shown = [each for each in map(self.corners, pictures) if each is not None]
-        apart = 0.0
-        if len(shown) >= 3:  # as Zhang's method needs
-            known, seen = zip(*((a.astype("f4"), b.astype("f4")) for a, b in shown), strict=True)
-            try:
-                off_px, k, bent, turns, _, deviations, *_ = self._cv2.calibrateCameraExtended(
-                    known, seen, (width, height), None, None, flags=self._cv2.CALIB_FIX_K3
-                )
-            except self._cv2.error as error:
-                raise InputError("--board", "corners", str(error), "usable") from error
-            normals = np.stack([self._cv2.Rodrigues(each)[0][:, 2] for each in turns])
-            apart = float(np.arccos(np.clip((normals @ normals.T).min(), -1.0, 1.0)))
+        tilted = "in 3 or more, tilted by 10 degrees or more"
+        if len(shown) < 3:  # as Zhang's method needs
+            raise InputError("--board", "shown", f"in {len(shown)} pictures", tilted)
+        known, seen = zip(*((a.astype("f4"), b.astype("f4")) for a, b in shown), strict=True)
+        try:
+            off_px, k, bent, turns, _, deviations, *_ = self._cv2.calibrateCameraExtended(
+                known, seen, (width, height), None, None, flags=self._cv2.CALIB_FIX_K3
+            )
+        except self._cv2.error as error:
+            raise InputError("--board", "corners", str(error), "usable") from error
+        normals = np.stack([self._cv2.Rodrigues(each)[0][:, 2] for each in turns])
+        apart = float(np.arccos(np.clip((normals @ normals.T).min(), -1.0, 1.0)))
         if apart < _APART:
             said = f"in {len(shown)} pictures, within {np.degrees(apart):.0f} degrees"
-            raise InputError("--board", "shown", said, "in 3 or more, tilted by 10 degrees or more")
+            raise InputError("--board", "shown", said, tilted)
         fx, fy, cx, cy = k[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
         lens = Lens(fx, fy, cx, cy, tuple(bent.ravel()[:5].tolist()), *start.light_m)
         deviations_px = deviations.ravel()[:4].tolist()
