@@ -56,6 +56,7 @@ def test_without_a_sensor_the_images_tell_the_noise() -> None:
     assert found.settings.neighbours == "edge-preserving"
     assert isinstance(found.image_noise, tm.noise.ImageNoise)
     assert found.variance_share is not None
+    assert stated.variance_share is not None
     assert np.median(found.variance_share) == pytest.approx(
         np.median(stated.variance_share), rel=0.1
     )
