@@ -47,7 +47,7 @@ async def _patiently(hub: Hub, *, after: int, wait_s: float) -> Frame:
     return await _newest(hub, after=after, wait_s=longer_s)
 
 
-Hub.newest = _patiently  # type: ignore[method-assign]
+Hub.newest = _patiently  # type: ignore[assignment,method-assign]
 _PATIENT: tuple[Any, ...] = (
     *(transientcam.Camera.__init__, transientcam.AsyncCamera.__init__, RemoteFile.__init__),
     *(transientcam.open, remote_recording),

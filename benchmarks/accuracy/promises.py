@@ -78,7 +78,7 @@ DEVICES: Final = {
     "ideal": Device("sim:{scene}?seed={seed}", _OWN_SCENES, (0.05, 0.02, 0.005), ideal=True),
     "prototype": Device(_PROTOTYPE, _OWN_SCENES, (0.05, 0.02, 0.01)),
     "prototype, 10 °C warmer": Device(_PROTOTYPE, _OWN_SCENES, (0.05, 0.02, 0.01), warmer_c=10.0),
-    "relay": Device("sim:{scene}?seed={seed}", _FEW, (0.05, 0.02, 0.005), True, True),
+    "relay": Device("sim:{scene}?seed={seed}", _FEW, (0.05, 0.02, 0.005), True),
     "TOFcam660": Device(
         "tofcam660:emulated?scene={scene}&settle_s=0&seed={seed}", _FEW, (0.1, 0.05, 0.02), True
     ),
@@ -292,7 +292,8 @@ class Captured:
         frequency_hz = self.sequence.base_frequency_hz
         found = self.moments[:m], self.variance[:m]
         range_m = ranges_m(*found, estimator, frequency_hz, SETTINGS)
-        return np.nan_to_num(np.abs(range_m - self.true_m), nan=math.inf)
+        off_m: NDArray[Any] = np.nan_to_num(np.abs(range_m - self.true_m), nan=math.inf)
+        return off_m
 
     def every(self) -> Iterator[tuple[float, NDArray[Any]]]:
         """Yield time and errors (K P) in m of each part with each estimator."""

@@ -90,10 +90,7 @@ def measure_photon_transfer(camera: Camera, *, frames: int) -> PhotonTransfer:
     they tell a sensor of one tap that has their noise. The camera is idle, and has its sequence of
     before afterwards. ``frames`` are those of each exposure.
 
-    Raises
-    ------
-    Problem
-        ``invalid-request`` where its frames do not tell the gain.
+    Raises Problem: ``invalid-request`` where its frames do not tell the gain.
     """
     before, about = camera.applied.sequence, camera.capabilities
     zeroth = "on-off" if "on-off" in about.zeroths else about.zeroths[0]

@@ -62,10 +62,7 @@ class Looks:
     ) -> SceneStatistics:
         """Return the scene by the twin of a simulated camera; ``progress`` may raise to end it.
 
-        Raises
-        ------
-        Problem
-            ``target-unreachable`` where the scene has no light, or too much.
+        Raises Problem: ``target-unreachable`` where the scene has no light, or too much.
         """
         assert self._twin is not None  # noqa: S101 - callers look at `needs_frame`
         self._planner.require_possible()
@@ -85,10 +82,7 @@ class Looks:
     async def of_frame(self, frame: Frame, ambient_dn_per_s: float | None) -> SceneStatistics:
         """Return the scene as far as one frame resolves it.
 
-        Raises
-        ------
-        Problem
-            ``target-unreachable`` where the frame shows no light.
+        Raises Problem: ``target-unreachable`` where the frame shows no light.
         """
         self._planner.require_possible()
         found = await frame.reconstruction("moments")

@@ -17,13 +17,9 @@ def error_map(
 ) -> NDArray[np.float32]:
     """Return noise and bias together of each pixel (H, W) in m; NaN where either is not known.
 
-    Parameters
-    ----------
-    amplification_m
-        (H, W) deviation of the range over ``noise``, by few draws; neighbours have nearly the same,
-        and their geometric mean is known better.
-    bias_m, noise
-        (H, W) of the range in m, and of the moments over the light.
+    ``amplification_m``: (H, W) deviation of the range over ``noise``, by few draws; neighbours have
+    nearly the same, and their geometric mean is known better.
+    ``bias_m``, ``noise``: (H, W) of the range in m, and of the moments over the light.
     """
     there = np.isfinite(amplification_m) & (amplification_m > 0)
     log = np.log(amplification_m, where=there, out=np.zeros_like(amplification_m))

@@ -27,14 +27,9 @@ from transientcam_server.settings import ReconstructionSettings
 class Planner:
     """Recommends sequences from the noise of one sensor and one way to reconstruct.
 
-    Parameters
-    ----------
-    capabilities
-        Of the camera.
-    sensor
-        Whose noise its images have.
-    settings
-        Of the reconstruction.
+    ``capabilities``: Of the camera.
+    ``sensor``: Whose noise its images have.
+    ``settings``: Of the reconstruction.
     """
 
     def __init__(
@@ -100,10 +95,7 @@ class Planner:
     ) -> NDArray[np.float32]:
         """Predict the error of each pixel (H, W) in m, noise and bias together; NaN if not lit.
 
-        Raises
-        ------
-        Problem
-            ``invalid-request`` for a scene that is given, which has no pixels.
+        Raises Problem: ``invalid-request`` for a scene that is given, which has no pixels.
         """
         progress = progress or Progress()
         progress.at(0.0, "error of each pixel")

@@ -32,12 +32,8 @@ of pixels explains (docs/accuracy.md)."""
 class Reach:
     """How far the interval of an error reaches (docs/plans.md, decision 14).
 
-    Attributes
-    ----------
-    least_bias, most_bias
-        Measured over predicted bias.
-    spread
-        As `MODEL_SPREAD`.
+    ``least_bias``, ``most_bias``: Measured over predicted bias.
+    ``spread``: As `MODEL_SPREAD`.
     """
 
     least_bias: float
@@ -63,16 +59,11 @@ _LEAST_M: Final = 1e-9
 class Figure:
     """A predicted error in m and its interval.
 
-    Attributes
-    ----------
-    median
-        Of the median lit pixel.
-    low, high
-        `COVERAGE` of the captures measure a value between them. An infinite end is not known.
-    p90
-        90 % of the pixels are predicted to be better.
-    with_margin
-        What `LIKELY` of the captures measure less than: what a target is held against.
+    ``median``: Of the median lit pixel.
+    ``low``, ``high``: `COVERAGE` of the captures measure a value between them. An infinite end is
+    not known.
+    ``p90``: 90 % of the pixels are predicted to be better.
+    ``with_margin``: What `LIKELY` of the captures measure less than: what a target is held against.
     """
 
     median: float
@@ -95,14 +86,10 @@ def figure(
 ) -> Figure:
     """Return the figure of the errors (P) of pixels.
 
-    Parameters
-    ----------
-    median
-        Of errors (..., P): an array (...).
-    picks
-        Indices (`RESAMPLED`, P) of pixels, drawn with replacement: samples of the same scene.
-    spread
-        Standard deviation of the logarithm of measured over predicted errors.
+    ``median``: Of errors (..., P): an array (...).
+    ``picks``: Indices (`RESAMPLED`, P) of pixels, drawn with replacement: samples of the same
+    scene.
+    ``spread``: Standard deviation of the logarithm of measured over predicted errors.
     """
     value = max(float(median(errors_m)), _LEAST_M)
     sampled = np.maximum(median(errors_m[picks]), _LEAST_M)

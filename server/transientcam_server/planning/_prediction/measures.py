@@ -17,20 +17,13 @@ TOLERANCES_M: Final = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
 class PixelErrors:
     """Errors of the range of P pixels.
 
-    Attributes
-    ----------
-    std_m
-        (P) standard deviation between captures: the typical difference of two captures, as the
-        deviation of the normal variable that has the same (decision 8).
-    bias_m
-        (P) how far the median of the captures is off, without sign. The noise of that median is
-        part of it: with 30 captures and no bias it is 0.15 of the deviation.
-    centre_m
-        (P) median of the captures; 0 where there are no two.
-    apart_m
-        (D, P) range less truth of each capture; infinite where it has none.
-    signed_m
-        (P) that of the median of the captures.
+    ``std_m``: (P) standard deviation between captures: the typical difference of two captures, as
+    the deviation of the normal variable that has the same (decision 8).
+    ``bias_m``: (P) how far the median of the captures is off, without sign. The noise of that
+    median is part of it: with 30 captures and no bias it is 0.15 of the deviation.
+    ``centre_m``: (P) median of the captures; 0 where there are no two.
+    ``apart_m``: (D, P) range less truth of each capture; infinite where it has none.
+    ``signed_m``: (P) that of the median of the captures.
     """
 
     std_m: _Array
@@ -61,15 +54,10 @@ def pixel_errors(
 ) -> PixelErrors:
     """Measure the errors of captured or drawn ranges.
 
-    Parameters
-    ----------
-    range_m
-        (D, P), D >= 2 ranges of each pixel; NaN where a capture has none. A pixel without two
-        ranges has infinite errors.
-    true_m
-        (P) what they should be.
-    uncertainty_m
-        (P) by how much that may itself be wrong; counts as bias.
+    ``range_m``: (D, P), D >= 2 ranges of each pixel; NaN where a capture has none. A pixel without
+    two ranges has infinite errors.
+    ``true_m``: (P) what they should be.
+    ``uncertainty_m``: (P) by how much that may itself be wrong; counts as bias.
     """
     count = np.isfinite(range_m).sum(axis=0)
     enough = count >= 2

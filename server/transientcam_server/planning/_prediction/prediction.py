@@ -71,22 +71,18 @@ _NORMAL: Final = np.array([NormalDist().inv_cdf(0.5 + (k + 0.5) / 64) for k in r
 class Prediction:
     """Predicted errors of the range.
 
-    Attributes
-    ----------
-    range_std, range_error
-        Noise, and the root sum of squares of noise and bias, pixel by pixel.
-    range_bias_m
-        Systematic error of the median pixel.
-    most_bias_m
-        Bias of the median pixel if the light begins where the moments only just allow it.
-    bias_known
-        Whether the moments tell the bias: not where shapes of light that explain them alike put
-        the range elsewhere, nor where estimators disagree about the direct range at all
-        frequencies, nor where many pixels may be lit by other surfaces alone.
-    off_m
-        How far the ranges of a capture are off, without sign, in equal shares by rising value.
-    within
-        What the share of a goal of them is within; None where a goal is of the median pixel.
+    ``range_std``, ``range_error``: Noise, and the root sum of squares of noise and bias, pixel by
+    pixel.
+    ``range_bias_m``: Systematic error of the median pixel.
+    ``most_bias_m``: Bias of the median pixel if the light begins where the moments only just allow
+    it.
+    ``bias_known``: Whether the moments tell the bias: not where shapes of light that explain them
+    alike put the range elsewhere, nor where estimators disagree about the direct range at all
+    frequencies, nor where many pixels may be lit by other surfaces alone.
+    ``off_m``: How far the ranges of a capture are off, without sign, in equal shares by rising
+    value.
+    ``within``: What the share of a goal of them is within; None where a goal is of the median
+    pixel.
     """
 
     range_std: Figure
@@ -105,23 +101,14 @@ class Prediction:
 class Predictor:
     """Predicts for one scene, one sensor and one way to reconstruct.
 
-    Parameters
-    ----------
-    scene
-        Of typical pixels.
-    sensor
-        Of the camera.
-    settings
-        Of the reconstruction; `estimator` is that of sequences that name none.
-    seed
-        Of all draws: the same arguments give the same result.
-    go_on
-        Called several times a second while this computes; whatever it raises ends that.
-    closely
-        Predict with all pixels of the scene, and not with few of them.
-    share
-        Of the ranges of a capture whose largest error is predicted; None for noise and bias
-        together of the median pixel.
+    ``scene``: Of typical pixels.
+    ``sensor``: Of the camera.
+    ``settings``: Of the reconstruction; `estimator` is that of sequences that name none.
+    ``seed``: Of all draws: the same arguments give the same result.
+    ``go_on``: Called several times a second while this computes; whatever it raises ends that.
+    ``closely``: Predict with all pixels of the scene, and not with few of them.
+    ``share``: Of the ranges of a capture whose largest error is predicted; None for noise and bias
+    together of the median pixel.
     """
 
     def __init__(
@@ -441,14 +428,9 @@ def _error(
 ) -> Figure:
     """Return the figure of an error; ``farthest_m`` (P) is the most bias, where none is known.
 
-    Parameters
-    ----------
-    of_bias
-        Returns the errors of pixels (P, ...) were their bias (P) the one given.
-    value
-        Of errors (..., P, ...), the figure (...).
-    drift_m
-        Expected; there may be none, and twice as much.
+    ``of_bias``: Returns the errors of pixels (P, ...) were their bias (P) the one given.
+    ``value``: Of errors (..., P, ...), the figure (...).
+    ``drift_m``: Expected; there may be none, and twice as much.
     """
     expected = figure(of_bias(np.hypot(errors.bias_m, drift_m)), value, picks)
     reach = KNOWN if farthest_m is None else UNKNOWN

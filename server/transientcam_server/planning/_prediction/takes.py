@@ -20,12 +20,8 @@ _PIXELS: Final = 1000
 class TakesPrediction:
     """What so many takes cost, and what they leave of the noise.
 
-    Attributes
-    ----------
-    takes, capture_s, frame_rate_hz
-        Of the sequence.
-    range_std_m
-        Predicted standard deviation of the range in the median pixel.
+    ``takes``, ``capture_s``, ``frame_rate_hz``: Of the sequence.
+    ``range_std_m``: Predicted standard deviation of the range in the median pixel.
     """
 
     takes: int
@@ -42,19 +38,10 @@ def predict_takes(
     Noise of the moments falls with the root of the takes; what calibration and light of no model
     leave in them (`tm.likelihood`'s ``model_error``) does not.
 
-    Parameters
-    ----------
-    camera
-        Its sequence is set to one take; it does not stream afterwards.
-    takes
-        Those that the camera cannot do are left out.
-    read_s
-        How long the frame may take.
-
-    Raises
-    ------
-    CameraError
-        The camera gives no frame.
+    ``camera``: Its sequence is set to one take; it does not stream afterwards.
+    ``takes``: Those that the camera cannot do are left out.
+    ``read_s``: How long the frame may take.
+    Raises CameraError: The camera gives no frame.
     """
     capabilities, settings = camera.capabilities, ReconstructionSettings(smoothing_px=0.0)
     applied = camera.configure(replace(camera.applied.sequence, takes=1))
@@ -73,12 +60,8 @@ def takes_of(
 ) -> list[TakesPrediction]:
     """Predict what takes give by a frame, which may have any number of them itself.
 
-    Parameters
-    ----------
-    recipe
-        Of the frame; its sensor has to be known.
-    takes
-        Those that the camera cannot do are left out.
+    ``recipe``: Of the frame; its sensor has to be known.
+    ``takes``: Those that the camera cannot do are left out.
     """
     settings = recipe.settings.model_copy(update={"neighbours": "none"})
     found = replace(recipe, settings=settings).reconstruct(frame)

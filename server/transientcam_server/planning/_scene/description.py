@@ -43,28 +43,16 @@ BRIGHTEST_SHARE: Final = 0.999
 class FrameAverages:
     """What frames of one sequence show.
 
-    Attributes
-    ----------
-    recipe, sensor
-        How they were captured.
-    frames
-        How many.
-    moments
-        (m + 1, H, W) smoothed moments, averaged over the frames.
-    first, last
-        (m + 1, H, W) smoothed moments of these frames.
-    scatter
-        (m + 1, H, W) variance of smoothed moments between frames, of both parts together.
-    temperature_c
-        Of the camera; None where that is not known.
-    single
-        (m + 1, H, W) moments that are not smoothed, averaged over the frames.
-    mean_dn
-        (H, W) mean of all four-bucket images above the dark level.
-    highest_dn
-        (H, W) the most that an image holds above the dark level.
-    usable
-        (H, W) which pixels are not saturated.
+    ``recipe``, ``sensor``: How they were captured.
+    ``frames``: How many.
+    ``moments``: (m + 1, H, W) smoothed moments, averaged over the frames.
+    ``first``, ``last``: (m + 1, H, W) smoothed moments of these frames.
+    ``scatter``: (m + 1, H, W) variance of smoothed moments between frames, of both parts together.
+    ``temperature_c``: Of the camera; None where that is not known.
+    ``single``: (m + 1, H, W) moments that are not smoothed, averaged over the frames.
+    ``mean_dn``: (H, W) mean of all four-bucket images above the dark level.
+    ``highest_dn``: (H, W) the most that an image holds above the dark level.
+    ``usable``: (H, W) which pixels are not saturated.
     """
 
     recipe: Recipe
@@ -98,10 +86,7 @@ class FrameAverages:
     def variance(self, signal_dn: _Array) -> _Array:
         """Return the variance (m + 1, ...) of a frame's smoothed moments.
 
-        Parameters
-        ----------
-        signal_dn
-            (...) mean of the images above the dark level, ambient light included.
+        ``signal_dn``: (...) mean of the images above the dark level, ambient light included.
         """
         sequence = self.recipe.applied.sequence
         noise = tm.noise.moment_noise(

@@ -54,10 +54,7 @@ class _FrameSums:
 
     Frames with images that could not be repaired are left out, unless there are no others.
 
-    Parameters
-    ----------
-    recipe, sensor
-        How they are captured.
+    ``recipe``, ``sensor``: How they are captured.
     """
 
     def __init__(self, recipe: Recipe, sensor: tm.noise.Sensor) -> None:
@@ -139,29 +136,19 @@ def look_at(
     calibration fits one sequence alone, a simulated camera is calibrated for the look, by the
     diffuser that it has: plans are for a camera that is calibrated with what they recommend.
 
-    Parameters
-    ----------
-    camera
-        Is left with another sequence, stopped.
-    sensor
-        Of the camera.
-    settings
-        Smoothing, biasing and threshold.
-    base
-        Whose base frequency, its multiples and half of it are planned with, and its sub-phases.
-    ambient_dn_per_s
-        Light that is not the camera's; None takes it from the mean of the images.
-    calibrated_c
-        Temperature of the camera at the calibration in use; None where that is not known.
-    go_on
-        Called with the name of the stage before each frame; whatever it raises ends the look.
-
-    Raises
-    ------
-    Problem
-        ``target-unreachable`` where no pixel has light, or the shortest exposure saturates.
-    CameraError
-        As the camera does.
+    ``camera``: Is left with another sequence, stopped.
+    ``sensor``: Of the camera.
+    ``settings``: Smoothing, biasing and threshold.
+    ``base``: Whose base frequency, its multiples and half of it are planned with, and its sub-
+    phases.
+    ``ambient_dn_per_s``: Light that is not the camera's; None takes it from the mean of the images.
+    ``calibrated_c``: Temperature of the camera at the calibration in use; None where that is not
+    known.
+    ``go_on``: Called with the name of the stage before each frame; whatever it raises ends the
+    look.
+    Raises Problem: ``target-unreachable`` where no pixel has light, or the shortest exposure
+    saturates.
+    Raises CameraError: As the camera does.
     """
     base = base or Sequence()
     capabilities = camera.capabilities
@@ -304,19 +291,10 @@ def look_of_frame(
 ) -> SceneStatistics:
     """Describe the scene that a single frame shows, as far as that resolves it.
 
-    Parameters
-    ----------
-    found
-        The frame's reconstruction.
-    raw
-        Its images.
-    ambient_dn_per_s
-        Light that is not the camera's; None takes it from the mean of the images.
-
-    Raises
-    ------
-    Problem
-        ``target-unreachable`` where no pixel has light.
+    ``found``: The frame's reconstruction.
+    ``raw``: Its images.
+    ``ambient_dn_per_s``: Light that is not the camera's; None takes it from the mean of the images.
+    Raises Problem: ``target-unreachable`` where no pixel has light.
     """
     if recipe.sensor is None:  # of a real camera, whose images are too dark to tell their noise
         raise no_light()

@@ -49,14 +49,9 @@ _FINE_RAD: Final = 2 * np.pi * np.arange(-0.024, 0.0245, 0.001)
 class _RotatedMoments:
     """Moments (m, P) rotated back by a phase that is near, and their weights.
 
-    Attributes
-    ----------
-    weighted
-        (m, P) moments times weights.
-    weight
-        (m, P) inverse variances of their parts.
-    total
-        (P) chi-square without any light.
+    ``weighted``: (m, P) moments times weights.
+    ``weight``: (m, P) inverse variances of their parts.
+    ``total``: (P) chi-square without any light.
     """
 
     weighted: _Array
@@ -66,12 +61,8 @@ class _RotatedMoments:
     def explained(self, phasors: _Array, q: _Array | None) -> _Array:
         """Return by how much light that begins at each phase (T, P) lowers chi-square.
 
-        Parameters
-        ----------
-        phasors
-            (m, T) of the phases.
-        q
-            (m) moments of the tail at phase 0; None for a sharp return alone.
+        ``phasors``: (m, T) of the phases.
+        ``q``: (m) moments of the tail at phase 0; None for a sharp return alone.
         """
         # by `einsum`: threads of BLAS would wait busily for each other
         turned = partial(np.einsum, "mt,mp->tp", phasors.conj())
@@ -106,15 +97,10 @@ def plausible_ranges(
 
     A pixel whose moments a single return explains is taken for one.
 
-    Parameters
-    ----------
-    b
-        (m + 1, P) moments.
-    variance
-        (m + 1, P) of their parts.
-    direct_m, uncertainty_m
-        (P) the range of the direct return and by how much it may be longer; part of what is
-        returned.
+    ``b``: (m + 1, P) moments.
+    ``variance``: (m + 1, P) of their parts.
+    ``direct_m``, ``uncertainty_m``: (P) the range of the direct return and by how much it may be
+    longer; part of what is returned.
     """
     m = len(b) - 1
     earliest_m, latest_m = direct_m, direct_m + uncertainty_m
@@ -148,10 +134,7 @@ def plausible_ranges(
 def _families(pixels: _RotatedMoments, j: _Array) -> Iterator[tuple[_Array, _Array]]:
     """Yield the least chi-square (K, P) of tails of one form, and the phases at which they begin.
 
-    Parameters
-    ----------
-    j
-        (m) harmonics over the highest.
+    ``j``: (m) harmonics over the highest.
     """
     widened = [(np.exp(-((j * width) ** 2) / 2), 1) for width in WIDTHS_RAD]
     for factor, power in [*((np.ones_like(j), each) for each in POWERS), *widened]:
@@ -183,10 +166,7 @@ def _fitted(
 ) -> tuple[_Array, _Array]:
     """Return the least chi-square (P) of a shape, and at which phase (P) it begins.
 
-    Parameters
-    ----------
-    near
-        (P) a phase that is near; searched where it is None.
+    ``near``: (P) a phase that is near; searched where it is None.
     """
     if near is None:
         coarse = pixels.explained(np.exp(1j * j[:, None] * _COARSE_RAD), q)

@@ -23,12 +23,8 @@ as far as predicted and measured shares of outliers are apart (docs/plans.md).""
 def typical_pixels(b: _Array, count: int) -> _Array:
     """Return which of N pixels stand for all, ``count`` of them, by their kind.
 
-    Parameters
-    ----------
-    b
-        (m + 1, N) moments of the lit pixels.
-    count
-        A multiple of `STRATUM`; pixels are taken repeatedly where there are fewer.
+    ``b``: (m + 1, N) moments of the lit pixels.
+    ``count``: A multiple of `STRATUM`; pixels are taken repeatedly where there are fewer.
     """
     strata = _evenly(np.argsort(coherence(b), kind="stable"), count // STRATUM)
     light = np.abs(b[1])

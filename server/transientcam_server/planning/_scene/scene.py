@@ -32,59 +32,39 @@ LATE_SHARE: Final = 0.05
 class SceneStatistics:
     """Typical lit pixels of a scene, P of them.
 
-    Attributes
-    ----------
-    brightness_dn_per_s
-        (P) zeroth moment b_0 in DN for each second of exposure.
-    ambient_dn_per_s
-        (P) light that is not the camera's, in DN an image for each second of exposure.
-    brightest_dn_per_s
-        What the brightest pixels of an image hold above the dark level, ambient light included;
-        they must not saturate.
-    direct_m
-        (P) range of the direct return.
-    uncertainty_m
-        (P) by how much that may be wrong: what the look at the scene did not resolve.
-    earliest_m, latest_m
-        (P) between which ranges the direct return lies: what the moments do not contradict.
-    delay_s, share
-        (K, P) returns: time of flight (NaN where unused) and share of the pixel's light (0 where
-        unused). What the shares leave to 1 comes back evenly at all times.
-    measured
-        (M + 1, P) measured moments over the brightness, at multiples of `base_frequency_hz`; None
-        where the returns are given exactly.
-    relative_noise
-        (P) deviation of these moments over the brightness.
-    lit_share
-        Share of all pixels whose light stands clear of the noise.
-    dim_share
-        Share of the lit pixels that other surfaces may light alone.
-    moving_share
-        Share of the lit pixels that changed while the scene was looked at.
-    ambiguity_checked
-        Whether `direct_m` is known not to be short by a multiple of the unambiguous range.
-    contrast
-        What the device leaves of its modulation at multiples 0 to M of `base_frequency_hz`; empty
-        where that is everything.
-    calibrated
-        Whether what was seen is known to be the scene's, and not the device's.
-    uncalibrated_m
-        How far ranges are off without a calibration, in the median pixel.
-    lost_share
-        Share of the images that lose their synchronisation.
-    drift_m
-        By how much ranges may have drifted since the calibration in use, without a sign.
-    swing_m_per_s
-        (P) how fast the ranges of lit pixels change, these or others; None where nothing moves.
-    of_one_frame
-        Whether no look was taken, but one frame of another purpose.
-    pixels
-        (P) places of the pixels in the picture, row by row; None of a scene that is given.
-    shape
-        Height and width of the picture.
-    seen
-        Describes pixels within a mask (H, W), None for all: typical ones or, with ``every``, each
-        lit one; None of a scene that is given, or if none is lit.
+    ``brightness_dn_per_s``: (P) zeroth moment b_0 in DN for each second of exposure.
+    ``ambient_dn_per_s``: (P) light that is not the camera's, in DN an image for each second of
+    exposure.
+    ``brightest_dn_per_s``: What the brightest pixels of an image hold above the dark level, ambient
+    light included; they must not saturate.
+    ``direct_m``: (P) range of the direct return.
+    ``uncertainty_m``: (P) by how much that may be wrong: what the look at the scene did not
+    resolve.
+    ``earliest_m``, ``latest_m``: (P) between which ranges the direct return lies: what the moments
+    do not contradict.
+    ``delay_s``, ``share``: (K, P) returns: time of flight (NaN where unused) and share of the
+    pixel's light (0 where unused). What the shares leave to 1 comes back evenly at all times.
+    ``measured``: (M + 1, P) measured moments over the brightness, at multiples of
+    `base_frequency_hz`; None where the returns are given exactly.
+    ``relative_noise``: (P) deviation of these moments over the brightness.
+    ``lit_share``: Share of all pixels whose light stands clear of the noise.
+    ``dim_share``: Share of the lit pixels that other surfaces may light alone.
+    ``moving_share``: Share of the lit pixels that changed while the scene was looked at.
+    ``ambiguity_checked``: Whether `direct_m` is known not to be short by a multiple of the
+    unambiguous range.
+    ``contrast``: What the device leaves of its modulation at multiples 0 to M of
+    `base_frequency_hz`; empty where that is everything.
+    ``calibrated``: Whether what was seen is known to be the scene's, and not the device's.
+    ``uncalibrated_m``: How far ranges are off without a calibration, in the median pixel.
+    ``lost_share``: Share of the images that lose their synchronisation.
+    ``drift_m``: By how much ranges may have drifted since the calibration in use, without a sign.
+    ``swing_m_per_s``: (P) how fast the ranges of lit pixels change, these or others; None where
+    nothing moves.
+    ``of_one_frame``: Whether no look was taken, but one frame of another purpose.
+    ``pixels``: (P) places of the pixels in the picture, row by row; None of a scene that is given.
+    ``shape``: Height and width of the picture.
+    ``seen``: Describes pixels within a mask (H, W), None for all: typical ones or, with ``every``,
+    each lit one; None of a scene that is given, or if none is lit.
     """
 
     brightness_dn_per_s: _Array
@@ -255,14 +235,9 @@ def uniform_scene(
 ) -> SceneStatistics:
     """Describe a scene of equal pixels.
 
-    Parameters
-    ----------
-    brightness_dn_per_s
-        b_0 in DN for each second of exposure.
-    returns
-        Range in m and relative weight of each.
-    ambient_dn_per_s
-        As in `SceneStatistics`.
+    ``brightness_dn_per_s``: b_0 in DN for each second of exposure.
+    ``returns``: Range in m and relative weight of each.
+    ``ambient_dn_per_s``: As in `SceneStatistics`.
     """
     range_m, weight = np.array(list(returns), dtype=float).T
     repeated = (len(range_m), FEW_PIXELS)

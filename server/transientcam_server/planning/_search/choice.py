@@ -24,26 +24,17 @@ def in_words(sequence: Sequence, estimator: str) -> str:
 class Choice:
     """A sequence, an estimator, and their predicted accuracy and cost.
 
-    Attributes
-    ----------
-    applied
-        As the camera would set it.
-    estimator
-        What its range is taken from.
-    predicted
-        Errors of the range.
-    beyond_scene
-        Whether it sees more than the look that describes the scene, so that the prediction is a
-        lower bound of the error.
-    timed
-        Returns the computing time of one frame in s, measured on demand; None where its kernels are
-        not compiled yet.
-    bound_width, separation_share
-        Predicted where the goal has them.
-    settling_s
-        Part of the capture in which the modulation settles.
-    share, target_m
-        Of the pixels, and the error that so many are to be within; None where the goal has none.
+    ``applied``: As the camera would set it.
+    ``estimator``: What its range is taken from.
+    ``predicted``: Errors of the range.
+    ``beyond_scene``: Whether it sees more than the look that describes the scene, so that the
+    prediction is a lower bound of the error.
+    ``timed``: Returns the computing time of one frame in s, measured on demand; None where its
+    kernels are not compiled yet.
+    ``bound_width``, ``separation_share``: Predicted where the goal has them.
+    ``settling_s``: Part of the capture in which the modulation settles.
+    ``share``, ``target_m``: Of the pixels, and the error that so many are to be within; None where
+    the goal has none.
     """
 
     applied: AppliedSequence

@@ -21,34 +21,21 @@ BUDGETS: Final = ("capture_s", "frame_rate_hz", "computing_share")
 class Goal:
     """Targets and budgets of a sequence.
 
-    Attributes
-    ----------
-    range_error_m
-        How far the range is off, noise and bias together, at most.
-    share
-        Of the pixels of a capture whose ranges are to be within it; None for the error of the
-        median pixel, over many captures.
-    region
-        Whose lit pixels count; None for all of the picture.
-    range_std_m
-        Standard deviation of the range of a typical pixel, at most.
-    separation_m
-        Distance at which two equal returns are both to be found in `separation_share` of all
-        captures.
-    bound_width
-        Width of the bounds on the density over the mean density, at most.
-    capture_s
-        Time of one capture, at most.
-    frame_rate_hz
-        Frames a second back to back, at least.
-    computing_share
-        Share of the time between two frames that reconstruction may take on this machine.
-    base
-        Sequence whose base frequency, half of it or a multiple, is used, and its sub-phases.
-    fixed
-        Names of further fields of it that must stay.
-    estimator
-        The only one that is planned with; None for any.
+    ``range_error_m``: How far the range is off, noise and bias together, at most.
+    ``share``: Of the pixels of a capture whose ranges are to be within it; None for the error of
+    the median pixel, over many captures.
+    ``region``: Whose lit pixels count; None for all of the picture.
+    ``range_std_m``: Standard deviation of the range of a typical pixel, at most.
+    ``separation_m``: Distance at which two equal returns are both to be found in `separation_share`
+    of all captures.
+    ``bound_width``: Width of the bounds on the density over the mean density, at most.
+    ``capture_s``: Time of one capture, at most.
+    ``frame_rate_hz``: Frames a second back to back, at least.
+    ``computing_share``: Share of the time between two frames that reconstruction may take on this
+    machine.
+    ``base``: Sequence whose base frequency, half of it or a multiple, is used, and its sub-phases.
+    ``fixed``: Names of further fields of it that must stay.
+    ``estimator``: The only one that is planned with; None for any.
     """
 
     range_error_m: float | None = None
@@ -115,10 +102,7 @@ class Goal:
     def require_sensible(self) -> None:
         """Refuse a goal without target or budget, or with a value out of bounds.
 
-        Raises
-        ------
-        Problem
-            ``invalid-request``.
+        Raises Problem: ``invalid-request``.
         """
         if self.empty:
             raise Problem(

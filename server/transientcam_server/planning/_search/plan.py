@@ -29,25 +29,15 @@ from transientcam_server.planning._search.summary import summary
 class Plan:
     """A recommendation and its neighbours; None where there is none.
 
-    Attributes
-    ----------
-    half_time
-        The most accurate one that takes at most half the time.
-    twice_accuracy
-        The quickest one with at most half the error.
-    leading
-        The target by which they are compared.
-    summary
-        A sentence about noise, bias and what half the error costs, and one where the bias is not
-        known.
-    scene
-        What it was planned for.
-    goal
-        What it was planned for, too.
-    changes
-        What better cameras would give, best first.
-    computing_s
-        Computing time of a frame by estimator; None where it is not known yet.
+    ``half_time``: The most accurate one that takes at most half the time.
+    ``twice_accuracy``: The quickest one with at most half the error.
+    ``leading``: The target by which they are compared.
+    ``summary``: A sentence about noise, bias and what half the error costs, and one where the bias
+    is not known.
+    ``scene``: What it was planned for.
+    ``goal``: What it was planned for, too.
+    ``changes``: What better cameras would give, best first.
+    ``computing_s``: Computing time of a frame by estimator; None where it is not known yet.
     """
 
     recommended: Choice
@@ -100,24 +90,13 @@ def plan(
 ) -> Plan:
     """Recommend a sequence and an estimator.
 
-    Parameters
-    ----------
-    goal
-        Targets and budgets.
-    predictor
-        Of the scene.
-    capabilities
-        Of the camera.
-    timed
-        Computing time in s of a frame of a sequence with an estimator on this machine.
-    progress
-        Receives the steps.
-
-    Raises
-    ------
-    Problem
-        ``invalid-request`` where the goal is empty or a value is out of bounds;
-        ``target-unreachable`` with the best that can be achieved and what limits it.
+    ``goal``: Targets and budgets.
+    ``predictor``: Of the scene.
+    ``capabilities``: Of the camera.
+    ``timed``: Computing time in s of a frame of a sequence with an estimator on this machine.
+    ``progress``: Receives the steps.
+    Raises Problem: ``invalid-request`` where the goal is empty or a value is out of bounds;
+    ``target-unreachable`` with the best that can be achieved and what limits it.
     """
     goal.require_sensible()
     progress = progress or Progress()
