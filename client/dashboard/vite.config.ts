@@ -25,6 +25,6 @@ export default defineConfig({
   worker: { format: "es" },
   server: { proxy: { "/api": { target: DAEMON, ws: true } } },
   // The tests stand with all others of the project, and find packages here.
-  resolve: { dedupe: ["@preact/signals", "@msgpack/msgpack"] },
+  resolve: { dedupe: ["@preact/signals", "@msgpack/msgpack", "idb-keyval"] },
   test: { dir: "../../tests/dashboard", environment: "node" },
 });
