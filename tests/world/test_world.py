@@ -4,8 +4,8 @@ import pytest
 
 from tests.world.world import tried_all
 
-SEEDS = 600
-PARTS = 12
+SEEDS = 1000
+PARTS = 20
 
 
 @pytest.mark.parametrize("part", range(PARTS))

@@ -720,12 +720,15 @@ def tried(seed: int, directory: Path) -> Counter[str]:
 
 def tried_all(seeds: range) -> tuple[Counter[str], list[str]]:
     """Run the worlds of some seeds; return what happened how often, and the violations."""
-    logging.disable()
     happened, violations = Counter[str](), []
-    with tempfile.TemporaryDirectory() as place:
-        for seed in seeds:
-            try:
-                happened += tried(seed, Path(place) / "recordings")
-            except Violation as violation:
-                violations.append(str(violation))
+    logging.disable()
+    try:
+        with tempfile.TemporaryDirectory() as place:
+            for seed in seeds:
+                try:
+                    happened += tried(seed, Path(place) / "recordings")
+                except Violation as violation:
+                    violations.append(str(violation))
+    finally:
+        logging.disable(logging.NOTSET)
     return happened, violations

@@ -25,7 +25,7 @@ from tests.server.recording.made import APPLIED, assert_same, frame, header
 from transientcam_server.recording import Recording, RecordingWriter, _layout as layout, recover
 from transientcam_server.recording._recorder import Limits, Recorder
 
-FRAMES: Final = 8
+FRAMES: Final = 20
 FAULTS: Final = ("EIO", "ENOSPC", "short")
 CALLS: Final = ("write", "pwrite", "fsync", "ftruncate")
 _FRAMES: Final = [frame(number) for number in range(FRAMES)]
