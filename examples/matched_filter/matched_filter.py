@@ -36,6 +36,5 @@ ESTIMATOR = Technique(
     name="matched-filter", label="matched filter", returns="1", frequencies="f .. m f",
     harmonics=from_first, least_harmonics=1, assumptions="One sharp return in each pixel.",
     cost="A search over 128 phases and four Newton steps.",
-    failure="Other light pulls the range to it.",
-    estimate=matched_filter, informed=True,
+    failure="Other light pulls the range to it.", estimate=matched_filter, informed=True,
 )  # fmt: skip
