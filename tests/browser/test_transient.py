@@ -418,8 +418,8 @@ def test_figures_of_moving_light_show_the_time_they_state(page: Page, served: Se
             time_s,
         )
         assert figure_of_light(page)[0] == name
-        # the name states whole picoseconds
-        assert np.abs(moving - figure_of_light(page)[1]).mean() < 0.05
+        # the name states whole picoseconds; between two pictures light moves for some hundred
+        assert np.abs(moving - figure_of_light(page)[1]).mean() < 1.0
 
 
 def figure_of_light(page: Page) -> tuple[str, NDArray[np.float64]]:
