@@ -246,7 +246,8 @@ def test_points_turn_and_change_their_colours(page: Page, served: Served) -> Non
     page.evaluate("() => transientcam.store.player.seek(0.27)")
     assert np.mean(canvas_pixels_of_scene(page)[..., :3]) > 1.5 * np.mean(early[..., :3])
     for before, after in pairwise(seen):
-        assert np.any(before != after)
+        # where the panel was laid out anew meanwhile, the picture has another size
+        assert before.shape != after.shape or np.any(before != after)
 
 
 def canvas_pixels_of_scene(page: Page) -> NDArray[np.uint8]:
