@@ -61,6 +61,8 @@ class Storage:
 
     def attribute(self, name: str) -> Any:
         """Return an attribute of the file: a number or a text."""
+        if name not in self._file.attrs:
+            raise ValueError(f"it has no attribute {name}")
         attribute = h5py.h5a.open(self._file.id, name.encode())
         if attribute.shape != ():
             raise ValueError(f"its attribute {name} is an array")

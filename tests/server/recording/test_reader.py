@@ -476,7 +476,8 @@ def test_what_is_no_recording_is_refused_with_the_reason(tmp_path: Path) -> None
     with h5py.File(newer, "r+") as file:
         file.attrs["format_version"] = 2
 
-    for path, reason in ((text, "file signature"), (foreign, "format"), (newer, "version 2")):
+    reasons = {text: "file signature", foreign: "no attribute format", newer: "version 2"}
+    for path, reason in reasons.items():
         with pytest.raises(NotARecording, match=reason):
             Recording(path)
     with pytest.raises(FileNotFoundError):
