@@ -303,8 +303,8 @@ def default_recordings_directory() -> Path:
 class LightSettings(_Group):
     """When the light of the camera begins, and when it ends by itself.
 
-    A simulated scene (sim:) or a recording shines at nobody; the emulation of a real device counts
-    as the device.
+    A simulated scene (sim:) or a recording shines at nobody. The emulation of a real device
+    captures from the start, too; else it counts as the device.
     """
 
     delay_s: _Finite | None = Field(default=None, ge=0.0, le=60.0)
@@ -388,7 +388,7 @@ class Settings(_Group):
     ``recording:FILE``, or one of another package; `transientcam devices` lists them."""
     capture_at_start: bool | None = None
     """Capture from the start, unless the light was switched off before; without it only a camera
-    does so that is simulated (``sim:``) or replayed. A relay does what its origin does."""
+    does so that is simulated, emulated or replayed. A relay does what its origin does."""
     host: str = Field(default="127.0.0.1", min_length=1)
     """Address to listen on."""
     port: int = Field(default=8000, ge=0, le=65535)

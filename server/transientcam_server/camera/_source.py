@@ -61,9 +61,10 @@ def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
 class LightRules:
     """When a camera's light may begin, and when its capture ends by itself.
 
-    A camera shines at somebody unless it is simulated (``sim:``) or replayed. The emulation of a
-    real device counts as the device: it is there to try what happens with that. ``unit`` is what
-    it is kept by that the light is off: the device, what is simulated, None of a recording.
+    A camera shines at somebody unless it is simulated or replayed. The emulation of a real device
+    captures from the start, since its scene is simulated; else it counts as the device: it is
+    there to try what happens with that. ``unit`` is what it is kept by that the light is off: the
+    device, what is simulated, None of a recording.
     """
 
     unit: str | None
@@ -80,9 +81,10 @@ class LightRules:
         capture, delay_s, unused_s = settings.capture_at_start, light.delay_s, light.unused_s
         unused_s = unused_s if unused_s is not None else UNUSED_S if shines else 0.0
         simulated = None if name.kind == "recording" else settings.camera
+        simulates = camera.simulation is not None
         return cls(
             unit=f"{about.model} {about.serial}" if shines else simulated,
-            capture_at_start=not shines if capture is None else capture,
+            capture_at_start=not shines or simulates if capture is None else capture,
             delay_s=delay_s if delay_s is not None else DELAY_S if shines else 0.0,
             unused_s=unused_s or math.inf,
             unserved_s=settings.limits.unserved_s if shines else math.inf,

@@ -2,11 +2,11 @@
 
 import logging
 import math
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
-from transientcam_driver import Sequence, open_camera
+from transientcam_driver import Camera, Sequence, open_camera
 from transientcam_server.camera import LightRules, start_with
 from transientcam_server.settings import SequenceSettings, Settings
 
@@ -43,9 +43,18 @@ def test_a_camera_that_cannot_do_it_does_what_is_nearest(caplog: pytest.LogCaptu
     assert "starts with" in caplog.text
 
 
-def rules(spec: str, **settings: Any) -> LightRules:
-    with open_camera("sim:wall") as camera:
-        return LightRules.of(camera, Settings(camera=spec, **settings))
+def rules(spec: str, camera: str = "sim:wall", **settings: Any) -> LightRules:
+    with open_camera(camera) as opened:
+        return LightRules.of(opened, Settings(camera=spec, **settings))
+
+
+class OfDevice:
+    """A camera whose device is none that is simulated here."""
+
+    simulation = None
+
+    def __init__(self, camera: Camera) -> None:
+        self.capabilities = camera.capabilities
 
 
 def test_a_simulated_camera_captures_from_the_start_without_delay_and_for_ever() -> None:
@@ -54,12 +63,25 @@ def test_a_simulated_camera_captures_from_the_start_without_delay_and_for_ever()
     assert found == LightRules("sim:wall?seed=1", True, 0.0, math.inf, math.inf)
 
 
-@pytest.mark.parametrize("spec", ["usb", "usb:42", "kinect2:emulated", "tofcam660:10.0.0.1", "own"])
-def test_any_other_camera_starts_dark_and_is_known_by_its_serial_number(spec: str) -> None:
+@pytest.mark.parametrize("spec", ["usb", "usb:42", "kinect2", "tofcam660:10.0.0.1", "own"])
+def test_a_device_starts_dark_and_is_known_by_its_serial_number(spec: str) -> None:
     with open_camera("sim:wall") as camera:
-        about = camera.capabilities
+        device = OfDevice(camera)
+    about, found = device.capabilities, LightRules.of(cast("Camera", device), Settings(camera=spec))
 
-    assert rules(spec) == LightRules(f"{about.model} {about.serial}", False, 3.0, 300.0, 1.0)
+    assert found == LightRules(f"{about.model} {about.serial}", False, 3.0, 300.0, 1.0)
+
+
+@pytest.mark.parametrize("kind", ["kinect2", "tofcam660", "opt8241"])
+def test_an_emulated_device_captures_from_the_start_and_else_counts_as_the_device(
+    kind: str,
+) -> None:
+    spec = f"{kind}:emulated?scene=wall"
+    found = rules(spec, spec)
+
+    assert (found.capture_at_start, found.delay_s, found.unused_s) == (True, 3.0, 300.0)
+    assert found.unit
+    assert "emulated?" not in found.unit
 
 
 def test_a_recording_is_replayed_from_the_start_and_nothing_is_kept_of_it() -> None:
