@@ -21,7 +21,7 @@ _STYLES: Final[dict[Level, str]] = {
     "fault": "bold red",
     "not tried": "dim",
 }
-_WIDTH = 12
+_WIDTH = 20
 
 
 def doctor(
@@ -90,10 +90,11 @@ def _tell(found: Iterable[Finding]) -> list[Finding]:
     seen = []
     for each in found:
         seen.append(each)
-        line = Text.assemble((f"{each.level:<10}", _STYLES[each.level]), f"{each.check:<{_WIDTH}} ")
+        level = f"{each.level:<7} "
+        line = Text.assemble((level, _STYLES[each.level]), f"{each.check:<{_WIDTH - len(level)}} ")
         console.print(line + Text(each.message))
         if each.remedy is not None:
-            indent = " " * (10 + _WIDTH + 1)
+            indent = " " * (_WIDTH + 1)
             for remedy in each.remedy.splitlines():
                 console.print(Text(f"{indent}{remedy}", style="dim"))
     counts = (f"{level}: {sum(each.level == level for each in seen)}" for level in _STYLES)

@@ -84,11 +84,11 @@ def test_each_finding_is_a_line_and_each_remedy_below_it(
 
     assert run(["doctor"]) == 1
 
-    lines = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    lines = capsys.readouterr().out.splitlines()
     assert lines[-4:] == [
-        "fault udev rule [there] is none",
-        "first line",
-        "second line",
+        "fault   udev rule    [there] is none",
+        "                     first line",
+        "                     second line",
         "ok: 2, warning: 0, fault: 1, not tried: 0.",
     ]
 
