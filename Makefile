@@ -19,7 +19,7 @@ DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace nginx-light ca
 
 .DEFAULT_GOAL := help
 .PHONY: help install serve test test-fast mutants check bench paper docs docs-site dist lock release clean dashboard debian-packages debian-package-names \
-	check-pyright check-mypy check-style check-documents check-dashboard check-newest
+	check-pyright check-mypy check-style check-documents check-dashboard check-newest simulation-kernels
 
 help:  ## Say what each target does
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 16
@@ -39,7 +39,7 @@ test-fast: .venv/test.stamp  ## Run the tests of mathematics, wire format and pl
 		tests/moments tests/client/wire tests/server/planning/prediction tests/server/planning/search/test_pareto.py
 
 check: .venv/test.stamp client/dashboard/node_modules/.package-lock.json  ## Lint, types, import laws
-	@$(MAKE) --no-print-directory --jobs 2 check-pyright check-mypy check-style check-documents check-dashboard
+	@$(MAKE) --no-print-directory --jobs 2 simulation-kernels check-pyright check-mypy check-style check-documents check-dashboard
 
 mutants: .venv/mutants.stamp  ## Draw random mutants that no test notices (SEED=2 COUNT=20 WHERE='wire lease')
 	$(BIN)/python -m tests.mutants $(SEED) $(COUNT) $(WHERE)
@@ -155,6 +155,10 @@ check-newest:  ## Test what uses internals of numba and uvicorn with the newest 
 	build/newest/bin/python -m pip list | grep -E '^(numba|uvicorn) '
 	build/newest/bin/python -m pytest --numprocesses auto --dist loadfile tests/compiled tests/moments/test_kernels*.py \
 		tests/simulation/light/test_image_kernels.py tests/server/daemon tests/server/api/stream
+
+# Once, before tests in several processes would each compile the same.
+simulation-kernels: .venv/test.stamp
+	$(BIN)/python -c 'import tests.simulation.light.test_compiled, tests.simulation.light.test_held_light'
 
 # Side by side, the slowest first.
 check-pyright:
