@@ -235,8 +235,9 @@ class Sequence:
 
     @property
     def unambiguous_range_m(self) -> float:
-        """Range c / (2 f) beyond which a target appears nearer by a multiple of it."""
-        return SPEED_OF_LIGHT_M_S / (2 * self.base_frequency_hz)
+        """Range c / (2 f) beyond which a target appears nearer, or what the sampling states."""
+        period_m = SPEED_OF_LIGHT_M_S / (2 * self.base_frequency_hz)
+        return min(period_m, self.sampling.max_range_m or period_m)
 
     def to_document(self) -> dict[str, Any]:
         """Return the sequence as the JSON document of the REST interface.

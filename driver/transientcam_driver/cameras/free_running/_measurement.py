@@ -1,0 +1,165 @@
+"""What a camera that runs by itself measures: raw exposures, complex moments, and its frames."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from transientcam_driver.camera import Lens, Sensor
+from transientcam_driver.errors import ProtocolError
+
+
+@dataclass(frozen=True, slots=True)
+class Exposure:
+    """A raw image of each frame: gain (offset + 1/2 (b_0 + Re(b exp(-i phase)))), in DN.
+
+    Attributes
+    ----------
+    frequency_hz, phase_rad
+        Of the modulation. Each frequency needs three phases or more; repeated ones are averaged.
+    exposure_s
+        Where it differs, moments are those of the first frequency's exposure.
+    gain, offset_dn
+        Of the tap that saw it, or (H, W) of its pixels: taken away as (image - offset_dn) / gain.
+    """
+
+    frequency_hz: float
+    phase_rad: float
+    exposure_s: float = 1e-3
+    gain: float | NDArray[Any] = 1.0
+    offset_dn: float | NDArray[Any] = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """A complex image of each frame: b = sum a exp(2 pi i f tau), NaN where a pixel has none.
+
+    A camera of phase and amplitude states amplitude * exp(i phase).
+
+    Attributes
+    ----------
+    frequency_hz
+        Of the modulation.
+    std
+        Standard deviation of its real part, and so of its imaginary part, in the moment's unit; or
+        (H, W) of each pixel's.
+    largest
+        What its modulus may reach; larger ones count as saturated.
+    gain
+        Complex, or (H, W): what the moment is divided by.
+    """
+
+    frequency_hz: float
+    std: float | NDArray[Any]
+    largest: float
+    gain: complex | NDArray[Any] = 1.0
+
+
+Measurement = Exposure | Moment
+
+
+@dataclass(frozen=True, slots=True)
+class Capture:
+    """One frame of a device.
+
+    Attributes
+    ----------
+    images
+        (H, W) each, of the measurements of its description and in their order: digital numbers of
+        exposures, complex numbers of moments.
+    number
+        The device's frame counter: a gap says how many frames were lost.
+    device_time_s
+        Begin of the first exposure, on the clock of the device.
+    temperature_c
+        Of the sensor; None where it is not known.
+    capture_s
+        From the first exposure to the last read-out; a period of the frame rate by default.
+    """
+
+    images: Sequence[NDArray[Any]]
+    number: int
+    device_time_s: float
+    temperature_c: float | None = None
+    capture_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Description:
+    """What a free-running device is and measures.
+
+    Attributes
+    ----------
+    model, serial, firmware
+        Which one it is.
+    width, height
+        Of an image, in pixels.
+    frame_rate_hz
+        Of whole frames, as the device states it.
+    measurements
+        What each frame holds, in the order of the images of a `Capture`.
+    bits
+        Of raw exposures: a pixel of the highest code is saturated.
+    sensor
+        Whose noise exposures have, in electrons and DN behind `Exposure.gain` and `offset_dn`; None
+        where that is not known.
+    max_range_m
+        The largest range; needed where frequencies have no base whose multiples are 32 or less.
+    lens
+        None where the device does not say.
+    clock, heartbeat_s
+        As of `Capabilities`.
+    min_exposure_s, max_exposure_s
+        Where the exposure can be set; the first measurement's by default.
+    """
+
+    model: str
+    serial: str
+    firmware: str
+    width: int
+    height: int
+    frame_rate_hz: float
+    measurements: tuple[Measurement, ...]
+    bits: int = 12
+    sensor: Sensor | None = None
+    max_range_m: float | None = None
+    lens: Lens | None = None
+    clock: Literal["device", "ptp"] = "device"
+    heartbeat_s: float = 0.0
+    min_exposure_s: float | None = None
+    max_exposure_s: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be measured (ProtocolError)."""
+        require("measurements", len(self.measurements), "at least one", self.measurements)
+        require("frame_rate_hz", self.frame_rate_hz > 0, "above 0 Hz", self.frame_rate_hz)
+        require("width, height", min(self.size) > 0, "1 or more", self.size)
+        require("bits", 1 <= self.bits <= 16, "1 to 16", self.bits)
+        for at, each in enumerate(self.measurements):
+            name, f_hz = f"measurements[{at}]", each.frequency_hz
+            require(f"{name}.frequency_hz", 0 < f_hz < math.inf, "above 0 Hz", f_hz)
+            if isinstance(each, Moment):
+                inside = (np.asarray(each.std) > 0).all() and (
+                    each.std < np.float64(each.largest)
+                ).all()
+                require(f"{name}.std", inside, f"above 0, below {each.largest}", each.std)
+            for part in ("gain", "std" if isinstance(each, Moment) else "offset_dn"):
+                shape = np.shape(getattr(each, part))
+                require(f"{name}.{part}", shape in ((), self.size), f"one or {self.size}", shape)
+            gain = np.asarray(each.gain)
+            usable = np.isfinite(gain).all() and (gain != 0).all()
+            require(f"{name}.gain", usable, "finite and not 0", each.gain)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Height and width in pixels."""
+        return self.height, self.width
+
+
+def require(field: str, kept: object, limit: str, value: object) -> None:
+    """Raise ProtocolError, which names field, value and limit, unless a condition is kept."""
+    if not kept:
+        raise ProtocolError(f"{field} is {value}; allowed: {limit}")
