@@ -173,6 +173,11 @@ class Sequence:
         return self.sampling.multiples_of(self.harmonics)
 
     @property
+    def order(self) -> int:
+        """The highest multiple, 32 at most: of the kernels that its frames are computed with."""
+        return min(self.multiples[-1], MAX_HARMONICS)
+
+    @property
     def images_per_take(self) -> int:
         """How many images one take holds."""
         phases = len(self.sampling.phases_rad)

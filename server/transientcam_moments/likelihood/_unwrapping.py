@@ -121,7 +121,8 @@ def unwrap(
         As of `likelihood`.
     harmonics : sequence of int, optional
         Which multiples of the base frequency they are, N different ones of 0 to 32, or with
-        `most_rad` to 65536, in any order; 0 to N - 1 when left out. That of 0 has no phase and may be anything.
+        `most_rad` to 65536, in any order; 0 to N - 1 when left out. That of 0 has no phase and may
+        be anything.
     model_error : float
         As of `likelihood`.
     most_rad : float, optional

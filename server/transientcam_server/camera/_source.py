@@ -43,7 +43,8 @@ def stated_sensor(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor |
 def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
     """Return the sensor of a camera: a simulated one has its own, a real one the settings'.
 
-    Where these state none it is the one that the camera reports. A relayed one has what its origin states. The dark level is the camera's where it has one.
+    Where these state none it is the one that the camera reports. A relayed one has what its origin
+    states. The dark level is the camera's where it has one.
     """
     if isinstance(camera, RelayCamera) and camera.origin.sensor is not None:
         return camera.origin.sensor

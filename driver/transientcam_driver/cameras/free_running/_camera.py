@@ -40,8 +40,8 @@ _T = TypeVar("_T")
 class FreeRunningDevice(Protocol):
     """A device that is connected, its light off.
 
-    Calls come from one thread at a time, but for ``receive``, which may run beside ``temperature_c``
-    and ``light_off``. Each raises `CameraLost` where the device does not answer, and another
+    Calls come from one thread at a time, but for ``receive``, which may run beside
+    ``temperature_c`` and ``light_off``. Each raises `CameraLost` where the device does not answer, and another
     `CameraError` where it refuses.
     """
 

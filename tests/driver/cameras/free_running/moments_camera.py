@@ -1,5 +1,6 @@
 """A mock: complex moments of 20 and 100 MHz, each with a noise of its own, in its own unit."""
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ class Device:
     off_switch = OffSwitch()
 
     def __init__(self) -> None:
-        self.number, self.rng, self.lit = 0, np.random.default_rng(2), False
+        self.number, self.rng, self.stopped = 0, np.random.default_rng(2), threading.Event()
         self.description = Description(
             model="moments",
             serial="M1",
@@ -39,9 +40,11 @@ class Device:
         )
 
     def start(self, exposure_s: float) -> None:
-        self.lit = True
+        self.stopped.clear()
 
     def receive(self, timeout_s: float) -> Capture | None:
+        if self.stopped.wait(1 / RATE_HZ):
+            return None
         images = []
         for each in MEASURED:
             noise = self.rng.standard_normal((2, HEIGHT, WIDTH)) * each.std
@@ -54,10 +57,10 @@ class Device:
         """It has no thermometer."""
 
     def light_off(self) -> None:
-        self.lit = False
+        self.stopped.set()
 
     def close(self) -> None:
-        self.lit = False
+        self.stopped.set()
 
 
 def _open(name: CameraName, clock: Any) -> Camera:
