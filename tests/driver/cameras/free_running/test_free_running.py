@@ -1,10 +1,8 @@
 """Cameras that run by themselves: three mocks keep the contract, and are measured by a daemon."""
 
-import json
 import math
-import sys
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,23 +13,11 @@ from mcap.reader import make_reader
 
 import transientcam
 from tests.driver.cameras.free_running import moments_camera, odd_camera, taps_camera
-from tests.serving import Served, serving
+from tests.serving import serving
 from transientcam import Camera
 from transientcam.cli import run as command
 from transientcam_conformance import Device, chosen, run as check
-from transientcam_driver import (
-    CameraName,
-    CameraPlugin,
-    Description,
-    Exposure,
-    FreeRunningCamera,
-    Moment,
-    ProtocolError,
-)
 from transientcam_driver.camera import _opening as opening
-from transientcam_driver.cameras.free_running._frequencies import common_base
-from transientcam_driver.clock import RealClock
-from transientcam_driver.contract import CLAUSES, Bench, Clause, ContractSkipped
 
 FRAMES = 10
 MOCKS: dict[str, Any] = {"taps": taps_camera, "moments": moments_camera, "odd": odd_camera}
