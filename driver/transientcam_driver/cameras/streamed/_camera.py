@@ -1,0 +1,341 @@
+"""What cameras share that stream once they are started, whoever reads."""
+
+import threading
+import time
+import warnings
+import weakref
+from abc import abstractmethod
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Final, Generic, Protocol, TypeVar
+
+from transientcam_driver.camera import (
+    AppliedSequence,
+    CameraState,
+    HostCamera,
+    RawFrame,
+    Simulation,
+    Status,
+)
+from transientcam_driver.clock import Clock, RealClock
+from transientcam_driver.errors import CameraError, CameraLost, FrameTimeout, NotStreaming
+from transientcam_driver.sequence import Sequence
+
+SILENCE_S: Final = 2.0
+UNREAD_S: Final = 2.0
+READ_S: Final = 0.1
+"""Longest wait for a frame in one go: how long a loss may stay unnoticed."""
+
+
+class _Device(Protocol):
+    def close(self) -> None:
+        """Give the device back, its light off; never fails."""
+        ...
+
+
+_D = TypeVar("_D", bound=_Device)
+_A = TypeVar("_A")
+_T = TypeVar("_T")
+
+
+class StreamedCamera(HostCamera, Generic[_D, _A]):
+    """A `Camera` of a device that streams; of frames and of requests to it a subclass knows.
+
+    While it is started and no frame is read for ``unread_s``, a thread here switches it off, and
+    the next ``read_frame`` on again.
+
+    ``connect``: opens the camera with a serial number, any where it is None.
+    ``clock``: of the times that frames carry; real time by default.
+    ``simulation``: the handle on an emulated camera; None for a real one.
+    ``silence_s``: without a whole frame for so long the camera is lost.
+    ``unread_s``: without a reader for so long, or twice as long, the light goes off.
+    ``now_s``: monotonic time, by which waits end.
+    Raises CameraError as ``connect``.
+    """
+
+    def __init__(
+        self,
+        connect: Callable[[str | None], _D],
+        *,
+        clock: Clock | None = None,
+        simulation: Simulation | None = None,
+        silence_s: float = SILENCE_S,
+        unread_s: float = UNREAD_S,
+        now_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        super().__init__(clock or RealClock(), simulation)
+        self._connect = connect
+        self._silence_s = silence_s
+        self._now_s = now_s
+        self._lit = False
+        self._heard = 0, 0.0  # whole images, and when their count had last changed
+        self._own(connect(None))
+        try:
+            self._describe()
+            self._applied = self._capabilities.apply(
+                self._capabilities.nearest(Sequence()), epoch=1
+            )
+        except BaseException:
+            self._release.detach()
+            self._device.close()
+            raise
+        self._state = CameraState.IDLE
+        self._watch = Watch(unread_s, self._unread)
+
+    # --- what a subclass does, under _control but for `_take` -----------------------------------
+
+    @abstractmethod
+    def _describe(self) -> None:
+        """Set ``_capabilities`` and ``factory`` by the device."""
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Let the device stream, its light on, and forget what had come before."""
+
+    @abstractmethod
+    def _end(self) -> None:
+        """Let the device stream no more; it also releases the reader."""
+
+    @abstractmethod
+    def _release_reader(self) -> None:
+        """Let `_take` return: nothing will come any more."""
+
+    @abstractmethod
+    def _take(self, timeout_s: float) -> _A | None:
+        """Return what has come, or None in time. Raises CameraError, after which it is lost."""
+
+    @abstractmethod
+    def _collected(self, arrival: _A) -> RawFrame | None:
+        """Add what has come to the frame; return it once it has all takes."""
+
+    @abstractmethod
+    def _check(self) -> float | None:
+        """Ask the device whether it is there; return its temperature, if it knows one."""
+
+    def _temperature_c(self) -> float | None:
+        """Ask for the temperature, and so whether the device is there."""
+        return self._check()
+
+    def _was_set(self, before: AppliedSequence) -> None:
+        """Another sequence was set: drop the frame that was begun."""
+
+    def _silence(self) -> str:
+        """Say what came in place of frames."""
+        return "nothing"
+
+    # --- state -------------------------------------------------------------------------------
+
+    def status(self) -> Status:
+        """Return what is known here, and what the device answers."""
+        with self._control:
+            self._require_connected()
+            temperature_c = self._asked(self._temperature_c)
+            return self._status(light_on=self._lit, temperature_c=temperature_c)
+
+    # --- sequence and light ------------------------------------------------------------------
+
+    def configure(self, sequence: Sequence) -> AppliedSequence:
+        """Set a sequence; takes of the frame begun are dropped."""
+        self.validate(sequence)
+        with self._control:
+            self._require_connected()
+            before = self._applied
+            self._applied = self._capabilities.apply(sequence, epoch=before.epoch + 1)
+            self._was_set(before)
+            return self._applied
+
+    def start(self) -> None:
+        """Switch the light on and capture frames back to back."""
+        with self._control:
+            self._require_connected()
+            self._watch.note()
+            self._light_on()
+            self._resume = True
+
+    def stop(self) -> None:
+        """Switch the light off; a ``read_frame`` that is waiting raises NotStreaming."""
+        with self._control:
+            self._resume = False
+            self._require_connected()
+            self._state = CameraState.IDLE
+            self._light_off()
+
+    def reconnect(self) -> None:
+        """After CameraLost: find the same camera again, restore the sequence, resume streaming."""
+        with self._reading, self._control:
+            self._require_open()
+            if self._state is not CameraState.DISCONNECTED:
+                return
+            device = self._connect(self._capabilities.serial)
+            self._release.detach()
+            self._own(device)
+            before = self._applied
+            self._applied = self._capabilities.apply(before.sequence, epoch=before.epoch + 1)
+            self._state = CameraState.IDLE
+            if self._resume:
+                self._light_on()
+
+    def close(self) -> None:
+        """Switch the light off and give the camera back; may be called twice."""
+        with self._control:
+            if self._closed:
+                return
+            self._closed = True
+            self._state = CameraState.DISCONNECTED
+            self._release_reader()
+        self._watch.close()
+        with self._reading, self._control:
+            self._lit = False
+            self._release.detach()
+            self._device.close()
+
+    # --- frames ------------------------------------------------------------------------------
+
+    def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
+        """Wait for the next complete frame.
+
+        Raises FrameTimeout: none was complete in time; the camera goes on capturing. Raises
+        NotStreaming where the camera was not started, or was stopped meanwhile. Raises CameraLost
+        where it was unplugged, does not answer, or sends nothing whole; see ``reconnect``.
+        """
+        with self._reading:
+            end_s = self._now_s() + timeout_s
+            while True:
+                self._keep_lit()
+                left_s = end_s - self._now_s()
+                arrival = self._taken(max(0.0, min(left_s, READ_S)))
+                if arrival is not None:
+                    frame = self._frame_of(arrival)
+                    if frame is not None:
+                        return frame
+                    continue
+                self._check_silence()
+                if left_s <= 0:
+                    raise FrameTimeout(timeout_s)
+
+    def _keep_lit(self) -> None:
+        """Switch the light on again where nothing was read for too long."""
+        with self._control:
+            self._require_connected()
+            if self._state is not CameraState.STREAMING:
+                raise NotStreaming(self._state)
+            self._watch.note()
+            self._light_on()
+
+    def _taken(self, timeout_s: float) -> _A | None:
+        try:
+            return self._take(timeout_s)
+        except CameraError as error:
+            with self._control:
+                self._require_open()  # closed by another thread: no loss
+                self._lose()
+            if isinstance(error, CameraLost):
+                raise
+            raise CameraLost(str(error)) from error
+
+    def _frame_of(self, arrival: _A) -> RawFrame | None:
+        with self._control:
+            if self._state is not CameraState.STREAMING:  # stopped meanwhile
+                return None
+            frame = self._collected(arrival)
+            if frame is not None:
+                self.counters.frames += 1
+            return frame
+
+    def _check_silence(self) -> None:
+        """Give the camera up that sends nothing whole; where it does not answer, for that."""
+        images, since_s = self._heard
+        now_s, count = self._now_s(), self.counters.images
+        if count != images:
+            self._heard = count, now_s
+            return
+        if now_s - since_s < self._silence_s:
+            return
+        with self._control:
+            self._require_connected()
+            if not self._lit:
+                return
+            try:
+                self._check()
+            finally:
+                self._lose()
+        raise CameraLost(
+            f"no whole frame within {self._silence_s:g} s ({self._silence()} since it was opened)"
+        )
+
+    def _own(self, device: _D) -> None:
+        self._device = device
+        self._release = weakref.finalize(self, _left_open, device)
+
+    # --- under _control ----------------------------------------------------------------------
+
+    def _light_on(self) -> None:
+        if not self._lit:
+            self._heard = self.counters.images, self._now_s()
+            self._asked(self._begin)
+            self._lit = True
+        self._state = CameraState.STREAMING
+
+    def _light_off(self) -> None:
+        self._asked(self._end)
+        self._lit = False
+
+    def _unread(self) -> None:
+        """Switch the light off without readers; the next `read_frame` needs it again."""
+        with self._control:
+            if self._lit:
+                with suppress(CameraError):  # the next request fails in the same way
+                    self._light_off()
+
+    def _lose(self) -> None:
+        """Mark the camera as gone, and switch off what still answers."""
+        self._state = CameraState.DISCONNECTED
+        self._release_reader()
+        self._device.close()
+        self._lit = False
+
+    def _asked(self, request: Callable[[], _T]) -> _T:
+        """Return the answer to requests; a loss disconnects the camera."""
+        try:
+            return request()
+        except CameraLost:
+            self._lose()
+            raise
+
+
+def _left_open(device: _Device) -> None:
+    """Light off when the interpreter ends without close()."""
+    warnings.warn("a camera was left open; use close() or `with`", ResourceWarning, stacklevel=2)
+    device.close()
+
+
+class Watch:
+    """Calls a function where nothing was noted for a time.
+
+    ``interval_s``: after one to two of these without a note.
+    ``idle``: called on a thread of its own, again and again until something is noted.
+    """
+
+    def __init__(self, interval_s: float, idle: Callable[[], None]) -> None:
+        self._interval_s = interval_s
+        self._idle = idle
+        self._notes = 0
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="camera-watch", daemon=True)
+        self._thread.start()
+
+    def note(self) -> None:
+        """Note that it still goes on."""
+        self._notes += 1
+
+    def close(self) -> None:
+        """End the thread; the function is not called any more once this returns."""
+        self._ended.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        notes = -1
+        while not self._ended.wait(self._interval_s):
+            if notes == self._notes:
+                self._idle()
+            notes = self._notes
