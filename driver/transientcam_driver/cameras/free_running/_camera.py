@@ -15,8 +15,8 @@ from transientcam_driver.camera import (
 from transientcam_driver.cameras.free_running._frequencies import common_base
 from transientcam_driver.cameras.free_running._measurement import Capture, Description
 from transientcam_driver.cameras.free_running._rendering import BITS, Renderer
-from transientcam_driver.cameras.streamed import StreamedCamera
-from transientcam_driver.errors import CameraError, CameraLost, CameraNotFound
+from transientcam_driver.cameras.streamed import StreamedCamera, same
+from transientcam_driver.errors import CameraLost
 from transientcam_driver.sequence import Sampling
 from transientcam_supervisor import OffSwitch
 
@@ -29,8 +29,8 @@ class FreeRunningDevice(Protocol):
     """A device that is connected, its light off.
 
     Calls come from one thread at a time, but for ``receive``, which may run beside
-    ``temperature_c`` and ``light_off``. Each raises `CameraLost` where the device does not answer, and another
-    `CameraError` where it refuses.
+    ``temperature_c`` and ``light_off``. Each raises `CameraLost` where the device does not answer,
+    and another `CameraError` where it refuses.
     """
 
     @property
@@ -85,21 +85,14 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
     """
 
     def __init__(self, connect: Callable[[], FreeRunningDevice], **others: Any) -> None:
-        def again(serial: str | None) -> FreeRunningDevice:
-            device = connect()
-            if serial in (None, device.description.serial):
-                return device
-            device.close()
-            raise CameraNotFound(str(serial))
-
         self._arrived = threading.Condition()
-        self._kept: Capture | CameraError | None = None
+        self._kept: Capture | CameraLost | None = None
         self._receiving: tuple[threading.Thread, threading.Event] | None = None
         self._takes: list[Capture] = []
         self._expected: int | None = None  # the device's number of the next frame
         self._number = self._lost = 0
         self._clocks_s = 0.0, 0.0  # of the device and of this machine, at its last frame
-        super().__init__(again, **others)
+        super().__init__(same(connect, lambda device: device.description.serial), **others)
 
     def _describe(self) -> None:
         about = self._device.description
@@ -120,11 +113,14 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
     def _check(self) -> float | None:
         return self._device.temperature_c()
 
-    def _was_set(self, before: AppliedSequence) -> None:
+    def _set(self, applied: AppliedSequence) -> None:
+        again = self._lit and applied.sequence.exposure_s != self._applied.sequence.exposure_s
+        if again:
+            self._end()
+        super()._set(applied)
         self._takes, self._kept = [], None
-        if self._lit and self._applied.sequence.exposure_s != before.sequence.exposure_s:
-            self._asked(self._end)
-            self._asked(self._begin)
+        if again:
+            self._begin()
 
     def _begin(self) -> None:
         self._kept, self._expected, self._takes = None, None, []
@@ -159,7 +155,7 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
                 lambda: self._kept is not None or self._receiving is None, timeout_s
             )
             found, self._kept = self._kept, None
-        if isinstance(found, CameraError):
+        if isinstance(found, CameraLost):
             raise found
         return found
 
@@ -198,12 +194,12 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
 
     def _receive(self, device: FreeRunningDevice, ended: threading.Event) -> None:
         while not ended.is_set():
-            found: Capture | CameraError | None
+            found: Capture | CameraLost | None
             try:
                 found = device.receive(RECEIVE_S)
-            except CameraError as error:
+            except CameraLost as error:
                 found = error
-            except Exception as error:  # of a plug-in: the camera fails, and says of what
+            except Exception as error:  # of a plug-in: the camera is lost, and it says by what
                 found = CameraLost(f"receive() raised {error!r}")
             if found is None:
                 continue
@@ -214,7 +210,7 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
                 if isinstance(found, Capture):
                     self._clocks_s = found.device_time_s, self._clock.now_s()
                 self._arrived.notify_all()
-            if isinstance(found, CameraError):
+            if isinstance(found, CameraLost):
                 return
 
 

@@ -12,6 +12,7 @@ from transientcam_driver.cameras.kinect2._off_switch import off_switch
 from transientcam_driver.cameras.kinect2._parameters import DepthParameters, Rows
 from transientcam_driver.cameras.kinect2._tables import P0Tables
 from transientcam_driver.cameras.streamed import StreamedCamera
+from transientcam_driver.errors import CameraError, CameraLost
 from transientcam_supervisor import OffSwitch
 
 
@@ -59,13 +60,17 @@ class Kinect2Camera(StreamedCamera[Kinect2, Arrival]):
         self._frame_queue.end()
 
     def _take(self, timeout_s: float) -> Arrival | None:
-        return self._frame_queue.take(timeout_s)
+        try:
+            return self._frame_queue.take(timeout_s)
+        except CameraError as error:
+            raise error if isinstance(error, CameraLost) else CameraLost(str(error)) from error
 
     def _collected(self, arrival: Arrival) -> RawFrame | None:
         return self._frames.push(arrival, self._applied)
 
-    def _was_set(self, before: AppliedSequence) -> None:
+    def _set(self, applied: AppliedSequence) -> None:
         self._frames.drop()
+        super()._set(applied)
 
     def _check(self) -> None:
         self._device.check()

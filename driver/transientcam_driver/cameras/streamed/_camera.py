@@ -18,7 +18,13 @@ from transientcam_driver.camera import (
     Status,
 )
 from transientcam_driver.clock import Clock, RealClock
-from transientcam_driver.errors import CameraError, CameraLost, FrameTimeout, NotStreaming
+from transientcam_driver.errors import (
+    CameraError,
+    CameraLost,
+    CameraNotFound,
+    FrameTimeout,
+    NotStreaming,
+)
 from transientcam_driver.sequence import Sequence
 
 SILENCE_S: Final = 2.0
@@ -36,6 +42,19 @@ class _Device(Protocol):
 _D = TypeVar("_D", bound=_Device)
 _A = TypeVar("_A")
 _T = TypeVar("_T")
+
+
+def same(connect: Callable[[], _D], serial_of: Callable[[_D], str]) -> Callable[[str | None], _D]:
+    """Return what connects, and raises CameraNotFound where the serial number is another one."""
+
+    def again(serial: str | None) -> _D:
+        device = connect()
+        if serial in (None, serial_of(device)):
+            return device
+        device.close()
+        raise CameraNotFound(str(serial))
+
+    return again
 
 
 class StreamedCamera(HostCamera, Generic[_D, _A]):
@@ -67,17 +86,16 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
         self._connect = connect
         self._silence_s = silence_s
         self._now_s = now_s
+        self._epoch = 0
         self._lit = False
         self._heard = 0, 0.0  # whole images, and when their count had last changed
         self._own(connect(None))
         try:
-            self._describe()
-            self._applied = self._capabilities.apply(
-                self._capabilities.nearest(Sequence()), epoch=1
-            )
+            with self._control:
+                self._describe()
+                self._apply(self._capabilities.nearest(Sequence()))
         except BaseException:
-            self._release.detach()
-            self._device.close()
+            self._give_back()
             raise
         self._state = CameraState.IDLE
         self._watch = Watch(unread_s, self._unread)
@@ -102,7 +120,7 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
 
     @abstractmethod
     def _take(self, timeout_s: float) -> _A | None:
-        """Return what has come, or None in time. Raises CameraError, after which it is lost."""
+        """Return what has come, or None in time. Raises CameraError: a loss disconnects it."""
 
     @abstractmethod
     def _collected(self, arrival: _A) -> RawFrame | None:
@@ -116,8 +134,9 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
         """Ask for the temperature, and so whether the device is there."""
         return self._check()
 
-    def _was_set(self, before: AppliedSequence) -> None:
-        """Another sequence was set: drop the frame that was begun."""
+    def _set(self, applied: AppliedSequence) -> None:
+        """Let the device do another sequence, and drop the frame that was begun."""
+        self._applied = applied
 
     def _silence(self) -> str:
         """Say what came in place of frames."""
@@ -139,9 +158,7 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
         self.validate(sequence)
         with self._control:
             self._require_connected()
-            before = self._applied
-            self._applied = self._capabilities.apply(sequence, epoch=before.epoch + 1)
-            self._was_set(before)
+            self._asked(lambda: self._apply(sequence))
             return self._applied
 
     def start(self) -> None:
@@ -166,11 +183,13 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
             self._require_open()
             if self._state is not CameraState.DISCONNECTED:
                 return
-            device = self._connect(self._capabilities.serial)
-            self._release.detach()
-            self._own(device)
-            before = self._applied
-            self._applied = self._capabilities.apply(before.sequence, epoch=before.epoch + 1)
+            self._give_back()
+            self._own(self._connect(self._capabilities.serial))
+            try:
+                self._apply(self._applied.sequence)
+            except BaseException:
+                self._give_back()
+                raise
             self._state = CameraState.IDLE
             if self._resume:
                 self._light_on()
@@ -186,8 +205,7 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
         self._watch.close()
         with self._reading, self._control:
             self._lit = False
-            self._release.detach()
-            self._device.close()
+            self._give_back()
 
     # --- frames ------------------------------------------------------------------------------
 
@@ -225,13 +243,11 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
     def _taken(self, timeout_s: float) -> _A | None:
         try:
             return self._take(timeout_s)
-        except CameraError as error:
+        except CameraLost:
             with self._control:
                 self._require_open()  # closed by another thread: no loss
                 self._lose()
-            if isinstance(error, CameraLost):
-                raise
-            raise CameraLost(str(error)) from error
+            raise
 
     def _frame_of(self, arrival: _A) -> RawFrame | None:
         with self._control:
@@ -267,7 +283,16 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
         self._device = device
         self._release = weakref.finalize(self, _left_open, device)
 
+    def _give_back(self) -> None:
+        """Close the device, once."""
+        if self._release.detach():
+            self._device.close()
+
     # --- under _control ----------------------------------------------------------------------
+
+    def _apply(self, sequence: Sequence) -> None:
+        self._epoch += 1
+        self._set(self._capabilities.apply(sequence, epoch=self._epoch))
 
     def _light_on(self) -> None:
         if not self._lit:
@@ -291,7 +316,7 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
         """Mark the camera as gone, and switch off what still answers."""
         self._state = CameraState.DISCONNECTED
         self._release_reader()
-        self._device.close()
+        self._give_back()
         self._lit = False
 
     def _asked(self, request: Callable[[], _T]) -> _T:
