@@ -118,7 +118,7 @@ def test_what_is_no_tof_camera_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_raw_images_of_another_layout_are_refused() -> None:
     message = mocked.ImgFrame(0, 60.0, np.zeros((480, 640), np.uint16))
-    with pytest.raises(ProtocolError, match=r"\(480, 640\), not 960 rows of 1280"):
+    with pytest.raises(ProtocolError, match=r"\(480, 640\), RAW12, not 960 rows of 1280"):
         taps_of(message)
 
 

@@ -33,22 +33,18 @@ class Camera(Protocol):
     @property
     def counters(self) -> Counters:
         """Images and frames received, and what was lost."""
-        ...
 
     @property
     def simulation(self) -> Simulation | None:
         """The handle of a simulated camera, None of any other."""
-        ...
 
     @property
     def capabilities(self) -> Capabilities:
         """Limits and size of the device."""
-        ...
 
     @property
     def factory(self) -> FactoryCalibration | None:
         """What the device reports of its pixels and its lens; None where it reports nothing."""
-        ...
 
     @property
     def off_switch(self) -> OffSwitch | None:
@@ -56,17 +52,14 @@ class Camera(Protocol):
 
         It may be another one after `reconnect`.
         """
-        ...
 
     @property
     def state(self) -> CameraState:
         """Where the camera stands."""
-        ...
 
     @property
     def applied(self) -> AppliedSequence:
         """The sequence as the camera really runs it."""
-        ...
 
     def validate(self, sequence: Sequence) -> AppliedSequence:
         """Return what `configure` would set; the epoch is 0.
@@ -76,7 +69,6 @@ class Camera(Protocol):
         SequenceError
             Naming the field, its value and the limit of this camera.
         """
-        ...
 
     def configure(self, sequence: Sequence) -> AppliedSequence:
         """Set a sequence; while streaming, the next frame is the new sequence's.
@@ -90,19 +82,15 @@ class Camera(Protocol):
         CameraLost
             The camera is gone.
         """
-        ...
 
     def start(self) -> None:
         """Switch the light on and capture frames back to back."""
-        ...
 
     def stop(self) -> None:
         """Switch the light off; a ``read_frame`` that is waiting raises NotStreaming."""
-        ...
 
     def safe_off(self) -> None:
         """Switch the light off, in any state."""
-        ...
 
     def status(self) -> Status:
         """Read the status of the device.
@@ -112,11 +100,9 @@ class Camera(Protocol):
         CameraLost
             It does not answer.
         """
-        ...
 
     def device_time_s(self) -> float:
         """Time on the clock that frames carry."""
-        ...
 
     def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
         """Wait for the next complete frame.
@@ -132,7 +118,6 @@ class Camera(Protocol):
         CameraError
             Another failure: the light is off.
         """
-        ...
 
     def reconnect(self) -> None:
         """After CameraLost: find the same device again, restore the sequence, resume streaming.
@@ -144,11 +129,9 @@ class Camera(Protocol):
         CameraError
             It is still absent, or cannot be opened; try again later.
         """
-        ...
 
     def close(self) -> None:
         """Switch the light off and give the device back; may be called twice."""
-        ...
 
     def __enter__(self) -> Self: ...
 

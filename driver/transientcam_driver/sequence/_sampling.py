@@ -83,8 +83,9 @@ class Sampling:
 
 def _require_multiples(multiples: object, most: int) -> None:
     limit = f"different integers from 1 to {most}, ascending, without a common factor"
-    numbers = isinstance(multiples, tuple | list)
-    if not numbers or not all(_is_multiple(each, most) for each in multiples):
+    if not isinstance(multiples, tuple | list) or not all(
+        _is_multiple(each, most) for each in multiples
+    ):
         raise SequenceError("sampling.multiples", multiples, limit)
     ascending = list(multiples) == sorted(set(multiples))
     if not ascending or (multiples and math.gcd(*multiples) != 1):

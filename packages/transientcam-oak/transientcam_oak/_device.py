@@ -30,7 +30,7 @@ _IMAGES: Final = 4
 """Of a frame: each frequency as it is, and with its taps swapped."""
 _BROWN: Final = 5
 """Coefficients of Brown and Conrady, k1, k2, p1, p2, k3, which further ones follow."""
-_BITS: Final = {"RAW8": 8, "RAW10": 10, "RAW12": 12, "RAW14": 14, "RAW16": 16}
+BITS: Final = 12
 MEASURED: Final = tuple(
     Exposure(f_hz, (tap + 2 * swapped) % _TAPS * np.pi / 2)
     for f_hz in FREQUENCIES_HZ
@@ -58,7 +58,6 @@ class Oak:
             raise PluginError("oak", "the package depthai is not installed") from error
         self._depthai, self._fps = depthai, fps
         self._pipeline: Any = None
-        self._collected: list[Any] = []
         try:
             self._device = depthai.Device(name) if name else depthai.Device()
         except RuntimeError as error:
@@ -76,6 +75,7 @@ class Oak:
                 height=HEIGHT,
                 frame_rate_hz=fps / _IMAGES,
                 measurements=MEASURED,
+                bits=BITS,
                 lens=self._lens(),
             )
         except BaseException:
@@ -160,14 +160,10 @@ class Oak:
 def taps_of(message: Any) -> list[NDArray[np.uint16]]:
     """Return the images (H, W) of the taps of a raw image: 2 x 2 to a pixel, rows of data behind.
 
-    Of 12 bits, whatever the type of the message. Raises ProtocolError for an image of another size.
+    Raises ProtocolError for an image of another size or type.
     """
     image, kind = message.getFrame(), message.getType().name
-    if kind not in _BITS or image.ndim != 2:
-        raise ProtocolError(f"raw images of the type {kind}, not one of {', '.join(_BITS)}")
-    if image.shape[1] != 2 * WIDTH or image.shape[0] < 2 * HEIGHT:
-        raise ProtocolError(f"raw images of {image.shape}, not {2 * HEIGHT} rows of {2 * WIDTH}")
-    shift = 12 - _BITS[kind]
-    whole = image[: 2 * HEIGHT]
-    whole = whole << shift if shift > 0 else whole >> -shift
-    return [whole[row::2, column::2] for row in (0, 1) for column in (0, 1)]
+    found = f"raw images of {image.shape}, {kind}"
+    if kind != f"RAW{BITS}" or image.shape[1:] != (2 * WIDTH,) or len(image) < 2 * HEIGHT:
+        raise ProtocolError(f"{found}, not {2 * HEIGHT} rows of {2 * WIDTH}, RAW{BITS}")
+    return [image[row : 2 * HEIGHT : 2, column::2] for row in (0, 1) for column in (0, 1)]

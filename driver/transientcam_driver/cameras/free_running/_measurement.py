@@ -16,14 +16,10 @@ from transientcam_driver.errors import ProtocolError
 class Exposure:
     """A raw image of each frame: gain (offset + 1/2 (b_0 + Re(b exp(-i phase)))), in DN.
 
-    Attributes
-    ----------
-    frequency_hz, phase_rad
-        Of the modulation. Each frequency needs three phases or more; repeated ones are averaged.
-    exposure_s
-        Where it differs, moments are those of the first frequency's exposure.
-    gain, offset_dn
-        Of the tap that saw it, or (H, W) of its pixels: taken away as (image - offset_dn) / gain.
+    ``frequency_hz``, ``phase_rad``: of the modulation. Each frequency needs three phases or more;
+    repeated ones are averaged.
+    ``exposure_s``: where it differs, moments are those of the first frequency's exposure.
+    ``gain``, ``offset_dn``: of the tap that saw it, or (H, W) of its pixels.
     """
 
     frequency_hz: float
@@ -35,21 +31,11 @@ class Exposure:
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """A complex image of each frame: b = sum a exp(2 pi i f tau), NaN where a pixel has none.
+    """A complex image of each frame, amplitude * exp(i phase); NaN where a pixel has none.
 
-    A camera of phase and amplitude states amplitude * exp(i phase).
-
-    Attributes
-    ----------
-    frequency_hz
-        Of the modulation.
-    std
-        Standard deviation of its real part, and so of its imaginary part, in the moment's unit; or
-        (H, W) of each pixel's.
-    largest
-        What its modulus may reach; larger ones count as saturated.
-    gain
-        Complex, or (H, W): what the moment is divided by.
+    ``std``: standard deviation of its real and of its imaginary part, in its own unit; or (H, W).
+    ``largest``: what its modulus may reach; larger ones count as saturated.
+    ``gain``: complex, or (H, W): what it is divided by, so that it is sum a exp(2 pi i f tau).
     """
 
     frequency_hz: float
@@ -65,19 +51,12 @@ Measurement = Exposure | Moment
 class Capture:
     """One frame of a device.
 
-    Attributes
-    ----------
-    images
-        (H, W) each, of the measurements of its description and in their order: digital numbers of
-        exposures, complex numbers of moments.
-    number
-        The device's frame counter: a gap says how many frames were lost.
-    device_time_s
-        Begin of the first exposure, on the clock of the device.
-    temperature_c
-        Of the sensor; None where it is not known.
-    capture_s
-        From the first exposure to the last read-out; a period of the frame rate by default.
+    ``images``: (H, W) each, of the measurements of its description and in their order: digital
+    numbers of exposures, complex numbers of moments.
+    ``number``: the device's frame counter: a gap says how many frames were lost.
+    ``device_time_s``: begin of the first exposure, on the clock of the device.
+    ``temperature_c``: of the sensor; None where it is not known.
+    ``capture_s``: from then to the last read-out; a period of the frame rate by default.
     """
 
     images: Sequence[NDArray[Any]]
@@ -91,29 +70,14 @@ class Capture:
 class Description:
     """What a free-running device is and measures.
 
-    Attributes
-    ----------
-    model, serial, firmware
-        Which one it is.
-    width, height
-        Of an image, in pixels.
-    frame_rate_hz
-        Of whole frames, as the device states it.
-    measurements
-        What each frame holds, in the order of the images of a `Capture`.
-    bits
-        Of raw exposures: a pixel of the highest code is saturated.
-    sensor
-        Whose noise exposures have, in electrons and DN behind `Exposure.gain` and `offset_dn`; None
-        where that is not known.
-    max_range_m
-        The largest range; needed where frequencies have no base whose multiples are 32 or less.
-    lens
-        None where the device does not say.
-    clock, heartbeat_s
-        As of `Capabilities`.
-    min_exposure_s, max_exposure_s
-        Where the exposure can be set; the first measurement's by default.
+    ``frame_rate_hz``: of whole frames, as the device states it.
+    ``measurements``: what each frame holds, in the order of the images of a `Capture`.
+    ``bits``: of raw exposures: a pixel of the highest code is saturated.
+    ``sensor``: whose noise exposures have, in the DN that ``gain`` and ``offset_dn`` of an
+    `Exposure` leave; None where that is not known.
+    ``max_range_m``: needed where frequencies have no base whose multiples are 32 or less.
+    ``min_exposure_s``, ``max_exposure_s``: where the exposure can be set.
+    ``clock``, ``heartbeat_s``: as of `Capabilities`.
     """
 
     model: str

@@ -5,9 +5,8 @@ fine as 16 bits are, with the sensor and the gains that give its moments and the
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Final
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from transientcam_driver.cameras.free_running._measurement import (
     Capture,
     Description,
     Exposure,
+    Measurement,
     Moment,
     require,
 )
@@ -32,19 +32,19 @@ _USUAL_LIGHT: Final = 0.1
 """Of what the converter holds."""
 _NO_SHOT_NOISE_E: Final = 1e6
 """Electrons a DN: moments state all of their noise."""
-_SAME_RAD: Final = 1e-6
 _Array = NDArray[Any]
 
 
-@dataclass(frozen=True, slots=True)
-class _Group:
-    """The measurements of one frequency: ``places`` in a frame; images are matrix @ values."""
+class _Group(NamedTuple):
+    """The measurements of one frequency: ``places`` in a frame; images are matrix @ values.
 
+    ``taken``: an image has the noise of the mean of so many values.
+    """
+
+    first: Measurement
     places: tuple[int, ...]
     matrix: _Array
     taken: float
-    """How many values, each with the noise of one exposure, an image has the noise of the mean of;
-    of a moment 1."""
 
 
 class Renderer:
@@ -57,124 +57,97 @@ class Renderer:
     Raises ProtocolError where the measurements of a frequency are no moment.
     """
 
-    def __init__(self, description: Description) -> None:
-        self._about = description
-        measurements = description.measurements
-        by_frequency: dict[float, list[int]] = {}
-        for at, each in enumerate(measurements):
-            by_frequency.setdefault(each.frequency_hz, []).append(at)
-        ordered = [by_frequency[f_hz] for f_hz in sorted(by_frequency)]
-        self.phases_rad = self._common_phases(ordered)
-        self._groups = [self._group(places) for places in ordered]
-        moments = [each for each in measurements if isinstance(each, Moment)]
+    def __init__(self, about: Description) -> None:
+        self._about = about
+        places: dict[float, list[int]] = {}
+        for at, each in enumerate(about.measurements):
+            places.setdefault(each.frequency_hz, []).append(at)
+        ordered = [places[f_hz] for f_hz in sorted(places)]
+        moments = [each for each in about.measurements if isinstance(each, Moment)]
+        sampled = [_phases_of([about.measurements[at] for at in each]) for each in ordered]
+        self.phases_rad = FOUR_PHASES_RAD if moments else _common(sampled)
+        self._groups = [self._group(*each) for each in zip(ordered, sampled, strict=True)]
         self.dark_dn = _MIDDLE_DN if moments else None
-        self._dark_dn = _MIDDLE_DN if moments else _DARK_DN
+        self._dark_dn = self.dark_dn or _DARK_DN
         self._scales = self._scaled(moments)
-        self.sensor = self._sensor(moments)
-        self.gains = self._gains()
+        self.sensor = self._sensor(bool(moments))
+        gains = np.stack([np.ones(about.size), *map(self._gain, self._groups, self._scales)])
+        same = np.allclose(gains, 1, rtol=0, atol=1e-12)
+        self.gains = None if same else gains.astype(np.complex64)
 
     def images(self, capture: Capture) -> NDArray[np.uint16]:
         """Return the images of a frame. Raises ProtocolError where it does not fit."""
-        about = self._about
-        count = len(about.measurements)
-        require("images", len(capture.images) == count, f"{count} a frame", len(capture.images))
-        for at, image in enumerate(capture.images):
-            shape = np.shape(image)
-            require(f"images[{at}]", shape == about.size, f"(H, W) = {about.size}", shape)
-        found = [
-            self._of_frequency(group, scale, capture.images)
+        found, wanted = [np.shape(each) for each in capture.images], self._about.size
+        count = len(self._about.measurements)
+        require("images", found == count * [wanted], f"{count} of {wanted} a frame", found)
+        made = [
+            self._of_frequency(
+                group, scale, [np.asarray(capture.images[at]) for at in group.places]
+            )
             for group, scale in zip(self._groups, self._scales, strict=True)
         ]
-        return np.concatenate(found)
+        return np.concatenate(made)
 
     def _of_frequency(
-        self, group: _Group, scale: _Array, images: Sequence[_Array]
+        self, group: _Group, scale: _Array, images: list[_Array]
     ) -> NDArray[np.uint16]:
         """Return the images of a frequency; of a spoilt pixel all are of the highest code."""
-        first = self._about.measurements[group.places[0]]
-        if isinstance(first, Moment):
-            moment = np.asarray(images[group.places[0]])
-            spoilt = abs(moment) > first.largest
+        if isinstance(group.first, Moment):
+            (moment,) = images
+            spoilt = abs(moment) > group.first.largest
             values = np.nan_to_num(np.stack([moment.real, moment.imag]))
         else:
-            values = np.stack([self._light(at, images[at]) for at in group.places])
-            spoilt = np.any([images[at] >= (1 << self._about.bits) - 1 for at in group.places], 0)
-        made = np.tensordot(group.matrix, values, 1) * scale + self._dark_dn
-        made = np.rint(np.clip(made, 0, _HIGHEST - 1))
-        return np.where(spoilt, _HIGHEST, made).astype(np.uint16)
+            spoilt = np.max(images, axis=0) >= (1 << self._about.bits) - 1
+            values = np.stack(list(map(self._light, group.places, images)))
+        made = np.rint(np.tensordot(group.matrix, values, 1) * scale + self._dark_dn)
+        made = np.where(spoilt, _HIGHEST, np.clip(made, 0, _HIGHEST - 1))
+        return np.asarray(made, np.uint16)
 
     def _light(self, at: int, image: _Array) -> _Array:
-        of = self._about.measurements[at]
-        assert isinstance(of, Exposure)  # noqa: S101 - groups are of one kind
-        return (image - np.asarray(of.offset_dn)) / of.gain
+        tap: Any = self._about.measurements[at]
+        light: _Array = (image - np.asarray(tap.offset_dn)) / tap.gain
+        return light
 
     # -- what is the same for all frames --------------------------------------------------------
 
-    def _common_phases(self, ordered: list[list[int]]) -> tuple[float, ...]:
-        """Return the phases where all frequencies have the same, each as often; else four."""
-        common: _Array | None = None
-        for places in ordered:
-            kinds = [self._about.measurements[at] for at in places]
-            phases = [each.phase_rad for each in kinds if isinstance(each, Exposure)]
-            distinct, counts = np.unique(_turned(phases), return_counts=True)
-            same = common is None or (
-                len(distinct) == len(common) and np.allclose(distinct, common, atol=_SAME_RAD)
-            )
-            if len(distinct) < 3 or not same or len(set(counts)) > 1:
-                return FOUR_PHASES_RAD
-            common = distinct
-        return FOUR_PHASES_RAD if common is None else tuple(common.tolist())
-
-    def _group(self, places: list[int]) -> _Group:
+    def _group(self, places: list[int], phases: _Array) -> _Group:
         """Return how the images of a frequency are made of its measurements."""
-        kinds = [self._about.measurements[at] for at in places]
-        wanted = np.array(self.phases_rad)
-        turning = np.stack([np.cos(wanted), np.sin(wanted)], axis=1) / 2
-        alike = len(kinds) == 1 or all(isinstance(each, Exposure) for each in kinds)
-        require("measurements", alike, "one moment, or exposures, of each frequency", kinds)
-        if isinstance(kinds[0], Moment):
-            return _Group(tuple(places), turning, 1.0)
-        phases = _turned([each.phase_rad for each in kinds if isinstance(each, Exposure)])
-        same = abs(wanted[:, None] - phases) < _SAME_RAD
+        first, wanted = self._about.measurements[places[0]], np.array(self.phases_rad)
+        if isinstance(first, Moment):
+            return _Group(first, tuple(places), _design(wanted)[:, 1:], 1.0)
+        same = abs(wanted[:, None] - phases) < 1e-6
         repeats = same.sum(axis=1)
-        if len(set(repeats)) == 1 and repeats.sum() == len(phases):
-            return _Group(tuple(places), same / repeats[0], float(repeats[0]))
-        design = np.column_stack([np.ones(len(phases)), np.cos(phases) / 2, np.sin(phases) / 2])
-        name, limit = f"phases of {kinds[0].frequency_hz:g} Hz", "three different ones or more"
-        require(name, np.linalg.matrix_rank(design, 1e-3) == 3, limit, phases.tolist())
-        solved = np.linalg.pinv(design)
+        if repeats.sum() == len(phases) and min(repeats) == max(repeats):
+            return _Group(first, tuple(places), same / repeats[0], float(repeats[0]))
+        name, limit = f"phases of {first.frequency_hz:g} Hz", "three different ones or more"
+        full = np.linalg.matrix_rank(_design(phases), 1e-3) == _design(phases).shape[1]
+        require(name, full, limit, phases.tolist())
         known = self._about.sensor is not None
         require("sensor", known, "stated, for phases that differ by frequency", None)
+        solved = np.linalg.pinv(_design(phases))
         # four images have a moment of twice their variance
         taken = 2 / (solved[1:] ** 2).sum(axis=1).mean()
-        return _Group(
-            tuple(places), np.column_stack([np.ones(len(wanted)), turning]) @ solved, float(taken)
-        )
+        return _Group(first, tuple(places), _design(wanted) @ solved, float(taken))
 
     def _scaled(self, moments: list[Moment]) -> list[_Array]:
         """Return by what each frequency is multiplied: all images have the noise of one sensor."""
-        about = self._about
-        room = min(self._dark_dn, _HIGHEST - self._dark_dn) if moments else _HIGHEST - _DARK_DN
-        firsts = [about.measurements[group.places[0]] for group in self._groups]
+        about, room = self._about, _HIGHEST - self._dark_dn
         least = [np.min(each.gain) for each in about.measurements if isinstance(each, Exposure)]
         most_taken = max(group.taken for group in self._groups)
         # DN a DN of the device
-        finer = room / ((1 << about.bits) / min(least)) if least else 1.0
+        finer = room / (1 << about.bits) * min(least, default=1.0)
         # the noise of an image of a moment, where none is larger than there is room for
-        self._noise_dn = min(
-            (math.sqrt(2) * room * np.min(each.std) / each.largest for each in moments),
-            default=math.inf,
-        )
-        known = about.sensor
-        if known is not None and least and moments:  # exposures beside them: the same noise
-            of_one = _read_dn(known) * finer / math.sqrt(most_taken)
-            self._noise_dn = min(self._noise_dn, of_one)
-            finer *= self._noise_dn / of_one
+        rooms = [math.sqrt(2) * room * np.min(each.std) / each.largest for each in moments]
+        if about.sensor is not None and least and moments:  # exposures beside them: the same noise
+            of_one = _read_dn(about.sensor) * finer / math.sqrt(most_taken)
+            rooms.append(of_one)
+            finer *= min(rooms) / of_one
+        self._noise_dn = min(rooms, default=0.0)
         return [
-            np.asarray(self._noise_dn * math.sqrt(2) / each.std)
-            if isinstance(each, Moment)
-            else np.asarray(finer * math.sqrt(group.taken / most_taken) / self._louder(each))
-            for each, group in zip(firsts, self._groups, strict=True)
+            np.asarray(self._noise_dn * math.sqrt(2) / each.first.std)
+            if isinstance(each.first, Moment)
+            else np.asarray(finer * math.sqrt(each.taken / most_taken) / self._louder(each.first))
+            for each in self._groups
         ]
 
     def _louder(self, of: Exposure) -> float:
@@ -182,55 +155,69 @@ class Renderer:
 
         At a usual light: read noise stays, and shot noise grows.
         """
-        known, first = self._about.sensor, self._about.measurements[self._groups[0].places[0]]
+        known, first = self._about.sensor, self._groups[0].first
         if known is None or not isinstance(first, Exposure):
             return 1.0
         shot = _USUAL_LIGHT * (1 << self._about.bits) / known.gain_e_per_dn
         longer, read = of.exposure_s / first.exposure_s, _read_dn(known) ** 2
         return math.sqrt((read + shot * longer) / (read + shot))
 
-    def _sensor(self, moments: list[Moment]) -> Sensor | None:
+    def _sensor(self, differences: bool) -> Sensor | None:
         """Return whose noise the images have."""
-        if moments:
+        known, taken, finer = (
+            self._about.sensor,
+            self._groups[0].taken,
+            float(self._scales[0].flat[0]),
+        )
+        if differences:
             read_dn = math.sqrt(max(self._noise_dn**2 - _ROUNDING, 0.0))
-            read_e = read_dn * _NO_SHOT_NOISE_E
-            full_e = _NO_SHOT_NOISE_E * _HIGHEST
-            return Sensor(full_e, _NO_SHOT_NOISE_E, read_e, _MIDDLE_DN, BITS)
-        known, taken, finer = self._about.sensor, self._groups[0].taken, float(self._scales[0])
+            e_per_dn = _NO_SHOT_NOISE_E
+            return Sensor(e_per_dn * _HIGHEST, e_per_dn, read_dn * e_per_dn, _MIDDLE_DN, BITS)
         if known is None:
             return None
         gain = taken * known.gain_e_per_dn / finer
-        read_e = _read_dn(known) * finer / math.sqrt(taken) * gain
         return replace(
             known,
             full_well_e=taken * known.full_well_e,
             gain_e_per_dn=gain,
-            read_noise_e=read_e,
+            read_noise_e=_read_dn(known) * finer / math.sqrt(taken) * gain,
             dark_dn=_DARK_DN + finer * known.dark_dn,
             bits=BITS,
         )
 
-    def _gains(self) -> NDArray[np.complex64] | None:
-        planes = [np.ones(self._about.size, np.complex128)]
-        for group, scale in zip(self._groups, self._scales, strict=True):
-            first = self._about.measurements[group.places[0]]
-            reference = self._about.measurements[self._groups[0].places[0]]
-            gain = np.asarray(scale / np.median(self._scales[0]), np.complex128)
-            if isinstance(first, Moment):
-                gain = gain * first.gain
-            elif isinstance(reference, Exposure):
-                gain = gain * (first.exposure_s / reference.exposure_s)
-            planes.append(gain + np.zeros(self._about.size))
-        gains = np.stack(planes)
-        return None if np.allclose(gains, 1, rtol=0, atol=1e-12) else gains.astype(np.complex64)
+    def _gain(self, group: _Group, scale: _Array) -> _Array:
+        """Return what the moments of a frequency are divided by, (H, W)."""
+        gain, reference = scale / np.median(self._scales[0]), self._groups[0].first
+        if isinstance(group.first, Moment):
+            gain = gain * group.first.gain
+        elif isinstance(reference, Exposure):
+            gain = gain * (group.first.exposure_s / reference.exposure_s)
+        return np.broadcast_to(gain, self._about.size)
 
 
-def _turned(phases_rad: Sequence[float]) -> _Array:
-    """Return phases from 0 to a turn; those of equal ones are equal."""
-    turned = np.mod(np.round(np.mod(phases_rad, 2 * np.pi) / _SAME_RAD) * _SAME_RAD, 2 * np.pi)
-    exact = np.mod(np.asarray(phases_rad, dtype=np.float64), 2 * np.pi)
-    near = abs(turned[:, None] - turned) < 2 * _SAME_RAD
-    return exact[near.argmax(axis=1)] if len(turned) else turned
+def _phases_of(kinds: list[Measurement]) -> _Array:
+    """Return the phases of exposures from 0 to a turn, to 1e-9; those of a moment are none."""
+    phases = [each.phase_rad for each in kinds if isinstance(each, Exposure)]
+    alike = len(phases) == len(kinds) or len(kinds) == 1
+    require("measurements", alike, "one moment, or exposures, of each frequency", kinds)
+    return np.mod(np.round(np.mod(phases, 2 * np.pi), 9), round(2 * np.pi, 9))
+
+
+def _common(sampled: list[_Array]) -> tuple[float, ...]:
+    """Return the phases where all frequencies have the same, each as often; else four."""
+    found = [np.unique(phases, return_counts=True) for phases in sampled]
+    distinct = {tuple(phases.tolist()) for phases, _ in found}
+    even = all(min(counts) == max(counts) for _, counts in found)
+    phases = distinct.pop()
+    four = len(phases) == 4 and np.allclose(phases, FOUR_PHASES_RAD, atol=1e-8)
+    return phases if even and not distinct and len(phases) > 2 and not four else FOUR_PHASES_RAD
+
+
+def _design(phases_rad: _Array) -> _Array:
+    """Return what (offset, real part, imaginary part) are multiplied by, of images at phases."""
+    return np.column_stack(
+        [np.ones(len(phases_rad)), np.cos(phases_rad) / 2, np.sin(phases_rad) / 2]
+    )
 
 
 def _read_dn(sensor: Sensor) -> float:

@@ -1,5 +1,6 @@
 """What cameras share that stream once they are started, whoever reads."""
 
+import math
 import threading
 import time
 import warnings
@@ -36,7 +37,6 @@ READ_S: Final = 0.1
 class _Device(Protocol):
     def close(self) -> None:
         """Give the device back, its light off; never fails."""
-        ...
 
 
 _D = TypeVar("_D", bound=_Device)
@@ -98,7 +98,13 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
             self._give_back()
             raise
         self._state = CameraState.IDLE
-        self._watch = Watch(unread_s, self._unread)
+        self._reads = 0  # of which a thread sees whether they go on
+        self._ended = threading.Event()
+        watching = threading.Thread(target=self._watch, args=(unread_s,), name="camera-watch")
+        watching.daemon = True
+        self._watching = watching if math.isfinite(unread_s) else None
+        if self._watching is not None:
+            self._watching.start()
 
     # --- what a subclass does, under _control but for `_take` -----------------------------------
 
@@ -165,7 +171,7 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
         """Switch the light on and capture frames back to back."""
         with self._control:
             self._require_connected()
-            self._watch.note()
+            self._reads += 1
             self._light_on()
             self._resume = True
 
@@ -202,7 +208,9 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
             self._closed = True
             self._state = CameraState.DISCONNECTED
             self._release_reader()
-        self._watch.close()
+        self._ended.set()
+        if self._watching is not None:
+            self._watching.join()
         with self._reading, self._control:
             self._lit = False
             self._give_back()
@@ -237,7 +245,7 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
             self._require_connected()
             if self._state is not CameraState.STREAMING:
                 raise NotStreaming(self._state)
-            self._watch.note()
+            self._reads += 1
             self._light_on()
 
     def _taken(self, timeout_s: float) -> _A | None:
@@ -279,6 +287,16 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
             f"no whole frame within {self._silence_s:g} s ({self._silence()} since it was opened)"
         )
 
+    def _watch(self, unread_s: float) -> None:
+        """Switch the light off without readers; the next `read_frame` needs it again."""
+        reads = -1
+        while not self._ended.wait(unread_s):
+            if reads == self._reads:
+                with self._control, suppress(CameraError):  # the next request fails in the same way
+                    if self._lit:
+                        self._light_off()
+            reads = self._reads
+
     def _own(self, device: _D) -> None:
         self._device = device
         self._release = weakref.finalize(self, _left_open, device)
@@ -305,13 +323,6 @@ class StreamedCamera(HostCamera, Generic[_D, _A]):
         self._asked(self._end)
         self._lit = False
 
-    def _unread(self) -> None:
-        """Switch the light off without readers; the next `read_frame` needs it again."""
-        with self._control:
-            if self._lit:
-                with suppress(CameraError):  # the next request fails in the same way
-                    self._light_off()
-
     def _lose(self) -> None:
         """Mark the camera as gone, and switch off what still answers."""
         self._state = CameraState.DISCONNECTED
@@ -332,35 +343,3 @@ def _left_open(device: _Device) -> None:
     """Light off when the interpreter ends without close()."""
     warnings.warn("a camera was left open; use close() or `with`", ResourceWarning, stacklevel=2)
     device.close()
-
-
-class Watch:
-    """Calls a function where nothing was noted for a time.
-
-    ``interval_s``: after one to two of these without a note.
-    ``idle``: called on a thread of its own, again and again until something is noted.
-    """
-
-    def __init__(self, interval_s: float, idle: Callable[[], None]) -> None:
-        self._interval_s = interval_s
-        self._idle = idle
-        self._notes = 0
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="camera-watch", daemon=True)
-        self._thread.start()
-
-    def note(self) -> None:
-        """Note that it still goes on."""
-        self._notes += 1
-
-    def close(self) -> None:
-        """End the thread; the function is not called any more once this returns."""
-        self._ended.set()
-        self._thread.join()
-
-    def _run(self) -> None:
-        notes = -1
-        while not self._ended.wait(self._interval_s):
-            if notes == self._notes:
-                self._idle()
-            notes = self._notes

@@ -23,7 +23,6 @@ class ImageConnection(Protocol):
 
     def expect(self, image_bytes: int) -> None:
         """Forget what came before, and wait for an image of this length."""
-        ...
 
     def receive(self, timeout_s: float) -> bytes | None:
         """Return the image, or None if it takes longer.
@@ -31,11 +30,9 @@ class ImageConnection(Protocol):
         Raises ImagesLost where it will not come, or not whole; CameraLost where the connection was
         closed.
         """
-        ...
 
     def close(self) -> None:
         """Close the connection; never fails."""
-        ...
 
 
 class UdpImages:

@@ -66,7 +66,7 @@ class TriggeredCamera(StreamedCamera[TriggeredDevice, _Arrival]):
             clock=clock,
             simulation=simulation,
             silence_s=math.inf,
-            unread_s=threading.TIMEOUT_MAX,  # nothing is exposed without a reader
+            unread_s=math.inf,  # nothing is exposed without a reader
             now_s=clock.now_s,
         )
 
