@@ -180,7 +180,6 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
             temperature_c=capture.temperature_c,
             lost_images=self._lost,
         )
-        self.counters.frames += 1
         self._lost = 0
         self._number += 1
         return frame
