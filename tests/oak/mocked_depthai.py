@@ -1,4 +1,4 @@
-"""What the plug-in asks of depthai 3.12, and no more: names and arguments as its documentation has them.
+"""What the plug-in asks of depthai 3.12, and no more: names and arguments are the documented ones.
 
 The device before it looks at a slanted wall. Raw images lie as the plug-in's README assumes.
 """

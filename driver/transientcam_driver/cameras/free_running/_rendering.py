@@ -139,7 +139,7 @@ class Renderer:
         # the noise of an image of a moment, where none is larger than there is room for
         rooms = [math.sqrt(2) * room * np.min(each.std) / each.largest for each in moments]
         if about.sensor is not None and least and moments:  # exposures beside them: the same noise
-            of_one = _read_dn(about.sensor) * finer / math.sqrt(most_taken)
+            of_one = self._usual_dn(about.sensor) * finer / math.sqrt(most_taken)
             rooms.append(of_one)
             finer *= min(rooms) / of_one
         self._noise_dn = min(rooms, default=0.0)
@@ -151,16 +151,16 @@ class Renderer:
         ]
 
     def _louder(self, of: Exposure) -> float:
-        """Return by how much more noise than the first one's an exposure of another length has.
-
-        At a usual light: read noise stays, and shot noise grows.
-        """
+        """Return by how much more noise than the first one's an exposure of another length has."""
         known, first = self._about.sensor, self._groups[0].first
         if known is None or not isinstance(first, Exposure):
             return 1.0
-        shot = _USUAL_LIGHT * (1 << self._about.bits) / known.gain_e_per_dn
-        longer, read = of.exposure_s / first.exposure_s, _read_dn(known) ** 2
-        return math.sqrt((read + shot * longer) / (read + shot))
+        return self._usual_dn(known, of.exposure_s / first.exposure_s) / self._usual_dn(known)
+
+    def _usual_dn(self, sensor: Sensor, longer: float = 1.0) -> float:
+        """Return the noise at a usual light: of the converter, and of what is longer exposed."""
+        shot = longer * _USUAL_LIGHT * (1 << self._about.bits) / sensor.gain_e_per_dn
+        return math.sqrt(_read_dn(sensor) ** 2 + shot)
 
     def _sensor(self, differences: bool) -> Sensor | None:
         """Return whose noise the images have."""

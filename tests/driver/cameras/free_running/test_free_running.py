@@ -1,8 +1,8 @@
 """Cameras that run by themselves: three mocks keep the contract, and are measured by a daemon."""
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -17,28 +17,35 @@ from tests.serving import serving
 from transientcam import Camera
 from transientcam.cli import run as command
 from transientcam_conformance import Device, chosen, run as check
+from transientcam_driver import (
+    CameraName,
+    CameraPlugin,
+    Description,
+    Exposure,
+    FreeRunningCamera,
+    Moment,
+    ProtocolError,
+)
 from transientcam_driver.camera import _opening as opening
+from transientcam_driver.cameras.free_running._frequencies import common_base
+from transientcam_driver.clock import RealClock
+from transientcam_driver.contract import CLAUSES, Bench, Clause
 
 FRAMES = 10
 MOCKS: dict[str, Any] = {"taps": taps_camera, "moments": moments_camera, "odd": odd_camera}
-UNTRIED = {"moments", "odd"}
 
 
 @pytest.fixture(scope="module", autouse=True)
 def installed() -> Iterator[None]:
-    """Offer the mocks as distributions do, by the names of their kinds."""
-    points = {
-        name: opening.EntryPoint(name, f"{module.__name__}:PLUGIN", opening.GROUP)
-        for name, module in MOCKS.items()
-    }
-    offered = opening.entry_points
+    """Offer the mocks by the names of their kinds, as distributions do."""
+    offered = opening.plugin_of
 
-    def with_mocks(*, group: str, name: str | None = None) -> Any:
-        own = [each for each in points.values() if name in (None, each.name)]
-        return own or offered(group=group, name=name)
+    def with_mocks(spec: str) -> tuple[CameraName, CameraPlugin]:
+        name = CameraName.parse(spec)
+        return (name, MOCKS[name.kind].PLUGIN) if name.kind in MOCKS else offered(spec)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(opening, "entry_points", with_mocks)
+        patch.setattr(opening, "plugin_of", with_mocks)
         yield
 
 
@@ -71,12 +78,14 @@ def measured(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
             path = directory / "copy.h5"
             path.write_bytes(device.send("GET", f"/api/v1/recordings/{recording}/file").content)
         failed = [(each.check.name, each.reason) for each in report.failed]
+        stated = frame.meta["predicted_range_std_m"]
+        assert stated is not None
         return Measured(
             MOCKS[request.param],
             path,
             about,
             client.sequence,
-            1e3 * frame.meta["predicted_range_std_m"]["median"],
+            1e3 * stated["median"],
             failed,
         )
 
@@ -114,3 +123,77 @@ def test_times_in_mcap_are_those_of_the_device(measured: Measured) -> None:
     ticks = device_s * measured.module.RATE_HZ
     assert abs(ticks - np.rint(ticks)).max() < 1e-4  # the mock's own
     assert np.diff(stamps_s) == pytest.approx(np.diff(device_s), abs=1e-6)
+
+
+@pytest.mark.parametrize("clause", CLAUSES, ids=lambda each: each.name)
+def test_the_contract_is_kept(clause: Clause) -> None:
+    taps_camera.Device.unplugged.clear()
+    bench = Bench(
+        lambda: taps_camera.PLUGIN.open(CameraName.parse("taps:"), RealClock()),
+        lit=lambda camera: (
+            taps_camera.Device.lit == 1 and not taps_camera.Device.unplugged.is_set()
+        ),
+        unplug=lambda camera: taps_camera.Device.unplugged.set(),
+        replug=lambda camera: taps_camera.Device.unplugged.clear(),
+        lose_image=lambda camera: taps_camera.Device.spoilt.set(),
+        read_s=60.0,
+    )
+    clause.run(bench)
+
+
+@pytest.mark.parametrize(
+    ("frequencies_hz", "max_range_m", "multiples"),
+    [
+        ((20e6, 100e6), None, (1, 5)),
+        ((120e6, 16e6, 80e6), None, (2, 10, 15)),
+        ((14.9e6, 100.1e6), 7.5, (149, 1001)),
+        ((60e6,), None, (1,)),
+    ],
+)
+def test_a_base_is_the_largest_that_there_is(
+    frequencies_hz: tuple[float, ...], max_range_m: float | None, multiples: tuple[int, ...]
+) -> None:
+    base_hz, found = common_base(frequencies_hz, max_range_m)
+
+    assert found == multiples
+    assert base_hz * np.array(found) == pytest.approx(sorted(frequencies_hz), rel=1e-12)
+
+
+def test_incommensurable_frequencies_are_off_by_less_than_shows() -> None:
+    wanted_hz = 20e6 * np.sqrt([1.0, 7.0, 10.0])
+    base_hz, multiples = common_base(wanted_hz, 10.0)
+
+    delay_s = 2 * 10.0 / 299_792_458.0
+    assert abs(2 * np.pi * delay_s * (base_hz * np.array(multiples) - wanted_hz)).max() < 2e-4
+
+
+def described(*measurements: Exposure | Moment, **others: Any) -> Description:
+    return Description(
+        model="x", serial="1", firmware="1", width=4, height=3, frame_rate_hz=10.0,
+        measurements=measurements, **others,
+    )  # fmt: skip
+
+
+THREE = tuple(Exposure(80e6, 2 * math.pi * k / 3) for k in range(3))
+FOUR = tuple(Exposure(100e6, math.pi * k / 2) for k in range(4))
+NOT_POSSIBLE: dict[str, Callable[[], Description]] = {
+    "at least one": described,
+    "three different ones": lambda: described(*THREE[:2], sensor=taps_camera.SENSOR),
+    "one moment, or exposures": lambda: described(*THREE, Moment(80e6, 1.0, 9.0)),
+    "stated, for phases that differ": lambda: described(*THREE, *FOUR),
+    "or max_range_m stated": lambda: described(Moment(2e7, 1.0, 9.0), Moment(7.1e7, 1.0, 9.0)),
+    r"std is -1.0": lambda: described(Moment(2e7, -1.0, 9.0)),
+    r"one or \(3, 4\)": lambda: described(Moment(2e7, 1.0, 9.0, np.ones((2, 2)))),
+    "finite and not 0": lambda: described(replace(THREE[0], gain=0.0)),
+}
+
+
+@pytest.mark.parametrize("limit", NOT_POSSIBLE)
+def test_what_cannot_be_measured_is_refused_by_name(limit: str) -> None:
+    class Device(moments_camera.Device):
+        def __init__(self) -> None:
+            super().__init__()
+            self.description = NOT_POSSIBLE[limit]()
+
+    with pytest.raises(ProtocolError, match=limit):
+        FreeRunningCamera(Device)
