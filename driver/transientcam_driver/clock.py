@@ -10,9 +10,11 @@ class Clock(Protocol):
 
     def now_s(self) -> float:
         """Monotonic time."""
+        ...
 
     def unix_s(self) -> float:
         """Unix time."""
+        ...
 
     def wait(self, condition: threading.Condition, timeout_s: float) -> None:
         """Wait, holding the condition, until it is notified or the time has passed."""

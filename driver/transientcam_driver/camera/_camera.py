@@ -33,18 +33,22 @@ class Camera(Protocol):
     @property
     def counters(self) -> Counters:
         """Images and frames received, and what was lost."""
+        ...
 
     @property
     def simulation(self) -> Simulation | None:
         """The handle of a simulated camera, None of any other."""
+        ...
 
     @property
     def capabilities(self) -> Capabilities:
         """Limits and size of the device."""
+        ...
 
     @property
     def factory(self) -> FactoryCalibration | None:
         """What the device reports of its pixels and its lens; None where it reports nothing."""
+        ...
 
     @property
     def off_switch(self) -> OffSwitch | None:
@@ -52,14 +56,17 @@ class Camera(Protocol):
 
         It may be another one after `reconnect`.
         """
+        ...
 
     @property
     def state(self) -> CameraState:
         """Where the camera stands."""
+        ...
 
     @property
     def applied(self) -> AppliedSequence:
         """The sequence as the camera really runs it."""
+        ...
 
     def validate(self, sequence: Sequence) -> AppliedSequence:
         """Return what `configure` would set; the epoch is 0.
@@ -69,6 +76,7 @@ class Camera(Protocol):
         SequenceError
             Naming the field, its value and the limit of this camera.
         """
+        ...
 
     def configure(self, sequence: Sequence) -> AppliedSequence:
         """Set a sequence; while streaming, the next frame is the new sequence's.
@@ -82,6 +90,7 @@ class Camera(Protocol):
         CameraLost
             The camera is gone.
         """
+        ...
 
     def start(self) -> None:
         """Switch the light on and capture frames back to back."""
@@ -100,9 +109,11 @@ class Camera(Protocol):
         CameraLost
             It does not answer.
         """
+        ...
 
     def device_time_s(self) -> float:
         """Time on the clock that frames carry."""
+        ...
 
     def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
         """Wait for the next complete frame.
@@ -118,6 +129,7 @@ class Camera(Protocol):
         CameraError
             Another failure: the light is off.
         """
+        ...
 
     def reconnect(self) -> None:
         """After CameraLost: find the same device again, restore the sequence, resume streaming.

@@ -171,25 +171,31 @@ class Simulation(Protocol):
     @property
     def scene(self) -> str:
         """Name of the scene."""
+        ...
 
     @property
     def definition(self) -> str | None:
         """Text of the scene's file where `change` was given it; None for one with a name."""
+        ...
 
     def lens(self, *, width: int, height: int) -> Lens | None:
         """Return what images are taken through, and where their light is; None without a place."""
+        ...
 
     @property
     def lamp(self) -> Lamp | None:
         """Of the scene; None where the scene has no camera, or behind the diffuser."""
+        ...
 
     @property
     def effects(self) -> dict[str, str]:
         """Choices of effects, "auto", "on" or "off", that `change` made in place of the scene's."""
+        ...
 
     @property
     def diffuser(self) -> bool:
         """Whether filter and diffuser are before the lens."""
+        ...
 
     def change(
         self,
@@ -233,17 +239,21 @@ class Simulation(Protocol):
 
     def truth(self, *, device_time_s: float | None = None) -> Truth:
         """Ground truth of the scene at the exposure set: of the last image, or at a time."""
+        ...
 
     def explain(self, sequence: Sequence | None = None) -> Explanation:
         """Explain what each effect makes of the scene and a sequence, by default the one set."""
+        ...
 
     @property
     def sensor(self) -> Sensor:
         """Its sensor, with the figures of a data sheet."""
+        ...
 
     @property
     def plugged(self) -> bool:
         """Whether the cable is in."""
+        ...
 
     def unplug(self) -> None:
         """Pull the cable; the camera raises CameraLost."""

@@ -5,6 +5,7 @@ depthai is imported when a camera is asked for: it is large, and looks for devic
 
 from contextlib import suppress
 from datetime import timedelta
+from importlib import import_module
 from typing import Any, Final
 
 import numpy as np
@@ -53,7 +54,7 @@ class Oak:
 
     def __init__(self, name: str, *, fps: float) -> None:
         try:
-            import depthai
+            depthai: Any = import_module("depthai")
         except ImportError as error:
             raise PluginError("oak", "the package depthai is not installed") from error
         self._depthai, self._fps = depthai, fps
@@ -85,7 +86,7 @@ class Oak:
     def start(self, exposure_s: float) -> None:
         """Build a pipeline, which lights the laser; a stopped one cannot be started again."""
         depthai = self._depthai
-        self._collected = []
+        self._collected: list[Any] = []
         try:
             self._pipeline = depthai.Pipeline(self._device)
             profile = depthai.ToFConfig.Profile.MID_RANGE

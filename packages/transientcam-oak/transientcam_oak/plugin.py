@@ -1,7 +1,8 @@
 """The plug-in ``oak``: a time-of-flight camera of Luxonis, on USB or a network."""
 
 from collections.abc import Iterator
-from typing import Final
+from importlib import import_module
+from typing import Any, Final
 
 from transientcam_driver import Camera, CameraName, CameraPlugin, FoundCamera, FreeRunningCamera
 from transientcam_driver.clock import Clock
@@ -17,7 +18,7 @@ def _open(name: CameraName, clock: Clock) -> Camera:
 
 def _find() -> Iterator[FoundCamera]:
     try:
-        import depthai
+        depthai: Any = import_module("depthai")
     except ImportError:  # `Oak` says so
         return
     for each in depthai.Device.getAllAvailableDevices():

@@ -32,19 +32,23 @@ class Link(Protocol):
     @property
     def node(self) -> str:
         """Device node of usbfs; empty without one."""
+        ...
 
     @property
     def serial(self) -> str:
         """Serial number; where it has none, the place it is plugged in at."""
+        ...
 
     def control_in(self, request: Request, value: int, index: int, length: int) -> bytes:
         """Send a request and return the answer, of just that length."""
+        ...
 
     def control_out(self, request: Request, value: int, index: int, data: bytes) -> None:
         """Send a request."""
 
     def read(self, most_bytes: int, *, timeout_s: float) -> bytes | None:
         """Return the next frame, up to so many bytes; None where none comes in time."""
+        ...
 
     def clear_halt(self) -> None:
         """Let the endpoint of the frames begin anew."""

@@ -36,19 +36,23 @@ class FreeRunningDevice(Protocol):
     @property
     def description(self) -> Description:
         """What it is and measures; constant."""
+        ...
 
     @property
     def off_switch(self) -> OffSwitch:
         """How another process switches the light off; ``OffSwitch()`` where none can."""
+        ...
 
     def start(self, exposure_s: float) -> None:
         """Switch the light on and capture, with this exposure where it can be set."""
 
     def receive(self, timeout_s: float) -> Capture | None:
         """Return the next whole frame since the start, or None if it takes longer."""
+        ...
 
     def temperature_c(self) -> float | None:
         """Ask for the temperature, by which the device also shows that it is there."""
+        ...
 
     def light_off(self) -> None:
         """Stop, and switch the light off; also where it was not started."""

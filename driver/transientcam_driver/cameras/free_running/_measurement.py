@@ -105,16 +105,17 @@ class Description:
         for at, each in enumerate(self.measurements):
             name, f_hz = f"measurements[{at}]", each.frequency_hz
             require(f"{name}.frequency_hz", 0 < f_hz < math.inf, "above 0 Hz", f_hz)
+            planes = {"gain": each.gain}
             if isinstance(each, Moment):
-                inside = (np.asarray(each.std) > 0).all() and (
-                    each.std < np.float64(each.largest)
-                ).all()
+                planes["std"] = each.std
+                inside = np.all((0 < np.asarray(each.std)) & (np.asarray(each.std) < each.largest))
                 require(f"{name}.std", inside, f"above 0, below {each.largest}", each.std)
-            for part in ("gain", "std" if isinstance(each, Moment) else "offset_dn"):
-                shape = np.shape(getattr(each, part))
+            else:
+                planes["offset_dn"] = each.offset_dn
+            for part, value in planes.items():
+                shape = np.shape(value)
                 require(f"{name}.{part}", shape in ((), self.size), f"one or {self.size}", shape)
-            gain = np.asarray(each.gain)
-            usable = np.isfinite(gain).all() and (gain != 0).all()
+            usable = np.all(np.isfinite(each.gain) & (np.asarray(each.gain) != 0))
             require(f"{name}.gain", usable, "finite and not 0", each.gain)
 
     @property

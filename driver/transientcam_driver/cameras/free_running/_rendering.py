@@ -93,7 +93,7 @@ class Renderer:
     ) -> NDArray[np.uint16]:
         """Return the images of a frequency; of a spoilt pixel all are of the highest code."""
         if isinstance(group.first, Moment):
-            (moment,) = images
+            moment: Any = images[0]
             spoilt = abs(moment) > group.first.largest
             values = np.nan_to_num(np.stack([moment.real, moment.imag]))
         else:

@@ -29,6 +29,7 @@ class Link(Protocol):
 
     def read(self, most_bytes: int) -> bytes:
         """Return the next transfer of the answer endpoint."""
+        ...
 
     def set_suspended(self, suspended: bool) -> None:
         """Suspend the function of the depth camera, or wake it up (SET_FEATURE, USB 3.2, 9.4.9)."""

@@ -30,6 +30,7 @@ class ImageConnection(Protocol):
         Raises ImagesLost where it will not come, or not whole; CameraLost where the connection was
         closed.
         """
+        ...
 
     def close(self) -> None:
         """Close the connection; never fails."""

@@ -25,16 +25,19 @@ class TriggeredDevice(Protocol):
     @property
     def capabilities(self) -> Capabilities:
         """Limits and size of the device."""
+        ...
 
     @property
     def off_switch(self) -> OffSwitch:
         """How another process ends an exposure; ``OffSwitch()`` where none can."""
+        ...
 
     def configure(self, applied: AppliedSequence) -> None:
         """Prepare for a sequence."""
 
     def prepare(self, labels: Group) -> float:
         """Set what the next images need, and return how long that takes to settle, in s."""
+        ...
 
     def trigger(self, labels: Group) -> None:
         """Expose these images once; images of earlier triggers are of no more use."""
@@ -47,9 +50,11 @@ class TriggeredDevice(Protocol):
         ImagesLost
             They will not come, or not whole.
         """
+        ...
 
     def temperature_c(self) -> float:
         """Temperature of the sensor."""
+        ...
 
     def light_off(self) -> None:
         """End an exposure that goes on, if there is one."""

@@ -21,9 +21,11 @@ class Pixels(Protocol):
         self, frequency_hz: float, exposure_s: float, *, delay_s: float, device_time_s: float
     ) -> NDArray[np.uint16]:
         """Return the images (quads, 240, 320) of a frame."""
+        ...
 
     def temperature_c(self, device_time_s: float) -> float:
         """Temperature of the sensor."""
+        ...
 
 
 class EmulatedOpt8241(PluggedCamera["EmulatedLink"]):
