@@ -18,7 +18,6 @@ class Clock(Protocol):
 
     def wait(self, condition: threading.Condition, timeout_s: float) -> None:
         """Wait, holding the condition, until it is notified or the time has passed."""
-        ...
 
 
 class RealClock:

@@ -12,7 +12,7 @@ from packaging.version import Version
 from tests.conftest import ROOT
 
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())
-OURS = {"transientcam", "transientcam-conformance", "transientcam-opt8241"}
+OURS = {"transientcam", "transientcam-conformance", "transientcam-oak", "transientcam-opt8241"}
 
 
 def wanted(*extras: str) -> list[Requirement]:

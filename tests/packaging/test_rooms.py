@@ -16,6 +16,7 @@ PACKAGES = (
     "transientcam_conformance",
     "transientcam_driver",
     "transientcam_moments",
+    "transientcam_oak",
     "transientcam_opt8241",
     "transientcam_server",
     "transientcam_simulation",

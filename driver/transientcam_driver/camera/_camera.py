@@ -94,15 +94,12 @@ class Camera(Protocol):
 
     def start(self) -> None:
         """Switch the light on and capture frames back to back."""
-        ...
 
     def stop(self) -> None:
         """Switch the light off; a ``read_frame`` that is waiting raises NotStreaming."""
-        ...
 
     def safe_off(self) -> None:
         """Switch the light off, in any state."""
-        ...
 
     def status(self) -> Status:
         """Read the status of the device.
@@ -144,11 +141,9 @@ class Camera(Protocol):
         CameraError
             It is still absent, or cannot be opened; try again later.
         """
-        ...
 
     def close(self) -> None:
         """Switch the light off and give the device back; may be called twice."""
-        ...
 
     def __enter__(self) -> Self: ...
 

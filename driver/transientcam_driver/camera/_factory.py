@@ -7,6 +7,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from transientcam_driver.camera._sensor import Sensor
+
 _Array = NDArray[Any]
 _STEPS: Final = 30
 _CLOSE: Final = 1e-12
@@ -129,7 +131,10 @@ class FactoryCalibration:
         divided by, b_0 first, as with a `CalibrationCapture`; None where nominal ones do.
     lens
         None where the camera does not say.
+    sensor
+        Whose noise the images have; None where the camera does not say.
     """
 
     gains: NDArray[np.complex64] | None = None
     lens: Lens | None = None
+    sensor: Sensor | None = None

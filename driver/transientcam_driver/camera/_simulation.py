@@ -236,7 +236,6 @@ class Simulation(Protocol):
         EffectError
             There is no such effect or choice.
         """
-        ...
 
     def truth(self, *, device_time_s: float | None = None) -> Truth:
         """Ground truth of the scene at the exposure set: of the last image, or at a time."""
@@ -258,20 +257,15 @@ class Simulation(Protocol):
 
     def unplug(self) -> None:
         """Pull the cable; the camera raises CameraLost."""
-        ...
 
     def replug(self) -> None:
         """Plug the cable in again; ``Camera.reconnect`` finds the camera."""
-        ...
 
     def corrupt_next(self, images: int = 1) -> None:
         """Damage the pixels of the next images on the wire."""
-        ...
 
     def drop_next(self, images: int = 1) -> None:
         """Lose the next images on the wire."""
-        ...
 
     def set_interlock(self, *, closed: bool) -> None:
         """Open or close the safety interlock of the light."""
-        ...

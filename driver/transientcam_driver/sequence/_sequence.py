@@ -173,6 +173,11 @@ class Sequence:
         return self.sampling.multiples_of(self.harmonics)
 
     @property
+    def order(self) -> int:
+        """The highest multiple, 32 at most: of the kernels that its frames are computed with."""
+        return min(self.multiples[-1], MAX_HARMONICS)
+
+    @property
     def images_per_take(self) -> int:
         """How many images one take holds."""
         phases = len(self.sampling.phases_rad)
@@ -235,8 +240,9 @@ class Sequence:
 
     @property
     def unambiguous_range_m(self) -> float:
-        """Range c / (2 f) beyond which a target appears nearer by a multiple of it."""
-        return SPEED_OF_LIGHT_M_S / (2 * self.base_frequency_hz)
+        """Range c / (2 f) beyond which a target appears nearer, or what the sampling states."""
+        period_m = SPEED_OF_LIGHT_M_S / (2 * self.base_frequency_hz)
+        return min(period_m, self.sampling.max_range_m or period_m)
 
     def to_document(self) -> dict[str, Any]:
         """Return the sequence as the JSON document of the REST interface.

@@ -45,7 +45,6 @@ class Link(Protocol):
 
     def control_out(self, request: Request, value: int, index: int, data: bytes) -> None:
         """Send a request."""
-        ...
 
     def read(self, most_bytes: int, *, timeout_s: float) -> bytes | None:
         """Return the next frame, up to so many bytes; None where none comes in time."""
@@ -53,8 +52,6 @@ class Link(Protocol):
 
     def clear_halt(self) -> None:
         """Let the endpoint of the frames begin anew."""
-        ...
 
     def close(self) -> None:
         """Give the camera back; never fails."""
-        ...

@@ -1,6 +1,6 @@
 """The plug-in ``opt8241``: a Texas Instruments OPT8241-CDK on USB, or its emulation."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing, suppress
 from typing import Final
 
@@ -27,25 +27,12 @@ def _open(name: CameraName, clock: Clock) -> Camera:
     if name.address != EMULATED:
         require_no_emulation(name)
         link = SameCamera(name.address or None)
-        connect = _one_at_a_time(lambda: Opt8241(link(), quads=quads))
-        return TriggeredCamera(connect, clock=clock)
+        return TriggeredCamera(lambda: Opt8241(link(), quads=quads), clock=clock)
     scene = simulated_scene(name)
     emulated, simulation = build_opt8241(scene.load(), seed=scene.seed, clock=clock, quads=quads)
-    connect = _one_at_a_time(lambda: Opt8241(emulated.connect(), quads=quads))
-    return TriggeredCamera(connect, clock=clock, simulation=simulation)
-
-
-def _one_at_a_time(connect: Callable[[], Opt8241]) -> Callable[[], Opt8241]:
-    """Return what gives a camera back before it claims it again."""
-    opened: list[Opt8241] = []
-
-    def again() -> Opt8241:
-        while opened:
-            opened.pop().close()
-        opened.append(connect())
-        return opened[0]
-
-    return again
+    return TriggeredCamera(
+        lambda: Opt8241(emulated.connect(), quads=quads), clock=clock, simulation=simulation
+    )
 
 
 def _check(name: CameraName) -> None:

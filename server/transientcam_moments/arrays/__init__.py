@@ -36,6 +36,7 @@ from transientcam_moments.arrays._loops import repeat
 from transientcam_moments.arrays._planes import (
     BLOCK_PIXELS,
     MAX_HARMONICS,
+    MAX_MULTIPLE,
     Array,
     as_array,
     by_blocks,

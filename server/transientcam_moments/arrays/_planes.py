@@ -17,6 +17,8 @@ Array: TypeAlias = Any
 """A NumPy, JAX or CuPy array; the array API gives no common type to check against."""
 
 MAX_HARMONICS = 32
+MAX_MULTIPLE = 1 << 16
+"""Of the base frequency, where one return is looked for within a range that is stated."""
 BLOCK_PIXELS = 8192
 
 

@@ -301,13 +301,15 @@ def dense(
     return planes, variance
 
 
-def places_of(harmonics: Sequence[int] | None, count: int) -> tuple[int, ...]:
+def places_of(
+    harmonics: Sequence[int] | None, count: int, most: int = MAX_HARMONICS
+) -> tuple[int, ...]:
     """Return the multiple of each of `count` moments; raises as `likelihood`."""
     places = tuple(range(count)) if harmonics is None else tuple(int(each) for each in harmonics)
     if len(places) != count:
         raise ShapeError("harmonics", f"{len(places)} numbers", f"one for each of {count} moments")
-    if len(set(places)) != count or not 0 <= min(places) <= max(places) <= MAX_HARMONICS:
-        raise ParameterError("harmonics", places, f"different ones of 0 to {MAX_HARMONICS}")
+    if len(set(places)) != count or not 0 <= min(places) <= max(places) <= most:
+        raise ParameterError("harmonics", places, f"different ones of 0 to {most}")
     return places
 
 

@@ -9,6 +9,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from transientcam_moments.arrays import (
+    MAX_HARMONICS,
+    MAX_MULTIPLE,
     Array,
     by_blocks,
     in_range,
@@ -31,6 +33,8 @@ from transientcam_moments.noise import MomentNoise, free_of_scale
 SAME_DEVIATIONS: Final = 4.0
 """Wrap counts whose phases are no further apart than so many deviations are one hypothesis."""
 _TURN: Final = 2 * np.pi
+_BEYOND: Final = 0.02
+"""Of the largest phase, by which noise may leave the phases that are looked at."""
 
 
 class Unwrapped(NamedTuple):
@@ -105,6 +109,7 @@ def unwrap(
     *,
     harmonics: Sequence[int] | None = None,
     model_error: float = 0.0,
+    most_rad: float | None = None,
 ) -> Unwrapped:
     """Estimate one return of every pixel from the phases of its moments.
 
@@ -115,22 +120,26 @@ def unwrap(
     noise : MomentNoise, optional
         As of `likelihood`.
     harmonics : sequence of int, optional
-        Which multiples of the base frequency they are, N different ones of 0 to 32 in any order;
-        0 to N - 1 when left out. That of 0 has no phase and may be anything.
+        Which multiples of the base frequency they are, N different ones of 0 to 32, or with
+        `most_rad` to 65536, in any order; 0 to N - 1 when left out. That of 0 has no phase and may
+        be anything.
     model_error : float
         As of `likelihood`.
+    most_rad : float, optional
+        The largest phase of the base frequency that is looked for; a turn, when left out.
 
     Returns
     -------
     Unwrapped
-        Pixels without light or with a measured moment that is not finite have no return.
+        Pixels without light or with a measured moment that is not finite have no return,
+        nor have those that none within `most_rad` is found of.
 
     Raises
     ------
     ShapeError
         When `b` is not 2 to 33 planes of numbers, or noise or harmonics don't fit it.
     ParameterError
-        For other harmonics or model errors, and for 0 alone.
+        For other harmonics, model errors or `most_rad`, and for 0 alone.
 
     Notes
     -----
@@ -143,16 +152,24 @@ def unwrap(
     constant, so that these intervals, as many as the sum of all j / g, are all wrap counts that
     can be the best.
     """
-    return _unwrapped(b, noise, harmonics, model_error)
+    return _unwrapped(b, noise, harmonics, model_error, most_rad)
 
 
 @free_of_scale
 def _unwrapped(
-    b: Array, noise: MomentNoise, harmonics: Sequence[int] | None, model_error: float
+    b: Array,
+    noise: MomentNoise,
+    harmonics: Sequence[int] | None,
+    model_error: float,
+    most_rad: float | None,
 ) -> Unwrapped:
     planes, trailing = moment_planes(b)
     in_range("model_error", model_error, 0.0, 1.0, "0 to 1")
-    places = places_of(harmonics, planes.shape[0])
+    if most_rad is not None:
+        in_range("most_rad", most_rad, 0.0, float(_TURN), "0 to a turn")
+    places = places_of(
+        harmonics, planes.shape[0], MAX_HARMONICS if most_rad is None else MAX_MULTIPLE
+    )
     variance = variance_of(noise, planes, trailing)
     kept = [at for at, j in enumerate(places) if j > 0]
     if not kept:
@@ -160,14 +177,16 @@ def _unwrapped(
     xp = namespace(planes)
     multiples = [places[at] for at in kept]
     found = by_blocks(
-        lambda b, variance: _unwrap(b, variance, multiples, float(model_error)),
+        lambda b, variance: _unwrap(b, variance, multiples, float(model_error), most_rad),
         xp.stack([planes[at] for at in kept]),
         xp.stack([variance[at] for at in kept]),
     )
     return Unwrapped(*(part.reshape(trailing) for part in found))
 
 
-def _unwrap(b: Array, variance: Array, multiples: list[int], error: float) -> tuple[Array, ...]:
+def _unwrap(
+    b: Array, variance: Array, multiples: list[int], error: float, most_rad: float | None
+) -> tuple[Array, ...]:
     """Return the attributes of `Unwrapped` of planes (N, P)."""
     xp = namespace(b)
     divisor = math.gcd(*multiples)
@@ -183,7 +202,10 @@ def _unwrap(b: Array, variance: Array, multiples: list[int], error: float) -> tu
         precision = xp.where(usable, inverse * (size / largest) ** 2, 0)
         angle = xp.where(seen & usable, xp.arctan2(b.imag, b.real), 0)
         std = 1 / xp.sqrt(_sum(j * j * each for j, each in zip(coprime, precision, strict=True)))
-        best, phase, second = _search(list(angle), list(precision), coprime, SAME_DEVIATIONS * std)
+        most = None if most_rad is None or most_rad * divisor >= _TURN else most_rad * divisor
+        same = SAME_DEVIATIONS * std
+        best, phase, second = _search(list(angle), list(precision), coprime, same, most)
+        usable = usable & xp.isfinite(best)
         turned = _sum(
             weight * (plane.real * xp.cos(j * phase) + plane.imag * xp.sin(j * phase))
             for j, weight, plane in zip(coprime, inverse, b, strict=True)
@@ -202,14 +224,19 @@ def _unwrap(b: Array, variance: Array, multiples: list[int], error: float) -> tu
 
 
 def _search(
-    angle: list[Array], precision: list[Array], multiples: list[int], same: Array
+    angle: list[Array],
+    precision: list[Array],
+    multiples: list[int],
+    same: Array,
+    most_rad: float | None,
 ) -> tuple[Array, Array, Array]:
     """Return the least chi-square, its phase, and the least one more than `same` away from it."""
     xp = namespace(same)
     information = _sum(j * j * each for j, each in zip(multiples, precision, strict=True))
     best, phase, second = np.inf + 0 * angle[0], 0 * angle[0], np.inf + 0 * angle[0]
     for k, j in enumerate(multiples):
-        for turns in range(j):
+        first, last = (0, j) if most_rad is None else (-1, int(j * most_rad / _TURN) + 1)
+        for turns in range(first, last):
             # where the count of frequency k becomes one more, and all others are the nearest
             edge = (angle[k] + (2 * turns + 1) * np.pi) / j
             unwrapped = [
@@ -219,7 +246,10 @@ def _search(
             planes = list(zip(multiples, precision, unwrapped, strict=True))
             tried = _sum(of * weight * plane for of, weight, plane in planes) / information
             cost = _sum(weight * (plane - of * tried) ** 2 for of, weight, plane in planes)
-            cost = xp.where(precision[k] > 0, cost, np.inf)
+            known = precision[k] > 0
+            if most_rad is not None:
+                known &= abs(tried / most_rad - 0.5) < 0.5 + _BEYOND
+            cost = xp.where(known, cost, np.inf)
             apart = abs(xp.remainder(tried - phase + np.pi, _TURN) - np.pi) > same
             better = cost < best
             loser = xp.where(better, best, cost)

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from transientcam_moments.arrays import MAX_HARMONICS, Array
+from transientcam_moments.arrays import MAX_MULTIPLE, Array
 from transientcam_moments.errors import ParameterError, ShapeError
 from transientcam_moments.images import (
     FOUR_PHASES_RAD,
@@ -188,9 +188,11 @@ class Labels:
         return np.where(turned > 2 * np.pi - SAME_PHASE_RAD, 0.0, turned)
 
     def _require_a_capture(self) -> None:
-        known = (self.harmonic >= 0) & (self.harmonic <= MAX_HARMONICS)
+        known = (self.harmonic >= 0) & (self.harmonic <= MAX_MULTIPLE)
         if not known.all() or not self.multiples:
-            raise ParameterError("harmonic", self.harmonic.tolist(), "0 .. m, with m from 1 to 32")
+            raise ParameterError(
+                "harmonic", self.harmonic.tolist(), f"0 .. m, with m from 1 to {MAX_MULTIPLE}"
+            )
         if len(self.phases_rad) < LEAST_PHASES:
             self._refuse(self.multiples[0], self.take[0])
         for take in np.unique(self.take):

@@ -439,7 +439,8 @@ class Reconstruction:
     def unwrapped(self) -> Unwrapped:
         """One return by the phases of all frequencies, and how clear it is."""
         moments, noise, harmonics, error = self._evidence
-        return unwrap(moments, noise, harmonics=harmonics, model_error=error)
+        most_rad = self.settings.most_rad
+        return unwrap(moments, noise, harmonics=harmonics, model_error=error, most_rad=most_rad)
 
     @property
     def estimate(self) -> Likelihood | Unwrapped:

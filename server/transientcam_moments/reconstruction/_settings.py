@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import DTypeLike
 
-from transientcam_moments.arrays import MAX_HARMONICS, chosen, in_range
+from transientcam_moments.arrays import MAX_HARMONICS, MAX_MULTIPLE, chosen, in_range
 from transientcam_moments.comparisons import TECHNIQUES, plugged_names, technique_of
 from transientcam_moments.errors import EstimatorFailed, ParameterError
 from transientcam_moments.images import FOUR_PHASES_RAD, SIGMA_PX, ZEROTH_IMAGES, phase_weights
@@ -48,7 +48,11 @@ def automatic(multiples: tuple[int, ...] | None) -> str:
     if not multiples or multiples[-1] == len(multiples):
         return "likelihood"
     # two returns of three frequencies leave something to judge them by
-    return "two-returns" if len(multiples) > 2 else "unwrapped-phase"
+    return (
+        "two-returns"
+        if len(multiples) > 2 and multiples[-1] <= MAX_HARMONICS
+        else "unwrapped-phase"
+    )
 
 
 def least_harmonics(estimator: str) -> int:
@@ -78,7 +82,7 @@ class Settings:
         Captures in the images, averaged without outliers. Raw images need it.
     multiples : tuple of int, optional
         Which multiples of the base frequency were measured, ascending; 1 to m, when left out. Only
-        `OF_ANY_MULTIPLES` serve others.
+        `OF_ANY_MULTIPLES` serve others, and "unwrapped-phase" alone those above 32.
     phases_rad : tuple of float, optional
         Of the raw images of each frequency, in their order, three or more: 0, 90, 180 and 270
         degrees, when left out.
@@ -99,6 +103,9 @@ class Settings:
     least_range_m : float
         Of the sensor, where a turn of the phase, c / (2 f), begins, and so "first". For 0 strong
         first light in the last 64th is below 0: noise puts nothing at 0 m to the far end.
+    max_range_m : float, optional
+        No target is beyond it, which multiples above 32 need; what the frequencies tell apart, when
+        left out.
     threshold : float
         The range is that of the first return, or peak, with this share of the strongest one's
         weight, or density.
@@ -141,6 +148,7 @@ class Settings:
     delay_s: float = 0.0
     still_frames: int = 1
     least_range_m: float = 0.0
+    max_range_m: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no stage could work with (ParameterError)."""
@@ -155,8 +163,11 @@ class Settings:
                 if getattr(self, field) is None:
                     raise ParameterError(field, None, "stated, for the noise of a sensor")
         phase_weights(self.sampled_rad)
-        if self.multiples is not None and not _ascending(self.multiples):
-            raise ParameterError("multiples", self.multiples, "ascending, from 1 to 32")
+        most = MAX_HARMONICS if self.max_range_m is None else MAX_MULTIPLE
+        if self.multiples is not None and not _ascending(self.multiples, most):
+            raise ParameterError("multiples", self.multiples, f"ascending, from 1 to {most}")
+        if self.max_range_m is not None and not 0 < self.max_range_m < float("inf"):
+            raise ParameterError("max_range_m", self.max_range_m, "> 0 m and finite")
         in_range("epsilon", self.epsilon, 0.0, float(np.nextafter(1.0, 0.0)), "0 <= epsilon < 1")
         chosen("keep", self.keep, ("harmonics", "brightness"))
         chosen("neighbours", self.neighbours, NEIGHBOURS)
@@ -190,6 +201,14 @@ class Settings:
         return self.least_range_m / float(range_m(1.0, self.base_frequency_hz))
 
     @property
+    def most_rad(self) -> float | None:
+        """Phase at the base frequency of the largest range; None for a turn."""
+        if self.max_range_m is None or self.base_frequency_hz is None:
+            return None
+        most = self.max_range_m / float(range_m(1.0, self.base_frequency_hz))
+        return most if most < 2 * np.pi else None
+
+    @property
     def low_ratio(self) -> float:
         """The low frequency over the base frequency; 0 where it cannot tell turns."""
         ratio = (self.low_frequency_hz or 0.0) / (self.base_frequency_hz or math.inf)
@@ -211,7 +230,7 @@ class Settings:
         return self.multiples is None or self.multiples[-1] == len(self.multiples)
 
 
-def _ascending(multiples: tuple[int, ...]) -> bool:
+def _ascending(multiples: tuple[int, ...], most: int) -> bool:
     """Return whether there are multiples, each larger than the one before."""
-    inside = bool(multiples) and multiples[0] >= 1 and multiples[-1] <= MAX_HARMONICS
+    inside = bool(multiples) and multiples[0] >= 1 and multiples[-1] <= most
     return inside and list(multiples) == sorted(set(multiples))

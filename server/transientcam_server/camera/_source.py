@@ -13,6 +13,7 @@ from transientcam_driver import (
     Camera,
     CameraError,
     CameraName,
+    Sensor,
     Sequence,
     open_camera,
 )
@@ -35,18 +36,21 @@ def stated_sensor(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor |
     """Return the sensor of a camera; None where neither it nor the settings state any of it."""
     if isinstance(camera, RelayCamera):
         return camera.origin.sensor
-    stated = camera.simulation is not None or settings.model_fields_set
+    stated = camera.simulation is not None or settings.model_fields_set or _own_sensor(camera)
     return sensor_of(camera, settings) if stated else None
 
 
 def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
     """Return the sensor of a camera: a simulated one has its own, a real one the settings'.
 
-    A relayed one has what its origin states. The dark level is the camera's where it has one.
+    Where these state none it is the one that the camera reports. A relayed one has what its origin
+    states. The dark level is the camera's where it has one.
     """
     if isinstance(camera, RelayCamera) and camera.origin.sensor is not None:
         return camera.origin.sensor
-    model = settings if camera.simulation is None else camera.simulation.sensor
+    model = _own_sensor(camera) or settings
+    if camera.simulation is None and settings.model_fields_set:
+        model = settings
     dark_dn = camera.capabilities.dark_dn
     return tm.noise.Sensor(
         gain_e_per_dn=model.gain_e_per_dn,
@@ -55,6 +59,12 @@ def sensor_of(camera: Camera, settings: SensorSettings) -> tm.noise.Sensor:
         dark_dn=model.dark_dn if dark_dn is None else dark_dn,
         bits=camera.capabilities.bits,
     )
+
+
+def _own_sensor(camera: Camera) -> Sensor | None:
+    if camera.simulation is not None:
+        return camera.simulation.sensor
+    return None if camera.factory is None else camera.factory.sensor
 
 
 @dataclass(frozen=True, slots=True)

@@ -119,7 +119,7 @@ def load_kernels(recipe: Recipe) -> None:
     if not tm.kernels.state()["enabled"]:
         return
     needed = {*tm.kernels.LANES} - {*_SELDOM} | {*recipe.kernels}
-    order = recipe.applied.sequence.multiples[-1]
+    order = recipe.applied.sequence.order
     tm.kernels.compile(harmonics=[order], precisions=["float32"], names=[*needed])
 
 

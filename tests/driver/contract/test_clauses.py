@@ -54,7 +54,7 @@ class DoesAnything(Honest):
 
 class KeepsEpoch(Honest):
     def configure(self, sequence: Sequence) -> AppliedSequence:
-        self._applied = self.capabilities.describe(self._applied.sequence, epoch=0)
+        self._epoch = 0
         return super().configure(sequence)
 
 
@@ -73,6 +73,7 @@ class ForgetsToResume(Honest):
 class WorksOn(Honest):
     def close(self) -> None:
         self.stop()
+        self._release.detach()
 
 
 BROKEN = {

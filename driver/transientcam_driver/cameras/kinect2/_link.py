@@ -26,7 +26,6 @@ class Link(Protocol):
 
     def write(self, data: bytes) -> None:
         """Send a request to the command endpoint."""
-        ...
 
     def read(self, most_bytes: int) -> bytes:
         """Return the next transfer of the answer endpoint."""
@@ -34,26 +33,21 @@ class Link(Protocol):
 
     def set_suspended(self, suspended: bool) -> None:
         """Suspend the function of the depth camera, or wake it up (SET_FEATURE, USB 3.2, 9.4.9)."""
-        ...
 
     def set_stream_enabled(self, enabled: bool) -> None:
         """Give the depth endpoint its bandwidth, or take it away: alternate setting 1 or 0."""
-        ...
 
     def start_images(self, received: PacketTaker, failed: FailureTaker) -> None:
         """Hand over every packet from now on, in their order, on a thread of the link.
 
         Both functions must return at once, and must not call the link.
         """
-        ...
 
     def stop_images(self) -> None:
         """Hand over nothing more once this returns; no effect where nothing is handed over.
 
         It must not be called by a function that ``start_images`` was given.
         """
-        ...
 
     def close(self) -> None:
         """Give the device back; never fails, and may be called twice."""
-        ...

@@ -23,7 +23,6 @@ class ImageConnection(Protocol):
 
     def expect(self, image_bytes: int) -> None:
         """Forget what came before, and wait for an image of this length."""
-        ...
 
     def receive(self, timeout_s: float) -> bytes | None:
         """Return the image, or None if it takes longer.
@@ -35,7 +34,6 @@ class ImageConnection(Protocol):
 
     def close(self) -> None:
         """Close the connection; never fails."""
-        ...
 
 
 class UdpImages:

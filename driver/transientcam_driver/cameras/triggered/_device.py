@@ -34,7 +34,6 @@ class TriggeredDevice(Protocol):
 
     def configure(self, applied: AppliedSequence) -> None:
         """Prepare for a sequence."""
-        ...
 
     def prepare(self, labels: Group) -> float:
         """Set what the next images need, and return how long that takes to settle, in s."""
@@ -42,7 +41,6 @@ class TriggeredDevice(Protocol):
 
     def trigger(self, labels: Group) -> None:
         """Expose these images once; images of earlier triggers are of no more use."""
-        ...
 
     def receive(self, timeout_s: float) -> Images | None:
         """Return the images (N, H, W) of the last trigger, or None if they take longer.
@@ -60,8 +58,6 @@ class TriggeredDevice(Protocol):
 
     def light_off(self) -> None:
         """End an exposure that goes on, if there is one."""
-        ...
 
     def close(self) -> None:
         """Give the device back, its light off; never fails."""
-        ...

@@ -23,6 +23,8 @@ class SamplingDocument(Document):
     """Of the base frequency; empty for 1 to m."""
     phases_rad: list[float]
     """Of the images of each frequency."""
+    max_range_m: float | None = None
+    """No target is taken to be beyond it; null for what the frequencies tell apart."""
 
 
 class SequenceDocument(Document):

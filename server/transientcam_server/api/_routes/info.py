@@ -63,7 +63,7 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
 
 
 def _kernels(recipe: Recipe) -> InfoDocument.KernelsDocument | None:
-    now_s, order = asyncio.get_running_loop().time(), recipe.applied.sequence.multiples[-1]
+    now_s, order = asyncio.get_running_loop().time(), recipe.applied.sequence.order
     preparing, left_s = tm.kernels.preparing(recipe.kernels, order, now_s)
     return InfoDocument.KernelsDocument(preparing=preparing, left_s=left_s) if preparing else None
 

@@ -131,7 +131,7 @@ class Pipeline:
         Returns the thread that compiles, if one does.
         """
         kernels = self.recipe_of(applied).kernels
-        return tm.kernels.prepare(kernels, applied.sequence.multiples[-1])
+        return tm.kernels.prepare(kernels, applied.sequence.order)
 
     def recorded_frame(
         self,

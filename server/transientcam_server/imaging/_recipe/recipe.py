@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import AppliedSequence, RawFrame, Sampling, Sequence
 from transientcam_driver.camera import Lamp
+from transientcam_driver.sequence import MAX_HARMONICS
 from transientcam_moments.comparisons import plugged_names, statements
 from transientcam_moments.reconstruction import OF_ANY_MULTIPLES, automatic
 from transientcam_server.errors import Problem, kinds
@@ -51,13 +52,15 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
     Raises Problem ``estimator-misfit``.
     """
     if not _serves(settings, sequence.sampling):
+        fine = sequence.multiples[-1] > MAX_HARMONICS
+        needs = f"multiples up to {MAX_HARMONICS}" if fine else "consecutive multiples"
         raise Problem(
             kinds.ESTIMATOR_MISFIT,
-            f"The estimator {settings.estimator} needs consecutive multiples of one frequency, and "
+            f"The estimator {settings.estimator} needs {needs} of one frequency, and "
             f"this camera measures the multiples {listed(sequence.multiples)}.",
             field="estimator",
             value=settings.estimator,
-            limit=f"one of {', '.join(OF_ANY_MULTIPLES)}",
+            limit="unwrapped-phase" if fine else f"one of {', '.join(OF_ANY_MULTIPLES)}",
         )
     failed = statements().get(settings.estimator)
     if isinstance(failed, tm.EstimatorFailed):
@@ -93,6 +96,8 @@ def suited(settings: ReconstructionSettings, sampling: Sampling) -> Reconstructi
 
 def _serves(settings: ReconstructionSettings, sampling: Sampling) -> bool:
     """Return whether the settings' estimator goes with the multiples that are measured."""
+    if sampling.multiples[-1:] > (MAX_HARMONICS,):
+        return settings.estimator in ("automatic", "unwrapped-phase")
     return sampling.consecutive or settings.estimator in ("automatic", *OF_ANY_MULTIPLES)
 
 
@@ -263,6 +268,7 @@ class Recipe:
             takes=sequence.takes,
             multiples=sequence.multiples,
             phases_rad=sequence.sampling.phases_rad,
+            max_range_m=sequence.sampling.max_range_m,
             full_scale=self.full_scale,
             sensor=self.sensor,
         )
