@@ -91,19 +91,15 @@ class HeldLight:
                 cells, shares = shape.between_cells(point, grid)
                 moments[part] = np.einsum("pk,pk->p", shares, light[cells + first])
         of = np.array(balls, np.float32).reshape(-1, 6), np.array(spans, np.int64).reshape(-1, 5)
-        pairs = (each.view(np.float32).reshape(-1, 2) for each in (light, moments))
-        compiled_gathered.on_ellipsoids(*ends.point, *of, *pairs)
-        moments *= lit.reflectance.astype(np.float32)
+        given, on = (each.view(np.float32).reshape(-1, 2) for each in (light, moments))
+        compiled_gathered.on_ellipsoids(*ends.point, *of, given, on)
         if not frequency_hz:
-            return moments.real
+            return moments.real * lit.reflectance.astype(np.float32)
         delay_s = ends.distance_m.astype(np.float64) / SPEED_OF_LIGHT_M_S
         phase_rad = compiled_light.phases(delay_s, 2 * np.pi * frequency_hz)
-        turned = np.empty_like(moments)
-        turned.real, turned.imag = np.cos(phase_rad), np.sin(phase_rad)
+        compiled_gathered.sent(on, lit.reflectance, np.cos(phase_rad), np.sin(phase_rad))
         scatter = scatter_of(ends.still, ends.index)
-        if scatter is not None:
-            turned *= scatter.transfer(frequency_hz)
-        return moments * turned
+        return moments if scatter is None else moments * scatter.transfer(frequency_hz)
 
     def _of_patches(self, frequency_hz: float) -> NDArray[np.complex64]:
         return self._light.get(frequency_hz, lambda: self._solve(frequency_hz))
