@@ -128,6 +128,7 @@ def _moments(world: World, sequence: Sequence) -> Moments:
 
 
 def four_buckets(sequence: Sequence, image: Callable[[ImageLabel], NDArray[np.float64]]) -> Moments:
+    """Return moments (m, P) of the first, the middle and the last take, as means over these."""
     takes = sorted({0, sequence.takes // 2, sequence.takes - 1})
     moments: list[Moments] = []
     for j in range(1, sequence.harmonics + 1):

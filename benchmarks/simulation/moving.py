@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from statistics import median
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.common.tables import Cell, Table, heads
 from benchmarks.simulation.accuracy import SEQUENCES, four_buckets
@@ -76,7 +77,7 @@ def error(scene: Scene, sequence: Sequence) -> tuple[float, float, float]:
     period_s, scale_e = sequence.exposure_s + READOUT_S, 0.5 * conditions.scale_e
     beside = np.zeros((height, width), dtype=bool)
 
-    def image(label: ImageLabel) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    def image(label: ImageLabel) -> NDArray[np.float64]:
         time_s, now = START_S + label.index * period_s, scene.at(START_S + label.index * period_s)
         found_e, direct_e = (
             of.mean_image_e(label, number=0, device_time_s=time_s).astype(np.float64)
