@@ -116,6 +116,7 @@ _ALL: Final = (
         "simulation.accuracy", "measured/simulation", ("driver",), 2, "simulation_left_out"
     ),
     Measurement("simulation.judge", "measured/simulation", ("driver",), 2, "simulation_judged"),
+    Measurement("simulation.moving", "measured/simulation", ("driver",), 2, "simulation_moving"),
     Measurement("simulation.noise", "measured/simulation", ("driver",), 2, "simulation_noise"),
     # -- accuracy
     Measurement("accuracy.prices", "measured/accuracy", _PLANNED),

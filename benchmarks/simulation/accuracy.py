@@ -124,12 +124,11 @@ def _moments(world: World, sequence: Sequence) -> Moments:
         mean_e = world.mean_image_e(label, number=label.index, device_time_s=time_s)
         return mean_e.ravel().astype(np.float64)
 
-    return _four_buckets(sequence, image)
+    return four_buckets(sequence, image)
 
 
-def _four_buckets(
-    sequence: Sequence, image: Callable[[ImageLabel], NDArray[np.float64]]
-) -> Moments:
+def four_buckets(sequence: Sequence, image: Callable[[ImageLabel], NDArray[np.float64]]) -> Moments:
+    """Return moments (m, P) of the first, the middle and the last take, as means over these."""
     takes = sorted({0, sequence.takes // 2, sequence.takes - 1})
     moments: list[Moments] = []
     for j in range(1, sequence.harmonics + 1):
@@ -179,7 +178,7 @@ def _reference(
         electrons: NDArray[np.float64] = scale_e * cosine * (moments[0] + turned).real
         return electrons  # but for other light, which cancels
 
-    return _four_buckets(sequence, image)
+    return four_buckets(sequence, image)
 
 
 def tables(*, small: bool = False) -> Iterator[Table]:

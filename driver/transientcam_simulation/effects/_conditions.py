@@ -2,12 +2,12 @@
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from transientcam_driver.camera import Sensor
-from transientcam_driver.sequence import LOW_FREQUENCY_HZ, Sequence
+from transientcam_driver.sequence import LOW_FREQUENCY_HZ, Sequence, SubPhases
 from transientcam_simulation.base import IDEAL, PINHOLE, DeviceProfile, Lens
 from transientcam_simulation.effects._glimpses import Facts, Glimpse, Noise, Values
 
@@ -118,9 +118,7 @@ class Conditions:
 
     def sub_phase_gain(self, harmonic: int) -> complex:
         """G_k: gain of a harmonic by the division of the exposure (Sec. 4.1)."""
-        sub_phases = self.sequence.sub_phases
-        phases = np.array(sub_phases.phases_rad)
-        return complex(np.sum(sub_phases.weights * np.exp(-1j * harmonic * phases)))
+        return _sub_phase_gain(self.sequence.sub_phases, harmonic)
 
     @property
     def negligible(self) -> float:
@@ -136,6 +134,12 @@ class Conditions:
         if self.facts is None:
             return ()
         return self.facts.changes(effect, self.frequencies_hz, during_s=self.sequence_s)
+
+
+@lru_cache(maxsize=64)
+def _sub_phase_gain(sub_phases: SubPhases, harmonic: int) -> complex:
+    phases = np.array(sub_phases.phases_rad)
+    return complex(np.sum(sub_phases.weights * np.exp(-1j * harmonic * phases)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.base import PINHOLE
-from transientcam_simulation.effects import WORST_ABOVE, Glimpse, Noise, Values
+from transientcam_simulation.effects import Glimpse, Noise, Values
 from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._further_light import FurtherLight
 from transientcam_simulation.light._missing import SampledWays, sampled_glimpses
@@ -31,7 +31,7 @@ _ROUNDING = 1e-9
 _KEPT = 32  # changes by effects, for the last few sequences
 _RESOLUTIONS = tuple((per_side, reach) for per_side in (6, 9, 13, 18) for reach in (1.0, 0.5))
 """Patches a side, and their edges that anything moves in a step, where these are fine enough."""
-_BEYOND = 0.01  # of the pixels, which coarser patches may put off by more
+_BEYOND, _OFF = 0.01, 0.4  # of the pixels, which coarser patches may put off by this much noise
 PAIR_S, TURNED_S = 3e-7, 3e-8  # processor time: of two patches, and of a moment between them, ...
 STILL_S, MOVING_S = 2e-8, 3e-8  # and of a moment on a pixel of what stands still, and moves
 _ROUGH_PATCHES = 6  # a side, to estimate interreflection
@@ -83,7 +83,7 @@ class SceneFacts:
         self._left_out: dict[str, list[list[_SampledView]]] = {}
         self._rough = min(_ROUGH_PATCHES, scene.transport.patches)
         self._errors: dict[tuple[int, float], Values] = {}
-        self._in_full: dict[int, Values] = {}  # light over several surfaces, by time
+        self._in_full: dict[int, Values] = {}  # what moves changes of it, by time
 
     @property
     def glimpses(self) -> tuple[Glimpse, ...]:
@@ -304,7 +304,7 @@ class SceneFacts:
             return most, _RESOLUTIONS[-1][1]
         when = int(np.argmax([each.sum() for each in light]))
         glimpse = self.glimpses[when]
-        limit = WORST_ABOVE * noise.deviation(glimpse.brightness, glimpse.reflectance)
+        limit = _OFF * noise.deviation(glimpse.brightness, glimpse.reflectance)
         if np.mean(light[when] > limit) < _BEYOND:  # whatever its error
             return min(_RESOLUTIONS[0][0], most), _RESOLUTIONS[0][1]
         for per_side, reach in (each for each in _RESOLUTIONS if each[0] < most):
@@ -323,11 +323,17 @@ class SceneFacts:
             # of a step, that light which stands is off, on average
             late = light.held_s / light.step_s / 4
             ends = Gathering(seen.scene, light.patches, seen.lits[0])
-            coarse = ends.moments((0.5 - late) * one + (0.5 + late) * other, 0.0)
+            change = (0.5 - late) * one + (0.5 + late) * other - light.without_movers(0.0)
             if when not in self._in_full:
                 self._in_full[when] = self._further(seen, self._scene.transport.patches)
-            self._errors[key] = np.abs(coarse - self._in_full[when])
+                fine = Gathering(seen.scene, self._finest.patches, seen.lits[0])
+                self._in_full[when] -= fine.moments(self._finest.without_movers(0.0), 0.0).real
+            self._errors[key] = np.abs(ends.moments(change, 0.0) - self._in_full[when])
         return self._errors[key]
+
+    @cached_property
+    def _finest(self) -> FurtherLight:
+        return FurtherLight(self._scene, per_side=self._scene.transport.patches)
 
     def _further(self, seen: _SampledView, per_side: int) -> Values:
         """Return the brightness of light over several surfaces."""

@@ -1,7 +1,8 @@
 """Light that surfaces give each other where some move, as a function of the time alone.
 
 It is solved at steps of time, and interpolated in the patches' own places: what moves takes its
-light with it. `SceneFacts.resolution` says how fine patches and steps must be.
+light with it. Coarse patches do where only the change by what moves is taken of them, and the rest
+is solved once on fine ones. `SceneFacts.resolution` says how fine patches and steps must be.
 """
 
 import math
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._patches import Patches
 from transientcam_simulation.light._recent import Recent
+from transientcam_simulation.light._variants import still_scene
 from transientcam_simulation.scene import Points, Scene, patch_edges_m
 
 _HELD_PATCHES: Final = 0.25
@@ -37,12 +39,32 @@ class FurtherLight:
         self._held_steps = _HELD_PATCHES / reach
         self._exchanges: Recent[float, tuple[Exchange, int]] = Recent(_EXCHANGES)
         self._solved: Recent[tuple[float, float], NDArray[np.complex128]] = Recent(_SOLVED)
+        self._without: Recent[float, NDArray[np.complex128]] = Recent(_SOLVED)
 
     @cached_property
     def patches(self) -> Patches:
         """All patches, at their places without motion."""
         finest = self._scene.transport.patches
         return Patches.of(self._scene, self._per_side, moving=finest)
+
+    @cached_property
+    def _standing(self) -> tuple[NDArray[np.intp], Exchange, int]:
+        """Patches of what stands still, and the light between these alone."""
+        moves = np.array([bool(each.motions) for each in self._scene.surfaces])
+        still = np.flatnonzero(~moves[self.patches.surface])
+        between = Exchange.between(still_scene(self._scene), self.patches.part(still))
+        return still, between, between.bounces(self._tolerance)
+
+    def without_movers(self, frequency_hz: float) -> NDArray[np.complex128]:
+        """Moments (N) of the light that patches get where nothing moves; 0 for what does."""
+
+        def solve() -> NDArray[np.complex128]:
+            still, between, bounces = self._standing
+            light = np.zeros(len(self.patches), dtype=np.complex128)
+            light[still] = between.irradiance(frequency_hz, bounces)
+            return light
+
+        return self._without.get(frequency_hz, solve)
 
     @cached_property
     def step_s(self) -> float:

@@ -26,25 +26,36 @@ _WAYS = 8  # kept
 
 
 class StillEnds:
-    """Places on what stands still where rays end, and their ways to the camera."""
+    """Places on what stands still where rays end, and their ways to the camera.
 
-    def __init__(self, light: FurtherLight, still: StillLight) -> None:
+    ``fine``: light on patches so fine that what nothing that moves changes is taken of it.
+    """
+
+    def __init__(self, light: FurtherLight, fine: FurtherLight, still: StillLight) -> None:
         lit = replace(still.lit, reflectance=still.reflectance.astype(np.float64))
+        self._light, self._fine = light, fine
         self._ends = Gathering(still.scene, light.patches, lit)
+        self._fine_ends = Gathering(still.scene, fine.patches, lit)
         index, shares = self._ends.places
         self.places = index.astype(np.int32), shares.astype(np.float32)
-        self._ways: Recent[float, NDArray[np.complex64]] = Recent(_WAYS)
+        self._kept: Recent[float, tuple[NDArray[np.complex64], ...]] = Recent(_WAYS)
 
     def moments(self, light: NDArray[np.complex64], frequency_hz: float) -> Moments:
         """Return the moments (P) that the camera sees, given those on the patches."""
 
-        def way() -> NDArray[np.complex64]:
-            return self._ends.way(frequency_hz).astype(np.complex64)
+        def found() -> tuple[NDArray[np.complex64], ...]:
+            light = self._light.without_movers(frequency_hz)
+            fine = self._fine_ends.moments(self._fine.without_movers(frequency_hz), frequency_hz)
+            kept = light, self._ends.way(frequency_hz), fine
+            return tuple(each.astype(np.complex64) for each in kept)
 
+        without, way, fine = self._kept.get(frequency_hz, found)
+        light = light - without
         moments = np.empty(len(self.places[0]), dtype=np.complex64)
         pairs = (each.view(np.float32).reshape(-1, 2) for each in (light, moments))
         compiled_gathered.on_ends(*self.places, *pairs)
-        moments *= self._ways.get(frequency_hz, way)
+        moments *= way
+        moments += fine
         return moments if frequency_hz else moments.real
 
 
@@ -91,27 +102,25 @@ class HeldLight:
                 cells, shares = shape.between_cells(point, grid)
                 moments[part] = np.einsum("pk,pk->p", shares, light[cells + first])
         of = np.array(balls, np.float32).reshape(-1, 6), np.array(spans, np.int64).reshape(-1, 5)
-        pairs = (each.view(np.float32).reshape(-1, 2) for each in (light, moments))
-        compiled_gathered.on_ellipsoids(*ends.point, *of, *pairs)
-        moments *= lit.reflectance.astype(np.float32)
+        given, on = (each.view(np.float32).reshape(-1, 2) for each in (light, moments))
+        compiled_gathered.on_ellipsoids(*ends.point, *of, given, on)
         if not frequency_hz:
-            return moments.real
+            return moments.real * lit.reflectance.astype(np.float32)
         delay_s = ends.distance_m.astype(np.float64) / SPEED_OF_LIGHT_M_S
         phase_rad = compiled_light.phases(delay_s, 2 * np.pi * frequency_hz)
-        turned = np.empty_like(moments)
-        turned.real, turned.imag = np.cos(phase_rad), np.sin(phase_rad)
+        compiled_gathered.sent(on, lit.reflectance, np.cos(phase_rad), np.sin(phase_rad))
         scatter = scatter_of(ends.still, ends.index)
-        if scatter is not None:
-            turned *= scatter.transfer(frequency_hz)
-        return moments * turned
+        return moments if scatter is None else moments * scatter.transfer(frequency_hz)
 
     def _of_patches(self, frequency_hz: float) -> NDArray[np.complex64]:
         return self._light.get(frequency_hz, lambda: self._solve(frequency_hz))
 
 
-def held_light(light: FurtherLight, still: StillLight) -> Callable[[float], HeldLight]:
+def held_light(
+    light: FurtherLight, fine: FurtherLight, still: StillLight
+) -> Callable[[float], HeldLight]:
     """Return the light that stands at any time: that of the middle of its part of a step."""
-    ends, held_s = StillEnds(light, still), light.held_s
+    ends, held_s = StillEnds(light, fine, still), light.held_s
     kept: Recent[int, HeldLight] = Recent(3)
 
     def at(time_s: float) -> HeldLight:

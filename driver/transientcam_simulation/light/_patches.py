@@ -62,6 +62,11 @@ class Patches:
         corners = self.corners + by_m[:, None]
         return replace(self, centre=self.centre + by_m, corners=corners)
 
+    def part(self, of: NDArray[np.intp]) -> "Patches":
+        """Return some of them, by index; grids stay those of all."""
+        lines = ("surface", "centre", "normal", "corners", "albedo")
+        return replace(self, **{name: getattr(self, name)[of] for name in lines})
+
 
 def form_factors(scene: Scene, patches: Patches, at: Points, normal: Points) -> NDArray[np.float64]:
     """Irradiance (P, N) at points by each patch of radiosity 1: Lambert's contour integral.

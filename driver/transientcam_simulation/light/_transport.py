@@ -273,8 +273,11 @@ class SurfaceScenery:
         held: Callable[[float], HeldLight | None] = nothing
         if further:
             per_side, reach = self.facts.resolution(wanted.noise)
-            of = FurtherLight(scene, per_side=per_side, reach=reach, tolerance=tolerance)
-            held = held_light(of, still)
+            coarse, fine = (
+                FurtherLight(scene, per_side=each, reach=reach, tolerance=tolerance)
+                for each in (per_side, scene.transport.patches)
+            )
+            held = held_light(coarse, fine, still)
 
         far = {"pixel_rad": still.pixel_rad, "every_s": wanted.image_period_s}
         steps = Steps(scene, lambda time_s: moving.at(time_s, held(time_s)), **far)

@@ -1,6 +1,7 @@
 """Motion of surfaces along straight lines, as a function of the device's time alone."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -10,7 +11,7 @@ from transientcam_simulation.scene._geometry import Points
 Repeat = Literal["restart", "back", "loop"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """Offsets visited one after the other, at equal intervals of a period."""
 
@@ -22,7 +23,7 @@ class Motion:
     """How the path's end joins its start: "restart" jumps, "back" goes the way back, "loop" goes on
     straight to the start."""
 
-    @property
+    @cached_property
     def _knots_m(self) -> Points:
         if self.repeat == "back":
             return np.concatenate([self.path_m, self.path_m[-2::-1]])
