@@ -4,14 +4,12 @@ As in a crease, or in the shadow at the foot of something. Where a row or a colu
 off the straight line through its neighbours, which is what pixels take between them, it is halved.
 """
 
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.light._exchange import Exchange
-from transientcam_simulation.light._over_mirrors import OverMirrors
 from transientcam_simulation.light._patches import Cuts, Patches, contour
 from transientcam_simulation.scene import Scene, evenly, most_patches, patches_of
 
@@ -47,7 +45,7 @@ def graded(scene: Scene, per_side: int) -> Exchange:
         finer = _finer(exchange, first * (most / first) ** (step / _ROUNDS))
         if _count(finer) > len(exchange.patches):
             exchange = Exchange.between(scene, Patches.cut(scene, finer))
-    return replace(exchange, over_mirrors=OverMirrors.of(scene, exchange.patches))
+    return exchange.with_reflections()
 
 
 def _count(cuts: dict[int, Cuts]) -> int:

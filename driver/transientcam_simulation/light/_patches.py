@@ -56,6 +56,17 @@ class Patches:
             dict(zip(cells, np.cumsum([0, *counts]).tolist(), strict=False)),
         )
 
+    def at(self, scene: Scene, point: Points, surface: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return the patches whose middles are nearest to points on surfaces."""
+        found = np.zeros(len(point), dtype=np.intp)
+        for index, cells in self.cells.items():
+            mine = surface == index
+            if mine.any():
+                near, weight = scene.surfaces[index].shape.between_cells(point[mine], cells)
+                nearest = np.take_along_axis(near, weight.argmax(axis=1)[:, None], axis=1)
+                found[mine] = self.first[index] + nearest[:, 0]
+        return found
+
     def moved(self, by_m: Points) -> "Patches":
         """Return them where surfaces (S, 3) are moved."""
         by_m = by_m[self.surface]
