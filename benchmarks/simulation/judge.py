@@ -22,7 +22,7 @@ from transientcam_simulation.effects import EFFECTS, LightEffect
 from transientcam_simulation.emulated import world_of
 from transientcam_simulation.scene import Scene
 
-_CERTAIN = 2  # standard errors of the tracer
+_CERTAIN = 3  # standard errors of the tracer: what chance puts beyond, in 0.3 % of the moments
 
 Values = NDArray[np.float64]
 
@@ -31,8 +31,8 @@ class Verdict(NamedTuple):
     """The simulation less the tracer, in units of the noise, over pixels that any light reaches.
 
     ``error`` is the tracer's own, ``beyond_half`` the share of pixels that differ by more than
-    half the noise and twice their error; ``missing`` are the kinds of light that the simulation
-    says it cannot make, with their sizes.
+    half the noise and three times their error; ``missing`` are the kinds of light that the
+    simulation says it cannot make, with their sizes.
     """
 
     scene: str

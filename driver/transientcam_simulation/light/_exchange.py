@@ -47,12 +47,15 @@ class Exchange:
         return cls.between(scene, Patches.of(scene, per_side), mirrors=mirrors)
 
     @classmethod
-    def between(cls, scene: Scene, patches: Patches, *, mirrors: bool = False) -> "Exchange":
+    def between(
+        cls, scene: Scene, patches: Patches, *, mirrors: bool = False, moves: bool = True
+    ) -> "Exchange":
         """Compute form factors and distances between patches, and the direct light on each.
 
-        ``mirrors``: also of what patches see of each other in mirrors and by gloss.
+        ``mirrors``: also of what patches see of each other in mirrors and by gloss. ``moves``:
+        patches count as seen or hidden by their middles, which takes less time.
         """
-        factors = form_factors(scene, patches, patches.centre, patches.normal)
+        factors = form_factors(scene, patches, patches.centre, patches.normal, shares=not moves)
         squared = np.maximum(
             np.sum(patches.centre**2, 1)[:, None]
             + np.sum(patches.centre**2, 1)
@@ -192,15 +195,7 @@ def _spread(
 
 def _direct(scene: Scene, patches: Patches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Direct light on samples of each patch, as the share of the patch's radiosity it makes."""
-    middles = (2 * np.arange(_SAMPLES) + 1) / (2 * _SAMPLES)
-    u, w = (grid.ravel() for grid in np.meshgrid(middles, middles))
-    c = patches.corners
-    points = (
-        np.einsum("s,nc->nsc", (1 - u) * (1 - w), c[:, 0])
-        + np.einsum("s,nc->nsc", u * (1 - w), c[:, 1])
-        + np.einsum("s,nc->nsc", u * w, c[:, 2])
-        + np.einsum("s,nc->nsc", (1 - u) * w, c[:, 3])
-    ).reshape(-1, 3)
+    points = patches.places(_SAMPLES).reshape(-1, 3)
     surface = np.repeat(patches.surface, _SAMPLES**2)
     points = _onto(scene, points, surface)
     normal = normals_at(scene, points, surface)
