@@ -44,12 +44,13 @@ def graded(scene: Scene, per_side: int) -> Exchange:
         for k, cells in patches.cells.items()
     }
     first = _count(cuts)
-    exchange = Exchange.between(scene, Patches.cut(scene, cuts), moves=False)
+    exchange = Exchange.between(scene, Patches.cut(scene, cuts))
     for step in range(1, _ROUNDS + 1):
         # the same share more in each round, so that what is off most is halved most often
         finer = _finer(exchange, first * (most / first) ** (step / _ROUNDS))
-        if _count(finer) > len(exchange.patches):
-            exchange = Exchange.between(scene, Patches.cut(scene, finer), moves=False)
+        last = step == _ROUNDS
+        if last or _count(finer) > len(exchange.patches):
+            exchange = Exchange.between(scene, Patches.cut(scene, finer), moves=not last)
     return exchange.with_reflections()
 
 
