@@ -1,6 +1,6 @@
 """Light that patches of surfaces give each other, with its times of flight."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import BIN_S, Scatter, ask
+from transientcam_simulation.light._over_gloss import NO_GLOW, Glow, between_patches
 from transientcam_simulation.light._over_mirrors import NOTHING, OverMirrors
 from transientcam_simulation.light._patches import Patches, form_factors
 from transientcam_simulation.light._paths import image_lights, light_on, normals_at, scatter_of
@@ -26,7 +27,8 @@ class Exchange:
     ``factors``, ``distance_m``: (N, N) form factors, receivers first, and distances.
     ``delay_s``, ``radiosity``: (K, N, S) direct light on S samples of each patch by each chain of
     mirrors, and what it gives on.
-    ``over_mirrors``: what mirrors show patches of each other.
+    ``over_mirrors``, ``over_gloss``: what mirrors and glossy surfaces show patches of each other,
+    and ``glow`` what these show them of the lamp.
     """
 
     scene: Scene
@@ -35,7 +37,9 @@ class Exchange:
     distance_m: NDArray[np.float32]
     delay_s: NDArray[np.float64]
     radiosity: NDArray[np.float64]
-    over_mirrors: OverMirrors
+    over_mirrors: OverMirrors = NOTHING
+    over_gloss: OverMirrors = NOTHING
+    glow: Glow = NO_GLOW
 
     @classmethod
     def of(cls, scene: Scene, per_side: int, *, mirrors: bool = False) -> "Exchange":
@@ -43,12 +47,15 @@ class Exchange:
         return cls.between(scene, Patches.of(scene, per_side), mirrors=mirrors)
 
     @classmethod
-    def between(cls, scene: Scene, patches: Patches, *, mirrors: bool = False) -> "Exchange":
+    def between(
+        cls, scene: Scene, patches: Patches, *, mirrors: bool = False, moves: bool = True
+    ) -> "Exchange":
         """Compute form factors and distances between patches, and the direct light on each.
 
-        ``mirrors``: also of what patches see of each other in mirrors.
+        ``mirrors``: also of what patches see of each other in mirrors and by gloss. ``moves``:
+        patches count as seen or hidden by their middles, which takes less time.
         """
-        factors = form_factors(scene, patches, patches.centre, patches.normal)
+        factors = form_factors(scene, patches, patches.centre, patches.normal, shares=not moves)
         squared = np.maximum(
             np.sum(patches.centre**2, 1)[:, None]
             + np.sum(patches.centre**2, 1)
@@ -56,14 +63,27 @@ class Exchange:
             0,
         )
         delay_s, radiosity = _direct(scene, patches)
-        return cls(
+        exchange = cls(
             scene,
             patches,
             factors.astype(np.float32),
             np.sqrt(squared).astype(np.float32),
             delay_s,
             radiosity,
-            OverMirrors.of(scene, patches) if mirrors else NOTHING,
+        )
+        return exchange.with_reflections() if mirrors else exchange
+
+    def with_reflections(self) -> "Exchange":
+        """Add light over mirrors and by gloss, which what moves has none of."""
+        scene, patches = self.scene, self.patches
+        over_mirrors = OverMirrors.of(scene, patches)
+        if not any(each.gloss for each in scene.surfaces):
+            return replace(self, over_mirrors=over_mirrors)
+        return replace(
+            self,
+            over_mirrors=over_mirrors,
+            over_gloss=between_patches(scene, patches),
+            glow=Glow.of(scene, patches),
         )
 
     def bounces(self, tolerance: float) -> int:
@@ -81,6 +101,9 @@ class Exchange:
             ask()
             got = self.factors @ light.astype(np.float32)
             got = got + self.over_mirrors.irradiance(light, 0.0).real
+            got = got + self.over_gloss.irradiance(light, 0.0).real
+            if bounce == 0:
+                got = got + self.glow.irradiance(0.0, len(self.patches)).real
             light = self.patches.albedo * got
             highest.append(float(light.max(initial=0.0)))
             share = min(highest[-1] / highest[-2], 0.999) if highest[-2] else 0.0
@@ -97,17 +120,22 @@ class Exchange:
         ask()
         phase = np.float32(omega / SPEED_OF_LIGHT_M_S) * self.distance_m
         in_phase, quadrature = self.factors * np.cos(phase), self.factors * np.sin(phase)
+        self.over_mirrors.add(in_phase, quadrature, frequency_hz)
         total = np.zeros(len(self.patches), dtype=np.complex128)
-        for _bounce in range(bounces):
+        before = np.zeros(len(self.patches), dtype=np.complex64)
+        for bounce in range(bounces):
             ask()
             given = (light * transfer).astype(np.complex64)
             of_real, of_imag = given.real.copy(), given.imag.copy()
             got = (in_phase @ of_real - quadrature @ of_imag) + 1j * (
                 in_phase @ of_imag + quadrature @ of_real
             )
-            got = got + self.over_mirrors.irradiance(given, frequency_hz)
+            # light over a glossy surface has met one surface more
+            got = got + self.over_gloss.irradiance(before, frequency_hz)
+            if bounce == 0:
+                got = got + self.glow.irradiance(frequency_hz, len(self.patches))
             total += got
-            light = self.patches.albedo * got
+            light, before = self.patches.albedo * got, given
         return total
 
     @cached_property
@@ -167,15 +195,7 @@ def _spread(
 
 def _direct(scene: Scene, patches: Patches) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Direct light on samples of each patch, as the share of the patch's radiosity it makes."""
-    middles = (2 * np.arange(_SAMPLES) + 1) / (2 * _SAMPLES)
-    u, w = (grid.ravel() for grid in np.meshgrid(middles, middles))
-    c = patches.corners
-    points = (
-        np.einsum("s,nc->nsc", (1 - u) * (1 - w), c[:, 0])
-        + np.einsum("s,nc->nsc", u * (1 - w), c[:, 1])
-        + np.einsum("s,nc->nsc", u * w, c[:, 2])
-        + np.einsum("s,nc->nsc", (1 - u) * w, c[:, 3])
-    ).reshape(-1, 3)
+    points = patches.places(_SAMPLES).reshape(-1, 3)
     surface = np.repeat(patches.surface, _SAMPLES**2)
     points = _onto(scene, points, surface)
     normal = normals_at(scene, points, surface)

@@ -35,6 +35,7 @@ _BEYOND, _OFF = 0.01, 0.4  # of the pixels, which coarser patches may put off by
 PAIR_S, TURNED_S = 3e-7, 3e-8  # processor time: of two patches, and of a moment between them, ...
 STILL_S, MOVING_S = 2e-8, 3e-8  # and of a moment on a pixel of what stands still, and moves
 _ROUGH_PATCHES = 6  # a side, to estimate interreflection
+_ROUGH_LOBE_RAYS = 8
 _ROUGH_ERROR = 1.5  # by which that may be too low
 
 
@@ -339,7 +340,13 @@ class SceneFacts:
         """Return the brightness of light over several surfaces."""
         exchange, (height, width) = self._exchange(seen.scene, per_side), self._shape
         light = Interreflection(
-            seen.scene, seen.lits[0], width=width, height=height, exchange=exchange
+            seen.scene,
+            seen.lits[0],
+            width=width,
+            height=height,
+            exchange=exchange,
+            rays=None if self._scene.moves else self._rays(self._camera),
+            lobe_rays=_ROUGH_LOBE_RAYS,
         )
         brightness: Values = light.moments(0.0).real.ravel()
         return brightness

@@ -4,17 +4,16 @@ As in a crease, or in the shadow at the foot of something. Where a row or a colu
 off the straight line through its neighbours, which is what pixels take between them, it is halved.
 """
 
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.light._exchange import Exchange
-from transientcam_simulation.light._over_mirrors import OverMirrors
 from transientcam_simulation.light._patches import Cuts, Patches, contour
-from transientcam_simulation.scene import Scene, evenly, most_patches, patches_of
+from transientcam_simulation.scene import Rectangle, Scene, evenly, most_patches, patches_of
 
+Values = NDArray[np.float64]
 _OFF: Final = 1e-3
 """Of the highest radiosity: a tenth of the noise of a moment of some thousand electrons."""
 _FIRST_PER_SIDE: Final = 12  # patches along the longest side, at first
@@ -24,6 +23,8 @@ _BOUNCES: Final = 2  # judged
 _AFFORDED: Final = 1500  # patches, at most so many times as many as the scene says
 _TIMES: Final = 8
 _HIGHEST_HZ: Final = 150e6
+_TOUCHES: Final = 1e-6  # of a plane's size
+_NEAR: Final = 0.25  # of the mean distance of cuts
 _LEAST: Final = 1e-6  # share of the view, of patches that are halved where not all can be, ...
 _HIGHER: Final = 1.25  # and how much larger they are next
 
@@ -37,7 +38,9 @@ def graded(scene: Scene, per_side: int) -> Exchange:
     most = min(max(equal, min(_AFFORDED, _TIMES * equal)), most_patches(scene))
     patches = Patches.of(scene, min(per_side, max(_FIRST_PER_SIDE, per_side // 2)))
     cuts = {
-        k: (evenly(max(_FEWEST, cells.rows)), evenly(max(_FEWEST, cells.columns)))
+        k: _where_others_stand(
+            scene, k, evenly(max(_FEWEST, cells.rows)), evenly(max(_FEWEST, cells.columns))
+        )
         for k, cells in patches.cells.items()
     }
     first = _count(cuts)
@@ -45,9 +48,42 @@ def graded(scene: Scene, per_side: int) -> Exchange:
     for step in range(1, _ROUNDS + 1):
         # the same share more in each round, so that what is off most is halved most often
         finer = _finer(exchange, first * (most / first) ** (step / _ROUNDS))
-        if _count(finer) > len(exchange.patches):
-            exchange = Exchange.between(scene, Patches.cut(scene, finer))
-    return replace(exchange, over_mirrors=OverMirrors.of(scene, exchange.patches))
+        last = step == _ROUNDS
+        if last or _count(finer) > len(exchange.patches):
+            exchange = Exchange.between(scene, Patches.cut(scene, finer), moves=not last)
+    return exchange.with_reflections()
+
+
+def _where_others_stand(scene: Scene, index: int, up: Values, along: Values) -> Cuts:
+    """Cut a plane also along edges of other ones that stand on it: light changes at once there."""
+    plane = scene.surfaces[index].shape
+    if not isinstance(plane, Rectangle):
+        return up, along
+    cuts = {"up": up, "along": along}
+    for other in scene.surfaces:
+        if other is scene.surfaces[index] or not isinstance(other.shape, Rectangle):
+            continue
+        off = other.shape.extent() - plane.centre
+        stands = np.abs(off @ plane.normal) < _TOUCHES * max(plane.width, plane.height)
+        x, y = off @ plane.right / (plane.width / 2), off @ plane.up / (plane.height / 2)
+        for corner in range(4):
+            pair = [corner, (corner + 1) % 4]
+            if not stands[pair].all():
+                continue
+            for name, at in (("along", x[pair]), ("up", y[pair])):
+                if abs(at[1] - at[0]) < _TOUCHES and abs(at[0]) < 1:
+                    cuts[name] = _cut_at(cuts[name], at[0])
+    return cuts["up"], cuts["along"]
+
+
+def _cut_at(cuts: Values, place: float) -> Values:
+    """Cut there too, or move the cut that is near to it."""
+    off = np.abs(cuts - place)
+    near = 1 + int(off[1:-1].argmin())
+    beside = off.min() < _NEAR * (2 / (len(cuts) - 1))
+    if beside and off[near] > off.min():  # the plane's own end
+        return cuts
+    return np.sort(np.append(np.delete(cuts, near) if beside else cuts, place))
 
 
 def _count(cuts: dict[int, Cuts]) -> int:

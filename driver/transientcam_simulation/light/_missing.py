@@ -6,7 +6,7 @@ for the kind of way it took: over a mirror between two scattering surfaces, by g
 but the lamp, over more surfaces than the scene's file allows, or as radiosity follows it.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,12 @@ from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import ask
 from transientcam_simulation.effects import Glimpse, Values
 from transientcam_simulation.light._graded import graded
+from transientcam_simulation.light._over_gloss import (
+    around,
+    of_surfaces,
+    sent_by_gloss,
+    some,
+)
 from transientcam_simulation.light._paths import (
     RayEnds,
     first_scattering,
@@ -26,7 +32,7 @@ from transientcam_simulation.light._paths import (
 )
 from transientcam_simulation.light._radiosity import Interreflection
 from transientcam_simulation.light._variants import without_scattering
-from transientcam_simulation.scene import Points, Scene
+from transientcam_simulation.scene import Ellipsoid, Points, Scene
 
 PIXELS = 64
 """At all times of a scene's life together."""
@@ -67,9 +73,10 @@ class SampledWays:
         # each half has places of its own for the first direction, shifted for each pixel
         shifts = random.random((len(ends.ray), 2, 1, 2))
         places = ((shifts + np.arange(paths)[:, None] * _PLASTIC) % 1.0).reshape(-1, 2)
-        ends = _some(ends, np.repeat(np.arange(len(ends.ray)), 2 * paths))
+        ends = some(ends, np.repeat(np.arange(len(ends.ray)), 2 * paths))
         slot = ends.ray + pixels * (np.arange(len(ends.ray)) // paths % 2)
         length_m, weight = ends.distance_m, ends.throughput / paths
+        curved = np.array([isinstance(each.shape, Ellipsoid) for each in scene.surfaces])
         over, glossy = np.zeros((2, len(slot)), dtype=bool)
         lights, most = tuple(image_lights(scene)), scene.transport.diffuse_bounces
         found: list[tuple[NDArray[np.intp], Values, Values, NDArray[np.intp]]] = []
@@ -84,13 +91,16 @@ class SampledWays:
             over, glossy = over[on] | (ends.direction != way[on]).any(axis=1), glossy[on] | lobe[on]
             slot, weight, length_m = slot[on], sent[on], length_m[on] + ends.distance_m
             normal = normals_at(scene, ends.point, ends.surface)
-            albedo = ends.throughput * _of(scene, "reflectivity")[ends.surface]
+            albedo = ends.throughput * of_surfaces(scene, "reflectivity")[ends.surface]
             cut = _BOUNCES if most is not None and further > most else min(further - 1, _FOLLOWED)
-            kind = np.where(glossy, _GLOSS, np.where(over & moves, _MIRRORS, cut))
+            if moves:
+                cut = np.where(glossy, _GLOSS, np.where(over, _MIRRORS, cut))
+            kind = np.broadcast_to(cut, len(slot))
             for light in lights:
                 far_m, irradiance = light_on(scene, light, ends.point, normal)
                 gloss = highlight(scene, light, ends, normal)
-                for sends, by in ((albedo, kind), (gloss, np.full(len(gloss), _GLOSS))):
+                shines = np.where(moves | curved[ends.surface], _GLOSS, kind)
+                for sends, by in ((albedo, kind), (gloss, shines)):
                     brings = weight * irradiance * sends
                     lit = brings > 0
                     found.append((slot[lit], length_m[lit] + far_m[lit], brings[lit], by[lit]))
@@ -132,7 +142,9 @@ class SampledWays:
         scene = without_scattering(replace(self.scene, transport=once))
         lit = light_rays(scene, self.rays)
         exchange = graded(scene, scene.transport.patches)
-        patches = Interreflection(scene, lit, width=len(lit.surface), height=1, exchange=exchange)
+        patches = Interreflection(
+            scene, lit, width=len(lit.surface), height=1, exchange=exchange, rays=self.rays
+        )
         seen = patches.moments(frequency_hz)[0]
         one, other = self._moments(_FIRST, frequency_hz)
         power = _power(one - seen, other - seen)
@@ -166,29 +178,11 @@ def _sent_on(
 ) -> tuple[Points, Values, NDArray[np.bool_]]:
     """Directions, the share of light that goes on so, and whether gloss sends it."""
     normal = normals_at(scene, ends.point, ends.surface)
-    albedo, gloss, power = (
-        _of(scene, name)[ends.surface] for name in ("reflectivity", "gloss", "gloss_exponent")
-    )
+    albedo, gloss = (of_surfaces(scene, name)[ends.surface] for name in ("reflectivity", "gloss"))
     part = np.divide(gloss, albedo + gloss, out=np.zeros(len(gloss)), where=gloss > 0)
     lobe = choice < part
-    cosine = np.where(lobe, places[:, 0] ** (1 / (power + 1)), np.sqrt(places[:, 0]))
-    across = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    turn, sine = 2 * np.pi * places[:, 1:], np.sqrt(1 - cosine**2)[:, None]
-    aside = np.cos(turn) * across + np.sin(turn) * np.cross(normal, across)
-    axis = cosine[:, None] * normal + sine * aside
-    facing = -np.einsum("pc,pc->p", axis, ends.direction)
-    way = np.where(lobe[:, None], ends.direction + 2 * facing[:, None] * axis, axis)
-    rising = np.einsum("pc,pc->p", way, normal).clip(0)
-    of_lobe = gloss * (power + 8) / (power + 1) * facing.clip(0) * rising
-    share = np.divide(of_lobe, part, out=np.zeros(len(part)), where=lobe)
-    share = np.where(lobe, share, albedo / np.maximum(1 - part, 1e-12))
-    return way, np.where(rising > 0, share, 0.0), lobe
-
-
-def _of(scene: Scene, name: str) -> Values:
-    return np.array([getattr(surface, name) for surface in scene.surfaces], dtype=float)
-
-
-def _some(ends: RayEnds, index: NDArray[np.intp]) -> RayEnds:
-    return RayEnds(*(getattr(ends, each.name)[index] for each in fields(ends)))
+    way = around(normal, np.sqrt(places[:, 0]), places[:, 1])
+    share = albedo / np.maximum(1 - part, 1e-12)
+    mirrored, of_lobe = sent_by_gloss(scene, ends, normal, places)
+    way[lobe], share[lobe] = mirrored[lobe], of_lobe[lobe] / part[lobe]
+    return way, share, lobe

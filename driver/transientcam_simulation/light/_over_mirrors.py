@@ -37,6 +37,14 @@ class OverMirrors:
                     found += _seen(scene, patches, chain)
         return cls(*map(np.concatenate, zip(*found, strict=True))) if found else NOTHING
 
+    def add(
+        self, in_phase: NDArray[np.float32], quadrature: NDArray[np.float32], frequency_hz: float
+    ) -> None:
+        """Add form factors, turned by their times of flight, to those of patches without."""
+        phase = 2 * np.pi * frequency_hz / SPEED_OF_LIGHT_M_S * self.distance_m
+        np.add.at(in_phase, (self.to, self.by), self.factors * np.cos(phase))
+        np.add.at(quadrature, (self.to, self.by), self.factors * np.sin(phase))
+
     def irradiance(self, given: NDArray[np.number], frequency_hz: float) -> NDArray[np.complex128]:
         """Moments (N) of what patches get of the radiosity that patches give."""
         turn = np.exp(2j * np.pi * frequency_hz / SPEED_OF_LIGHT_M_S * self.distance_m)

@@ -12,6 +12,8 @@ from transientcam_simulation.scene import Cells, Points, Scene, cells_of, evenly
 Cuts = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Where a surface is cut over its height, and over its width or longitude."""
 _BLOCK = 1 << 18  # segments at a time
+_PLACES = 4  # a side, of a patch that is seen in part
+_OFF_M = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +58,29 @@ class Patches:
             dict(zip(cells, np.cumsum([0, *counts]).tolist(), strict=False)),
         )
 
+    def places(self, count: int) -> Points:
+        """Return evenly spread places (N, count^2, 3) on them."""
+        middles, c = (2 * np.arange(count) + 1) / (2 * count), self.corners
+        u, w = (grid.ravel() for grid in np.meshgrid(middles, middles))
+        places: Points = (
+            np.einsum("s,nc->nsc", (1 - u) * (1 - w), c[:, 0])
+            + np.einsum("s,nc->nsc", u * (1 - w), c[:, 1])
+            + np.einsum("s,nc->nsc", u * w, c[:, 2])
+            + np.einsum("s,nc->nsc", (1 - u) * w, c[:, 3])
+        )
+        return places
+
+    def at(self, scene: Scene, point: Points, surface: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return the patches whose middles are nearest to points on surfaces."""
+        found = np.zeros(len(point), dtype=np.intp)
+        for index, cells in self.cells.items():
+            mine = surface == index
+            if mine.any():
+                near, weight = scene.surfaces[index].shape.between_cells(point[mine], cells)
+                nearest = np.take_along_axis(near, weight.argmax(axis=1)[:, None], axis=1)
+                found[mine] = self.first[index] + nearest[:, 0]
+        return found
+
     def moved(self, by_m: Points) -> "Patches":
         """Return them where surfaces (S, 3) are moved."""
         by_m = by_m[self.surface]
@@ -68,11 +93,14 @@ class Patches:
         return replace(self, **{name: getattr(self, name)[of] for name in lines})
 
 
-def form_factors(scene: Scene, patches: Patches, at: Points, normal: Points) -> NDArray[np.float64]:
+def form_factors(
+    scene: Scene, patches: Patches, at: Points, normal: Points, *, shares: bool = False
+) -> NDArray[np.float64]:
     """Irradiance (P, N) at points by each patch of radiosity 1: Lambert's contour integral.
 
     Patches that face away, stand behind the point's surface, or are hidden, give nothing. A patch
-    that the point's horizon cuts counts by its centre.
+    that the point's horizon cuts counts by its centre. ``shares``: one that is hidden and beside
+    one that is not, or the other way, counts by the share of its places that are seen.
     """
     factors = np.zeros((len(at), len(patches)))
     rows = max(1, _BLOCK // max(1, len(patches)))
@@ -86,11 +114,37 @@ def form_factors(scene: Scene, patches: Patches, at: Points, normal: Points) -> 
         p, n = np.nonzero(towards & back)
         if hides:
             clear = ~_blocked(scene, patches, at[block][p], n)
-            p, n = p[clear], n[clear]
+            seen = np.full(way.shape[:2], np.nan)
+            seen[p, n] = clear
+            if shares:
+                _share(scene, patches, at[block], seen)
+            p, n = np.nonzero(seen > 0)
         factors[block][p, n] = contour(
             patches.corners[n] - at[block][p][:, None, :], normal[block][p]
         )
+        if hides:
+            factors[block][p, n] *= seen[p, n]
     return factors
+
+
+def _share(scene: Scene, patches: Patches, at: Points, seen: NDArray[np.float64]) -> None:
+    """Put in shares (P, N) of what is seen at the edges between 0 and 1; NaN is of no account."""
+    edge = np.zeros(seen.shape, dtype=bool)
+    for k, cells in patches.cells.items():
+        mine = slice(patches.first[k], patches.first[k] + len(cells.centre))
+        of = seen[:, mine].reshape(-1, cells.rows, cells.columns)
+        at_edge = np.zeros(of.shape, dtype=bool)
+        for axis in (1, 2):
+            values, marked = np.moveaxis(of, axis, 0), np.moveaxis(at_edge, axis, 0)
+            differ = np.abs(values[1:] - values[:-1]) > 0
+            marked[1:] |= differ
+            marked[:-1] |= differ
+        edge[:, mine] = at_edge.reshape(len(seen), -1)
+    p, n = np.nonzero(edge)
+    total = np.zeros(len(p))
+    for point in patches.places(_PLACES).swapaxes(0, 1):
+        total += ~blocked(scene, at[p], point[n] + _OFF_M * patches.normal[n])
+    seen[p, n] = total / _PLACES**2
 
 
 def _blocked(

@@ -6,8 +6,9 @@ flight. Moments are therefore sums over all paths between patches, at exactly th
 requested; nothing is binned.
 """
 
+from collections.abc import Callable
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +17,15 @@ from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import BIN_S, Responses
 from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._followed import Within
+from transientcam_simulation.light._over_gloss import LOBE_RAYS, ShownByGloss
 from transientcam_simulation.light._patches import Patches
 from transientcam_simulation.light._paths import Lit
-from transientcam_simulation.scene import Bilinear, Scene
+from transientcam_simulation.light._rays import rays_within
+from transientcam_simulation.scene import Bilinear, Points, Scene
 
 _CENTROID_HZ = 1e5  # low enough that a phase is proportional to the mean delay
+InGloss = Callable[[NDArray[np.complexfloating], float], Any]
+_LOBES = 32  # rays in a pixel whose gloss is followed
 _HISTOGRAM_PATCHES = 12  # a side, for the impulse response of a pixel
 
 
@@ -67,6 +72,8 @@ class Interreflection:
     ``tolerance``: brightness that light may lack, where the scene does not say how far it is
     followed.
     ``exchange``: light between the scene's patches, where that is known.
+    ``rays``: (P, 3) of the camera where gloss is to show them what stands before it, each in up to
+    ``lobe_rays`` directions.
     """
 
     def __init__(
@@ -79,6 +86,8 @@ class Interreflection:
         fine: tuple[Within, ...] = (),
         tolerance: float = 1e-4,
         exchange: Exchange | None = None,
+        rays: Points | None = None,
+        lobe_rays: int = LOBE_RAYS,
     ) -> None:
         self._scene = scene
         self._lit = lit
@@ -89,6 +98,34 @@ class Interreflection:
         patches = self._exchange.patches
         self._ends = Gathering(scene, patches, lit)
         self._ends_of_fine = [Gathering(scene, patches, each.rays) for each in fine]
+        self._shown = None if rays is None else self._seen_in_gloss(rays, lobe_rays)
+        self._shown_of_fine = [
+            None if self._shown is None else self._seen_in_gloss(*self._few_rays(each))
+            for each in fine
+        ]
+
+    def _few_rays(self, within: Within) -> tuple[Points, int]:
+        """Return some of the rays in pixels, and into how many directions their lobes go."""
+        camera, (height, width) = self._scene.camera, self._shape
+        assert camera is not None  # noqa: S101  (a scene of surfaces has one)
+        count = len(within.rays.surface) // within.pixel.size
+        rays = rays_within(camera, within.pixel, count, width=width, height=height)
+        step = max(1, count // _LOBES)
+        few = rays.reshape(count, -1, 3)[::step].reshape(-1, 3)
+        return few, max(1, LOBE_RAYS * within.pixel.size // len(few))
+
+    def _seen_in_gloss(self, rays: Points, lobe_rays: int) -> InGloss | None:
+        shown = ShownByGloss.of(self._scene, rays, lobe_rays)
+        if shown is None:
+            return None
+        ends = Gathering(self._scene, self._exchange.patches, shown.lit)
+        scatter, lit = shown.lit.scatter(self._scene), shown.lit
+
+        def moments(irradiance: NDArray[np.complexfloating], frequency_hz: float) -> Any:
+            seen = lit.moments(frequency_hz, scatter) + ends.moments(irradiance, frequency_hz)
+            return shown.of_rays(seen, frequency_hz, len(rays))
+
+        return moments
 
     def moments(self, frequency_hz: float) -> NDArray[np.complex128]:
         """``int g(tau) exp(2 pi i f tau) dtau`` of this light, (H, W)."""
@@ -102,9 +139,18 @@ class Interreflection:
     def _moments(self, frequency_hz: float) -> NDArray[np.complex128]:
         irradiance = self._exchange.irradiance(frequency_hz, self._bounces)
         moments = self._ends.moments(irradiance, frequency_hz)
-        for each, ends in zip(self._fine, self._ends_of_fine, strict=True):
+        earlier = irradiance
+        if self._shown is not None:
+            if self._scene.transport.diffuse_bounces is not None:  # gloss is one more
+                earlier = self._exchange.irradiance(frequency_hz, self._bounces - 1)
+            moments += self._shown(earlier, frequency_hz)
+        for each, ends, shown in zip(
+            self._fine, self._ends_of_fine, self._shown_of_fine, strict=True
+        ):
             of_rays = ends.moments(irradiance, frequency_hz)
             moments[each.pixel] = each.of_pixels(of_rays).mean(axis=0)
+            if shown is not None:
+                moments[each.pixel] += each.of_pixels(shown(earlier, frequency_hz)).mean(axis=0)
         return moments.reshape(self._shape)
 
     @cached_property

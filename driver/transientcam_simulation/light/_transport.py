@@ -251,6 +251,7 @@ class SurfaceScenery:
                     fine=still.fine,
                     tolerance=tolerance,
                     exchange=followed.exchange,
+                    rays=still.rays,
                 )
                 responses = WithInterreflection(responses, light)
             view = View(responses.moments, lambda: reflectance)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.camera import Sensor
 from transientcam_driver.errors import SceneError
+from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_driver.texts import read_text
 from transientcam_simulation.base import (
     PROFILES,
@@ -309,11 +310,15 @@ def _motions(tables: list[Table]) -> dict[str, Motion]:
         name = table.text("name")
         if name in motions:
             raise table.error("name", name, "a name that no other motion has")
-        motions[name] = Motion(
+        motion = motions[name] = Motion(
             path_m=table.vectors("path_m", least=2),
             period_s=table.number("period_s", least=1e-6, most=1e9),
             repeat=table.choice("repeat", get_args(Repeat), "restart"),
         )
+        if motion.speed_m_s > SPEED_OF_LIGHT_M_S:
+            longer = motion.period_s * motion.speed_m_s / SPEED_OF_LIGHT_M_S
+            limit = f"of at least {longer:.3g}, or path_m is faster than light"
+            raise table.error("period_s", motion.period_s, limit)
         table.done()
     return motions
 

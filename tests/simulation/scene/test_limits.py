@@ -16,7 +16,7 @@ from transientcam_simulation.base import giving_up_by
 from transientcam_simulation.emulated._build import world_of
 from transientcam_simulation.light._exchange import Exchange
 from transientcam_simulation.light._patches import Patches
-from transientcam_simulation.scene import Scene, parse_scene
+from transientcam_simulation.scene import Scene, list_scenes, parse_scene
 from transientcam_simulation.scene._limits import MOST_PATCHES, patches_of
 
 EVERYTHING = """
@@ -148,8 +148,8 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         yield from places(each, (*path, key))
 
 
-def with_number(path: tuple[Any, ...], number: float) -> str:
-    document = copy.deepcopy(DOCUMENT)
+def with_number(document: dict[str, Any], path: tuple[Any, ...], number: float) -> str:
+    document = copy.deepcopy(document)
     table: Any = document
     for key in path[:-1]:
         table = table[key]
@@ -178,27 +178,52 @@ def require_images(scene: Scene) -> None:
     json.dumps(world.explain("own").to_document(), allow_nan=False)
 
 
+DOCUMENTS = {
+    info.name: tomllib.loads(info.path.read_text()) | {"name": "changed"}
+    for info in list_scenes()
+    if info.name != "measured"  # which names files
+} | {"everything": DOCUMENT}
 CENTRE = ("surface", 2, "centre_m", 0)
 ABSURD = (1e308, -1e308, 5e-324, -1e-308, 1e-30, 1e-12, 0.0, -1.0, 1e6, -1e6, 1e-6, 1e15, 2**63)
 """Where sums, squares and quotients leave what a float holds, and what is still allowed."""
 
 
 @settings(max_examples=40, deadline=None)
-@given(place=st.sampled_from(list(places(DOCUMENT))), number=st.sampled_from(ABSURD))
-@example(place=CENTRE, number=1e308)
-@example(place=CENTRE, number=-1e6)
-@example(place=("light", "electrons_per_s"), number=1e15)
-@example(place=("surface", 0, "radius_m"), number=1e-6)
-@example(place=("surface", 1, "radii_m", 2), number=1e6)
+@given(place=st.sampled_from(list(places(DOCUMENTS))), number=st.sampled_from(ABSURD))
+@example(place=("everything", *CENTRE), number=1e308)
+@example(place=("everything", *CENTRE), number=-1e6)
+@example(place=("everything", "light", "electrons_per_s"), number=1e15)
+@example(place=("everything", "surface", 0, "radius_m"), number=1e-6)
+@example(place=("everything", "surface", 1, "radii_m", 2), number=1e6)
+@example(place=("corner", "surface", 0, "centre_m", 0), number=1e6)
+@example(place=("visitor", "motion", 0, "period_s"), number=1e-6)
 def test_every_finite_number_works_or_is_refused_in_words(
     place: tuple[Any, ...], number: float
 ) -> None:
-    found = parsed_or_refused(with_number(place, number))
+    """In every field of every built-in scene."""
+    found = parsed_or_refused(with_number(DOCUMENTS[place[0]], place[1:], number))
     if isinstance(found, SceneError):
         assert found.key
         assert found.allowed
-    else:
+    elif place[0] == "everything":  # what else is taken has the same fields, and more patches
         require_images(found)
+
+
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_no_field_takes_a_number_beyond_all_bounds(name: str) -> None:
+    for place, number in zip(
+        places(DOCUMENTS[name]), itertools.cycle((1e308, -1e308)), strict=False
+    ):
+        found = parsed_or_refused(with_number(DOCUMENTS[name], place, number))
+        assert isinstance(found, SceneError), place
+        assert found.value is not None
+
+
+def test_nothing_moves_faster_than_light() -> None:
+    quick = tomllib.loads(with_number(DOCUMENTS["visitor"], ("motion", 0, "period_s"), 1e-6))
+    fast = with_number(quick, ("motion", 0, "path_m", 0, 0), 1e3)
+    with pytest.raises(SceneError, match=r"motion\[0\].period_s"):
+        parse_scene(fast)
 
 
 @pytest.mark.parametrize(
