@@ -44,6 +44,8 @@ TAIL_VARIANCE, LENGTH_VARIANCE = 25, 26
 PLANES: Final = 27
 STEPS: Final = (4, 8, 10)
 """Of the fits of one, two and three returns."""
+LATE_STEPS: Final = 60
+"""Of fits of two and three returns that go on, or begin anew, where noise isn't all they leave."""
 TAIL_STEPS: Final = 10
 MORE_TAIL_STEPS: Final = 5
 """Of the fit of each further shape, which begins with what the one before found."""
@@ -152,11 +154,15 @@ def offer_returns(
 
 
 def split(x2: Bank, y2: Bank, w2: Bank, cosine: float, sine: float, xs: Bank, ys: Bank) -> None:
-    """Put two points in `xs` and `ys`, as far before the stronger one of two returns as behind."""
+    """Put two points in `xs` and `ys`, as far before the stronger one of two returns as behind.
+
+    The third one is that of the other return.
+    """
     first = w2[0] >= w2[1]
     x, y = select(first, x2[0], x2[1]), select(first, y2[0], y2[1])
     xs[0], ys[0] = x * cosine + y * sine, y * cosine - x * sine
     xs[1], ys[1] = x * cosine - y * sine, y * cosine + x * sine
+    xs[2], ys[2] = select(first, x2[1], x2[0]), select(first, y2[1], y2[0])
 
 
 def missed(cost: Array, free: Array) -> Any:
