@@ -211,7 +211,7 @@ def offer_tail(
     better = (score < found[SCORE]) & allowed
     zero = 0.0 * cost
     spread = bank(cost, unknowns, 0)
-    tail.deviations(order, power, unknowns, weight, prior, w, v, d, spread)
+    common = tail.deviations(order, power, unknowns, weight, prior, w, v, d, spread)
     found[X], found[Y] = select(better, x, found[X]), select(better, y, found[Y])
     found[WEIGHT] = select(better, w, found[WEIGHT])
     for k in range(1, MOST_RETURNS):
@@ -228,7 +228,14 @@ def offer_tail(
     found[PHASE_VARIANCE] = select(better, spread[2], found[PHASE_VARIANCE])
     found[LENGTH_VARIANCE] = select(better, spread[3], found[LENGTH_VARIANCE])
     score = chi_square + 4.0 * penalty - (3.0 * MARGIN - 2.0 * math.log(shapes))
-    join(phase_of(x, y), spread[2], score, allowed & (v > 0.0), found)
+    allowed = allowed & (v > 0.0)
+    join(phase_of(x, y), spread[2], score, allowed, found)
+    # the same without light at its beginning, as wax has it, as far as the fit is linear
+    slope = common / larger(spread[0], least(spread[0]))
+    moved = larger(smaller(slope * w, 1.0 + zero), -1.0 + zero)
+    square = larger(spread[2] - slope * common, zero)
+    lost = w * w / larger(spread[0], least(spread[0]))
+    join(phase_of(x, y) - moved, square, score + lost - penalty + MARGIN, allowed, found)
 
 
 def bar_of_returns(unknowns: int, penalty: Array, found: Bank) -> Array:
