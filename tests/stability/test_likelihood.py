@@ -41,7 +41,8 @@ def least_chi_square(b: Array, std: float, truth: Array, count: int) -> float:
 
     bounds = (np.r_[np.full(count, -9.0), np.zeros(count)], np.full(2 * count, 20.0))
     starts = [truth, truth * random.uniform(0.7, 1.4, 2 * count)]
-    return float(min(2 * least_squares(left, each, slopes, bounds).cost for each in starts))
+    jac: Any = slopes  # SciPy's stubs know names of methods alone
+    return float(min(2 * least_squares(left, each, jac, bounds).cost for each in starts))
 
 
 @pytest.mark.parametrize("std", [3.5e-2, 3.5e-3, 7e-4, 1.4e-4])
