@@ -104,7 +104,7 @@ _ALL: Final = (
     ),
     Measurement("estimators.corner_strip:draw"),
     # -- likelihood
-    Measurement("likelihood.sparse", "measured/likelihood", _MOMENTS),
+    Measurement("likelihood.limit", "measured/limit", _MOMENTS, timed=False),
     Measurement("likelihood.captures", "measured/likelihood", _MOMENTS),
     Measurement("likelihood.shapes", "measured/likelihood", _MOMENTS),
     Measurement("likelihood.neighbours", "measured/neighbours", _MOMENTS),

@@ -15,15 +15,14 @@ from benchmarks.likelihood.errors import (
     COLUMNS,
     ESTIMATORS,
     HEAD,
-    Array,
     Errors,
     captured,
     errors_of,
     ranges,
     turn_m,
 )
-from transientcam_driver import Sequence as Capture, Truth
-from transientcam_experiments.paper.bench import Bench, ReconstructedShot
+from transientcam_driver import Sequence as Capture
+from transientcam_experiments.paper.bench import Bench
 
 SCENES: Final = ("wall", "mirrors", "corner", "corner-left", "translucent")
 ORDERS: Final = (3, 4, 8)
@@ -34,12 +33,6 @@ MOST_OF_SHORT: Final = 4
 Zeroth = Literal["low-frequency", "estimated"]
 ZEROTHS: Final[tuple[Zeroth, ...]] = ("low-frequency", "estimated")
 SEED: Final = 1
-DIRECT_SHARE: Final = 0.1
-"""Light within a bin of the first return, over all: with less there is no direct return."""
-SOFT: Final = "corner-left"
-"""The scene half of whose pixels have no direct light."""
-SMOOTHING_BINS: Final = 2.0
-"""Of the response, in which the first maximum is looked for."""
 
 
 @dataclass
@@ -130,8 +123,6 @@ def _row(
     shot, gains, settings, truth = captured(bench, scene, sequence)
     base_hz = shot.base_frequency_hz
     found = ranges(shot.found.measured, settings, calibration=gains)
-    if scene == SOFT:
-        truth = with_maxima(shot, truth)
     errors = {
         ESTIMATORS[name]: errors_of(each, truth, turn_m(base_hz)) for name, each in found.items()
     }
@@ -147,31 +138,3 @@ def _row(
         f"{model.likelihood.explained()[shot.truth.lit].mean():.0%}",
         f"{np.nanmedian(std_mm):.1f}",
     )
-
-
-def with_maxima(shot: ReconstructedShot, range_m: Array) -> Array:
-    """Return true ranges (H, W), without direct light those of the first maximum of the light."""
-    found = range_m.copy()
-    for y, x in zip(*np.nonzero(shot.truth.lit), strict=True):
-        maximum = _without_direct(shot.truth, int(x), int(y))
-        if maximum is not None:
-            found[y, x] = maximum
-    return found
-
-
-def _without_direct(truth: Truth, x: int, y: int) -> float | None:
-    """Return the range of the first maximum of a response without direct light, else None."""
-    time_s, light = truth.impulse_response(x, y)
-    if light.size < 3 or not light.any():
-        return None
-    bin_s = float(time_s[1] - time_s[0])
-    near = np.abs(time_s - truth.delay_s[0, y, x]) < 1.5 * bin_s
-    if light[near].sum() > DIRECT_SHARE * light.sum():
-        return None
-    reach = np.arange(-8, 9)
-    smooth = np.convolve(light, np.exp(-0.5 * (reach / SMOOTHING_BINS) ** 2))[8:-8]
-    peak = (smooth[1:-1] > smooth[:-2]) & (smooth[1:-1] >= smooth[2:])
-    peak &= smooth[1:-1] > tm.Settings().threshold * smooth.max()
-    if not peak.any():
-        return None
-    return float(tm.SPEED_OF_LIGHT_M_S * time_s[1 + int(peak.argmax())] / 2)

@@ -46,7 +46,7 @@ class Responses:
 def tables() -> Iterator[Table]:
     """Measure the range of one return with a tail by each exponent, and of the other estimators."""
     data = data_folder()
-    responses = [*analytic(), *(() if data is None else measured(data)), *_rendered(data)]
+    responses = [*(() if data is None else measured(data)), *_rendered(data)]
     for m in ORDERS:
         table = Table(
             f"Tails of other shapes, m = {m}: median / 90 % / RMSE / bias, mm",
@@ -83,30 +83,6 @@ def _row(responses: Responses, m: int) -> tuple[str, ...]:
     explained = tm.likelihood(noisy, noise, model_error=MODEL_ERROR).explained().mean()
     cells = (str(errors_of(each, truth, turn_m(BASE_HZ))) for each in columns)
     return (responses.name, *cells, f"{explained:.0%}")
-
-
-def analytic(pixels: int = 1000) -> Iterator[Responses]:
-    """Yield a return with an exponential tail, with two tails, and with a box of light."""
-    random = np.random.default_rng(SEED)
-    step = 20e-12
-    time_s = np.arange(4000) * step
-    start = random.integers(100, 900, pixels)
-    since = time_s[None] - time_s[start][:, None]
-    delay = random.uniform(2e-9, 7e-9, pixels)[:, None]
-    share = random.uniform(0.3, 0.7, pixels)[:, None]
-    after = np.maximum(since, 0)
-    on = since >= 0
-
-    def made(name: str, tail: Array) -> Responses:
-        light = (1 - share) * tail / tail.sum(axis=1, keepdims=True)
-        light[np.arange(pixels), start] += share[:, 0]
-        return Responses(name, time_s, light, time_s[start])
-
-    fast = np.where(on, np.exp(-after / delay), 0)
-    yield made("exponential tail", fast)
-    slow = np.where(on, after * np.exp(-after / (1.5 * delay)), 0)
-    yield made("two tails", fast / fast.sum(1)[:, None] + slow / slow.sum(1)[:, None])
-    yield made("box", np.where(on & (after < 2 * delay), 1.0, 0.0))
 
 
 def measured(data: Path, pixels: int = 500) -> Iterator[Responses]:

@@ -106,7 +106,10 @@ def fit(
     data_i: Bank, weight: Bank, x: Bank, y: Bank, w: Bank, pr: Bank, pi: Bank, rr: Bank, ri: Bank,
     active: Mask, bar: Plane,
 ) -> Any:  # fmt: skip
-    """Add a return and fit all of them, until `active` pixels have settled; return chi-square."""
+    """Add a return and fit all of them, until `active` pixels have settled.
+
+    Returns chi-square and the damping of a next step.
+    """
     cost = _new(order, returns, turns, data_r, data_i, weight, x, y, w, pr, pi, rr, ri)
     return _improve(
         order, returns, unknowns, steps, data_r, data_i, weight, x, y, w, pr, pi, rr, ri, cost,
@@ -116,9 +119,8 @@ def fit(
 
 @njit(error_model="numpy")
 def fit_again(
-    order: Length, returns: Length, unknowns: Length, steps: int, data_r: Bank, data_i: Bank,
-    weight: Bank, from_x: Bank, from_y: Bank, x: Bank, y: Bank, w: Bank, cost: Plane, active: Mask,
-    bar: Plane,
+    order: Length, returns: Length, unknowns: Length, data_r: Bank, data_i: Bank, weight: Bank,
+    from_x: Bank, from_y: Bank, x: Bank, y: Bank, w: Bank, cost: Plane, active: Mask, bar: Plane,
 ) -> Any:  # fmt: skip
     """Fit returns from other points on as well; keep the better ones and return chi-square."""
     pr, pi = product_bank(cost, order, returns), product_bank(cost, order, returns)
@@ -128,9 +130,9 @@ def fit_again(
         sharp.powers(order, from_x[k], from_y[k], k, pr, pi)
     sharp.weigh(order, returns, data_r, data_i, weight, pr, pi, size)
     sharp.remains(order, returns, data_r, data_i, pr, pi, size, rr, ri)
-    tried = _improve(
-        order, returns, unknowns, steps, data_r, data_i, weight, from_x, from_y, size, pr, pi, rr,
-        ri, sharp.chi_square(order, weight, rr, ri), active, bar,
+    tried, _ = _improve(
+        order, returns, unknowns, choice.LATE_STEPS, data_r, data_i, weight, from_x, from_y, size,
+        pr, pi, rr, ri, sharp.chi_square(order, weight, rr, ri), active, bar,
     )  # fmt: skip
     better = active & (tried < cost)
     for k in range(len(returns)):
@@ -155,7 +157,7 @@ def _improve(
         )
     for k in range(len(returns)):
         x[k], y[k] = pr[k * m], pi[k * m]
-    return cost
+    return cost, damping
 
 
 @njit(error_model="numpy")
@@ -275,7 +277,7 @@ def fit_one(
     scale, numbers, usable = _prepare(order, b, variance, error, p, one, data_r, data_i, weight)
     penalty = logarithm(numbers) + choice.MARGIN
     choice.nothing(one, far, found)
-    cost = fit(
+    cost, _ = fit(
         order, (0,), (0, 0), choice.STEPS[0], turns, data_r, data_i, weight, x, y, w, pr, pi, rr,
         ri, usable, far,
     )  # fmt: skip

@@ -31,8 +31,8 @@ _TAIL: Final = choice.PLANES
 _POINTS: Final = _TAIL + 8
 _PENALTY: Final = _POINTS + 6
 _NUMBERS, _SCALE, _USABLE = _PENALTY + 1, _PENALTY + 2, _PENALTY + 3
-_COST: Final = _SCALE
-"""Behind the first fit: what two returns leave."""
+_COST, _MOVING = _SCALE, _USABLE
+"""Behind the first fit: what two returns leave, and the damping of their next step."""
 _DATA: Final = _PENALTY + 4
 
 
@@ -138,7 +138,7 @@ def fit_second(
         numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
         active = penalty > 0.0
         x[0], y[0], w[0] = points[0], points[1], points[2]
-        cost = fit(
+        cost, damping = fit(
             order, (0, 0), (0, 0, 0, 0), choice.STEPS[1], turns, data_r, data_i, weight, x, y, w,
             pr, pi, rr, ri, active, infinity(one),
         )  # fmt: skip
@@ -151,6 +151,7 @@ def fit_second(
             points[3 * k], points[3 * k + 1], points[3 * k + 2] = x[k], y[k], w[k]
         put(points, (0, 0, 0, 0, 0, 0), rooms, _POINTS, at)
         simd.store(rooms, _COST * ROW + at, cost)
+        simd.store(rooms, _MOVING * ROW + at, damping)
         start_tail(x, y, w, allowed, state)
         bar = choice.bar_of_tail(penalty, found)
         step_tail(
@@ -247,8 +248,10 @@ def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
             step_tail(order, power, (0, 0, 0, 0), steps, data_r, data_i, weight, state, bar)
             _offer_tail(order, power, weight, state, penalty, worth, found)
         put(found, _FOUND, rooms, 0, at)
-        more = _needs_more(found, penalty, numbers)
+        moving = simd.load(one, rooms, _MOVING * ROW + at)
+        more = _needs_more(found, penalty, numbers, moving)
         if some(more):
+            simd.pack(third, _MOVING * ROW + packed, more, moving)
             take(points, (0, 0, 0, 0, 0, 0), one, rooms, _POINTS, at)
             pack(more, points, (0, 0, 0, 0, 0, 0), third, _POINTS, packed)
             pack(more, found, _FOUND, third, 0, packed)
@@ -271,8 +274,9 @@ def _offer_tail(
 
 
 @njit(forceinline=True, error_model="numpy")
-def _needs_more(found: Bank, penalty: Plane, numbers: Plane) -> Any:
-    return (penalty > 0.0) & choice.worth_more_returns(penalty, found) & (numbers >= 4.0)
+def _needs_more(found: Bank, penalty: Plane, numbers: Plane, moving: Plane) -> Any:
+    more = choice.worth_more_returns(penalty, found) | (moving < sharp.SETTLED)
+    return (penalty > 0.0) & more & (numbers >= 4.0)
 
 
 @njit(error_model="numpy")
@@ -298,30 +302,46 @@ def fit_third(
         active = penalty > 0.0
         for k in range(2):
             x[k], y[k], w[k] = points[3 * k], points[3 * k + 1], points[3 * k + 2]
-        cost = simd.load(one, rooms, _COST * ROW + at)
-        missed = active & choice.missed(cost, free)
+        cost, far = simd.load(one, rooms, _COST * ROW + at), infinity(one)
+        moving = active & (simd.load(one, rooms, _MOVING * ROW + at) < sharp.SETTLED)
+        tried = cost
+        if some(moving):
+            from_x[0], from_y[0], from_x[1], from_y[1] = x[0], y[0], x[1], y[1]
+            tried = fit_again(
+                order, (0, 0), (0, 0, 0, 0), data_r, data_i, weight, from_x, from_y, x, y, w, cost,
+                moving, far,
+            )  # fmt: skip
+        missed = active & choice.missed(tried, free)
         if some(missed):
             choice.split(x, y, w, cosine, sine, from_x, from_y)
             tried = fit_again(
-                order, (0, 0), (0, 0, 0, 0), choice.STEPS[1], data_r, data_i, weight, from_x,
-                from_y, x, y, w, cost, missed, infinity(one),
+                order, (0, 0), (0, 0, 0, 0), data_r, data_i, weight, from_x, from_y, x, y, w, tried,
+                missed, choice.bar_of_returns(4, penalty, found),
             )  # fmt: skip
-            choice.offer_returns(
-                order, (0, 0), (0, 0, 0, 0), weight, x, y, w, tried, penalty, threshold,
-                active & (tried < cost - 1.0), found,
-            )  # fmt: skip
+        choice.offer_returns(
+            order, (0, 0), (0, 0, 0, 0), weight, x, y, w, tried, penalty, threshold,
+            active & (tried < cost - 1.0), found,
+        )  # fmt: skip
         if len(order) >= 3:
             bar = choice.bar_of_returns(6, penalty, found)
-            cost = fit(
+            choice.split(x, y, w, cosine, sine, from_x, from_y)
+            cost, damping = fit(
                 order, (0, 0, 0), (0, 0, 0, 0, 0, 0), choice.STEPS[2], turns, data_r, data_i,
                 weight, x, y, w, pr, pi, rr, ri, active, bar,
             )  # fmt: skip
-            missed = active & choice.missed(cost, free - 2.0)
-            if some(missed):
-                start.pisarenko(order, half_turns, data_r, data_i, from_x, from_y)
+            for attempt in range(3):
+                again = active & choice.missed(cost, free - 2.0)
+                if attempt == 1:
+                    again = active & (damping < sharp.SETTLED)
+                    for k in range(3):
+                        from_x[k], from_y[k] = x[k], y[k]
+                if not some(again):
+                    continue
+                if attempt == 2:
+                    start.pisarenko(order, half_turns, data_r, data_i, from_x, from_y)
                 cost = fit_again(
-                    order, (0, 0, 0), (0, 0, 0, 0, 0, 0), choice.STEPS[2], data_r, data_i, weight,
-                    from_x, from_y, x, y, w, cost, missed, bar,
+                    order, (0, 0, 0), (0, 0, 0, 0, 0, 0), data_r, data_i, weight, from_x, from_y, x,
+                    y, w, cost, again, bar,
                 )  # fmt: skip
             choice.offer_returns(
                 order, (0, 0, 0), (0, 0, 0, 0, 0, 0), weight, x, y, w, cost, penalty, threshold,
@@ -340,7 +360,8 @@ def take_three(rooms: Reals, count: int, third: Reals) -> None:
         take(found, _FOUND, one, rooms, 0, at)
         penalty = simd.load(one, rooms, _PENALTY * ROW + at)
         numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
-        more = _needs_more(found, penalty, numbers)
+        moving = simd.load(one, rooms, _MOVING * ROW + at)
+        more = _needs_more(found, penalty, numbers, moving)
         unpack(more, found, _FOUND, third, 0, done)
         put(found, _FOUND, rooms, 0, at)
         done += simd.count(more)

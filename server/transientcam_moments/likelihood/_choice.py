@@ -44,6 +44,8 @@ TAIL_VARIANCE, LENGTH_VARIANCE = 25, 26
 PLANES: Final = 27
 STEPS: Final = (4, 8, 10)
 """Of the fits of one, two and three returns."""
+LATE_STEPS: Final = 60
+"""Of fits of two and three returns that go on, or begin anew, where noise isn't all they leave."""
 TAIL_STEPS: Final = 10
 MORE_TAIL_STEPS: Final = 5
 """Of the fit of each further shape, which begins with what the one before found."""
@@ -152,11 +154,15 @@ def offer_returns(
 
 
 def split(x2: Bank, y2: Bank, w2: Bank, cosine: float, sine: float, xs: Bank, ys: Bank) -> None:
-    """Put two points in `xs` and `ys`, as far before the stronger one of two returns as behind."""
+    """Put two points in `xs` and `ys`, as far before the stronger one of two returns as behind.
+
+    The third one is that of the other return.
+    """
     first = w2[0] >= w2[1]
     x, y = select(first, x2[0], x2[1]), select(first, y2[0], y2[1])
     xs[0], ys[0] = x * cosine + y * sine, y * cosine - x * sine
     xs[1], ys[1] = x * cosine - y * sine, y * cosine + x * sine
+    xs[2], ys[2] = select(first, x2[1], x2[0]), select(first, y2[1], y2[0])
 
 
 def missed(cost: Array, free: Array) -> Any:
@@ -205,7 +211,7 @@ def offer_tail(
     better = (score < found[SCORE]) & allowed
     zero = 0.0 * cost
     spread = bank(cost, unknowns, 0)
-    tail.deviations(order, power, unknowns, weight, prior, w, v, d, spread)
+    common = tail.deviations(order, power, unknowns, weight, prior, w, v, d, spread)
     found[X], found[Y] = select(better, x, found[X]), select(better, y, found[Y])
     found[WEIGHT] = select(better, w, found[WEIGHT])
     for k in range(1, MOST_RETURNS):
@@ -222,7 +228,14 @@ def offer_tail(
     found[PHASE_VARIANCE] = select(better, spread[2], found[PHASE_VARIANCE])
     found[LENGTH_VARIANCE] = select(better, spread[3], found[LENGTH_VARIANCE])
     score = chi_square + 4.0 * penalty - (3.0 * MARGIN - 2.0 * math.log(shapes))
-    join(phase_of(x, y), spread[2], score, allowed & (v > 0.0), found)
+    allowed = allowed & (v > 0.0)
+    join(phase_of(x, y), spread[2], score, allowed, found)
+    # the same without light at its beginning, as wax has it, as far as the fit is linear
+    slope = common / larger(spread[0], least(spread[0]))
+    moved = larger(smaller(slope * w, 1.0 + zero), -1.0 + zero)
+    square = larger(spread[2] - slope * common, zero)
+    lost = w * w / larger(spread[0], least(spread[0]))
+    join(phase_of(x, y) - moved, square, score + lost - penalty + MARGIN, allowed, found)
 
 
 def bar_of_returns(unknowns: int, penalty: Array, found: Bank) -> Array:

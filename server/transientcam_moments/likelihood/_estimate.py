@@ -237,9 +237,10 @@ def likelihood(
 
     A fit begins with the returns of the one before and the best of 4 m + 6 phases for one more, the
     tail with two returns, further shapes with the first one. Where noise does not explain what they
-    leave, two returns begin once more with one that is split, and three with the brightest of
-    Pisarenko's. Each takes at most 4, 8, 10 and 10 of Levenberg and Marquardt's steps,
-    none of which raises chi^2, with the weights eliminated (Golub and Pereyra 1973, Kaufman 1975),
+    leave, two returns begin once more with one that is split, and three with that and with the
+    brightest of Pisarenko's. One, two and three returns and a tail take at most 4, 8, 10 and 10 of
+    Levenberg and Marquardt's steps, several returns that have not settled or begin once more up to
+    60; none raises chi^2, with the weights eliminated (Golub and Pereyra 1973, Kaufman 1975),
     and no more where one changes chi^2 by too little to matter (`sharp.judge`). Noise
     smaller than the rounding of the moments' precision counts as that large.
 

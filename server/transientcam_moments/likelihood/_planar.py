@@ -15,6 +15,7 @@ from transientcam_moments.likelihood import (
 )
 from transientcam_moments.likelihood._choice import (
     DELAY_RAD,
+    LATE_STEPS,
     MORE_TAIL_STEPS,
     MOST_RETURNS,
     PLANES,
@@ -101,13 +102,22 @@ def fit(data: Data, most: int, shapes: tuple[int, ...], threshold: float) -> Arr
             found, free = list(planes), data.numbers - 4
             two, cost = SharpFit.of(data, *before), before[3]
             x, y = [cost] * 3, [cost] * 3
-            split(two.x, two.y, two.w, math.cos(SPLIT / m), math.sin(SPLIT / m), x, y)
-            two.try_also(x[:2], y[:2], missed(cost, free), np.inf + 0 * cost)
+            far = np.inf + 0 * cost
+            two.try_also(two.x, two.y, two.damping < sharp.SETTLED, far)
+            apart = math.cos(SPLIT / m), math.sin(SPLIT / m)
+            split(two.x, two.y, two.w, *apart, x, y)
+            two.try_also(
+                x[:2], y[:2], missed(two.cost, free), bar_of_returns(4, data.penalty, found)
+            )
             if most >= 2:
                 two.offer(found, (free >= 0) & (two.cost < cost - 1), threshold)
             if most >= MOST_RETURNS:
                 bar = bar_of_returns(6, data.penalty, found)
+                split(two.x, two.y, two.w, *apart, x, y)
                 three = SharpFit.start(data, 3, two.state(), bar)
+                moving = three.damping < sharp.SETTLED
+                three.try_also(x, y, missed(three.cost, free - 2), bar)
+                three.try_also(three.x, three.y, moving, bar)
                 turns = xp.asarray(half_turns(m, data.re.dtype))
                 start.pisarenko(three.order, turns, list(data.re), list(data.im), x, y)
                 three.try_also(x, y, missed(three.cost, free - 2), bar)
@@ -118,7 +128,9 @@ def fit(data: Data, most: int, shapes: tuple[int, ...], threshold: float) -> Arr
         if len(shapes) > 1:
             worth = worth_more_shapes(late[6], done) & enough
             done = where(worth, of_shapes, data, late, done)
-        still = worth_more_returns(data.penalty, list(done)) & enough
+        still = (
+            worth_more_returns(data.penalty, list(done)) | (two.damping < sharp.SETTLED)
+        ) & enough
         return where(still, of_more, data, two.state(), done)
 
     # chi-square cannot become less than 0: no model with more unknowns is better below
@@ -149,6 +161,7 @@ class SharpFit:
     """A fit of K sharp returns: banks, as `sharp` takes them."""
 
     cost: Array
+    damping: Array
 
     def __init__(
         self, data: Data, x: Sequence[Array], y: Sequence[Array], w: Sequence[Array]
@@ -179,7 +192,7 @@ class SharpFit:
     def of(cls, data: Data, *state: Array) -> "SharpFit":
         """Return the fit that had a `state`."""
         fit = cls(data, *state[:3])
-        fit.cost = state[3]
+        fit.cost, fit.damping = state[3:]
         return fit
 
     @classmethod
@@ -210,7 +223,7 @@ class SharpFit:
         state = _times(steps, step, (*banks, self.cost, damping), _moving)
         self._pr, self._pi, self.w, self._rr, self._ri = (list(part) for part in state[:5])
         self.x, self.y = (list(part[:: len(self.order)]) for part in (self._pr, self._pi))
-        self.cost = state[5]
+        self.cost, self.damping = state[5:]
 
     def _look(self) -> None:
         """Find what the returns leave."""
@@ -240,9 +253,9 @@ class SharpFit:
         return x, y, along / (apart * total)
 
     def state(self) -> tuple[Array, ...]:
-        """Return points, weights and chi-square."""
+        """Return points, weights, chi-square and damping."""
         xp = namespace(self.cost)
-        return *(xp.stack(part) for part in (self.x, self.y, self.w)), self.cost
+        return *(xp.stack(part) for part in (self.x, self.y, self.w)), self.cost, self.damping
 
     def try_also(self, x: list[Array], y: list[Array], where: Array, bar: Array) -> None:
         """Fit from other points on as well, and keep the better one, `where` that may help."""
@@ -250,7 +263,7 @@ class SharpFit:
         if not some(where):
             return
         other = SharpFit.at(self.data, x, y)
-        other.improve(STEPS[len(x) - 1], bar, where)
+        other.improve(LATE_STEPS, bar, where)
         better = (other.cost < self.cost) & where
         for mine, theirs in ((self.x, other.x), (self.y, other.y), (self.w, other.w)):
             for k, plane in enumerate(theirs):

@@ -30,12 +30,14 @@ from transientcam_moments.likelihood._linear import decompose, solve, variances
 
 FIRST_DAMPING = 1e-2
 LESS_DAMPING, MORE_DAMPING = 0.15, 6.0
-LEAST_DAMPING, MOST_DAMPING = 1e-7, 1e7
+LEAST_DAMPING, MOST_DAMPING = 1e-7, 300.0
 SETTLED = 1e9
-"""The damping of pixels that take no further step; above `MOST_DAMPING`."""
+"""The damping of pixels that take no further step, as those do that reach `MOST_DAMPING`."""
 ENOUGH, ENOUGH_SHARE = 0.1, 3e-3
 """A step that changes chi-square by less, or by less of it, is the last one: noise moves the
 unknowns by ten times as much."""
+FINER = 0.05
+"""Share of these for several returns: where they are close, many small steps follow each other."""
 HOPELESS = 0.1
 """So is one that takes less than this share of what a model would still have to gain."""
 LEAST_APART = 0.02
@@ -52,21 +54,24 @@ def chi_square(order: Length, weight: Bank, rr: Bank, ri: Bank) -> Array:
     return total
 
 
-def judge(cost: Array, tried: Array, damping: Array, bar: Array) -> tuple[Any, Array]:
+def judge(
+    cost: Array, tried: Array, damping: Array, bar: Array, share: float = 1.0
+) -> tuple[Any, Array]:
     """Return where a step is taken, and the damping of the next one.
 
     `bar` is the chi-square from which on the model is not the best; infinite where that is open.
+    `share` is that of the change that is enough.
     """
     moving = damping < SETTLED
     lower = tried < cost
     change = select(lower, cost - tried, tried - cost)
     missing = larger(tried - bar, 0.0 * cost)
-    little = (change < ENOUGH + ENOUGH_SHARE * tried + HOPELESS * missing) & (damping < 1.0)
+    enough = share * (ENOUGH + ENOUGH_SHARE * tried) + HOPELESS * missing
+    little = (change < enough) & (damping < 1.0)
     factor = select(lower, LESS_DAMPING + 0.0 * cost, MORE_DAMPING + 0.0 * cost)
-    damping = smaller(
-        larger(damping * factor, LEAST_DAMPING + 0.0 * cost), MOST_DAMPING + 0.0 * cost
-    )
-    return lower & moving, select(moving & ~little, damping, SETTLED + 0.0 * cost)
+    damping = larger(damping * factor, LEAST_DAMPING + 0.0 * cost)
+    going_on = moving & ~little & (damping < MOST_DAMPING)
+    return lower & moving, select(going_on, damping, SETTLED + 0.0 * cost)
 
 
 def powers(order: Length, x: Array, y: Array, k: int, pr: Bank, pi: Bank) -> None:
@@ -352,7 +357,7 @@ def step(
     weigh(order, returns, data_r, data_i, weight, qr, qi, tw)
     remains(order, returns, data_r, data_i, qr, qi, tw, tr, ti)
     tried = chi_square(order, weight, tr, ti)
-    lower, damping = judge(cost, tried, damping, bar)
+    lower, damping = judge(cost, tried, damping, bar, FINER if count > 1 else 1.0)
     for i in range(count * m):
         pr[i], pi[i] = select(lower, qr[i], pr[i]), select(lower, qi[i], pi[i])
     for k in range(count):

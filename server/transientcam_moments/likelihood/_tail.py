@@ -216,8 +216,8 @@ def deviations(
     v: Array,
     d: Array,
     out: Bank,
-) -> None:
-    """Put the variances of w, v, phi and log d in `out`."""
+) -> Array:
+    """Put the variances of w, v, phi and log d in `out`; return the covariance of w and phi."""
     lag, qr, qi = bank(d, order, 1), bank(d, order, 1), bank(d, order, 1)
     shape(order, power, d, lag, qr, qi)
     a, g = square_bank(d, unknowns, 0), bank(d, unknowns, 0)
@@ -225,4 +225,7 @@ def deviations(
     information(order, power, weight, w, v, d, lag, qr, qi, qr, qi, a, g)
     a[15] = a[15] + prior
     decompose(unknowns, a)
+    g[0], g[1], g[2], g[3] = 1.0 + 0.0 * d, 0.0 * d, 0.0 * d, 0.0 * d
+    solve(unknowns, a, g, 2)
     variances(unknowns, a, out)
+    return g[2]
