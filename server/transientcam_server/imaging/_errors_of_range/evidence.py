@@ -67,12 +67,15 @@ def brighter_than_white(
 ) -> _Array:
     """Return where no surface at these points (3, H, W) can be this bright by the lamp itself.
 
-    The albedo that brightness, range and beam imply is at most 1. Highlights are small.
+    The albedo that brightness, range and beam imply is at most 1. Highlights are small: most of the
+    pixels around that have a range have to be as bright.
     """
     with np.errstate(all="ignore"):
         albedo = brightness_dn / (lamp.white_dn_per_s(points_m) * exposure_s)
-    bright = np.nan_to_num(albedo, nan=0.0, posinf=np.inf) > BRIGHTER_THAN_WHITE
-    return np.asarray(bright & (np.nanmean(around(bright, _GLOSS_PX), axis=-1) > 0.5))
+    bright = albedo > BRIGHTER_THAN_WHITE
+    others = around(np.where(np.isnan(albedo), np.nan, bright), _GLOSS_PX)
+    most = np.nansum(others, axis=-1) > 0.5 * np.isfinite(others).sum(axis=-1)
+    return np.asarray(bright & most)
 
 
 def shadowed(lamp: Lamp, lens: Intrinsics, range_m: _Array, margin_m: _Array) -> _Array:

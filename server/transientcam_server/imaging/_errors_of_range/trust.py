@@ -20,19 +20,23 @@ from transientcam_server.imaging._errors_of_range.evidence import (
 from transientcam_server.imaging._recipe.recipe import Recipe
 
 _Array = NDArray[Any]
-NOISE: Final = 1.645
-"""Half width of the interval that holds 90 % of a normal variable, in standard deviations."""
+NOISE: Final = 1.5
+"""Half width of an interval by noise, in standard deviations; 1.645 hold 90 % of a normal variable,
+and the larger of two estimates of the deviation is more than it."""
 BIAS: Final = 2.0
 NOISE_IN_BIAS: Final = 0.5
 """Times the estimators' disagreement that later light moves a range; what of that is noise."""
 LEAST_BIAS: Final = 0.02
 """Of the range of a radian at the highest frequency, by which later light may move a range that
 nothing shows."""
-SPREAD: Final = 0.5
-"""Times how much nearer the first light may be by how light is seen to be spread."""
 LEAST_LOSS: Final = 0.002
-NOISE_IN_LOSS: Final = 0.1
-"""Twice the lost modulation that shows half of that, without noise; how much noise adds to it."""
+NOISE_IN_LOSS: Final = 0.3
+"""Twice the lost modulation that may be none, without noise; how much noise adds to it."""
+TAIL_SKEW: Final = 2.0
+"""Skewness of an exponential decay, whose light comes as long after its begin as it is spread."""
+LEAST_SKEW: Final = 2e-4
+NOISE_IN_SKEW: Final = 0.2
+"""Third cumulant in cubic radians that may be none, without noise; how much noise adds to it."""
 FAR_FROM_CALIBRATION_M: Final = 0.015
 """A camera whose temperature may move ranges by more is not the one that was calibrated."""
 _UNRESOLVED: Final = 0.5
@@ -48,7 +52,7 @@ def judged(
 ) -> tuple[_Array, _Array]:
     """Return the half width of each pixel's 90 % interval in m, and its `Trust`, (H, W).
 
-    The factors from `BIAS` to `NOISE_IN_LOSS` were chosen on random scenes of two seeds;
+    The factors from `NOISE` to `NOISE_IN_SKEW` were chosen on random scenes of two seeds;
     ``python -m benchmarks trust`` measures how many pixels are within on others (decision 8).
     """
     sequence = recipe.applied.sequence
@@ -56,9 +60,9 @@ def judged(
     brightness_dn = np.asarray(found.brightness, dtype=np.float64)
     known = np.isfinite(range_m)
     length_m = float(tm.range_m(1.0, recipe.base_frequency_hz * sequence.multiples[-1]))
-    noise_m = std_m
+    noise_m = median_around(std_m)  # that of few draws is not known well in one pixel
     if recipe.technique == "likelihood":  # which knows how far other models are from its range
-        noise_m = np.fmax(std_m, found.range_std_m)
+        noise_m = np.fmax(noise_m, found.range_std_m)
     then_c = None if recipe.gains is None else recipe.gains.temperature_c
     drift = TemperatureDrift.between(then_c, None if raw is None else raw.temperature_c)
     drift_m = 0.0 if drift is None else drift.range_m
@@ -66,7 +70,7 @@ def judged(
         NOISE * noise_m,
         BIAS * np.sqrt(np.maximum(bias_m**2 - (NOISE_IN_BIAS * noise_m) ** 2, 0.0)),
         LEAST_BIAS * length_m,
-        SPREAD * _spread_m(recipe, found, range_m),
+        _spread_m(recipe, found, range_m),
         drift_m,
     )
     error_m = np.sqrt(sum(np.square(part) for part in parts_m))
@@ -104,11 +108,12 @@ def judged(
 def _spread_m(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Array:
     """Return how much nearer (H, W) than its range a pixel's first light may be, by its spread.
 
-    Light whose times of flight spread by s loses (j s)^2 / 2 of its modulation at the harmonic j,
-    and the first of it comes before the mean: by s, of light that a material sends back with
-    exponential delay and of two equal returns; by less, of a return with fainter light behind.
-    Returns whose phase at the highest frequency is over half a turn away are taken out, but for
-    such as noise makes.
+    Light whose times of flight have the variance s^2 and the third cumulant k loses (j s)^2 / 2 of
+    its modulation at the harmonic j, and its phase there is j^3 k / 6 less than j times the mean.
+    Its first part is s before the mean in a material with exponential delay (k = 2 s^3), as in two
+    equal returns; 2 s^4 / k before in what sends most light directly and some much later, as rooms
+    do. The lesser of both counts. Returns whose phase at the highest frequency is over half a turn
+    away are taken out, but for such as noise makes.
     """
     m = recipe.applied.sequence.multiples[-1]
     if m == 1:
@@ -126,10 +131,18 @@ def _spread_m(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Arr
     )
     with np.errstate(all="ignore"):
         lost = (1.0 - np.abs(highest) / np.abs(lowest)) * 2.0 / (m**2 - 1)
+        early = np.angle((lowest / np.abs(lowest)) ** m * np.conj(highest)) * 6.0 / (m**3 - m)
         after = np.angle(lowest * np.exp(-1j * first))
-    near = median_around(lost)
-    noise = median_around(np.abs(lost - near))
-    near = np.clip(median_around(median_around(near, 2), 5), 0.0, 1.0)  # of 33 x 33 pixels
-    known = near / (near + NOISE_IN_LOSS * noise + LEAST_LOSS / m**2)
-    spread_m = np.maximum(np.sqrt(near) - median_around(after), 0.0) * known * radian_m
-    return np.asarray(spread_m)
+    (square, unsure), (cube, unsure_cube), (after, _) = map(_typical, (lost, early, after))
+    square = np.clip(square, 0.0, 1.0)
+    none = (NOISE_IN_LOSS * unsure) ** 4 + (LEAST_LOSS / m**2) ** 4
+    spread = np.sqrt(square * square**4 / (square**4 + none))
+    skew = np.maximum(cube - NOISE_IN_SKEW * unsure_cube - LEAST_SKEW, 1e-12)
+    before = np.minimum(spread, TAIL_SKEW * spread**4 / skew)
+    return np.asarray(np.maximum(before - after, 0.0) * radian_m)
+
+
+def _typical(plane: _Array) -> tuple[_Array, _Array]:
+    """Return the median (H, W) over 33 x 33 pixels, and how far single pixels are from theirs."""
+    near = median_around(plane)
+    return median_around(median_around(near, 2), 5), median_around(np.abs(plane - near))
