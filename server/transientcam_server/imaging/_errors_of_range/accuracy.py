@@ -117,11 +117,17 @@ def range_accuracy(
         return np.remainder(other_m - range_m[seen] + turn_m / 2, turn_m) - turn_m / 2
 
     drawn_m = shift_m(frame.drawn_m())
-    if recipe.technique in _UNMOVED:
+    unmoved = recipe.technique in _UNMOVED
+    if unmoved:
         std_m = typical_deviation(drawn_m)
     else:  # a copy is off as the frame itself is
         std_m = np.median(np.nan_to_num(np.abs(drawn_m)), axis=0) / MEDIAN_OF_NORMAL
-    std_m = _placed(OF_FEW_DRAWS * std_m, seen)
+    # few draws tell the deviation over that of the first moment in a neighbourhood, not in a pixel
+    with np.errstate(all="ignore"):
+        of_first = np.sqrt(frame.variance[1]) / np.abs(frame.b[1])
+        times = median_around(_placed(std_m / of_first, seen))[seen]
+    std_m = OF_FEW_DRAWS * np.fmax(times * of_first, 0.0 if unmoved else std_m)
+    std_m = _placed(std_m, seen)
     shifts_m = [_placed(shift_m(other_m), seen) for other_m in frame.others_m()]
     unknown = np.full(seen.shape, np.nan, dtype=np.float32)
     bias_m = np.max([np.abs(median_around(each)) for each in shifts_m], axis=0, initial=0.0)

@@ -57,6 +57,14 @@ def median_around(plane: _Array, step_px: int = 1) -> _Array:
     return np.nan_to_num(found)
 
 
+def mean_alike(plane: _Array, range_m: _Array, step_px: int) -> _Array:
+    """Return the mean (H, W) of the pixels so many steps apart that are about as far; 0 of none."""
+    values, others_m = around(plane, step_px=step_px), around(range_m, step_px=step_px)
+    own_m = range_m[..., None]
+    alike = np.isfinite(values) & (np.abs(others_m - own_m) < _STEP * own_m)
+    return np.asarray(np.where(alike, values, 0.0).sum(-1) / np.maximum(alike.sum(-1), 1))
+
+
 def spread(values: _Array) -> _Array:
     """Return how far the known ones of values (H, W, N) are apart; NaN where there are none."""
     return np.asarray(np.fmax.reduce(values, axis=-1) - np.fmin.reduce(values, axis=-1))

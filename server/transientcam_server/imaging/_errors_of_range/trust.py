@@ -13,6 +13,7 @@ from transientcam_server.imaging._errors_of_range.evidence import (
     SHADOW,
     brighter_than_white,
     edges_and_strays,
+    mean_alike,
     median_around,
     moved,
     shadowed,
@@ -29,13 +30,15 @@ NOISE_IN_BIAS: Final = 0.5
 LEAST_BIAS: Final = 0.02
 """Of the range of a radian at the highest frequency, by which later light may move a range that
 nothing shows."""
+SPREAD: Final = 1.05
+"""Times how much nearer the first light may be by how light is seen to be spread."""
 LEAST_LOSS: Final = 0.002
-NOISE_IN_LOSS: Final = 0.3
+NOISE_IN_LOSS: Final = 0.25
 """Twice the lost modulation that may be none, without noise; how much noise adds to it."""
 TAIL_SKEW: Final = 2.0
 """Skewness of an exponential decay, whose light comes as long after its begin as it is spread."""
 LEAST_SKEW: Final = 2e-4
-NOISE_IN_SKEW: Final = 0.2
+NOISE_IN_SKEW: Final = 0.15
 """Third cumulant in cubic radians that may be none, without noise; how much noise adds to it."""
 FAR_FROM_CALIBRATION_M: Final = 0.015
 """A camera whose temperature may move ranges by more is not the one that was calibrated."""
@@ -60,9 +63,9 @@ def judged(
     brightness_dn = np.asarray(found.brightness, dtype=np.float64)
     known = np.isfinite(range_m)
     length_m = float(tm.range_m(1.0, recipe.base_frequency_hz * sequence.multiples[-1]))
-    noise_m = median_around(std_m)  # that of few draws is not known well in one pixel
+    noise_m = std_m
     if recipe.technique == "likelihood":  # which knows how far other models are from its range
-        noise_m = np.fmax(noise_m, found.range_std_m)
+        noise_m = np.fmax(std_m, found.range_std_m)
     then_c = None if recipe.gains is None else recipe.gains.temperature_c
     drift = TemperatureDrift.between(then_c, None if raw is None else raw.temperature_c)
     drift_m = 0.0 if drift is None else drift.range_m
@@ -70,7 +73,7 @@ def judged(
         NOISE * noise_m,
         BIAS * np.sqrt(np.maximum(bias_m**2 - (NOISE_IN_BIAS * noise_m) ** 2, 0.0)),
         LEAST_BIAS * length_m,
-        _spread_m(recipe, found, range_m),
+        SPREAD * _spread_m(recipe, found, range_m),
         drift_m,
     )
     error_m = np.sqrt(sum(np.square(part) for part in parts_m))
@@ -133,7 +136,10 @@ def _spread_m(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Arr
         lost = (1.0 - np.abs(highest) / np.abs(lowest)) * 2.0 / (m**2 - 1)
         early = np.angle((lowest / np.abs(lowest)) ** m * np.conj(highest)) * 6.0 / (m**3 - m)
         after = np.angle(lowest * np.exp(-1j * first))
-    (square, unsure), (cube, unsure_cube), (after, _) = map(_typical, (lost, early, after))
+    typical_m = median_around(range_m)
+    (square, unsure), (cube, unsure_cube), (after, _) = (
+        _typical(plane, typical_m) for plane in (lost, early, after)
+    )
     square = np.clip(square, 0.0, 1.0)
     none = (NOISE_IN_LOSS * unsure) ** 4 + (LEAST_LOSS / m**2) ** 4
     spread = np.sqrt(square * square**4 / (square**4 + none))
@@ -142,7 +148,8 @@ def _spread_m(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Arr
     return np.asarray(np.maximum(before - after, 0.0) * radian_m)
 
 
-def _typical(plane: _Array) -> tuple[_Array, _Array]:
-    """Return the median (H, W) over 33 x 33 pixels, and how far single pixels are from theirs."""
+def _typical(plane: _Array, range_m: _Array) -> tuple[_Array, _Array]:
+    """Return the mean (H, W) over 53 x 53 pixels of a surface, and by how much one pixel is off."""
     near = median_around(plane)
-    return median_around(median_around(near, 2), 5), median_around(np.abs(plane - near))
+    far_off = median_around(np.abs(plane - near))
+    return mean_alike(mean_alike(near, range_m, 2), range_m, 10), far_off

@@ -91,7 +91,7 @@ def test_pixels_without_light_have_no_range_and_those_beside_a_step_are_edges() 
     assert (trust[8:, :11] == Trust.TRUSTED).all()
 
 
-@pytest.mark.parametrize(("after_m", "most_m"), [(0.3, 0.05), (2.5, 6e-3)])
+@pytest.mark.parametrize(("after_m", "most_m"), [(0.3, 0.07), (2.5, 6e-3)])
 def test_later_light_widens_the_interval_where_it_is_near_and_not_where_it_is_resolved(
     after_m: float, most_m: float
 ) -> None:
@@ -121,18 +121,21 @@ def test_estimators_that_disagree_by_much_leave_later_light_open(
 
 
 @pytest.mark.parametrize("estimator", ["likelihood", "pisarenko"])
-@pytest.mark.parametrize("kind", ["material", "mirror image"])
+@pytest.mark.parametrize("kind", ["material", "mirror image", "room"])
 def test_light_that_is_spread_by_less_than_any_return_resolves_may_have_begun_earlier(
     kind: str, estimator: str
 ) -> None:
-    """Behind 2 m: an exponential delay of 50 mm in the mean; half of the light 80 mm later."""
+    """Behind 2 m: an exponential delay of 50 mm in the mean; half of the light 80 mm later; of 10 %
+    an exponential delay of 300 mm, whose spread of 131 mm is mostly that of its tail."""
     settings = ReconstructionSettings.model_validate({"estimator": estimator})
     recipe = replace(RECIPE, settings=settings)
     j = np.arange(M + 1).reshape(-1, 1, 1)
-    late, range_m = {"material": 0.05, "mirror image": 0.04}[kind], np.full(SHAPE, 2.0)
+    late, range_m = {"material": 0.05, "mirror image": 0.04, "room": 0.03}[kind], 2.0
     delayed = 1 / (1 - 1j * j * METRES * late)
     mirrored = (1 + np.exp(1j * j * METRES * 2 * late)) / 2
-    b = np.exp(1j * j * METRES * range_m) * (delayed if kind == "material" else mirrored)
+    tailed = 0.9 + 0.1 / (1 - 1j * j * METRES * 10 * late)
+    light = {"material": delayed, "mirror image": mirrored, "room": tailed}[kind]
+    b = light * np.exp(1j * j * METRES * np.full(SHAPE, range_m))
     # with noise: no far return that it makes may pass for what was lost of the modulation
     random = np.random.default_rng(4)
     b = b + random.normal(0, 0.002, b.shape) + 1j * random.normal(0, 0.002, b.shape)
@@ -141,8 +144,8 @@ def test_light_that_is_spread_by_less_than_any_return_resolves_may_have_begun_ea
     error_m, _ = trust_of(recipe, image)
 
     off_m = np.asarray(image.range_m) - range_m
-    assert 0.5 * late < np.median(off_m) < 1.1 * late
-    assert np.median(off_m) / 3 < np.median(error_m) < late  # which is the spread
+    assert kind == "room" or 0.5 * late < np.median(off_m) < 1.1 * late
+    assert np.median(off_m) < 1.1 * np.median(error_m) < 1.3 * late
 
 
 def capture(temperature_c: float) -> RawFrame:
