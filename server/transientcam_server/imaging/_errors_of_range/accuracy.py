@@ -40,7 +40,7 @@ _QUICK: Final = ("likelihood", "pisarenko", "single-frequency")
 """Estimators that compiled kernels make quick."""
 _UNMOVED: Final = ("likelihood", "single-frequency")
 """Estimators whose range noise scatters around where it would be without."""
-OF_FEW_DRAWS: Final = 1.06
+OF_FEW_DRAWS: Final = 1.07
 """So that two thirds of normal errors are within a deviation that few copies tell."""
 _SEED: Final = 0
 
