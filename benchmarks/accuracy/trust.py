@@ -2,7 +2,6 @@
 
 import tempfile
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -76,7 +75,7 @@ def judged(scene: str) -> Judged:
     with camera_before(scene, seed=CAPTURE_SEED) as camera:
         simulation = camera.simulation
         assert simulation is not None
-        recipe = replace(_recipe(camera, simulation), lamp=simulation.lamp)
+        recipe = _recipe(camera, simulation)
         (frame,) = capture(camera, 1, middle=True)
         found = recipe.reconstruct(frame.raw)
         accuracy: RangeAccuracy = range_accuracy(recipe, found, 1, frame.raw)

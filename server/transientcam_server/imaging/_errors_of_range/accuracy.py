@@ -26,7 +26,7 @@ from transientcam_server.imaging._errors_of_range.deviation import (
 from transientcam_server.imaging._errors_of_range.evidence import median_around
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.imaging._errors_of_range.ranging import ranges_m
-from transientcam_server.imaging._errors_of_range.trust import judged
+from transientcam_server.imaging._errors_of_range.trust import judged, not_judged
 from transientcam_server.imaging._recipe.recipe import Recipe
 
 _Array = NDArray[Any]
@@ -61,6 +61,8 @@ class RangeAccuracy:
     """(H, W) `Trust`: why a range is not to be trusted, 0 where it is."""
     every_px: int = 1
     """The errors are of one pixel in so many rows and columns, and stand for those around it."""
+    not_judged: tuple[str, ...] = ()
+    """The reasons that no pixel can have, as nothing that is known would tell them."""
 
     def to_document(self) -> RangeAccuracyDocument:
         """Return shares, and errors of the median pixel with a range, as a frame's metadata do."""
@@ -74,6 +76,7 @@ class RangeAccuracy:
             "range_std_m": _median(self.std_m),
             "range_bias_m": _median(self.bias_m),
             "every_px": self.every_px,
+            "not_judged": list(self.not_judged),
         }
 
 
@@ -133,7 +136,8 @@ def range_accuracy(
     bias_m = np.max([np.abs(median_around(each)) for each in shifts_m], axis=0, initial=0.0)
     bias_m = np.where(np.isfinite(range_m), bias_m, np.nan) if shifts_m else unknown
     std_m, bias_m = (_around(each, has_range, every_px) for each in (std_m, bias_m))
-    return RangeAccuracy(std_m, bias_m, *judged(recipe, found, std_m, bias_m, raw), every_px)
+    error_m, trust = judged(recipe, found, std_m, bias_m, raw)
+    return RangeAccuracy(std_m, bias_m, error_m, trust, every_px, not_judged(recipe, raw))
 
 
 def _around(plane: _Array, has_range: _Array, every_px: int) -> _Array:

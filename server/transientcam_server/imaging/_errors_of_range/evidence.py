@@ -86,14 +86,14 @@ def brighter_than_white(
     return np.asarray(bright & most)
 
 
-def shadowed(lamp: Lamp, lens: Intrinsics, range_m: _Array, margin_m: _Array) -> _Array:
+def shadowed(lens: Intrinsics, range_m: _Array, margin_m: _Array) -> _Array:
     """Return the points of a range map (H, W) between which and the lamp it has something.
 
     On the way to the lamp a point gets behind the map, by more than a margin (H, W), and then
     through it.
     """
     points = lens.points(range_m).astype(np.float64)
-    lamp_m = np.reshape(lamp.position_m, (3, 1, 1))
+    lamp_m = np.reshape(lens.lens.light_m, (3, 1, 1))
     behind_before, map_before = np.zeros(range_m.shape, dtype=bool), range_m
     found = behind_before
     for step in range(1, _STEPS):
@@ -103,7 +103,8 @@ def shadowed(lamp: Lamp, lens: Intrinsics, range_m: _Array, margin_m: _Array) ->
         inside = (z > 0) & (row >= 0) & (row < len(range_m))
         inside &= (column >= 0) & (column < range_m.shape[1])
         there = tuple(np.where(inside, at, 0).astype(int) for at in (row, column))
-        map_m, far_m = range_m[there], np.sqrt(x * x + y * y + z * z)
+        map_m, to_lamp = range_m[there], np.stack([x, y, z]) - lamp_m
+        far_m = (np.sqrt(x * x + y * y + z * z) + np.linalg.norm(to_lamp, axis=0)) / 2.0
         limit_m = np.maximum(margin_m, margin_m[there])
         # through the map, and not past the edge of something nearer
         through = behind_before & inside & (far_m < map_m)

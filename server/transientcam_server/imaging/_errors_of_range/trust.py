@@ -83,15 +83,15 @@ def judged(
     disagree = np.isnan(bias_m) | (bias_m > np.maximum(_UNRESOLVED * length_m, NOISE * std_m))
     later = np.asarray(found.indirect) > _LATER * brightness_dn
     nowhere = np.zeros(known.shape, dtype=bool)
-    motion = shadow = bright = nowhere
+    motion = bright = nowhere
     if raw is not None and recipe.sensor is not None:
         motion = moved(raw, recipe.sensor)
+    lens = recipe.lens(*known.shape)
+    shadow = shadowed(lens, range_m, np.maximum(error_m, SHADOW * range_m))
     if recipe.lamp is not None:
-        lens = recipe.lens(*known.shape)
-        points_m = lens.points(range_m)
         direct_dn = np.asarray(found.direct)  # what came around later adds to the brightness
-        bright = brighter_than_white(recipe.lamp, points_m, direct_dn, sequence.exposure_s)
-        shadow = shadowed(recipe.lamp, lens, range_m, np.maximum(error_m, SHADOW * range_m))
+        exposure_s = sequence.exposure_s
+        bright = brighter_than_white(recipe.lamp, lens.points(range_m), direct_dn, exposure_s)
     reasons = {
         Trust.NO_RANGE: ~known,
         Trust.CORRUPT_IMAGE: nowhere | bool(found.unrepaired_images),
@@ -106,6 +106,20 @@ def judged(
     }
     trust = np.select(list(reasons.values()), list(reasons), Trust.TRUSTED).astype(np.uint8)
     return np.where(known, error_m, np.nan).astype(np.float32), trust
+
+
+def not_judged(recipe: Recipe, raw: RawFrame | None) -> tuple[str, ...]:
+    """Return the reasons, by name, that nothing known of a frame could give its pixels."""
+    then_c = None if recipe.gains is None else recipe.gains.temperature_c
+    drift = TemperatureDrift.between(then_c, None if raw is None else raw.temperature_c)
+    images = raw is not None and len(raw.images) > 0 and recipe.sensor is not None
+    unknown = {
+        Trust.NO_DIRECT_LIGHT: recipe.lamp is None,
+        Trust.SHADOW: recipe.intrinsics is None or recipe.intrinsics.source == "assumed",
+        Trust.MOTION: not images,
+        Trust.DRIFT: drift is None,
+    }
+    return tuple(reason.name.lower() for reason, missing in unknown.items() if missing)
 
 
 def _spread_m(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Array:

@@ -11,10 +11,9 @@ from transientcam.documents import TrustCountsDocument
 from transientcam.wire import Trust
 from transientcam_driver import AppliedSequence, RawFrame, Sequence, open_camera
 from transientcam_driver.calibration import TemperatureDrift
-from transientcam_driver.camera import Lamp
 from transientcam_driver.clock import VirtualClock
-from transientcam_server.imaging import Gains, Recipe
-from transientcam_server.imaging._errors_of_range.trust import judged
+from transientcam_server.imaging import Gains, Intrinsics, Recipe
+from transientcam_server.imaging._errors_of_range.trust import judged, not_judged
 from transientcam_server.settings import ReconstructionSettings
 
 F_HZ, M = 23e6, 4
@@ -70,12 +69,16 @@ def test_a_wall_by_its_own_light_is_trusted_within_a_few_millimetres() -> None:
 
 
 def test_light_that_no_surface_can_send_directly_is_not_trusted() -> None:
-    lamp = Lamp((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.0, 1e6)
+    lens = Intrinsics.of_field(45.0, width=SHAPE[1], height=SHAPE[0], source="settings")
     image = found(np.full(SHAPE, 2.0), np.full(SHAPE, 500.0))  # white would be 250 DN
 
-    assert (trust_of(replace(RECIPE, lamp=lamp), image)[1] == Trust.NO_DIRECT_LIGHT).all()
-    brighter = replace(RECIPE, lamp=replace(lamp, dn_per_s=4e6))
-    assert (trust_of(brighter, image)[1] == Trust.TRUSTED).all()
+    def by(white_dn_per_s: float) -> Recipe:
+        return replace(RECIPE, intrinsics=replace(lens, beam=(0.0, 0.0, 1.0, 0.0, white_dn_per_s)))
+
+    assert (trust_of(by(1e6), image)[1] == Trust.NO_DIRECT_LIGHT).all()
+    assert (trust_of(by(4e6), image)[1] == Trust.TRUSTED).all()
+    assert not_judged(by(1e6), None) == ("motion", "drift")
+    assert not_judged(RECIPE, None) == ("no_direct_light", "shadow", "motion", "drift")
 
 
 def test_pixels_without_light_have_no_range_and_those_beside_a_step_are_edges() -> None:
