@@ -122,7 +122,10 @@ _ALL: Final = (
     Measurement("accuracy.prices", "measured/accuracy", _PLANNED),
     Measurement("accuracy.tradeoffs", "measured/accuracy", _TRADED),
     Measurement("accuracy.noise", "measured/accuracy", _TRADED),
-    Measurement("accuracy.trust", "measured/accuracy", _IMAGING, by_hand=True),
+    Measurement("accuracy.trust", "measured/accuracy", _IMAGING, timed=False),
+    Measurement(
+        "accuracy.halves", "measured/accuracy", (*_MOMENTS, *_IMAGING), 2, "validity", timed=False
+    ),
     Measurement("accuracy.promises", "measured/plans", _PLANNED),
     # -- Kinect v2
     *(

@@ -1,6 +1,9 @@
 """Whether pixels without light have no range, and lit ones have one: halves of a picture."""
 
 import itertools
+import tempfile
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, get_args
 
@@ -41,7 +44,7 @@ SCENES: Final = {
 whose albedo is 0.8, in m, and other light in electrons a second."""
 
 
-def table(folder: Path, exposures_s: tuple[float, ...] = EXPOSURES_S) -> Table:
+def tables(*, exposures_s: tuple[float, ...] = EXPOSURES_S) -> Iterator[Table]:
     """Capture each scene at each exposure and with each b_0, and judge each estimator."""
     found = Table(
         "Pixels with and without light",
@@ -55,7 +58,9 @@ def table(folder: Path, exposures_s: tuple[float, ...] = EXPOSURES_S) -> Table:
         "in one pixel. Bars: 99 %, 1 % and two thirds. Without a low frequency any turn is right."
     )
     cases = [*itertools.product(SCENES, ZEROTHS)]
-    shares = np.array([[_shares(folder, *case, each) for each in exposures_s] for case in cases])
+    with tempfile.TemporaryDirectory() as folder:
+        of = partial(_shares, Path(folder))
+        shares = np.array([[of(*case, each) for each in exposures_s] for case in cases])
     unlit, lost, held = np.moveaxis(shares, -1, 0)
     kept = ~(unlit < 0.99) & ~(lost > 0.01) & ~(held < 2 / 3)
     worst = np.fmin.reduce(unlit, 1), np.fmax.reduce(lost, 1), np.fmin.reduce(held, 1)
@@ -63,7 +68,7 @@ def table(folder: Path, exposures_s: tuple[float, ...] = EXPOSURES_S) -> Table:
         figures = (float(of[row, at]) if np.isfinite(of[row, at]) else None for of in worst)
         found.rows.append((", ".join(cases[row]), ESTIMATORS[at], *figures))
     found.notes.append(f"{kept.sum()} of {kept.size} captures are within all bars.")
-    return found
+    yield found
 
 
 def _shares(folder: Path, scene: str, zeroth: Zeroth, exposure_s: float) -> NDArray[Any]:

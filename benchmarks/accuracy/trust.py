@@ -2,14 +2,13 @@
 
 import tempfile
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.accuracy import halves, worlds
+from benchmarks.accuracy import worlds
 from benchmarks.accuracy.capturing import CAPTURE_SEED, SETTINGS
 from benchmarks.common.tables import Table, heads
 from transientcam.wire import Trust
@@ -41,10 +40,9 @@ class Judged(NamedTuple):
 
 
 def tables(
-    *, scenes: int = 8, seed: int = 9, directory: str = "", names: tuple[str, ...] = BUILT_IN,
-    exposures_s: tuple[float, ...] = halves.EXPOSURES_S,
-) -> Iterator[Table]:  # fmt: skip
-    """Judge scenes of a seed, a directory, and built-in ones; and halves at some exposures."""
+    *, scenes: int = 32, seed: int = 42, directory: str = "", names: tuple[str, ...] = BUILT_IN
+) -> Iterator[Table]:
+    """Judge scenes of a seed, a directory, and built-in ones."""
     table = Table(
         "What pixels say of themselves",
         heads(
@@ -66,9 +64,6 @@ def tables(
         for path in (*paths, *names):
             found.append(judged(path))
             table.rows.append((Path(path).stem, *_figures(found[-1])))
-        yield halves.table(Path(folder), exposures_s)
-    if not found:
-        return
     together = Judged(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
     table.rows.append(("all", *_figures(together)))
     yield table
@@ -80,7 +75,7 @@ def judged(scene: str) -> Judged:
     with camera_before(scene, seed=CAPTURE_SEED) as camera:
         simulation = camera.simulation
         assert simulation is not None
-        recipe = replace(_recipe(camera, simulation), lamp=simulation.lamp)
+        recipe = _recipe(camera, simulation)
         (frame,) = capture(camera, 1, middle=True)
         found = recipe.reconstruct(frame.raw)
         accuracy: RangeAccuracy = range_accuracy(recipe, found, 1, frame.raw)

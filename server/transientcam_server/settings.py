@@ -237,6 +237,10 @@ class LensSettings(_Group):
     """How far below the lens."""
     light_z_m: _Finite | None = Field(default=None, ge=-10.0, le=10.0)
     """How far before the lens."""
+    beam: tuple[_Finite, ...] = ()
+    """The beam of the light, as `calibrate --beam` measures it: x, y and z of its axis, the power
+    of the cosine to it that it falls with, and how bright in DN, for a second of exposure, a white
+    surface is that faces it at 1 m. Ranges of what is brighter are then not trusted."""
 
     @model_validator(mode="after")
     def _agree(self) -> Self:
@@ -249,6 +253,8 @@ class LensSettings(_Group):
             raise ValueError(f"{' and '.join(given)} must stand beside fx_px")
         if len(self.distortion) not in (0, 5):
             raise ValueError(f"distortion has 5 numbers or none, not {len(self.distortion)}")
+        if len(self.beam) not in (0, 5):
+            raise ValueError(f"beam has 5 numbers or none, not {len(self.beam)}")
         return self
 
 

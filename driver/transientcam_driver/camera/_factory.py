@@ -30,6 +30,8 @@ class Lens:
         (k1, k2, p1, p2, k3), the order of OpenCV; empty without any.
     light_x_m, light_y_m, light_z_m
         Where the light is: right of the lens, below it, and before it.
+    beam
+        ``axis``, ``beam_exponent`` and ``dn_per_s`` of `Lamp`, five numbers; empty if not known.
     """
 
     fx: float
@@ -40,19 +42,27 @@ class Lens:
     light_x_m: float = 0.0
     light_y_m: float = 0.0
     light_z_m: float = 0.0
+    beam: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what no lens has (ValueError)."""
-        values = self.fx, self.fy, self.cx, self.cy, *self.distortion, *self.light_m
+        values = self.fx, self.fy, self.cx, self.cy, *self.distortion, *self.light_m, *self.beam
         if not all(map(math.isfinite, values)) or min(self.fx, self.fy) <= 0:
             raise ValueError(f"{self} is no lens: focal lengths are above 0, and all are finite")
         if len(self.distortion) not in (0, 5):
             raise ValueError(f"distortion has 5 coefficients or none, not {len(self.distortion)}")
+        if len(self.beam) not in (0, 5):
+            raise ValueError(f"beam has 5 numbers or none, not {len(self.beam)}")
 
     @property
     def light_m(self) -> tuple[float, float, float]:
         """Where the light is, x, y and z."""
         return self.light_x_m, self.light_y_m, self.light_z_m
+
+    @property
+    def lamp(self) -> "Lamp | None":
+        """The light; None where its beam is not known."""
+        return Lamp(self.light_m, self.beam[:3], *self.beam[3:]) if self.beam else None
 
     def slopes(self, width: int, height: int) -> tuple[_Array, _Array]:
         """Return x and y (H, W) of the rays (x, y, 1) of all pixels, without distortion.

@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.camera._factory import Lamp, Lens
+from transientcam_driver.camera._factory import Lens
 from transientcam_driver.camera._sensor import Sensor
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S, Sequence
 
@@ -179,12 +179,7 @@ class Simulation(Protocol):
         ...
 
     def lens(self, *, width: int, height: int) -> Lens | None:
-        """Return what images are taken through, and where their light is; None without a place."""
-        ...
-
-    @property
-    def lamp(self) -> Lamp | None:
-        """Of the scene; None where the scene has no camera, or behind the diffuser."""
+        """Return what images are taken through, and their light; None without a place."""
         ...
 
     @property

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from transientcam_driver.camera import Explanation, Lamp, Lens, Sensor, Truth
+from transientcam_driver.camera import Explanation, Lens, Sensor, Truth
 from transientcam_driver.errors import CameraError
 from transientcam_driver.sequence import Sequence
 from transientcam_simulation.base import giving_up_by
@@ -85,23 +85,17 @@ class SimulationHandle:
 
     def lens(self, *, width: int, height: int) -> Lens | None:
         """Return what images are taken through, and where their light is; None without a place."""
-        camera, light_m = self._scene.camera, self._scene.light.position_m
+        camera, light = self._scene.camera, self._scene.light
         if camera is None:
             return None
         seen = replace(camera, lens=self._world.world.lens)
-        return seen.as_lens(light_m, width=width, height=height)
-
-    @property
-    def lamp(self) -> Lamp | None:
-        """Of the scene; None where the scene has no camera, or behind the diffuser."""
-        camera, light = self._scene.camera, self._scene.light
-        if camera is None or self._diffuser:
-            return None
-        position = camera.axes @ (light.position_m - camera.position_m)
+        lens = seen.as_lens(light.position_m, width=width, height=height)
+        if self._diffuser:  # which the light goes through
+            return lens
         axis = camera.axes @ (light.aim_at_m - light.position_m)
-        axis = axis / np.linalg.norm(axis)
-        white = light.electrons_per_s / self._world.world.sensor.gain_e_per_dn
-        return Lamp(tuple(position), tuple(axis), light.beam_exponent, white)
+        axis = (axis / np.linalg.norm(axis)).tolist()
+        white_dn = float(light.electrons_per_s / self._world.world.sensor.gain_e_per_dn)
+        return replace(lens, beam=(*axis, float(light.beam_exponent), white_dn))
 
     @property
     def effects(self) -> dict[str, str]:

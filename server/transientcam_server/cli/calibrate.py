@@ -85,6 +85,14 @@ def calibrate(
             "--board: prints [lens] of the settings.",
         ),
     ] = False,
+    beam: Annotated[
+        bool,
+        typer.Option(
+            "--beam",
+            help="Measure the beam of the light instead, by a white wall: prints [lens] of the "
+            "settings. Ranges that are too bright for it are then not trusted.",
+        ),
+    ] = False,
     board: Annotated[
         str | None,
         typer.Option(
@@ -115,12 +123,17 @@ def calibrate(
         measure_noise(camera or "usb", takes, output, as_json=as_json)
         return
     require_suffix(output, ".npz")
-    if lens:
+    if lens or beam:
         kept = {"--name": name, "--output": output, "--activate": activate, "--force": force}
         others = {"--camera": camera, "--sequence": sequence, "--undo": undo}
-        _refuse(kept | others, "is not for --lens")
+        hint = "--beam" if beam else "--lens"
+        _refuse(kept | others, f"is not for {hint}")
         if url is None:
-            raise typer.BadParameter("needs the URL of a daemon", param_hint="--lens")
+            raise typer.BadParameter("needs the URL of a daemon", param_hint=hint)
+        if beam:
+            _refuse({"--board": board, "--second": second, "--lens": lens}, "is not for --beam")
+            _measure_beam(url, takes=takes, token=token, as_json=as_json)
+            return
         if board is not None:
             _refuse({"--second": second}, "needs walls, not a --board")
         urls = [url, *filter(None, [second])]
@@ -200,6 +213,18 @@ def _measure_lens(
     lines = [f"{name} = {value}" for name, value in lens.items()]
     lines += [f"# {name} = {value}" for name, value in beside.items()]
     echo(json.dumps({"lens": lens} | beside) if as_json else "\n".join(["[lens]", *lines]))
+
+
+def _measure_beam(url: str, *, takes: int, token: str | None, as_json: bool) -> None:
+    from transientcam import Camera
+    from transientcam_server.imaging import Intrinsics, beam_of_wall
+
+    with Camera(url, token=token) as camera:
+        known = Intrinsics.of_document(camera.camera["intrinsics"])
+        exposure_s = camera.sequence["exposure_s"]
+        range_m, light_dn = (_mean(camera, name, takes) for name in ("range", "brightness"))
+    beam = [float(f"{each:.5g}") for each in beam_of_wall(range_m, light_dn, exposure_s, known)]
+    echo(json.dumps({"lens": {"beam": beam}}) if as_json else f"[lens]\nbeam = {beam}")
 
 
 def _mean(camera: "Client", product: str, takes: int) -> Any:

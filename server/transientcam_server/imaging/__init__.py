@@ -2,7 +2,11 @@
 
 from transientcam_server.imaging._calibrations.board import Board
 from transientcam_server.imaging._calibrations.diffuser import judge
-from transientcam_server.imaging._calibrations.lens import lens_of_walls, second_in_first
+from transientcam_server.imaging._calibrations.lens import (
+    beam_of_wall,
+    lens_of_walls,
+    second_in_first,
+)
 from transientcam_server.imaging._calibrations.verdict import Verdict
 from transientcam_server.imaging._encodings.compact import (
     encoding_name,

@@ -97,3 +97,19 @@ def test_what_cannot_be_measured_is_refused_at_once(
     assert run(["calibrate", served.url, *arguments]) == 2
 
     assert message in capfd.readouterr().err.replace("\n", " ")
+
+
+def test_a_white_wall_gives_the_beam_that_the_scene_has(
+    served: Served, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with Camera(served.url) as camera:
+        camera.sequence = {"harmonics": 1, "zeroth": "estimated", "exposure_s": 0.0005}
+        narrow = WALL.format(aside=0.3, up=0.1).replace("= 5.0e7", "= 5.0e7\nbeam_exponent = 8.0")
+        camera.simulate(definition=narrow.replace("albedo = 0.8", "albedo = 1.0"))
+        *axis, exponent, white_dn_per_s = camera.camera["intrinsics"]["beam"]
+
+    assert run(["calibrate", served.url, "--beam", "--takes", "2"]) == 0
+
+    found = LensSettings(**tomllib.loads(capfd.readouterr().out)["lens"]).beam
+    assert found[:3] == pytest.approx(axis, abs=0.02)
+    assert found[3:] == pytest.approx((exponent, white_dn_per_s), rel=0.05)

@@ -26,6 +26,9 @@ class CameraDocument(Document):
         """How far below it."""
         light_z_m: float
         """How far before it."""
+        beam: tuple[float, ...]
+        """Its axis x, y, z, the power of the cosine to it that it falls with, and how bright in DN,
+        for a second of exposure, a white surface is that faces it at 1 m; or none."""
         source: Literal["settings", "camera", "scene", "recording", "origin", "assumed"]
         """Its origin: the settings `[lens]`, the camera itself, the simulated scene, the recording,
         the origin of a relay, or none."""

@@ -71,3 +71,39 @@ def second_in_first(first: _Array, second: _Array) -> _Array:
     pose[:3, :3] = Rotation.align_vectors(first, second)[0].as_matrix()
     pose[:3, 3] = np.linalg.lstsq(normals, far_m - far2_m)[0]
     return pose
+
+
+def beam_of_wall(
+    range_m: _Array, brightness_dn: _Array, exposure_s: float, seen_by: Intrinsics
+) -> tuple[float, ...]:
+    """Return the beam of the light, as `Lens` has it, by one flat, white, matt wall.
+
+    ``range_m`` and ``brightness_dn`` are (H, W). Where b_0 r^2 over the cosine to the wall's normal
+    falls off is the beam. Raises InputError if less than half of the pixels have a range.
+    """
+    from scipy.optimize import least_squares  # likewise
+
+    points, light_dn = seen_by.points(range_m).reshape(3, -1), brightness_dn.ravel()
+    known = np.isfinite(points).all(axis=0) & (light_dn > 0)
+    if (share := known.mean()) < 0.5:
+        raise InputError("--beam", "wall", f"seen by {share:.0%} of the pixels", "seen by half")
+    chosen = np.flatnonzero(known)[:: max(1, int(known.sum()) // _PIXELS**2)]
+    points, light_dn = points[:, chosen], light_dn[chosen]
+    plane = np.linalg.lstsq(points.T, np.ones(chosen.size))[0]
+    way = points - np.reshape(seen_by.lens.light_m, (3, 1))
+    far_m = np.linalg.norm(way, axis=0)
+    facing = np.abs(plane @ way) / (np.linalg.norm(plane) * far_m)
+    white = np.log(light_dn * far_m**2 / (facing * exposure_s))
+
+    def axis_of(found: _Array) -> _Array:
+        along = np.array([*found[:2], 1.0])
+        return np.asarray(along / np.linalg.norm(along))
+
+    def off(found: _Array) -> _Array:
+        cosine = np.maximum(axis_of(found) @ way / far_m, 1e-3)
+        return np.asarray(found[3] + found[2] * np.log(cosine) - white)
+
+    low = [-np.inf, -np.inf, 0.0, -np.inf]
+    start = [0.0, 0.0, 1.0, np.median(white)]
+    found = least_squares(off, start, bounds=(low, np.inf), loss="soft_l1", f_scale=0.05).x
+    return (*axis_of(found).tolist(), float(found[2]), float(np.exp(found[3])))

@@ -26,7 +26,7 @@ from transientcam_server.imaging._errors_of_range.deviation import (
 from transientcam_server.imaging._errors_of_range.evidence import median_around
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.imaging._errors_of_range.ranging import ranges_m
-from transientcam_server.imaging._errors_of_range.trust import judged
+from transientcam_server.imaging._errors_of_range.trust import judged, not_judged
 from transientcam_server.imaging._recipe.recipe import Recipe
 
 _Array = NDArray[Any]
@@ -40,7 +40,7 @@ _QUICK: Final = ("likelihood", "pisarenko", "single-frequency")
 """Estimators that compiled kernels make quick."""
 _UNMOVED: Final = ("likelihood", "single-frequency")
 """Estimators whose range noise scatters around where it would be without."""
-OF_FEW_DRAWS: Final = 1.06
+OF_FEW_DRAWS: Final = 1.07
 """So that two thirds of normal errors are within a deviation that few copies tell."""
 _SEED: Final = 0
 
@@ -61,6 +61,8 @@ class RangeAccuracy:
     """(H, W) `Trust`: why a range is not to be trusted, 0 where it is."""
     every_px: int = 1
     """The errors are of one pixel in so many rows and columns, and stand for those around it."""
+    not_judged: tuple[str, ...] = ()
+    """The reasons that no pixel can have, as nothing that is known would tell them."""
 
     def to_document(self) -> RangeAccuracyDocument:
         """Return shares, and errors of the median pixel with a range, as a frame's metadata do."""
@@ -74,6 +76,7 @@ class RangeAccuracy:
             "range_std_m": _median(self.std_m),
             "range_bias_m": _median(self.bias_m),
             "every_px": self.every_px,
+            "not_judged": list(self.not_judged),
         }
 
 
@@ -117,17 +120,24 @@ def range_accuracy(
         return np.remainder(other_m - range_m[seen] + turn_m / 2, turn_m) - turn_m / 2
 
     drawn_m = shift_m(frame.drawn_m())
-    if recipe.technique in _UNMOVED:
+    unmoved = recipe.technique in _UNMOVED
+    if unmoved:
         std_m = typical_deviation(drawn_m)
     else:  # a copy is off as the frame itself is
         std_m = np.median(np.nan_to_num(np.abs(drawn_m)), axis=0) / MEDIAN_OF_NORMAL
-    std_m = _placed(OF_FEW_DRAWS * std_m, seen)
+    # few draws tell the deviation over that of the first moment in a neighbourhood, not in a pixel
+    with np.errstate(all="ignore"):
+        of_first = np.sqrt(frame.variance[1]) / np.abs(frame.b[1])
+        times = median_around(_placed(std_m / of_first, seen))[seen]
+    std_m = OF_FEW_DRAWS * np.fmax(times * of_first, 0.0 if unmoved else std_m)
+    std_m = _placed(std_m, seen)
     shifts_m = [_placed(shift_m(other_m), seen) for other_m in frame.others_m()]
     unknown = np.full(seen.shape, np.nan, dtype=np.float32)
     bias_m = np.max([np.abs(median_around(each)) for each in shifts_m], axis=0, initial=0.0)
     bias_m = np.where(np.isfinite(range_m), bias_m, np.nan) if shifts_m else unknown
     std_m, bias_m = (_around(each, has_range, every_px) for each in (std_m, bias_m))
-    return RangeAccuracy(std_m, bias_m, *judged(recipe, found, std_m, bias_m, raw), every_px)
+    error_m, trust = judged(recipe, found, std_m, bias_m, raw)
+    return RangeAccuracy(std_m, bias_m, error_m, trust, every_px, not_judged(recipe, raw))
 
 
 def _around(plane: _Array, has_range: _Array, every_px: int) -> _Array:

@@ -57,6 +57,14 @@ def median_around(plane: _Array, step_px: int = 1) -> _Array:
     return np.nan_to_num(found)
 
 
+def mean_alike(plane: _Array, range_m: _Array, step_px: int) -> _Array:
+    """Return the mean (H, W) of the pixels so many steps apart that are about as far; 0 of none."""
+    values, others_m = around(plane, step_px=step_px), around(range_m, step_px=step_px)
+    own_m = range_m[..., None]
+    alike = np.isfinite(values) & (np.abs(others_m - own_m) < _STEP * own_m)
+    return np.asarray(np.where(alike, values, 0.0).sum(-1) / np.maximum(alike.sum(-1), 1))
+
+
 def spread(values: _Array) -> _Array:
     """Return how far the known ones of values (H, W, N) are apart; NaN where there are none."""
     return np.asarray(np.fmax.reduce(values, axis=-1) - np.fmin.reduce(values, axis=-1))
@@ -67,22 +75,25 @@ def brighter_than_white(
 ) -> _Array:
     """Return where no surface at these points (3, H, W) can be this bright by the lamp itself.
 
-    The albedo that brightness, range and beam imply is at most 1. Highlights are small.
+    The albedo that brightness, range and beam imply is at most 1. Highlights are small: most of the
+    pixels around that have a range have to be as bright.
     """
     with np.errstate(all="ignore"):
         albedo = brightness_dn / (lamp.white_dn_per_s(points_m) * exposure_s)
-    bright = np.nan_to_num(albedo, nan=0.0, posinf=np.inf) > BRIGHTER_THAN_WHITE
-    return np.asarray(bright & (np.nanmean(around(bright, _GLOSS_PX), axis=-1) > 0.5))
+    bright = albedo > BRIGHTER_THAN_WHITE
+    others = around(np.where(np.isnan(albedo), np.nan, bright), _GLOSS_PX)
+    most = np.nansum(others, axis=-1) > 0.5 * np.isfinite(others).sum(axis=-1)
+    return np.asarray(bright & most)
 
 
-def shadowed(lamp: Lamp, lens: Intrinsics, range_m: _Array, margin_m: _Array) -> _Array:
+def shadowed(lens: Intrinsics, range_m: _Array, margin_m: _Array) -> _Array:
     """Return the points of a range map (H, W) between which and the lamp it has something.
 
     On the way to the lamp a point gets behind the map, by more than a margin (H, W), and then
     through it.
     """
     points = lens.points(range_m).astype(np.float64)
-    lamp_m = np.reshape(lamp.position_m, (3, 1, 1))
+    lamp_m = np.reshape(lens.lens.light_m, (3, 1, 1))
     behind_before, map_before = np.zeros(range_m.shape, dtype=bool), range_m
     found = behind_before
     for step in range(1, _STEPS):
@@ -92,7 +103,8 @@ def shadowed(lamp: Lamp, lens: Intrinsics, range_m: _Array, margin_m: _Array) ->
         inside = (z > 0) & (row >= 0) & (row < len(range_m))
         inside &= (column >= 0) & (column < range_m.shape[1])
         there = tuple(np.where(inside, at, 0).astype(int) for at in (row, column))
-        map_m, far_m = range_m[there], np.sqrt(x * x + y * y + z * z)
+        map_m, to_lamp = range_m[there], np.stack([x, y, z]) - lamp_m
+        far_m = (np.sqrt(x * x + y * y + z * z) + np.linalg.norm(to_lamp, axis=0)) / 2.0
         limit_m = np.maximum(margin_m, margin_m[there])
         # through the map, and not past the edge of something nearer
         through = behind_before & inside & (far_m < map_m)

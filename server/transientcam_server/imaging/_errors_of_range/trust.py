@@ -13,6 +13,7 @@ from transientcam_server.imaging._errors_of_range.evidence import (
     SHADOW,
     brighter_than_white,
     edges_and_strays,
+    mean_alike,
     median_around,
     moved,
     shadowed,
@@ -20,19 +21,25 @@ from transientcam_server.imaging._errors_of_range.evidence import (
 from transientcam_server.imaging._recipe.recipe import Recipe
 
 _Array = NDArray[Any]
-NOISE: Final = 1.645
-"""Half width of the interval that holds 90 % of a normal variable, in standard deviations."""
+NOISE: Final = 1.5
+"""Half width of an interval by noise, in standard deviations; 1.645 hold 90 % of a normal variable,
+and the larger of two estimates of the deviation is more than it."""
 BIAS: Final = 2.0
 NOISE_IN_BIAS: Final = 0.5
 """Times the estimators' disagreement that later light moves a range; what of that is noise."""
 LEAST_BIAS: Final = 0.02
 """Of the range of a radian at the highest frequency, by which later light may move a range that
 nothing shows."""
-SPREAD: Final = 0.5
+SPREAD: Final = 1.05
 """Times how much nearer the first light may be by how light is seen to be spread."""
 LEAST_LOSS: Final = 0.002
-NOISE_IN_LOSS: Final = 0.1
-"""Twice the lost modulation that shows half of that, without noise; how much noise adds to it."""
+NOISE_IN_LOSS: Final = 0.25
+"""Twice the lost modulation that may be none, without noise; how much noise adds to it."""
+TAIL_SKEW: Final = 2.0
+"""Skewness of an exponential decay, whose light comes as long after its begin as it is spread."""
+LEAST_SKEW: Final = 2e-4
+NOISE_IN_SKEW: Final = 0.15
+"""Third cumulant in cubic radians that may be none, without noise; how much noise adds to it."""
 FAR_FROM_CALIBRATION_M: Final = 0.015
 """A camera whose temperature may move ranges by more is not the one that was calibrated."""
 _UNRESOLVED: Final = 0.5
@@ -48,7 +55,7 @@ def judged(
 ) -> tuple[_Array, _Array]:
     """Return the half width of each pixel's 90 % interval in m, and its `Trust`, (H, W).
 
-    The factors from `BIAS` to `NOISE_IN_LOSS` were chosen on random scenes of two seeds;
+    The factors from `NOISE` to `NOISE_IN_SKEW` were chosen on random scenes of two seeds;
     ``python -m benchmarks trust`` measures how many pixels are within on others (decision 8).
     """
     sequence = recipe.applied.sequence
@@ -76,15 +83,15 @@ def judged(
     disagree = np.isnan(bias_m) | (bias_m > np.maximum(_UNRESOLVED * length_m, NOISE * std_m))
     later = np.asarray(found.indirect) > _LATER * brightness_dn
     nowhere = np.zeros(known.shape, dtype=bool)
-    motion = shadow = bright = nowhere
+    motion = bright = nowhere
     if raw is not None and recipe.sensor is not None:
         motion = moved(raw, recipe.sensor)
+    lens = recipe.lens(*known.shape)
+    shadow = shadowed(lens, range_m, np.maximum(error_m, SHADOW * range_m))
     if recipe.lamp is not None:
-        lens = recipe.lens(*known.shape)
-        points_m = lens.points(range_m)
         direct_dn = np.asarray(found.direct)  # what came around later adds to the brightness
-        bright = brighter_than_white(recipe.lamp, points_m, direct_dn, sequence.exposure_s)
-        shadow = shadowed(recipe.lamp, lens, range_m, np.maximum(error_m, SHADOW * range_m))
+        exposure_s = sequence.exposure_s
+        bright = brighter_than_white(recipe.lamp, lens.points(range_m), direct_dn, exposure_s)
     reasons = {
         Trust.NO_RANGE: ~known,
         Trust.CORRUPT_IMAGE: nowhere | bool(found.unrepaired_images),
@@ -101,14 +108,29 @@ def judged(
     return np.where(known, error_m, np.nan).astype(np.float32), trust
 
 
+def not_judged(recipe: Recipe, raw: RawFrame | None) -> tuple[str, ...]:
+    """Return the reasons, by name, that nothing known of a frame could give its pixels."""
+    then_c = None if recipe.gains is None else recipe.gains.temperature_c
+    drift = TemperatureDrift.between(then_c, None if raw is None else raw.temperature_c)
+    images = raw is not None and len(raw.images) > 0 and recipe.sensor is not None
+    unknown = {
+        Trust.NO_DIRECT_LIGHT: recipe.lamp is None,
+        Trust.SHADOW: recipe.intrinsics is None or recipe.intrinsics.source == "assumed",
+        Trust.MOTION: not images,
+        Trust.DRIFT: drift is None,
+    }
+    return tuple(reason.name.lower() for reason, missing in unknown.items() if missing)
+
+
 def _spread_m(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Array:
     """Return how much nearer (H, W) than its range a pixel's first light may be, by its spread.
 
-    Light whose times of flight spread by s loses (j s)^2 / 2 of its modulation at the harmonic j,
-    and the first of it comes before the mean: by s, of light that a material sends back with
-    exponential delay and of two equal returns; by less, of a return with fainter light behind.
-    Returns whose phase at the highest frequency is over half a turn away are taken out, but for
-    such as noise makes.
+    Light whose times of flight have the variance s^2 and the third cumulant k loses (j s)^2 / 2 of
+    its modulation at the harmonic j, and its phase there is j^3 k / 6 less than j times the mean.
+    Its first part is s before the mean in a material with exponential delay (k = 2 s^3), as in two
+    equal returns; 2 s^4 / k before in what sends most light directly and some much later, as rooms
+    do. The lesser of both counts. Returns whose phase at the highest frequency is over half a turn
+    away are taken out, but for such as noise makes.
     """
     m = recipe.applied.sequence.multiples[-1]
     if m == 1:
@@ -126,10 +148,22 @@ def _spread_m(recipe: Recipe, found: tm.Reconstruction, range_m: _Array) -> _Arr
     )
     with np.errstate(all="ignore"):
         lost = (1.0 - np.abs(highest) / np.abs(lowest)) * 2.0 / (m**2 - 1)
+        early = np.angle((lowest / np.abs(lowest)) ** m * np.conj(highest)) * 6.0 / (m**3 - m)
         after = np.angle(lowest * np.exp(-1j * first))
-    near = median_around(lost)
-    noise = median_around(np.abs(lost - near))
-    near = np.clip(median_around(median_around(near, 2), 5), 0.0, 1.0)  # of 33 x 33 pixels
-    known = near / (near + NOISE_IN_LOSS * noise + LEAST_LOSS / m**2)
-    spread_m = np.maximum(np.sqrt(near) - median_around(after), 0.0) * known * radian_m
-    return np.asarray(spread_m)
+    typical_m = median_around(range_m)
+    (square, unsure), (cube, unsure_cube), (after, _) = (
+        _typical(plane, typical_m) for plane in (lost, early, after)
+    )
+    square = np.clip(square, 0.0, 1.0)
+    none = (NOISE_IN_LOSS * unsure) ** 4 + (LEAST_LOSS / m**2) ** 4
+    spread = np.sqrt(square * square**4 / (square**4 + none))
+    skew = np.maximum(cube - NOISE_IN_SKEW * unsure_cube - LEAST_SKEW, 1e-12)
+    before = np.minimum(spread, TAIL_SKEW * spread**4 / skew)
+    return np.asarray(np.maximum(before - after, 0.0) * radian_m)
+
+
+def _typical(plane: _Array, range_m: _Array) -> tuple[_Array, _Array]:
+    """Return the mean (H, W) over 53 x 53 pixels of a surface, and by how much one pixel is off."""
+    near = median_around(plane)
+    far_off = median_around(np.abs(plane - near))
+    return mean_alike(mean_alike(near, range_m, 2), range_m, 10), far_off

@@ -122,7 +122,6 @@ class Pipeline:
             self.reconstruction.id,
             None if self._intrinsics is None else self._intrinsics(),
             self._sensor,
-            None if self._simulation is None else self._simulation.lamp,
         )
 
     def prepare_kernels(self, applied: AppliedSequence) -> threading.Thread | None:

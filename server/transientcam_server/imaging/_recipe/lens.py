@@ -32,7 +32,7 @@ class Intrinsics(Pinhole):
     source
         Where they come from: the ``settings`` of the service, the ``camera`` itself, the simulated
         ``scene``, the ``recording``, the ``origin`` of a relay, or none of these (``assumed``).
-    light_x_m, light_y_m, light_z_m
+    light_x_m, light_y_m, light_z_m, beam
         As of `Lens`.
     """
 
@@ -41,6 +41,7 @@ class Intrinsics(Pinhole):
     light_x_m: float = 0.0
     light_y_m: float = 0.0
     light_z_m: float = 0.0
+    beam: tuple[float, ...] = ()
 
     @classmethod
     def of_field(
@@ -62,7 +63,7 @@ class Intrinsics(Pinhole):
             field_deg = settings.field_of_view_deg or ASSUMED_FIELD_OF_VIEW_DEG
             known = self.of_field(field_deg, width=self.width, height=self.height)
             known = replace(known, source="settings", distortion=settings.distortion)
-        kept = {name: getattr(self, name) for name in _LIGHT}
+        kept = {name: getattr(self, name) for name in _LIGHT} | {"beam": settings.beam or self.beam}
         given = {name: getattr(settings, f"{name}_px") for name in ("fx", "cx", "cy")}
         given |= {"fy": settings.fy_px or settings.fx_px}
         given |= {name: getattr(settings, name) for name in _LIGHT}
@@ -82,7 +83,8 @@ class Intrinsics(Pinhole):
         fx, fy, cx, cy = (float(document[name]) for name in ("fx", "fy", "cx", "cy"))
         distortion = tuple(float(each) for each in document.get("distortion", ()))
         light_m = (float(document.get(name, 0.0)) for name in _LIGHT)
-        lens = Lens(fx, fy, cx, cy, distortion, *light_m)
+        beam = tuple(float(each) for each in document.get("beam", ()))
+        lens = Lens(fx, fy, cx, cy, distortion, *light_m, beam)
         width, height = int(document["width"]), int(document["height"])
         return cls.of_lens(lens, width=width, height=height, source=source)
 
@@ -90,13 +92,13 @@ class Intrinsics(Pinhole):
     def of_lens(cls, lens: Lens, *, width: int, height: int, source: Source) -> Self:
         """Return those of a lens."""
         pinhole = lens.fx, lens.fy, lens.cx, lens.cy
-        return cls(*pinhole, width, height, source, lens.distortion, *lens.light_m)
+        return cls(*pinhole, width, height, source, lens.distortion, *lens.light_m, lens.beam)
 
     @property
     def lens(self) -> Lens:
         """The lens and where the light is, as a camera reports them."""
         light_m = self.light_x_m, self.light_y_m, self.light_z_m
-        return Lens(self.fx, self.fy, self.cx, self.cy, self.distortion, *light_m)
+        return Lens(self.fx, self.fy, self.cx, self.cy, self.distortion, *light_m, self.beam)
 
     def points(self, range_m: NDArray[Any]) -> NDArray[np.float32]:
         """Return the points (3, H, W) in m of a range (H, W): half of the path of the light."""
@@ -140,9 +142,8 @@ def known_intrinsics(
     Where the light of a simulated camera is, and how its lens bends, its simulation knows best.
     """
     if reported is not None and scene is not None:
-        x, y, z = scene.light_m
-        bent = scene.distortion
-        reported = replace(reported, distortion=bent, light_x_m=x, light_y_m=y, light_z_m=z)
+        pinhole = {name: getattr(reported, name) for name in ("fx", "fy", "cx", "cy")}
+        reported = replace(scene, **pinhole)
     found = Intrinsics.of_field(ASSUMED_FIELD_OF_VIEW_DEG, width=width, height=height)
     if reported is not None:
         found = Intrinsics.of_lens(reported, width=width, height=height, source="camera")

@@ -125,8 +125,6 @@ class Recipe:
     """Where the pixels look; None for a usual field of view."""
     sensor: tm.noise.Sensor | None = None
     """Whose noise the images have; None where no one states it."""
-    lamp: Lamp | None = None
-    """Its place and brightness; None where they are not known."""
 
     @property
     def technique(self) -> str:
@@ -158,6 +156,11 @@ class Recipe:
     def fills(self) -> bool:
         """Whether the frame before is needed."""
         return self.settings.spoilt_images == "fill"
+
+    @property
+    def lamp(self) -> Lamp | None:
+        """The light; None where its beam is not known."""
+        return None if self.intrinsics is None else self.intrinsics.lens.lamp
 
     def lens(self, height: int, width: int) -> Intrinsics:
         """Return where the pixels look, as it is known or else assumed."""

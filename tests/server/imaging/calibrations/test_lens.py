@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 
 from transientcam_driver import Lens
 from transientcam_server.errors import InputError
-from transientcam_server.imaging import Intrinsics, lens_of_walls, second_in_first
+from transientcam_server.imaging import (
+    Intrinsics,
+    beam_of_wall,
+    lens_of_walls,
+    second_in_first,
+)
 
 WIDTH, HEIGHT = 163, 120
 SIZE: dict[str, Any] = {"width": WIDTH, "height": HEIGHT}
@@ -39,6 +44,26 @@ def test_walls_from_several_sides_say_how_the_lens_is_and_where_they_are() -> No
     assert lens.light_m == TRUE.light_m
     assert off_m < 0.002
     np.testing.assert_allclose(found, WALLS, atol=0.005)
+
+
+def test_one_white_wall_says_how_the_light_falls_off_and_how_bright_it_is() -> None:
+    """By the law of the beam itself: a slanted wall, of which a part has no range."""
+    axis = np.array([0.3, -0.1, 1.0]) / np.sqrt(1.1)
+    known = Intrinsics.of_lens(TRUE, **SIZE, source="camera")
+    range_m = ranges_of(WALLS[1])
+    points = np.moveaxis(known.points(range_m), 0, -1)
+    way = points - TRUE.light_m
+    far_m = np.linalg.norm(way, axis=-1)
+    facing = (way @ WALLS[1]) / (far_m * np.linalg.norm(WALLS[1]))
+    light_dn = 2e6 * 1e-3 * (way @ axis / far_m) ** 12 * facing / far_m**2
+
+    *found_axis, exponent, white_dn_per_s = beam_of_wall(range_m, light_dn, 1e-3, known)
+
+    np.testing.assert_allclose(found_axis, axis, atol=0.01)
+    assert exponent == pytest.approx(12.0, rel=0.05)
+    assert white_dn_per_s == pytest.approx(2e6, rel=0.05)
+    with pytest.raises(InputError, match="seen by half"):
+        beam_of_wall(np.full((HEIGHT, WIDTH), np.nan), light_dn, 1e-3, known)
 
 
 def test_a_wall_that_is_hardly_seen_is_refused() -> None:

@@ -1,5 +1,7 @@
 """Motion, shadow, edges and too much light, on pictures whose geometry is given."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -24,10 +26,11 @@ SENSOR = tm.noise.Sensor()
 Array = NDArray[np.float64]
 
 
-def plane_m(depth_m: float) -> Array:
-    """Ranges of a plane across the line of sight."""
+def plane_m(depth_m: float, aside_m: float = 0.0) -> Array:
+    """Ranges of a plane across the line of sight, the lamp so far to the right."""
     x, y = np.meshgrid(*((np.arange(n) - (n - 1) / 2) / LENS.fx for n in (WIDTH, HEIGHT)))
-    return np.asarray(depth_m * np.sqrt(1 + x * x + y * y), dtype=np.float64)
+    there, back = (np.sqrt(1 + (x - at) ** 2 + y * y) for at in (aside_m / depth_m, 0.0))
+    return np.asarray(depth_m * (there + back) / 2, dtype=np.float64)
 
 
 def lamp(x_m: float, exponent: float = 0.0) -> Lamp:
@@ -37,11 +40,11 @@ def lamp(x_m: float, exponent: float = 0.0) -> Lamp:
 def test_a_plate_throws_its_shadow_to_the_side_where_the_lamp_is_not() -> None:
     """By similar triangles: the plate's edge at x, seen from a lamp aside, is on the wall at x'."""
     wall_m, plate_m, aside_m = 2.0, 1.2, 0.3
-    range_m, near = plane_m(wall_m), plane_m(plate_m)
+    range_m, near = plane_m(wall_m, aside_m), plane_m(plate_m, aside_m)
     inside = np.s_[14:26, 24:36]
     range_m[inside] = near[inside]
 
-    found = shadowed(lamp(aside_m), LENS, range_m, 0.02 * range_m)
+    found = shadowed(replace(LENS, light_x_m=aside_m), range_m, 0.02 * range_m)
 
     x_m = wall_m * (np.arange(WIDTH) - (WIDTH - 1) / 2) / LENS.fx
     left_m, right_m = (plate_m * ((edge - 0.5) - (WIDTH - 1) / 2) / LENS.fx for edge in (24, 36))
@@ -57,9 +60,9 @@ def test_a_plate_throws_its_shadow_to_the_side_where_the_lamp_is_not() -> None:
 
 def test_nothing_throws_a_shadow_on_an_empty_wall_or_behind_a_lamp_in_the_lens() -> None:
     range_m = plane_m(2.0)
-    assert not shadowed(lamp(0.3), LENS, range_m, 0.02 * range_m).any()
+    assert not shadowed(replace(LENS, light_x_m=0.3), range_m, 0.02 * range_m).any()
     range_m[10:20, 10:20] = plane_m(1.0)[10:20, 10:20]
-    assert not shadowed(lamp(0.0), LENS, range_m, 0.02 * range_m).any()
+    assert not shadowed(LENS, range_m, 0.02 * range_m).any()
 
 
 def test_a_wall_beside_the_beam_is_too_bright_and_one_in_it_is_not() -> None:

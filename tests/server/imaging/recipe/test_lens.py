@@ -90,7 +90,7 @@ def test_a_scene_knows_the_field_of_view_of_its_camera() -> None:
         lens = camera.simulation.lens(**SIZE)
 
     found = known_intrinsics(LensSettings(), **SIZE, scene=lens)
-    assert replace(found, light_x_m=0.0, light_z_m=0.0) == SCENE
+    assert replace(found, light_x_m=0.0, light_z_m=0.0, beam=()) == SCENE
     assert (found.light_x_m, found.light_z_m) == pytest.approx((-0.6, 0.12), abs=0.05)
 
 
