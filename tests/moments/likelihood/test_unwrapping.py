@@ -169,3 +169,30 @@ def test_what_cannot_be_unwrapped_is_refused() -> None:
         tm.unwrap(b, harmonics=(0, *KINECT), model_error=2.0)
     with pytest.raises(tm.ParameterError, match="significance"):
         tm.unwrap(b, harmonics=(0, *KINECT)).ambiguous(0.0)
+
+
+def test_within_a_largest_phase_it_finds_what_trying_all_wrap_counts_finds() -> None:
+    multiples, most_rad = (305, 2046), 0.02
+    rng = np.random.default_rng(5)
+    phase = rng.uniform(0.0, most_rad, 200)
+    noise = 0.05 * (rng.standard_normal((2, 200)) + 1j * rng.standard_normal((2, 200)))
+    b = np.exp(1j * np.outer(multiples, phase)) + noise
+    found = tm.unwrap(b, harmonics=multiples, most_rad=most_rad)
+
+    tried = np.linspace(0.0, most_rad, 20_001)
+    cost = sum(
+        abs(each)[:, None] ** 2 * np.angle(each[:, None] * np.exp(-1j * j * tried)) ** 2
+        for j, each in zip(multiples, b, strict=True)
+    )
+    inside = (found.phase_rad > 0) & (found.phase_rad < most_rad)  # noise may leave it
+    best = tried[np.argmin(cost, axis=1)]
+    assert inside.mean() > 0.9
+    assert found.phase_rad[inside] == pytest.approx(best[inside], abs=2 * most_rad / 20_000)
+
+
+def test_multiples_above_32_need_a_largest_phase() -> None:
+    b = np.ones((2, 4), complex)
+    with pytest.raises(tm.ParameterError, match="different ones of 0 to 32"):
+        tm.unwrap(b, harmonics=(305, 2046))
+    with pytest.raises(tm.ParameterError, match="0 to a turn"):
+        tm.unwrap(b, harmonics=(1, 2), most_rad=7.0)

@@ -108,7 +108,7 @@ class Description:
             planes = {"gain": each.gain}
             if isinstance(each, Moment):
                 planes["std"] = each.std
-                inside = np.all((0 < np.asarray(each.std)) & (np.asarray(each.std) < each.largest))
+                inside = np.all((np.asarray(each.std) > 0) & (np.asarray(each.std) < each.largest))
                 require(f"{name}.std", inside, f"above 0, below {each.largest}", each.std)
             else:
                 planes["offset_dn"] = each.offset_dn
