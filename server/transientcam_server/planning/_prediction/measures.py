@@ -5,8 +5,8 @@ covers the sampling of pixels and what the model is wrong by. That of an error h
 own: the error with the least bias that may be expected, and that with the most. Where the moments
 tell the bias, these are shares of the predicted one (`KNOWN`). Where they do not, the light may
 begin at any range that they do not contradict (`plausible`), and what is predicted of the bias is
-worth less (`UNKNOWN`). ``python -m benchmarks promises`` measures what both hold, with ``--seed`` on
-random scenes.
+worth less (`UNKNOWN`). ``python -m benchmarks promises`` measures what both hold, with ``--seed``
+on random scenes.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""What is searched: goals, the families of sequences for them, and what of any points no other beats."""
+"""What is searched: goals, families of sequences for them, and what no other point beats."""
 
 import itertools
 import math

@@ -1,7 +1,11 @@
 """The search for the choice that reaches a goal soonest, or comes nearest to it.
 
-A candidate is a sequence and an estimator. A bound on the error of one costs nothing; few draws serve
-all that have its frequencies and its estimator; many draws are its own, and predict its `Choice`.
+A candidate is a sequence and an estimator. A bound on the error of one costs nothing; few draws
+serve all that have its frequencies and its estimator; many draws are its own, and predict its
+`Choice`. Bounds rule families out before any draw, few draws all but the contenders, and many draws
+decide among these. The longer a capture, the less its noise; its bias may grow, as where the
+likelihood finds more returns the less noise there is. So the errors of a family fall to a least
+one, and may rise again.
 """
 
 import bisect
