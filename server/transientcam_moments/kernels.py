@@ -22,7 +22,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypedDict
+from typing import NamedTuple, TypedDict
 
 from transientcam_compiled import (
     THREAD,
@@ -33,6 +33,7 @@ from transientcam_compiled import (
     use_all_cores,
     use_one_thread,
 )
+from transientcam_moments import _gpu
 from transientcam_moments._dispatch import (
     CACHE,
     KERNELS,
@@ -44,18 +45,20 @@ from transientcam_moments._dispatch import (
     lookup,
 )
 from transientcam_moments.arrays import MAX_HARMONICS, chosen
-from transientcam_moments.errors import ParameterError
+from transientcam_moments.errors import DeviceUnavailable, ParameterError
 
 __all__ = [
     "LANES",
     "MOST_ROOTS",
     "THREAD",
+    "DeviceState",
     "Progress",
     "Spread",
     "State",
     "at_once",
     "cache_directory",
     "compile",
+    "devices",
     "load",
     "make_ready",
     "only_note",
@@ -117,6 +120,52 @@ def state() -> State:
         "compiling": None if compiling is None else str(compiling),
         "failed": [f"{key}: {reason}" for key, reason in list(KERNELS.failed.items())],
     }
+
+
+class DeviceState(NamedTuple):
+    """An adapter that `devices` found, by what its driver says of it."""
+
+    name: str
+    kind: str
+    """DiscreteGPU, IntegratedGPU, VirtualGPU, CPU (software) or Unknown."""
+    backend: str
+    """Vulkan, Metal or D3D12."""
+    frames: int
+    """That reconstructors of this process have from it, by "gpu" or its whole name."""
+    refused: str
+    """Why it gives no frames of order ``harmonics``; "" where it is right, or was not checked."""
+
+
+def devices(check: int | None = None) -> list[DeviceState]:
+    """Return what could compute frames here beside this processor, real GPUs first.
+
+    Parameters
+    ----------
+    check : int, optional
+        An order m, 1 to 8: each of them computes a known frame of it, which takes seconds.
+
+    Raises
+    ------
+    DeviceUnavailable
+        Where that cannot be found out: wgpu, of the extra ``gpu``, is not installed.
+    ParameterError
+        For another order.
+    """
+    if check is not None and not 1 <= check <= MOST_ROOTS:
+        raise ParameterError("check", check, f"1 to {MOST_ROOTS}")
+    found = []
+    for each in _gpu.devices():
+        refused, device = "", _gpu.device_named(f"gpu:{each.name}")
+        if check is not None:
+            try:
+                device.require(check)
+            except DeviceUnavailable as error:
+                refused = error.reason
+        frames = device.frames + sum(
+            other.frames for other in (_gpu.device_named("gpu"),) if other.adapter == each
+        )
+        found.append(DeviceState(each.name, each.kind, each.backend, frames, refused))
+    return found
 
 
 def cache_directory() -> Path | None:

@@ -1,0 +1,215 @@
+"""Statements of algorithms, called with planes that write down in WGSL what is done to them.
+
+`arrays` has the words of which algorithms are stated once; here they get a third meaning. A traced
+plane is one pixel's number in a shader. Straight-line arithmetic becomes one ``let`` an operation,
+the same one twice only one, and `repeat` a loop. What `some` would leave out is always there.
+"""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+
+class Writer:
+    """The text of a shader's function, as far as it is written."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self._known: dict[str, str] = {}
+        self._names = 0
+
+    def put(self, text: str, kind: str = "f32") -> Any:  # it stands for a Plane, or a Mask
+        """Return the value of an expression, computed here unless it is known."""
+        name = self._known.get(text)
+        if name is None:
+            name = self._known[text] = self._name()
+            self.lines.append(f"let {name}: {kind} = {text};")
+        return Traced(self, name, kind)
+
+    def variable(self, value: Any) -> str:
+        """Return the name of a new variable that begins as a plane or a number."""
+        name = self._name()
+        kind = value.kind if isinstance(value, Traced) else "f32"
+        self.lines.append(f"var {name}: {kind} = {literal(value)};")
+        return name
+
+    @contextmanager
+    def loop(self, head: str) -> Iterator[None]:
+        """Write a loop; what is computed inside is not known behind it."""
+        known = dict(self._known)
+        self.lines.append(f"{head} {{")
+        yield
+        self.lines.append("}")
+        self._known = known
+
+    def _name(self) -> str:
+        self._names += 1
+        return f"t{self._names}"
+
+
+class Traced:
+    """A pixel's number, or truth value (``kind`` "bool"), by its name in the shader."""
+
+    __array_ufunc__ = None  # NumPy's numbers leave operations to this class
+    dtype = np.dtype(np.float32)
+    __hash__ = None  # type: ignore[assignment]  # as planes
+
+    def __init__(self, writer: Writer, name: str, kind: str = "f32") -> None:
+        self.writer, self.name, self.kind = writer, name, kind
+
+    def __array_namespace__(self) -> Any:
+        return Words
+
+    def _two(self, text: str, kind: str = "f32") -> "Traced":
+        return self.writer.put(text, kind)
+
+    def __add__(self, other: Any) -> "Traced":
+        return self._two(f"{self.name} + {literal(other)}")
+
+    def __radd__(self, other: Any) -> "Traced":
+        return self._two(f"{literal(other)} + {self.name}")
+
+    def __sub__(self, other: Any) -> "Traced":
+        return self._two(f"{self.name} - {literal(other)}")
+
+    def __rsub__(self, other: Any) -> "Traced":
+        return self._two(f"{literal(other)} - {self.name}")
+
+    def __mul__(self, other: Any) -> "Traced":
+        return self._two(f"{self.name} * {literal(other)}")
+
+    def __rmul__(self, other: Any) -> "Traced":
+        return self._two(f"{literal(other)} * {self.name}")
+
+    def __truediv__(self, other: Any) -> "Traced":
+        if not isinstance(other, Traced):  # rounded to no more than half a unit
+            return self._two(f"{self.name} * {literal(1.0 / float(other))}")
+        return self._two(f"quotient({self.name}, {other.name})")
+
+    def __rtruediv__(self, other: Any) -> "Traced":
+        return self._two(f"quotient({literal(other)}, {self.name})")
+
+    def __neg__(self) -> "Traced":
+        return self._two(f"-{self.name}")
+
+    def __abs__(self) -> "Traced":
+        return self._two(f"abs({self.name})")
+
+    def __lt__(self, other: Any) -> "Traced":
+        return self._two(f"{self.name} < {literal(other)}", "bool")
+
+    def __le__(self, other: Any) -> "Traced":
+        return self._two(f"{self.name} <= {literal(other)}", "bool")
+
+    def __gt__(self, other: Any) -> "Traced":
+        return self._two(f"{self.name} > {literal(other)}", "bool")
+
+    def __ge__(self, other: Any) -> "Traced":
+        return self._two(f"{self.name} >= {literal(other)}", "bool")
+
+    def __and__(self, other: "Traced") -> "Traced":
+        return self._two(f"{self.name} & {other.name}", "bool")
+
+    def __or__(self, other: "Traced") -> "Traced":
+        return self._two(f"{self.name} | {other.name}", "bool")
+
+    def __invert__(self) -> "Traced":
+        return self._two(f"!{self.name}", "bool")
+
+
+def literal(value: Any) -> str:
+    """Return how a plane or a number is written; WGSL has neither NaN nor infinity."""
+    if isinstance(value, Traced):
+        return value.name
+    number = float(value)
+    if math.isnan(number):
+        return "params.nan"
+    return repr(
+        math.copysign(float(np.finfo(np.float32).max), number) if math.isinf(number) else number
+    )
+
+
+class Words:
+    """The words of `arrays` that are no operators, by the names that it asks a namespace for."""
+
+    @staticmethod
+    def where(mask: Traced, yes: Any, no: Any) -> Traced:
+        """As `select`."""
+        return mask.writer.put(f"select({literal(no)}, {literal(yes)}, {mask.name})")
+
+    @staticmethod
+    def maximum(x: Traced, y: Any) -> Traced:
+        """As `larger`."""
+        return x.writer.put(f"max({x.name}, {literal(y)})")
+
+    @staticmethod
+    def minimum(x: Traced, y: Any) -> Traced:
+        """As `smaller`."""
+        return x.writer.put(f"min({x.name}, {literal(y)})")
+
+    @staticmethod
+    def sqrt(x: Traced) -> Traced:
+        """As `root`."""
+        return x.writer.put(f"root_of({x.name})")
+
+    @staticmethod
+    def lost_by_squaring(x: Traced, square: Traced) -> Traced:
+        """Do as the word does, where products and sums may be fused, or not.
+
+        The square is what it was rounded to, here and in all that comes after.
+        """
+        square.name = x.writer.put(f"rounded({square.name})").name
+        return x.writer.put(f"lost_by_squaring({x.name}, {square.name})")
+
+    @staticmethod
+    def iterate(
+        body: Any, steps: int, fixed: tuple[Any, ...], given: tuple[Any, ...], state: Any
+    ) -> Any:
+        """As `repeat`: a loop, before which the first step stands where it is another one."""
+        writer: Writer = state[0].writer
+        begun = 0
+        if _is_other_at_first(body, fixed, given, state):
+            state, begun = body(True, fixed, given, state), 1
+        names = [writer.variable(plane) for plane in _planes(state)]
+        form = [len(part) if isinstance(part, list) else None for part in state]
+        kinds = [getattr(plane, "kind", "f32") for plane in _planes(state)]
+        step = f"i{names[0]}"
+        with writer.loop(f"for (var {step} = {begun}; {step} < {steps} && {names[0]}; {step}++)"):
+            inside = [Traced(writer, *each) for each in zip(names, kinds, strict=True)]
+            # once a step: names of variables stand for other values in each
+            inside = [writer.put(f"{each.name} /* in {step} */", each.kind) for each in inside]
+            found = list(_planes(body(False, fixed, given, _formed(form, inside))))
+            for name, plane in zip(names, found, strict=True):
+                writer.lines.append(f"{name} = {literal(plane)};")
+        behind = [
+            writer.put(f"{name} /* behind {step} */", kind)
+            for name, kind in zip(names, kinds, strict=True)
+        ]
+        return _formed(form, behind)
+
+
+def _is_other_at_first(body: Any, fixed: Any, given: Any, state: Any) -> bool:
+    texts = []
+    for first in (True, False):
+        scratch = Writer()
+        moved = [Traced(scratch, plane.name, plane.kind) for plane in _planes(state)]
+        form = [len(part) if isinstance(part, list) else None for part in state]
+        of_given = _formed(
+            [len(part) if isinstance(part, list) else None for part in given],
+            [Traced(scratch, plane.name, plane.kind) for plane in _planes(given)],
+        )
+        body(first, fixed, of_given, _formed(form, moved))
+        texts.append(scratch.lines)
+    return texts[0] != texts[1]
+
+
+def _planes(state: Any) -> list[Any]:
+    return [plane for part in state for plane in (part if isinstance(part, list) else [part])]
+
+
+def _formed(form: list[int | None], planes: list[Any]) -> tuple[Any, ...]:
+    rest = iter(planes)
+    return tuple(next(rest) if size is None else [next(rest) for _ in range(size)] for size in form)
