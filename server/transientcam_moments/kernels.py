@@ -70,6 +70,7 @@ __all__ = [
     "settled",
     "state",
     "use_all_cores",
+    "use_device",
     "use_one_thread",
 ]
 
@@ -130,10 +131,8 @@ class DeviceState(NamedTuple):
     """DiscreteGPU, IntegratedGPU, VirtualGPU, CPU (software) or Unknown."""
     backend: str
     """Vulkan, Metal or D3D12."""
-    frames: int
-    """That reconstructors of this process have from it, by "gpu" or its whole name."""
     refused: str
-    """Why it gives no frames of order ``harmonics``; "" where it is right, or was not checked."""
+    """What it makes wrong of a known frame; "" where it is right, or was not checked."""
 
 
 def devices(check: int | None = None) -> list[DeviceState]:
@@ -154,18 +153,33 @@ def devices(check: int | None = None) -> list[DeviceState]:
     if check is not None and not 1 <= check <= MOST_ROOTS:
         raise ParameterError("check", check, f"1 to {MOST_ROOTS}")
     found = []
-    for each in _gpu.devices():
-        refused, device = "", _gpu.device_named(f"gpu:{each.name}")
+    for name, kind, backend, _ in _gpu.device_named("gpu").adapters():
+        refused = ""
         if check is not None:
             try:
-                device.require(check)
+                _gpu.device_named(f"gpu:{name}").require(check)
             except DeviceUnavailable as error:
                 refused = error.reason
-        frames = device.frames + sum(
-            other.frames for other in (_gpu.device_named("gpu"),) if other.adapter == each
-        )
-        found.append(DeviceState(each.name, each.kind, each.backend, frames, refused))
+        found.append(DeviceState(name, kind, backend, refused))
     return found
+
+
+def use_device(name: str) -> None:
+    """Have each `Reconstructor` made from now on use a device, unless it is given one.
+
+    ``name``: as the Reconstructor takes it; "cpu" until this is called.
+
+    Raises
+    ------
+    ParameterError
+        For another name.
+    DeviceUnavailable
+        For "gpu" and "gpu:NAME", where there is no such adapter.
+    """
+    device = _gpu.device_of(name)
+    if device is not None and name != "auto":
+        device.require(0)
+    _gpu.CHOICE.name = name
 
 
 def cache_directory() -> Path | None:

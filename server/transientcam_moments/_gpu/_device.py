@@ -5,7 +5,10 @@ functions are called through `ChildProcess`, one at a time; what they were told 
 """
 
 import mmap
+import os
+import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
@@ -15,7 +18,7 @@ from transientcam_moments._gpu._shader import GROUP, ROW
 
 SOFTWARE: Final = "CPU"
 _RANK: Final = {"DiscreteGPU": 0, "IntegratedGPU": 1, "VirtualGPU": 2, SOFTWARE: 4}
-_OF_ANY_USE: Final = ("Vulkan", "Metal", "D3D12")
+_BACKENDS: Final = ("Vulkan", "Metal", "DX12")
 
 
 class Adapter(NamedTuple):
@@ -55,10 +58,6 @@ def told(function: Callable[..., Any], *arguments: Any) -> Any:
     """Return what a function does; whatever it raises is told in words, as nobody else has wgpu."""
     try:
         return function(*arguments)
-    except ImportError as error:
-        raise RuntimeError(
-            f"{error.name} is not installed: pip install 'transientcam[gpu]'"
-        ) from None
     except Exception as error:
         raise RuntimeError(f"{type(error).__name__}: {error}".splitlines()[0]) from None
 
@@ -70,13 +69,18 @@ def adapters(_tell: object) -> list[Adapter]:
 
 def _adapters() -> list[tuple[Adapter, Any]]:
     import wgpu
+    from wgpu.backends.wgpu_native.extras import set_instance_extras
 
+    # else drivers complain on the terminal that there is no display
+    os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
+    if _HERE.device is None:  # OpenGL's drivers look for displays, which there may not be
+        with suppress(RuntimeError):  # it is asked once more
+            set_instance_extras(backends=_BACKENDS)
     found = []
     for each in wgpu.gpu.enumerate_adapters_sync():
         info = each.info
-        if info["backend_type"] in _OF_ANY_USE:
-            named = info["device"], info["adapter_type"], info["backend_type"], info["description"]
-            found.append((Adapter(*named), each))
+        named = info["device"], info["adapter_type"], info["backend_type"], info["description"]
+        found.append((Adapter(*named), each))
     return sorted(found, key=lambda each: _RANK.get(each[0].kind, 3))
 
 

@@ -12,6 +12,7 @@ import weakref
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,7 +25,7 @@ from transientcam_moments._gpu._golden import wrong
 from transientcam_moments._gpu._passes import DevicePass, Rows
 from transientcam_moments._kernels.one_pass import Constants
 from transientcam_moments.arrays import Array
-from transientcam_moments.errors import DeviceUnavailable
+from transientcam_moments.errors import DeviceUnavailable, ParameterError
 
 AUTO_PIXELS: Final = 100_000
 """Of a frame from which "auto" takes a GPU, whatever its order."""
@@ -67,17 +68,17 @@ class Device:
     def adapters(self) -> list[Adapter]:
         """Return what there is. Raises DeviceUnavailable where that cannot be found out."""
         try:
-            found: list[Adapter] = self._thread.submit(self._call, there.adapters).result()
+            found: list[Adapter] = self._thread.submit(self._adapters).result()
         except (OSError, RuntimeError) as error:
             raise DeviceUnavailable(self.wanted, _in_words(error)) from None
         return found
 
     def require(self, m: int) -> None:
-        """Wait until frames of an order have been checked.
+        """Wait until frames of an order have been checked; with 0, until there is a device.
 
         Raises DeviceUnavailable where there is no such device, or where it is wrong.
         """
-        reason = self._check(m).result() or self._reason
+        reason = self._check(m).result()
         if reason:
             raise DeviceUnavailable(self.wanted, reason)
 
@@ -120,6 +121,8 @@ class Device:
             self._end()
             return _in_words(error)
         assert self.adapter is not None  # noqa: S101 - it has begun
+        if not m:
+            return ""
 
         def make(*given: Any) -> DevicePass:
             return DevicePass(self._frame, *given, images=True, hostile=self._hostile)
@@ -134,9 +137,15 @@ class Device:
         """Start the process with its device, unless it is there."""
         if self._open:
             return
-        self.adapter = self._chosen(self._call(there.adapters))
+        self.adapter = self._chosen(self._adapters())
         self._most_bytes = self._call(there.take, self.adapter)
         self._open = True
+
+    def _adapters(self) -> list[Adapter]:
+        if find_spec("wgpu") is None:
+            raise RuntimeError("wgpu is not installed: pip install 'transientcam[gpu]'")
+        found: list[Adapter] = self._call(there.adapters)
+        return found
 
     def _chosen(self, found: list[Adapter]) -> Adapter:
         named = [each for each in found if self._named.lower() in each.name.lower()]
@@ -219,6 +228,20 @@ def device_named(wanted: str) -> Device:
     return Device(wanted)
 
 
-def devices() -> list[Adapter]:
-    """Return the adapters of this machine. Raises DeviceUnavailable where it does not say."""
-    return device_named("gpu").adapters()
+def device_of(name: str) -> Device | None:
+    """Return the device of a reconstructor's ``device``; None for the processor.
+
+    Raises ParameterError for another name.
+    """
+    if name not in ("cpu", "auto", "gpu") and not name.startswith("gpu:"):
+        raise ParameterError("device", name, "cpu, auto, gpu or gpu:NAME")
+    return None if name == "cpu" else device_named("gpu" if name == "auto" else name)
+
+
+class _Choice:
+    """What reconstructors of this process use that are given no device."""
+
+    name = "cpu"
+
+
+CHOICE: Final = _Choice()

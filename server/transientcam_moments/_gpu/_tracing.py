@@ -6,7 +6,7 @@ the same one twice only one, and `repeat` a loop. What `some` would leave out is
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -50,6 +50,13 @@ class Writer:
         return f"t{self._names}"
 
 
+def _operator(text: str, kind: str = "f32") -> Callable[..., Any]:
+    def put(self: "Traced", *other: Any) -> Any:
+        return self.writer.put(text.format(self.name, *map(literal, other)), kind)
+
+    return put
+
+
 class Traced:
     """A pixel's number, or truth value (``kind`` "bool"), by its name in the shader."""
 
@@ -63,61 +70,23 @@ class Traced:
     def __array_namespace__(self) -> Any:
         return Words
 
-    def _two(self, text: str, kind: str = "f32") -> "Traced":
-        return self.writer.put(text, kind)
-
-    def __add__(self, other: Any) -> "Traced":
-        return self._two(f"{self.name} + {literal(other)}")
-
-    def __radd__(self, other: Any) -> "Traced":
-        return self._two(f"{literal(other)} + {self.name}")
-
-    def __sub__(self, other: Any) -> "Traced":
-        return self._two(f"{self.name} - {literal(other)}")
-
-    def __rsub__(self, other: Any) -> "Traced":
-        return self._two(f"{literal(other)} - {self.name}")
-
-    def __mul__(self, other: Any) -> "Traced":
-        return self._two(f"{self.name} * {literal(other)}")
-
-    def __rmul__(self, other: Any) -> "Traced":
-        return self._two(f"{literal(other)} * {self.name}")
-
     def __truediv__(self, other: Any) -> "Traced":
         if not isinstance(other, Traced):  # rounded to no more than half a unit
-            return self._two(f"{self.name} * {literal(1.0 / float(other))}")
-        return self._two(f"quotient({self.name}, {other.name})")
+            return self * (1.0 / float(other))
+        return self.writer.put(f"quotient({self.name}, {other.name})")
 
-    def __rtruediv__(self, other: Any) -> "Traced":
-        return self._two(f"quotient({literal(other)}, {self.name})")
-
-    def __neg__(self) -> "Traced":
-        return self._two(f"-{self.name}")
-
-    def __abs__(self) -> "Traced":
-        return self._two(f"abs({self.name})")
-
-    def __lt__(self, other: Any) -> "Traced":
-        return self._two(f"{self.name} < {literal(other)}", "bool")
-
-    def __le__(self, other: Any) -> "Traced":
-        return self._two(f"{self.name} <= {literal(other)}", "bool")
-
-    def __gt__(self, other: Any) -> "Traced":
-        return self._two(f"{self.name} > {literal(other)}", "bool")
-
-    def __ge__(self, other: Any) -> "Traced":
-        return self._two(f"{self.name} >= {literal(other)}", "bool")
-
-    def __and__(self, other: "Traced") -> "Traced":
-        return self._two(f"{self.name} & {other.name}", "bool")
-
-    def __or__(self, other: "Traced") -> "Traced":
-        return self._two(f"{self.name} | {other.name}", "bool")
-
-    def __invert__(self) -> "Traced":
-        return self._two(f"!{self.name}", "bool")
+    __add__, __radd__ = _operator("{0} + {1}"), _operator("{1} + {0}")
+    __sub__, __rsub__ = _operator("{0} - {1}"), _operator("{1} - {0}")
+    __mul__, __rmul__ = _operator("{0} * {1}"), _operator("{1} * {0}")
+    __rtruediv__ = _operator("quotient({1}, {0})")
+    __neg__, __abs__, __invert__ = (
+        _operator("-{0}"),
+        _operator("abs({0})"),
+        _operator("!{0}", "bool"),
+    )
+    __lt__, __le__ = _operator("{0} < {1}", "bool"), _operator("{0} <= {1}", "bool")
+    __gt__, __ge__ = _operator("{0} > {1}", "bool"), _operator("{0} >= {1}", "bool")
+    __and__, __or__ = _operator("{0} & {1}", "bool"), _operator("{0} | {1}", "bool")
 
 
 def literal(value: Any) -> str:
@@ -174,34 +143,31 @@ class Words:
         if _is_other_at_first(body, fixed, given, state):
             state, begun = body(True, fixed, given, state), 1
         names = [writer.variable(plane) for plane in _planes(state)]
-        form = [len(part) if isinstance(part, list) else None for part in state]
         kinds = [getattr(plane, "kind", "f32") for plane in _planes(state)]
         step = f"i{names[0]}"
         with writer.loop(f"for (var {step} = {begun}; {step} < {steps} && {names[0]}; {step}++)"):
             inside = [Traced(writer, *each) for each in zip(names, kinds, strict=True)]
             # once a step: names of variables stand for other values in each
             inside = [writer.put(f"{each.name} /* in {step} */", each.kind) for each in inside]
-            found = list(_planes(body(False, fixed, given, _formed(form, inside))))
+            found = list(_planes(body(False, fixed, given, _formed(state, inside))))
             for name, plane in zip(names, found, strict=True):
                 writer.lines.append(f"{name} = {literal(plane)};")
         behind = [
             writer.put(f"{name} /* behind {step} */", kind)
             for name, kind in zip(names, kinds, strict=True)
         ]
-        return _formed(form, behind)
+        return _formed(state, behind)
 
 
 def _is_other_at_first(body: Any, fixed: Any, given: Any, state: Any) -> bool:
     texts = []
     for first in (True, False):
         scratch = Writer()
-        moved = [Traced(scratch, plane.name, plane.kind) for plane in _planes(state)]
-        form = [len(part) if isinstance(part, list) else None for part in state]
-        of_given = _formed(
-            [len(part) if isinstance(part, list) else None for part in given],
-            [Traced(scratch, plane.name, plane.kind) for plane in _planes(given)],
+        moved = (
+            _formed(each, [Traced(scratch, plane.name, plane.kind) for plane in _planes(each)])
+            for each in (given, state)
         )
-        body(first, fixed, of_given, _formed(form, moved))
+        body(first, fixed, *moved)
         texts.append(scratch.lines)
     return texts[0] != texts[1]
 
@@ -210,6 +176,9 @@ def _planes(state: Any) -> list[Any]:
     return [plane for part in state for plane in (part if isinstance(part, list) else [part])]
 
 
-def _formed(form: list[int | None], planes: list[Any]) -> tuple[Any, ...]:
+def _formed(state: Any, planes: list[Any]) -> tuple[Any, ...]:
+    """Return other planes in the form of a state."""
     rest = iter(planes)
-    return tuple(next(rest) if size is None else [next(rest) for _ in range(size)] for size in form)
+    return tuple(
+        [next(rest) for _ in part] if isinstance(part, list) else next(rest) for part in state
+    )

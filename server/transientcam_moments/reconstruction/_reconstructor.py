@@ -13,9 +13,10 @@ from transientcam_moments._dispatch import LEAST_PIXELS, MOST_ROOTS, lookup, on_
 from transientcam_moments._gpu import (
     AUTO_HARMONICS,
     AUTO_PIXELS,
+    CHOICE,
     Device,
     DevicePass,
-    device_named,
+    device_of,
 )
 from transientcam_moments._kernels.one_pass import Constants, OnePass, Planes
 from transientcam_moments._kernels.padding import LEAST_WIDTH
@@ -80,11 +81,12 @@ class Reconstructor:
     waveform : array, shape (m, K), optional
         Odd harmonics of the modulation, from `waveform_of`, that are taken out of the moments; none
         are known, when left out. Needs the calibration.
-    device : str
-        What computes the pass over a frame. "cpu": compiled kernels. "gpu": the first GPU that
-        there is, or "gpu:NAME" the adapter with this in its name, which may be one of software, as
-        `kernels.devices` lists them; frames that it does not take or give are computed as by "cpu".
-        "auto": the first GPU, for frames of 100,000 pixels or m >= 6, once it has been found right.
+    device : str, optional
+        What computes the pass over a frame; as `kernels.use_device` said, when left out. "cpu":
+        compiled kernels. "gpu": the first GPU that there is, or "gpu:NAME" the adapter with this in
+        its name, which may be one of software, as `kernels.devices` lists them; frames that it does
+        not take or give are computed as by "cpu". "auto": the first GPU, for frames of 100,000
+        pixels or m >= 6, once it has computed a known frame rightly.
 
     Raises
     ------
@@ -102,10 +104,10 @@ class Reconstructor:
         calibration: Array | None = None,
         bad_pixels: Array | None = None,
         waveform: Array | None = None,
-        device: str = "cpu",
+        device: str | None = None,
     ) -> None:
-        self._device = _device_of(device)
-        self._automatic = device == "auto"
+        device = CHOICE.name if device is None else device
+        self._device, self._automatic = device_of(device), device == "auto"
         if self._device is not None and not self._automatic and calibration is not None:
             self._device.require(len(calibration) - 1)
         self.settings = Settings() if settings is None else settings
@@ -516,12 +518,6 @@ class Reconstructor:
         return replacement.places, lambda raw: measure(
             replacement.values(raw), zeroth=zeroth, phases_rad=phases_rad
         )
-
-
-def _device_of(name: str) -> Device | None:
-    if name not in ("cpu", "auto", "gpu") and not name.startswith("gpu:"):
-        raise ParameterError("device", name, "cpu, auto, gpu or gpu:NAME")
-    return None if name == "cpu" else device_named("gpu" if name == "auto" else name)
 
 
 def _first(found: Iterable[Planes | None]) -> Planes | None:

@@ -42,7 +42,7 @@ def on_the_device(device: Device, monkeypatch: pytest.MonkeyPatch) -> Iterator[N
         passed = any(key.name == "reconstruct" for key in KERNELS.compiled)
         begin(made, *args, device="gpu" if passed else "cpu", **given)
 
-    monkeypatch.setattr(_reconstructor, "device_named", lambda name: device)
+    monkeypatch.setattr(_reconstructor, "device_of", lambda name: None if name == "cpu" else device)
     monkeypatch.setattr(tm.Reconstructor, "__init__", begun)
     before = device.frames
     yield
