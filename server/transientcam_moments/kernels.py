@@ -20,9 +20,9 @@ each of these, and `use_all_cores` for what is urgent.
 
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import NamedTuple, TypedDict
+from typing import TypedDict
 
 from transientcam_compiled import (
     THREAD,
@@ -51,7 +51,6 @@ __all__ = [
     "LANES",
     "MOST_ROOTS",
     "THREAD",
-    "DeviceState",
     "Progress",
     "Spread",
     "State",
@@ -123,25 +122,18 @@ def state() -> State:
     }
 
 
-class DeviceState(NamedTuple):
-    """An adapter that `devices` found, by what its driver says of it."""
-
-    name: str
-    kind: str
-    """DiscreteGPU, IntegratedGPU, VirtualGPU, CPU (software) or Unknown."""
-    backend: str
-    """Vulkan, Metal or D3D12."""
-    refused: str
-    """What it makes wrong of a known frame; "" where it is right, or was not checked."""
-
-
-def devices(check: int | None = None) -> list[DeviceState]:
+def devices(check: int | None = None) -> list[_gpu.Adapter]:
     """Return what could compute frames here beside this processor, real GPUs first.
 
     Parameters
     ----------
     check : int, optional
         An order m, 1 to 8: each of them computes a known frame of it, which takes seconds.
+
+    Returns
+    -------
+    list of named tuple
+        ``name``, ``kind``, ``backend``, ``driver``, and, if it was checked, why it is ``refused``.
 
     Raises
     ------
@@ -152,15 +144,14 @@ def devices(check: int | None = None) -> list[DeviceState]:
     """
     if check is not None and not 1 <= check <= MOST_ROOTS:
         raise ParameterError("check", check, f"1 to {MOST_ROOTS}")
-    found = []
-    for name, kind, backend, _ in _gpu.device_named("gpu").adapters():
-        refused = ""
-        if check is not None:
+    with closing(_gpu.Device()) as any_device:
+        found = any_device.adapters()
+    for at, each in enumerate(found if check is not None else ()):
+        with closing(_gpu.Device(f"gpu:{each.name}")) as device:
             try:
-                _gpu.device_named(f"gpu:{name}").require(check)
+                device.require(check or 0)
             except DeviceUnavailable as error:
-                refused = error.reason
-        found.append(DeviceState(name, kind, backend, refused))
+                found[at] = each._replace(refused=error.reason)
     return found
 
 
@@ -179,7 +170,7 @@ def use_device(name: str) -> None:
     device = _gpu.device_of(name)
     if device is not None and name != "auto":
         device.require(0)
-    _gpu.CHOICE.name = name
+    _gpu.CHOICE[0] = name
 
 
 def cache_directory() -> Path | None:

@@ -1,5 +1,6 @@
 """Frames on a GPU: shaders traced from the statements, and the process that runs them."""
 
+from transientcam_moments._gpu._device import Adapter
 from transientcam_moments._gpu._host import (
     AUTO_HARMONICS,
     AUTO_PIXELS,

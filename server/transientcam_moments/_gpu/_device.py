@@ -7,7 +7,7 @@ functions are called through `ChildProcess`, one at a time; what they were told 
 import mmap
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
@@ -26,18 +26,12 @@ class Adapter(NamedTuple):
 
     name: str
     kind: str
-    """Of WebGPU's adapters: DiscreteGPU, IntegratedGPU, VirtualGPU, CPU, Unknown."""
+    """DiscreteGPU, IntegratedGPU, VirtualGPU, CPU (software) or Unknown."""
     backend: str
+    """Vulkan, Metal or D3D12."""
     driver: str
-
-
-class Inputs(NamedTuple):
-    """What stays from frame to frame, as the shader's bindings of these names take it."""
-
-    params: Any
-    inverse: Any
-    weights: Any
-    places: Any
+    refused: str = ""
+    """What it makes wrong of a known frame; "" where it is right, or was not checked."""
 
 
 @dataclass
@@ -101,10 +95,11 @@ def share(path: str, _tell: object) -> None:
 
 
 def prepare(
-    key: int, code: str, inputs: Inputs, sizes: tuple[int, int, int, int], _tell: object
+    key: int, code: str, inputs: Sequence[Any], sizes: tuple[int, int, int, int], _tell: object
 ) -> None:
     """Make ready to compute frames that are alike.
 
+    ``inputs``: what stays from frame to frame: params, inverse, weights, places of the bindings.
     ``sizes``: bytes of raw images, replaced moments, calibrated moments and results.
     """
     import wgpu
@@ -131,7 +126,7 @@ def prepare(
             entries=[{"binding": at, "resource": {"buffer": buffers[at]}} for at in bindings],
         )
         entries.append((pipeline, bind))
-    pixels = int(inputs.params[0]) * int(inputs.params[1])
+    pixels = int(inputs[0][0]) * int(inputs[0][1])
     _HERE.passes[key] = entries, buffers, sizes, pixels
 
 

@@ -238,10 +238,5 @@ def device_of(name: str) -> Device | None:
     return None if name == "cpu" else device_named("gpu" if name == "auto" else name)
 
 
-class _Choice:
-    """What reconstructors of this process use that are given no device."""
-
-    name = "cpu"
-
-
-CHOICE: Final = _Choice()
+CHOICE: Final = ["cpu"]
+"""What reconstructors of this process use that are given no device."""

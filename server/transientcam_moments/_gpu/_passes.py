@@ -9,7 +9,6 @@ import numpy as np
 
 from transientcam_compiled import Spread, empty
 from transientcam_moments._dispatch import HEAVY_PIXELS, LEAST_PIXELS, lookup
-from transientcam_moments._gpu._device import Inputs
 from transientcam_moments._gpu._shader import EPS, PLANES, ZEROTH, rows, shader
 from transientcam_moments._kernels.arrays import Booleans, Complexes, Images
 from transientcam_moments._kernels.one_pass import Constants, Planes
@@ -70,8 +69,8 @@ class DevicePass:
         self.key = next(_KEYS)  # unlike that of any other
         self.inputs = self._inputs(replaced)
 
-    def _inputs(self, replaced: int) -> Inputs:
-        """Return what stays from frame to frame."""
+    def _inputs(self, replaced: int) -> tuple[Array, ...]:
+        """Return what stays from frame to frame, as `_device.prepare` takes it."""
         constants, settings = self._constants, self._constants.settings
         taps = constants.taps if self._images else None
         planes = np.asarray(constants.inverse, np.complex64).reshape(self._m + 1, -1)
@@ -94,7 +93,7 @@ class DevicePass:
             settings.threshold, constants.range_per_rad_m, np.nan,
         )  # fmt: skip
         inverse = np.where(usable, planes, 0).view(np.float32)
-        return Inputs(params, inverse, np.concatenate([weight, taps]).astype(np.float32), places)
+        return params, inverse, np.concatenate([weight, taps]).astype(np.float32), places
 
     def images(
         self, images: Images, saturated: Booleans | bool | None, spread: Spread
@@ -184,7 +183,7 @@ class DevicePass:
         weight = weight.astype(np.float32)
         planes.phase_rad[:, ill], planes.weight[:, ill], planes.count[ill] = phase, weight, count
         threshold = self._constants.settings.threshold
-        one = np.ones(ill.size, np.float32)
+        one: Array = np.ones(ill.size, np.float32)
         first: Array
         direct, indirect, first = sparse.separate(
             (0,) * self._m, threshold, one, list(phase), list(weight)

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from transientcam_moments._gpu._tracing import Traced, Writer, literal
+from transientcam_moments.arrays import larger
 from transientcam_moments.images import phasors
 from transientcam_moments.moment_problem import eigenvalue, half_turns, sparse, toeplitz
 
@@ -126,47 +127,35 @@ def _measured(m: int, zeroth: str) -> str:
     writer = Writer()
     first = ZEROTH[zeroth]
     image = [writer.put(f"image({i}u, p, pixels)") for i in range(first + 4 * m)]
-    found: list[tuple[Any, Any]] = []
-    peaks: list[Any] = []
+    zero = 0.0 * image[0]
+    found: list[Any] = [(zero, zero)]
+    largest: Any = zero
     if zeroth == "low-frequency":
-        x, y, peak = phasors.bucket(*image[:4])
-        found.append((phasors.low_frequency(x, y), 0.0 * x))
-        peaks.append(peak)
+        x, y, largest = phasors.bucket(*image[:4])
+        found = [(phasors.low_frequency(x, y), zero)]
     elif zeroth == "on-off":
-        x, peak = phasors.on_off(*image[:2])
-        found.append((x, 0.0 * x))
-        peaks.append(peak)
-    else:
-        found.append((0.0 * image[0], 0.0 * image[0]))
-    for j in range(m):
-        x, y, peak = phasors.bucket(*image[first + 4 * j : first + 4 * j + 4])
+        x, largest = phasors.on_off(*image[:2])
+        found = [(x, zero)]
+    for j in range(first, len(image), 4):
+        x, y, here = phasors.bucket(*image[j : j + 4])
         found.append((x, y))
-        peaks.append(peak)
-    saturated = writer.put("false", "bool")
-    for peak in peaks:
-        saturated = saturated | (peak >= writer.put("params.full_scale"))
-    lines = ["let place = places[min(p, arrayLength(&places) - 1u)];"]
+        largest = larger(largest, here)
+    saturated: Any = largest >= writer.put("params.full_scale")
+    writer.lines.append("let place = places[min(p, arrayLength(&places) - 1u)];")
     for j, (x, y) in enumerate(found):
-        here = f"{j}u * params.bad + place - 1u"
-        own = f"vec2<f32>({x.name}, {y.name})"
-        lines += [f"var z{j} = {own};", f"if (place > 0u) {{ z{j} = replaced[{here}]; }}"]
         at = f"{j}u * select(1u, pixels, params.stride == 1u) + p * params.stride"
-        lines.append(f"let g{j} = inverse[{at}];")
-        # computed of names that are written above
-        inner = Writer()
-        parts: Any = (Traced(inner, f"{name}{j}.{part}") for name in "zg" for part in "xy")
-        x, y, u, v = parts
-        u, v = phasors.calibrated(x, y, u, v)
-        lines += [
-            "{",
-            *inner.lines,
-            f"moments[{j}u * pixels + p] = vec2<f32>({u.name}, {v.name});",
-            "}",
+        writer.lines += [
+            f"var z{j} = vec2<f32>({literal(x)}, {literal(y)});",
+            f"if (place > 0u) {{ z{j} = replaced[{j}u * params.bad + place - 1u]; }}",
+            f"let g{j} = inverse[{at}];",
         ]
-    lines.append(
-        f"out[{len(PLANES) - 1}u * pixels + p] = select(0u, 4u, {saturated.name} && place == 0u);"
-    )
-    return "\n".join(writer.lines + lines)
+        parts: Any = [Traced(writer, f"{name}{j}.{part}") for name in "zg" for part in "xy"]
+        u, v = phasors.calibrated(*parts)
+        moment = f"vec2<f32>({literal(u)}, {literal(v)})"
+        writer.lines.append(f"moments[{j}u * pixels + p] = {moment};")
+    flag = f"select(0u, 4u, {literal(saturated)} && place == 0u)"
+    writer.lines.append(f"out[{len(PLANES) - 1}u * pixels + p] = {flag};")
+    return "\n".join(writer.lines)
 
 
 def _smoothed(m: int, *, estimated: bool, kept: bool) -> str:
@@ -231,15 +220,15 @@ def _analysed(m: int, *, estimated: bool) -> str:
     direct, indirect, angle = sparse.separate(order, threshold, one, phases, weights)
     range_m: Any = angle * writer.put("params.metres")
     sound = writer.put("sound", "bool")
-    nan = float("nan")
     valid: Any = sound & finite & ~dark
+    known = {"brightness": brightness, "validity": validity, "uniform": uniform}
     values = {
-        "brightness": writer.put(f"select(params.nan, {literal(brightness)}, sound)"),
-        "validity": writer.put(f"select(params.nan, {literal(validity)}, sound)"),
-        "uniform": writer.put(f"select(params.nan, {literal(uniform)}, sound)"),
+        name: writer.put(f"select(params.nan, {literal(value)}, sound)")
+        for name, value in known.items()
+    } | {
         "direct": direct,
         "indirect": indirect,
-        "range": writer.put(f"select({literal(nan)}, {literal(range_m)}, {valid.name})"),
+        "range": writer.put(f"select(params.nan, {literal(range_m)}, {valid.name})"),
         "residual": residual,
     }
     at = {name: f"out[{row}u * pixels + p]" for row, name in enumerate(PLANES)}

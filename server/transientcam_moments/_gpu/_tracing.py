@@ -137,15 +137,13 @@ class Words:
     def iterate(
         body: Any, steps: int, fixed: tuple[Any, ...], given: tuple[Any, ...], state: Any
     ) -> Any:
-        """As `repeat`: a loop, before which the first step stands where it is another one."""
+        """As `repeat`: a loop, before which the first step stands, which may be another one."""
         writer: Writer = state[0].writer
-        begun = 0
-        if _is_other_at_first(body, fixed, given, state):
-            state, begun = body(True, fixed, given, state), 1
+        state = body(True, fixed, given, state)
         names = [writer.variable(plane) for plane in _planes(state)]
         kinds = [getattr(plane, "kind", "f32") for plane in _planes(state)]
         step = f"i{names[0]}"
-        with writer.loop(f"for (var {step} = {begun}; {step} < {steps} && {names[0]}; {step}++)"):
+        with writer.loop(f"for (var {step} = 1; {step} < {steps} && {names[0]}; {step}++)"):
             inside = [Traced(writer, *each) for each in zip(names, kinds, strict=True)]
             # once a step: names of variables stand for other values in each
             inside = [writer.put(f"{each.name} /* in {step} */", each.kind) for each in inside]
@@ -157,19 +155,6 @@ class Words:
             for name, kind in zip(names, kinds, strict=True)
         ]
         return _formed(state, behind)
-
-
-def _is_other_at_first(body: Any, fixed: Any, given: Any, state: Any) -> bool:
-    texts = []
-    for first in (True, False):
-        scratch = Writer()
-        moved = (
-            _formed(each, [Traced(scratch, plane.name, plane.kind) for plane in _planes(each)])
-            for each in (given, state)
-        )
-        body(first, fixed, *moved)
-        texts.append(scratch.lines)
-    return texts[0] != texts[1]
 
 
 def _planes(state: Any) -> list[Any]:

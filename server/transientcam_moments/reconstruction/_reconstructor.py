@@ -9,15 +9,8 @@ from typing import Any
 import numpy as np
 
 from transientcam_compiled import Spread, at_once
+from transientcam_moments import _gpu
 from transientcam_moments._dispatch import LEAST_PIXELS, MOST_ROOTS, lookup, on_threads
-from transientcam_moments._gpu import (
-    AUTO_HARMONICS,
-    AUTO_PIXELS,
-    CHOICE,
-    Device,
-    DevicePass,
-    device_of,
-)
 from transientcam_moments._kernels.one_pass import Constants, OnePass, Planes
 from transientcam_moments._kernels.padding import LEAST_WIDTH
 from transientcam_moments.arrays import Array, as_array
@@ -59,7 +52,7 @@ from transientcam_moments.reconstruction._turns import low_phase_rad
 _BY_THE_PASS = ("pisarenko", "pisarenko-merged", *OF_ANY_MULTIPLES)
 """Estimators that follow from the pass's returns or moments."""
 _SHAPES = 4  # of images that a reconstructor keeps prepared
-Pass = OnePass | DevicePass
+Pass = OnePass | _gpu.DevicePass
 
 
 class Reconstructor:
@@ -106,8 +99,8 @@ class Reconstructor:
         waveform: Array | None = None,
         device: str | None = None,
     ) -> None:
-        device = CHOICE.name if device is None else device
-        self._device, self._automatic = device_of(device), device == "auto"
+        device = _gpu.CHOICE[0] if device is None else device
+        self._device, self._automatic = _gpu.device_of(device), device == "auto"
         if self._device is not None and not self._automatic and calibration is not None:
             self._device.require(len(calibration) - 1)
         self.settings = Settings() if settings is None else settings
@@ -473,14 +466,14 @@ class Reconstructor:
             self._prepared[key] = made
         return self._prepared[key]
 
-    def _device_for(self, m: int, pixels: int) -> Device | None:
+    def _device_for(self, m: int, pixels: int) -> _gpu.Device | None:
         """Return the device for frames of this kind, if there is one; may wait for its check."""
         if self._device is None or m > MOST_ROOTS:
             return None
         if not self._automatic:
             self._device.require(m)
             return self._device
-        worth = pixels >= AUTO_PIXELS or m >= AUTO_HARMONICS
+        worth = pixels >= _gpu.AUTO_PIXELS or m >= _gpu.AUTO_HARMONICS
         return self._device if worth and self._device.is_ready(m) else None
 
     # -- preparing -----------------------------------------------------------------------------

@@ -22,9 +22,9 @@ from tests.moments.kernels.test_kernels_reconstruct import (  # noqa: F401 - col
     test_saturated_pixels_can_be_given,
     test_takes_and_other_images_join_behind_the_smoothing,
 )
+from transientcam_moments import _gpu
 from transientcam_moments._dispatch import KERNELS
 from transientcam_moments._gpu import Device
-from transientcam_moments.reconstruction import _reconstructor
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def on_the_device(device: Device, monkeypatch: pytest.MonkeyPatch) -> Iterator[N
         passed = any(key.name == "reconstruct" for key in KERNELS.compiled)
         begin(made, *args, device="gpu" if passed else "cpu", **given)
 
-    monkeypatch.setattr(_reconstructor, "device_of", lambda name: None if name == "cpu" else device)
+    monkeypatch.setattr(_gpu, "device_of", lambda name: None if name == "cpu" else device)
     monkeypatch.setattr(tm.Reconstructor, "__init__", begun)
     before = device.frames
     yield

@@ -10,9 +10,10 @@ import pytest
 
 import transientcam_moments as tm
 from tests.moments.gpu_devices import software_device
-from transientcam_moments._gpu import Device, _golden, _host, _passes
+from transientcam_moments import _gpu
+from transientcam_moments._gpu import Device, _device, _golden, _passes
 from transientcam_moments._gpu._device import Adapter
-from transientcam_moments.reconstruction import _reconstructor
+from transientcam_moments._gpu._shader import shader
 
 M = 2
 SETTINGS = tm.Settings(
@@ -35,7 +36,7 @@ def frame() -> np.ndarray:
 
 
 def on(device: Device, monkeypatch: pytest.MonkeyPatch, **given: Any) -> tm.Reconstructor:
-    monkeypatch.setattr(_reconstructor, "device_of", lambda name: device)
+    monkeypatch.setattr(_gpu, "device_of", lambda name: device)
     return tm.Reconstructor(SETTINGS, calibration=np.ones(M + 1), device="gpu", **given)
 
 
@@ -67,7 +68,7 @@ def test_each_order_is_right(device: Device) -> None:
 def test_a_device_whose_shader_is_spoilt_is_refused(
     device: Device, monkeypatch: pytest.MonkeyPatch, change: tuple[str, str]
 ) -> None:
-    right = _passes.shader
+    right = shader
 
     def spoilt(*args: Any, **given: Any) -> str:
         code = right(*args, **given)
@@ -89,11 +90,11 @@ def test_the_frame_of_a_killed_process_is_computed_here_and_the_next_one_there(
     reconstructor = on(device, monkeypatch)
     alone = reconstructor(frame())
     before = device.frames
-    run = _host.there.run
+    run = _device.run
 
-    monkeypatch.setattr(_host.there, "run", killed_in_it)
+    monkeypatch.setattr(_device, "run", killed_in_it)
     fallen = reconstructor(frame())
-    monkeypatch.setattr(_host.there, "run", run)
+    monkeypatch.setattr(_device, "run", run)
     again = reconstructor(frame())
 
     assert device.frames == before + 1
@@ -113,7 +114,7 @@ def test_a_device_that_fails_three_times_in_a_row_is_asked_no_more(
     with software_device("llvmpipe") as device:
         reconstructor = on(device, monkeypatch)
         reconstructor(frame())
-        monkeypatch.setattr(_host.there, "run", killed_in_it)
+        monkeypatch.setattr(_device, "run", killed_in_it)
         for _ in range(3):
             reconstructor(frame())
         monkeypatch.undo()
@@ -159,12 +160,12 @@ def test_auto_leaves_small_frames_to_the_processor(
     device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     device.require(M)
-    monkeypatch.setattr(_reconstructor, "device_of", lambda name: device)
+    monkeypatch.setattr(_gpu, "device_of", lambda name: device)
     reconstructor = tm.Reconstructor(SETTINGS, calibration=np.ones(M + 1), device="auto")
     before = device.frames
 
     reconstructor(frame())
-    monkeypatch.setattr(_reconstructor, "AUTO_PIXELS", 400)
+    monkeypatch.setattr(_gpu, "AUTO_PIXELS", 400)
     reconstructor(frame())
 
     assert device.frames == before + 1
@@ -188,7 +189,8 @@ def test_odd_shapes_are_computed_alike(
 def test_devices_are_listed_with_what_they_make_wrong(
     device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("transientcam_moments._gpu.device_named", lambda name: device)
+    monkeypatch.setattr("transientcam_moments._gpu.Device", lambda name="gpu": device)
+    monkeypatch.setattr(device, "close", lambda: None)
 
     (found,) = tm.kernels.devices(check=1)
 
