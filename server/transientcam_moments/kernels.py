@@ -125,15 +125,8 @@ def state() -> State:
 def devices(check: int | None = None) -> list[_gpu.Adapter]:
     """Return what could compute frames here beside this processor, real GPUs first.
 
-    Parameters
-    ----------
-    check : int, optional
-        An order m, 1 to 8: each of them computes a known frame of it, which takes seconds.
-
-    Returns
-    -------
-    list of named tuple
-        ``name``, ``kind``, ``backend``, ``driver``, and, if it was checked, why it is ``refused``.
+    Each has ``name``, ``kind``, ``backend``, ``driver``, and real GPUs why they are ``refused``,
+    if they are: by a known frame of order ``check``, 1 to 8, which takes seconds.
 
     Raises
     ------
@@ -146,10 +139,12 @@ def devices(check: int | None = None) -> list[_gpu.Adapter]:
         raise ParameterError("check", check, f"1 to {MOST_ROOTS}")
     with closing(_gpu.Device()) as any_device:
         found = any_device.adapters()
-    for at, each in enumerate(found if check is not None else ()):
+    for at, each in enumerate(found):
+        if check is None or each.kind == _gpu.SOFTWARE:
+            continue
         with closing(_gpu.Device(f"gpu:{each.name}")) as device:
             try:
-                device.require(check or 0)
+                device.require(check)
             except DeviceUnavailable as error:
                 found[at] = each._replace(refused=error.reason)
     return found

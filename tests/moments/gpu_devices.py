@@ -1,16 +1,16 @@
 """Software devices for tests: two drivers of Vulkan, whose compilers share nothing."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
 import transientcam_moments as tm
-from transientcam_moments._gpu import Device
+from transientcam_moments._gpu import Device, DevicePass
 
 DRIVERS: Final = {
     "llvmpipe": "/usr/share/vulkan/icd.d/lvp_icd.x86_64.json",  # of mesa-vulkan-drivers
@@ -18,14 +18,25 @@ DRIVERS: Final = {
 }
 
 
+class CountingDevice(Device):
+    """A device that counts the frames that it gave."""
+
+    frames = 0
+
+    def frame(self, one: DevicePass, given: Sequence[Any]) -> Any:
+        found = super().frame(one, given)
+        self.frames += found is not None
+        return found
+
+
 @contextmanager
-def software_device(name: str, *, hostile: bool = False) -> Iterator[Device]:
+def software_device(name: str, *, hostile: bool = False) -> Iterator[CountingDevice]:
     """Have a device of a driver inside; skips where it is not installed."""
     reason = _missing(name)
     if reason:
         pytest.skip(reason)
     with _only(name):
-        device = Device(f"gpu:{name}", hostile=hostile)
+        device = CountingDevice(f"gpu:{name}", hostile=hostile)
         try:
             device.adapters()  # starts its process
             yield device

@@ -9,7 +9,7 @@ import os
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -34,18 +34,8 @@ class Adapter(NamedTuple):
     """What it makes wrong of a known frame; "" where it is right, or was not checked."""
 
 
-@dataclass
-class _Here:
-    """What this process keeps."""
-
-    device: Any = None
-    room: Any = None
-    passes: dict[int, Any] = field(default_factory=dict)
-    pipelines: dict[str, Any] = field(default_factory=dict)
-    """Of each shader, by its text: those of its entries with the bindings that they use."""
-
-
-_HERE: Final = _Here()
+_HERE: Final[Any] = SimpleNamespace(device=None, room=None, passes={}, pipelines={})
+"""What this process keeps: a device, shared memory, passes by key, and pipelines by their text."""
 
 
 def told(function: Callable[..., Any], *arguments: Any) -> Any:
@@ -62,8 +52,10 @@ def adapters(_tell: object) -> list[Adapter]:
 
 
 def _adapters() -> list[tuple[Adapter, Any]]:
-    import wgpu
-    from wgpu.backends.wgpu_native.extras import set_instance_extras
+    import wgpu  # type: ignore[import-untyped]  # it has no marker
+    from wgpu.backends.wgpu_native.extras import (  # type: ignore[import-untyped]
+        set_instance_extras,
+    )
 
     # else drivers complain on the terminal that there is no display
     os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())
@@ -133,7 +125,7 @@ def prepare(
 def _pipelines(code: str) -> list[tuple[Any, tuple[int, ...]]]:
     device = _HERE.device
     module = device.create_shader_module(code=code)
-    found = []
+    found: list[tuple[Any, tuple[int, ...]]] = []
     for name, bindings in (("measure", (0, 1, 2, 4, 5, 6, 7)), ("analyse", (0, 3, 6, 7))):
         if f"fn {name}(" in code:
             stage = {"module": module, "entry_point": name}

@@ -35,10 +35,6 @@ def wrong(m: int, make: Callable[[int, tuple[int, ...], Constants], Any]) -> str
     found = make(m, SHAPE, constants).images(images, None, at_once)
     if found is None:
         return "it gave none"
-    return _difference(found, images, gains)
-
-
-def _difference(found: Any, images: Array, gains: Array) -> str:
     b = smooth(calibrate(measure(images.astype(float), zeroth="low-frequency"), gains), _SIGMA_PX)
     smallest = smallest_eigenvalue(b)
     biased = bias(b, _EPSILON, eigenvalue=smallest)

@@ -50,8 +50,6 @@ class Device:
     def __init__(self, wanted: str = "gpu", *, hostile: bool = False) -> None:
         self.wanted, self._hostile = wanted, hostile
         self.adapter: Adapter | None = None
-        self.frames = 0
-        """That it gave."""
         self._named = wanted.partition(":")[2]
         # a child process is for one thread
         self._thread = ThreadPoolExecutor(1, "transientcam-kernel-device")
@@ -70,7 +68,7 @@ class Device:
         try:
             found: list[Adapter] = self._thread.submit(self._adapters).result()
         except (OSError, RuntimeError) as error:
-            raise DeviceUnavailable(self.wanted, _in_words(error)) from None
+            raise DeviceUnavailable(self.wanted, str(error)) from None
         return found
 
     def require(self, m: int) -> None:
@@ -119,7 +117,7 @@ class Device:
             self._begin()
         except (OSError, RuntimeError) as error:
             self._end()
-            return _in_words(error)
+            return str(error)
         assert self.adapter is not None  # noqa: S101 - it has begun
         if not m:
             return ""
@@ -155,8 +153,9 @@ class Device:
         names = ", ".join(each.name for each in found)
         if self._named:
             raise RuntimeError(f"no adapter has that name; there are: {names or 'none'}")
-        computes = f"{names} computes on the processor" if names else "no adapter was found"
-        raise RuntimeError(computes)
+        raise RuntimeError(
+            f"{names} computes on the processor" if names else "no adapter was found"
+        )
 
     def _frame(self, one: DevicePass, given: Sequence[Array]) -> Rows | None:
         if self._reason:
@@ -167,12 +166,11 @@ class Device:
         except (OSError, RuntimeError, MemoryError) as error:
             self._end()
             self._failures += 1
-            self.failed = _in_words(error)
+            self.failed = str(error)
             if self._failures >= _FAILURES:
                 self._reason = f"it failed {_FAILURES} times in a row: {self.failed}"
             return None
         self._failures = 0
-        self.frames += 1
         return found
 
     def _computed(self, one: DevicePass, given: Sequence[Array]) -> Rows:
@@ -218,24 +216,17 @@ class Device:
         self._child.end()
 
 
-def _in_words(error: BaseException) -> str:
-    return str(error) or type(error).__name__
-
-
 @lru_cache(maxsize=8)
-def device_named(wanted: str) -> Device:
-    """Return the device of this process that goes by a name: "gpu", or "gpu:NAME"."""
-    return Device(wanted)
-
-
 def device_of(name: str) -> Device | None:
-    """Return the device of a reconstructor's ``device``; None for the processor.
+    """Return this process's device of a reconstructor's ``device``; None for the processor.
 
     Raises ParameterError for another name.
     """
     if name not in ("cpu", "auto", "gpu") and not name.startswith("gpu:"):
         raise ParameterError("device", name, "cpu, auto, gpu or gpu:NAME")
-    return None if name == "cpu" else device_named("gpu" if name == "auto" else name)
+    if name == "auto":
+        return device_of("gpu")
+    return None if name == "cpu" else Device(name)
 
 
 CHOICE: Final = ["cpu"]

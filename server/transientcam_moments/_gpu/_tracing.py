@@ -70,7 +70,7 @@ class Traced:
     def __array_namespace__(self) -> Any:
         return Words
 
-    def __truediv__(self, other: Any) -> "Traced":
+    def __truediv__(self, other: Any) -> Any:
         if not isinstance(other, Traced):  # rounded to no more than half a unit
             return self * (1.0 / float(other))
         return self.writer.put(f"quotient({self.name}, {other.name})")
@@ -104,28 +104,15 @@ def literal(value: Any) -> str:
 class Words:
     """The words of `arrays` that are no operators, by the names that it asks a namespace for."""
 
-    @staticmethod
-    def where(mask: Traced, yes: Any, no: Any) -> Traced:
-        """As `select`."""
-        return mask.writer.put(f"select({literal(no)}, {literal(yes)}, {mask.name})")
+    where = staticmethod(
+        lambda mask, yes, no: mask.writer.put(f"select({literal(no)}, {literal(yes)}, {mask.name})")
+    )
+    maximum = staticmethod(_operator("max({0}, {1})"))
+    minimum = staticmethod(_operator("min({0}, {1})"))
+    sqrt = staticmethod(_operator("root_of({0})"))
 
     @staticmethod
-    def maximum(x: Traced, y: Any) -> Traced:
-        """As `larger`."""
-        return x.writer.put(f"max({x.name}, {literal(y)})")
-
-    @staticmethod
-    def minimum(x: Traced, y: Any) -> Traced:
-        """As `smaller`."""
-        return x.writer.put(f"min({x.name}, {literal(y)})")
-
-    @staticmethod
-    def sqrt(x: Traced) -> Traced:
-        """As `root`."""
-        return x.writer.put(f"root_of({x.name})")
-
-    @staticmethod
-    def lost_by_squaring(x: Traced, square: Traced) -> Traced:
+    def lost_by_squaring(x: Traced, square: Traced) -> Any:
         """Do as the word does, where products and sums may be fused, or not.
 
         The square is what it was rounded to, here and in all that comes after.

@@ -110,7 +110,7 @@ def _devices() -> Iterator[Reported]:
         yield "ok", "devices", f"frames are computed on the processor: {error.reason}", None
         return
     for each in found:
-        said = each.refused or f"{each.name} ({each.kind}, {each.backend}) computes rightly"
+        said = each.refused or f"{each.name} ({each.kind}, {each.backend}) can be used"
         yield "warning" if each.refused else "ok", "devices", said, "docs/gpu.md"
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 import transientcam_moments as tm
-from tests.moments.gpu_devices import software_device
+from tests.moments.gpu_devices import CountingDevice, software_device
 from tests.moments.kernels.test_kernels_reconstruct import (  # noqa: F401 - collected here, too
     compiled,
     test_a_pass_gives_what_numpy_gives,
@@ -24,17 +24,16 @@ from tests.moments.kernels.test_kernels_reconstruct import (  # noqa: F401 - col
 )
 from transientcam_moments import _gpu
 from transientcam_moments._dispatch import KERNELS
-from transientcam_moments._gpu import Device
 
 
 @pytest.fixture(scope="module")
-def device() -> Iterator[Device]:
+def device() -> Iterator[CountingDevice]:
     with software_device("llvmpipe") as found:
         yield found
 
 
 @pytest.fixture(autouse=True)
-def on_the_device(device: Device, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def on_the_device(device: CountingDevice, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Have reconstructors use the device, but for those that are to do without the pass."""
     begin = tm.Reconstructor.__init__
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import transientcam_moments as tm
-from tests.moments.gpu_devices import software_device
+from tests.moments.gpu_devices import CountingDevice, software_device
 from transientcam_moments import _gpu
 from transientcam_moments._gpu import Device, _device, _golden, _passes
 from transientcam_moments._gpu._device import Adapter
@@ -24,7 +24,7 @@ SOFTWARE = Adapter("llvmpipe", "CPU", "Vulkan", "1.0")
 
 
 @pytest.fixture(scope="module")
-def device() -> Iterator[Device]:
+def device() -> Iterator[CountingDevice]:
     with software_device("llvmpipe") as found:
         yield found
 
@@ -35,7 +35,7 @@ def frame() -> np.ndarray:
     return images
 
 
-def on(device: Device, monkeypatch: pytest.MonkeyPatch, **given: Any) -> tm.Reconstructor:
+def on(device: CountingDevice, monkeypatch: pytest.MonkeyPatch, **given: Any) -> tm.Reconstructor:
     monkeypatch.setattr(_gpu, "device_of", lambda name: device)
     return tm.Reconstructor(SETTINGS, calibration=np.ones(M + 1), device="gpu", **given)
 
@@ -50,7 +50,7 @@ def test_two_drivers_are_right_with_the_worst_quotients_that_a_device_may_have(
             device.require(m)
 
 
-def test_each_order_is_right(device: Device) -> None:
+def test_each_order_is_right(device: CountingDevice) -> None:
     for m in range(1, 9):
         device.require(m)
 
@@ -66,7 +66,7 @@ def test_each_order_is_right(device: Device) -> None:
     ],
 )
 def test_a_device_whose_shader_is_spoilt_is_refused(
-    device: Device, monkeypatch: pytest.MonkeyPatch, change: tuple[str, str]
+    device: CountingDevice, monkeypatch: pytest.MonkeyPatch, change: tuple[str, str]
 ) -> None:
     right = shader
 
@@ -85,7 +85,7 @@ def test_a_device_whose_shader_is_spoilt_is_refused(
 
 
 def test_the_frame_of_a_killed_process_is_computed_here_and_the_next_one_there(
-    device: Device, monkeypatch: pytest.MonkeyPatch
+    device: CountingDevice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     reconstructor = on(device, monkeypatch)
     alone = reconstructor(frame())
@@ -157,7 +157,7 @@ def test_another_device_is_refused_by_its_name() -> None:
 
 
 def test_auto_leaves_small_frames_to_the_processor(
-    device: Device, monkeypatch: pytest.MonkeyPatch
+    device: CountingDevice, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     device.require(M)
     monkeypatch.setattr(_gpu, "device_of", lambda name: device)
@@ -173,7 +173,7 @@ def test_auto_leaves_small_frames_to_the_processor(
 
 @pytest.mark.parametrize("shape", [(1, 64), (64, 1), (9, 33), (163, 1), (1, 1)])
 def test_odd_shapes_are_computed_alike(
-    device: Device, monkeypatch: pytest.MonkeyPatch, shape: tuple[int, int]
+    device: CountingDevice, monkeypatch: pytest.MonkeyPatch, shape: tuple[int, int]
 ) -> None:
     images = np.ascontiguousarray(np.resize(frame(), (4 * M + 4, *shape)))
     found = on(device, monkeypatch)(images)
@@ -186,15 +186,31 @@ def test_odd_shapes_are_computed_alike(
     assert np.allclose(found.direct, expected.direct, rtol=1e-2, atol=2)
 
 
-def test_devices_are_listed_with_what_they_make_wrong(
-    device: Device, monkeypatch: pytest.MonkeyPatch
+def test_devices_are_listed_with_what_real_ones_make_wrong(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("transientcam_moments._gpu.Device", lambda name="gpu": device)
-    monkeypatch.setattr(device, "close", lambda: None)
+    class Wrong(Device):
+        def adapters(self) -> list[Adapter]:
+            return [GPU, SOFTWARE]
 
-    (found,) = tm.kernels.devices(check=1)
+        def require(self, m: int) -> None:
+            assert (self.wanted, m) == ("gpu:Big GPU", 4)
+            raise tm.DeviceUnavailable(self.wanted, "phases are off")
 
-    assert found.name.startswith("llvmpipe")
-    assert (found.kind, found.backend, found.refused) == ("CPU", "Vulkan", "")
+    monkeypatch.setattr(_gpu, "Device", Wrong)
+
+    assert tm.kernels.devices() == [GPU, SOFTWARE]
+    assert [each.refused for each in tm.kernels.devices(check=4)] == ["phases are off", ""]
     with pytest.raises(tm.ParameterError, match="1 to 8"):
         tm.kernels.devices(check=9)
+
+
+def test_reconstructors_use_what_was_said_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_gpu, "CHOICE", ["cpu"])
+    with pytest.raises(tm.DeviceUnavailable, match="no adapter has that name"):
+        tm.kernels.use_device("gpu:none such")
+    tm.kernels.use_device("auto")
+
+    assert _gpu.CHOICE == ["auto"]
+    assert tm.Reconstructor()._automatic
+    assert not tm.Reconstructor(device="cpu")._automatic
