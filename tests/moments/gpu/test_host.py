@@ -46,7 +46,8 @@ def test_two_drivers_are_right_with_the_worst_quotients_that_a_device_may_have(
     driver: str, hostile: bool
 ) -> None:
     with software_device(driver, hostile=hostile) as device:
-        for m in (1, 2, 4, 5) if driver == "llvmpipe" else (1, 3):
+        # SwiftShader takes long to compile quotients that are spoilt
+        for m in (1, 2, 4, 5) if driver == "llvmpipe" else (1, 2) if hostile else (1, 3):
             device.require(m)
 
 
