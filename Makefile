@@ -14,8 +14,8 @@ BIN := .venv/bin
 PACKAGES := $(foreach each,$(wildcard packages/*),--editable ./$(each))
 BUILT_PAGE := server/transientcam_server/static/index.html
 DASHBOARD := $(shell find client/dashboard -not -path '*/node_modules*' -type f -not -name '*.d.ts' 2>/dev/null)
-# The last three, for tests that skip without them: 124 packages, 290 MB on the disk, recommended ones left out.
-DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace nginx-light caddy octave
+# The last four, for tests that skip without them, recommended ones left out. Mesa has a software device of Vulkan.
+DEBIAN_PACKAGES := umockdev libusb-1.0-0 usbutils chromium strace nginx-light caddy octave mesa-vulkan-drivers
 
 .DEFAULT_GOAL := help
 .PHONY: help install serve test test-fast mutants check bench paper docs docs-site dist lock release clean dashboard debian-packages debian-package-names \

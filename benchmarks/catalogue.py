@@ -70,6 +70,7 @@ _ALL: Final = (
     Measurement("speed.scaling", "measured/benchmarks", _MOMENTS),
     Measurement("speed.warm_up", "measured/benchmarks", _MOMENTS),
     Measurement("speed.automatic", "measured/benchmarks", _MOMENTS),
+    Measurement("speed.gpu", "gpu", _MOMENTS, by_hand=True),
     # -- service
     Measurement("service.throughput", "measured/throughput", (*_MOMENTS, *_SERVER)),
     Measurement("service.stream_load", "measured/stream-load", _SERVER),

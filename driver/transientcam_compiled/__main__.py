@@ -13,8 +13,6 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final, NoReturn
 
-from transientcam_compiled._process import NICE
-
 _LOOK_EVERY_S: Final = 1.0
 _IDLE_S: Final = 1.0
 _PR_SET_PDEATHSIG: Final = 1
@@ -63,7 +61,7 @@ def serve(connection: Connection, parent: int) -> NoReturn:
                 send("raised", error)
 
 
-def be_a_child(parent: int, memory_bytes: int) -> None:
+def be_a_child(parent: int, memory_bytes: int, nice: int) -> None:
     """End with a parent, also where nothing here can run, and take from others what they leave.
 
     What the system refuses, as the sandbox of a service may, is left.
@@ -73,7 +71,7 @@ def be_a_child(parent: int, memory_bytes: int) -> None:
     if os.getppid() != parent:  # it ended before that
         os._exit(0)
     with suppress(OSError):
-        os.nice(NICE)
+        os.nice(nice)
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("1000")
     with suppress(OSError, ValueError):  # less is allowed anyway
@@ -84,8 +82,8 @@ def be_a_child(parent: int, memory_bytes: int) -> None:
 
 
 if __name__ == "__main__":
-    _connection, _parent, _memory_bytes = map(int, sys.argv[1:])
-    be_a_child(_parent, _memory_bytes)
+    _connection, _parent, _memory_bytes, _nice = map(int, sys.argv[1:])
+    be_a_child(_parent, _memory_bytes, _nice)
     # Ctrl-C at a terminal is for the other side
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     serve(Connection(_connection), _parent)

@@ -34,7 +34,7 @@ class ChildProcess:
     """Calls functions in another process, one at a time; started by the first call, or before it.
 
     It is a fresh Python with this `sys.path`, which runs no main module, so that nothing of a
-    script runs twice. It has a low priority (`NICE`) and leaves Ctrl-C at a terminal to this one.
+    script runs twice. It has a low priority (``nice``) and leaves Ctrl-C at a terminal to this one.
     Where memory is short it is the first to go, and it gets no more than ``memory_bytes``.
     It ends with the thread that started it, however that ends and whatever it does then. For one
     thread.
@@ -43,6 +43,7 @@ class ChildProcess:
     ``idle``: called there after each second without a call.
     ``memory_bytes``: for data beyond that of its libraries (``RLIMIT_DATA``): what needs more
     raises `MemoryError` there.
+    ``nice``: taken from its priority.
     """
 
     def __init__(
@@ -51,9 +52,10 @@ class ChildProcess:
         idle: Callable[[], object] = _nothing,
         *,
         memory_bytes: int = MEMORY_BYTES,
+        nice: int = NICE,
     ) -> None:
         self._inside, self._idle = inside, idle
-        self._memory_bytes = memory_bytes
+        self._memory_bytes, self._nice = memory_bytes, nice
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
@@ -70,7 +72,7 @@ class ChildProcess:
         if program is None:
             raise OSError("there is no Python to start beside this program")
         ours, theirs = Pipe()
-        numbers = theirs.fileno(), os.getpid(), self._memory_bytes
+        numbers = theirs.fileno(), os.getpid(), self._memory_bytes, self._nice
         try:
             with theirs:
                 self._process = subprocess.Popen(  # noqa: S603 - this program

@@ -14,6 +14,7 @@ of pixels after them, single or double precision, NumPy, JAX or CuPy. ::
 
 from transientcam_moments import comparisons, kernels, noise
 from transientcam_moments.errors import (
+    DeviceUnavailable,
     EstimatorFailed,
     MomentsError,
     ParameterError,
@@ -95,6 +96,7 @@ __all__ = [
     "Biased",
     "Coefficients",
     "Corrected",
+    "DeviceUnavailable",
     "EstimatorFailed",
     "Flags",
     "HarmonicCorrection",

@@ -3,6 +3,7 @@
 MomentsError
 ├── ShapeError (also a ValueError)
 ├── ParameterError (also a ValueError)
+├── DeviceUnavailable (also a RuntimeError)
 ├── EstimatorFailed (also a RuntimeError)
 └── UnlabelledImages (also a ValueError)
 """
@@ -65,6 +66,18 @@ class EstimatorFailed(MomentsError, RuntimeError):  # noqa: N818 - says what has
     def __str__(self) -> str:
         """Name the estimator and what is wrong with it."""
         return f"the estimator {self.name} of another package failed: {self.reason}"
+
+
+@dataclass(eq=False)
+class DeviceUnavailable(MomentsError, RuntimeError):  # noqa: N818 - says what has happened
+    """The ``device`` that was asked for cannot compute here, for a ``reason``."""
+
+    device: str
+    reason: str
+
+    def __str__(self) -> str:
+        """Name the device and what is wrong with it."""
+        return f"device = {self.device!r} cannot be used: {self.reason}"
 
 
 @dataclass(eq=False)

@@ -20,7 +20,7 @@ each of these, and `use_all_cores` for what is urgent.
 
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TypedDict
 
@@ -33,6 +33,7 @@ from transientcam_compiled import (
     use_all_cores,
     use_one_thread,
 )
+from transientcam_moments import _gpu
 from transientcam_moments._dispatch import (
     CACHE,
     KERNELS,
@@ -44,7 +45,7 @@ from transientcam_moments._dispatch import (
     lookup,
 )
 from transientcam_moments.arrays import MAX_HARMONICS, chosen
-from transientcam_moments.errors import ParameterError
+from transientcam_moments.errors import DeviceUnavailable, ParameterError
 
 __all__ = [
     "LANES",
@@ -56,6 +57,7 @@ __all__ = [
     "at_once",
     "cache_directory",
     "compile",
+    "devices",
     "load",
     "make_ready",
     "only_note",
@@ -67,6 +69,7 @@ __all__ = [
     "settled",
     "state",
     "use_all_cores",
+    "use_device",
     "use_one_thread",
 ]
 
@@ -117,6 +120,52 @@ def state() -> State:
         "compiling": None if compiling is None else str(compiling),
         "failed": [f"{key}: {reason}" for key, reason in list(KERNELS.failed.items())],
     }
+
+
+def devices(check: int | None = None) -> list[_gpu.Adapter]:
+    """Return what could compute frames here beside this processor, real GPUs first.
+
+    Each has ``name``, ``kind``, ``backend``, ``driver``, and real GPUs why they are ``refused``,
+    if they are: by a known frame of order ``check``, 1 to 8, which takes seconds.
+
+    Raises
+    ------
+    DeviceUnavailable
+        Where that cannot be found out: wgpu, of the extra ``gpu``, is not installed.
+    ParameterError
+        For another order.
+    """
+    if check is not None and not 1 <= check <= MOST_ROOTS:
+        raise ParameterError("check", check, f"1 to {MOST_ROOTS}")
+    with closing(_gpu.Device()) as any_device:
+        found = any_device.adapters()
+    for at, each in enumerate(found):
+        if check is None or each.kind == _gpu.SOFTWARE:
+            continue
+        with closing(_gpu.Device(f"gpu:{each.name}")) as device:
+            try:
+                device.require(check)
+            except DeviceUnavailable as error:
+                found[at] = each._replace(refused=error.reason)
+    return found
+
+
+def use_device(name: str) -> None:
+    """Have each `Reconstructor` made from now on use a device, unless it is given one.
+
+    ``name``: as the Reconstructor takes it; "cpu" until this is called.
+
+    Raises
+    ------
+    ParameterError
+        For another name.
+    DeviceUnavailable
+        For "gpu" and "gpu:NAME", where there is no such adapter.
+    """
+    device = _gpu.device_of(name)
+    if device is not None and name != "auto":
+        device.require(0)
+    _gpu.CHOICE[0] = name
 
 
 def cache_directory() -> Path | None:

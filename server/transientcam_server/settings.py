@@ -426,6 +426,9 @@ class Settings(_Group):
     """``auto`` is text on a terminal and JSON elsewhere."""
     workers: int = Field(default_factory=lambda: max(2, cores()), ge=2, le=256)
     """Threads that reconstruct and encode; at least 2, so that one long answer delays no other."""
+    device: str = Field(default="cpu", pattern="^(cpu|auto|gpu(:.+)?)$", max_length=200)
+    """What computes the pass over a frame: ``cpu``, ``gpu``, ``gpu:NAME`` with a part of an
+    adapter's name, or ``auto``: a GPU for large frames, if there is one (gpu.md)."""
     sequence: SequenceSettings = SequenceSettings()
     reconstruction: ReconstructionSettings = ReconstructionSettings()
     sensor: SensorSettings = SensorSettings()

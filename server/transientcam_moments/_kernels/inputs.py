@@ -12,8 +12,9 @@ from transientcam_moments._kernels.arrays import (
     RealPlane,
     RealPlanes,
 )
-from transientcam_moments._kernels.portable import larger, root, select, some
+from transientcam_moments._kernels.portable import larger, select, some
 from transientcam_moments.arrays import Length, Plane
+from transientcam_moments.images import phasors
 
 LOW_FREQUENCY, ON_OFF, ESTIMATED = 0, 1, 2
 _ROWS = 8  # that are smoothed before they leave the caches
@@ -21,11 +22,10 @@ _ROWS = 8  # that are smoothed before they leave the caches
 
 @njit(forceinline=True, error_model="numpy")
 def _bucket(one: Plane, images: Images, first: int, p: int) -> Any:
-    """Return (I_0 - I_180) + i (I_90 - I_270) and the largest of the four."""
+    """Return the phasor of four images, and the largest of them."""
     i0, i90 = simd.load(one, images[first], p), simd.load(one, images[first + 1], p)
     i180, i270 = simd.load(one, images[first + 2], p), simd.load(one, images[first + 3], p)
-    largest = larger(larger(i0, i90), larger(i180, i270))
-    return i0 - i180, i90 - i270, largest
+    return phasors.bucket(i0, i90, i180, i270)
 
 
 @njit(nogil=True, error_model="numpy")
@@ -55,10 +55,11 @@ def measure(
         x, largest = one * 0.0, one * 0.0
         if zeroth == LOW_FREQUENCY:
             x, y, largest = _bucket(one, images, 0, p)
-            x = root(x * x + y * y)
+            x = phasors.low_frequency(x, y)
         elif zeroth == ON_OFF:
             on, off = simd.load(one, images[0], p), simd.load(one, images[1], p)
-            x, largest, first = 2.0 * (on - off), larger(on, off), 2
+            x, largest = phasors.on_off(on, off)
+            first = 2
         else:
             first = 0
         u, v = simd.load_complex(one, inverse[0], p * stride)
@@ -67,7 +68,8 @@ def measure(
             x, y, here = _bucket(one, images, first + 4 * (j - 1), p)
             largest = larger(largest, here)
             u, v = simd.load_complex(one, inverse[j], p * stride)
-            simd.store_complex(moments[j], p, x * u - y * v, x * v + y * u)
+            x, y = phasors.calibrated(x, y, u, v)
+            simd.store_complex(moments[j], p, x, y)
         simd.store(flags, p, select(largest >= limit, 4.0 * one, 0.0))
 
 

@@ -18,18 +18,15 @@ from transientcam_moments._kernels.arrays import (
     WideRealPlane,
     WideRealPlanes,
 )
+from transientcam_moments._kernels.moments import load_harmonics, load_zeroth
 from transientcam_moments._kernels.portable import (
     bank,
-    eps,
-    larger,
-    largest,
-    magnitude,
     not_a_number,
     select,
     some,
 )
 from transientcam_moments.arrays import Length
-from transientcam_moments.moment_problem import sparse
+from transientcam_moments.moment_problem import eigenvalue as eigenvalues, sparse
 
 _INTERLEAVE = 2
 # transientcam_moments.Flags
@@ -56,36 +53,27 @@ def flag_and_bias(
 
     ``brightness`` and ``uniform`` become b_0 and the smallest eigenvalue after biasing.
     """
-    m = len(order)
     one = simd.ones(eigenvalue, _INTERLEAVE)
     step = simd.width(one)
+    re, im = bank(one, order, 1), bank(one, order, 1)
     for left in range(start, stop, step):
         p = min(left, stop - step)
         smallest = simd.load(one, eigenvalue, p)
-        b0, rest = simd.load_complex(one, b[0], p)
+        re[0] = load_zeroth(one, b, p)
         if estimated:
-            b0, rest = smallest / (epsilon - 1.0), one * 0.0
-            smallest = epsilon * b0
-        most, poison = magnitude(b0), b0 * 0.0 + rest * 0.0
-        for j in range(1, m + 1):
-            x, y = simd.load_complex(one, b[j], p)
-            most = larger(most, larger(magnitude(x), magnitude(y)))
-            poison = poison + x * 0.0 + y * 0.0
-        # so large a density would overflow
-        limit = (largest(b0) * eps(b0)) * (6.0 / (2.0 * m + 1.0))
-        finite = (poison >= 0.0) & (most < limit)
-        dark = finite & ~(b0 > least)
-        # less by rounding doesn't count, see `ROUNDING` of `bias`
-        biased = smallest < (epsilon - 4.0 * (m + 1.0) * eps(b0)) * b0
-        raised = select(biased, (b0 - smallest) / (1.0 - epsilon), b0)
+            re[0], smallest = eigenvalues.least_zeroth(smallest, epsilon)
+        load_harmonics(order, one, b, p, re, im)
+        finite, dark, biased, valid, raised, rest = eigenvalues.margin(
+            order, re, im, smallest, epsilon, least
+        )
         flag = simd.load(one, saturated, p)
         flag = flag + select(finite, one * 0.0, _NON_FINITE)
         flag = flag + select(dark, _NO_SIGNAL * one, 0.0)
         flag = flag + select(biased, _BIASED * one, 0.0)
         simd.store(flags, p, flag)
-        simd.store(validity, p, select(b0 > 0.0, smallest / b0, not_a_number(one)))
+        simd.store(validity, p, valid)
         simd.store(brightness, p, raised)
-        simd.store(uniform, p, smallest + (raised - b0))
+        simd.store(uniform, p, rest)
 
 
 @njit(nogil=True, error_model="numpy")

@@ -54,6 +54,7 @@ from transientcam_moments.arrays import (
     square_bank,
     tiny,
 )
+from transientcam_moments.images import phasors
 from transientcam_moments.likelihood import choice, linear, pair_fit, sharp, start, tail
 from transientcam_moments.moment_problem import (
     circle,
@@ -289,5 +290,6 @@ for _module in (
     sparse,
     interpolation,
     first_order,
+    phasors,
 ):
     _compile_statements(_module, inline=True)

@@ -50,6 +50,10 @@ def repeat(
         return _repeat_numpy(body, steps, fixed, given, state)
     if namespace(state[0]).__name__ == "jax.numpy":
         return _repeat_jax(body, steps, fixed, given, state)
+    own = getattr(namespace(state[0]), "iterate", None)  # of what isn't computed here
+    if own is not None:
+        found: State = own(body, steps, fixed, given, state)
+        return found
     for step in range(steps):
         state = body(step == 0, fixed, given, state)
         if not bool(state[0].any()):

@@ -1,5 +1,6 @@
 """From raw images to calibrated moments: demodulation, calibration, smoothing, repair."""
 
+from transientcam_moments.images import _phasors as phasors
 from transientcam_moments.images._bad_pixels import (
     Replacement,
     checked_mask,

@@ -8,7 +8,9 @@ from transientcam_moments.arrays import (
     bank,
     eps,
     larger,
+    largest,
     magnitude,
+    not_a_number,
     repeat,
     root,
     select,
@@ -45,6 +47,42 @@ def smallest_eigenvalue(order: Length, re: Bank, im: Bank) -> Plane:
     state = (x <= x, x, x * 0.0)  # NaN does not move
     found: Plane = repeat(climb, STEPS, (order,), (d, e), state)[1]
     return found
+
+
+def least_zeroth(smallest: Plane, epsilon: Plane | float) -> tuple[Plane, Plane]:
+    """Return b_0 and the smallest eigenvalue of B, of the latter with 0 in place of b_0 (4.3)."""
+    b0 = smallest / (epsilon - 1.0)
+    return b0, epsilon * b0
+
+
+def margin(
+    order: Length,
+    re: Bank,
+    im: Bank,
+    smallest: Plane,
+    epsilon: Plane | float,
+    least: Plane | float,
+) -> tuple[Mask, Mask, Mask, Plane, Plane, Plane]:
+    """Flag and bias moments whose smallest eigenvalue is known (Sec. 4.3).
+
+    Returns where they are finite, finite but without light (b_0 up to ``least``), and biased; the
+    smallest eigenvalue over b_0 before that; and b_0 and the smallest eigenvalue after it.
+    """
+    m = len(order)
+    b0 = re[0]
+    most, poison = magnitude(b0), b0 * 0.0 + im[0] * 0.0
+    for j in range(1, m + 1):
+        most = larger(most, larger(magnitude(re[j]), magnitude(im[j])))
+        poison = poison + re[j] * 0.0 + im[j] * 0.0
+    # so large a density would overflow
+    limit = (largest(b0) * eps(b0)) * (6.0 / (2.0 * m + 1.0))
+    finite = (poison >= 0.0) & (most < limit)
+    dark = finite & ~(b0 > least)
+    # less by rounding doesn't count, see `ROUNDING` of `bias`
+    biased = smallest < (epsilon - 4.0 * (m + 1.0) * eps(b0)) * b0
+    raised = select(biased, (b0 - smallest) / (1.0 - epsilon), b0)
+    validity = select(b0 > 0.0, smallest / b0, not_a_number(b0))
+    return finite, dark, biased, validity, raised, smallest + (raised - b0)
 
 
 def _fill(order: Length, re: Bank, im: Bank, h: Bank) -> None:

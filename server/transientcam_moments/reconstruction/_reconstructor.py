@@ -2,14 +2,16 @@
 
 import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from transientcam_compiled import Spread, at_once
-from transientcam_moments._dispatch import lookup, on_threads
-from transientcam_moments._kernels.one_pass import Constants, OnePass
+from transientcam_moments import _gpu
+from transientcam_moments._dispatch import LEAST_PIXELS, MOST_ROOTS, lookup, on_threads
+from transientcam_moments._kernels.one_pass import Constants, OnePass, Planes
 from transientcam_moments._kernels.padding import LEAST_WIDTH
 from transientcam_moments.arrays import Array, as_array
 from transientcam_moments.errors import ParameterError, UnlabelledImages
@@ -50,6 +52,7 @@ from transientcam_moments.reconstruction._turns import low_phase_rad
 _BY_THE_PASS = ("pisarenko", "pisarenko-merged", *OF_ANY_MULTIPLES)
 """Estimators that follow from the pass's returns or moments."""
 _SHAPES = 4  # of images that a reconstructor keeps prepared
+Pass = OnePass | _gpu.DevicePass
 
 
 class Reconstructor:
@@ -71,6 +74,20 @@ class Reconstructor:
     waveform : array, shape (m, K), optional
         Odd harmonics of the modulation, from `waveform_of`, that are taken out of the moments; none
         are known, when left out. Needs the calibration.
+    device : str, optional
+        What computes the pass over a frame; as `kernels.use_device` said, when left out. "cpu":
+        compiled kernels. "gpu": the first GPU that there is, or "gpu:NAME" the adapter with this in
+        its name, which may be one of software, as `kernels.devices` lists them; frames that it does
+        not take or give are computed as by "cpu". "auto": the first GPU, for frames of 100,000
+        pixels or m >= 6, once it has computed a known frame rightly.
+
+    Raises
+    ------
+    ParameterError
+        For another device; for a waveform without a calibration, or of other multiples.
+    DeviceUnavailable
+        For "gpu", where there is none, or it computes known frames wrongly; with the calibration
+        this is known at once, else from the first frame.
     """
 
     def __init__(
@@ -80,7 +97,12 @@ class Reconstructor:
         calibration: Array | None = None,
         bad_pixels: Array | None = None,
         waveform: Array | None = None,
+        device: str | None = None,
     ) -> None:
+        device = _gpu.CHOICE[0] if device is None else device
+        self._device, self._automatic = _gpu.device_of(device), device == "auto"
+        if self._device is not None and not self._automatic and calibration is not None:
+            self._device.require(len(calibration) - 1)
         self.settings = Settings() if settings is None else settings
         self._calibration = calibration
         self._bad = bad_pixels
@@ -96,7 +118,7 @@ class Reconstructor:
         )
         self._waveform = waveform if waveform is not None and matters(waveform) else None
         self._lock = threading.Lock()
-        self._prepared: dict[tuple[Any, ...], OnePass] = {}
+        self._prepared: dict[tuple[Any, ...], Pass | None] = {}
         self._corrections: dict[tuple[Any, ...], HarmonicCorrection] = {}
 
     def __call__(
@@ -145,9 +167,9 @@ class Reconstructor:
         # behind the smoothing, where a waveform is known: harmonics are taken out there
         keeps_edges = self.settings.neighbours == "edge-preserving"
         behind = self._waveform is not None or keeps_edges
-        one_pass = None if behind else self._pass_of_images(takes)
-        if one_pass is not None:
-            planes = one_pass.images(takes[0], saturated_pixels, spread)
+        passes = () if behind else self._passes_of_images(takes)
+        given = takes[0], saturated_pixels, spread
+        if (planes := _first(each.images(*given) for each in passes)) is not None:
             return PassedReconstruction(
                 planes,
                 self.settings,
@@ -279,17 +301,19 @@ class Reconstructor:
         }
         if settings.consecutive:
             correction = self._correction(moments, settings.gaussian_px)
-        if settings.consecutive and (one_pass := self._pass_of_moments(moments)) is not None:
+        planes = share = corrected = None
+        if settings.consecutive and (passes := self._passes_of_moments(moments)):
             left_out = frame.saturated, self._bad
             how = frame.images, spread, frames
             smoothed, share = over_neighbours(moments, settings, known, gains, left_out, *how)
-            corrected = None
             if correction is not None:
                 smoothed, corrected = correction(smoothed, spread=spread)
-            planes = one_pass.moments(smoothed, frame.saturated, spread)
-            given |= {"corrected": corrected, "share": share}
+            own = smoothed, frame.saturated, spread
+            planes = _first(each.moments(*own) for each in passes)
+        if planes is not None:
+            behind = {"corrected": corrected, "share": share}
             found: Reconstruction = PassedReconstruction(
-                planes, settings, lambda: frame.moments, **given
+                planes, settings, lambda: frame.moments, **behind, **given
             )
         else:
             kind = Reconstruction if settings.consecutive else GappedReconstruction
@@ -402,36 +426,55 @@ class Reconstructor:
     # (several takes, other images, moments) behind the smoothing. All else goes stage by stage,
     # each computed when it is first read.
 
-    def _pass_of_images(self, takes: Array) -> OnePass | None:
+    def _passes_of_images(self, takes: Array) -> list[Pass]:
+        """Return what may do raw images; a device first, if there is one."""
         zeroth, _ = self._require_labels()
         if not is_four_bucket(self.settings.sampled_rad):
-            return None
+            return []
         m = harmonics_of(takes.shape[1], zeroth)
         shape = tuple(takes.shape[2:])
         raw = isinstance(takes, np.ndarray) and takes.dtype == np.uint16 and takes.shape[0] == 1
         wide = self._taps(shape) is None or shape[1] >= LEAST_WIDTH
-        return self._pass(m, shape) if raw and wide else None
+        return self._passes(m, shape, images=True) if raw and wide else []
 
-    def _pass_of_moments(self, moments: Array) -> OnePass | None:
+    def _passes_of_moments(self, moments: Array) -> list[Pass]:
         if not isinstance(moments, np.ndarray) or moments.dtype != np.complex64 or not moments.ndim:
-            return None
-        return self._pass(moments.shape[0] - 1, moments.shape[1:])
+            return []
+        return self._passes(moments.shape[0] - 1, moments.shape[1:], images=False)
 
-    def _pass(self, m: int, shape: tuple[int, ...]) -> OnePass | None:
+    def _passes(self, m: int, shape: tuple[int, ...], *, images: bool) -> list[Pass]:
         usual = self.settings.keep == "harmonics" and self.settings.consecutive
         usual = usual and self.settings.technique in _BY_THE_PASS
-        prepare = lookup("reconstruct", m, math.prod(shape))
         masked = self._bad is None or np.shape(self._bad) == shape
-        if not usual or prepare is None or not masked:
-            return None
+        if not usual or not masked or math.prod(shape) < LEAST_PIXELS:
+            return []
+        ways: list[tuple[Any, Callable[[], Pass | None]]] = []
+        if (device := self._device_for(m, math.prod(shape))) is not None:
+            make = partial(device.prepare, m, shape, images=images)
+            ways.append(((device, images), lambda: make(self._constants(m, shape))))
+        if (prepare := lookup("reconstruct", m, math.prod(shape))) is not None:
+            ways.append((prepare, lambda: prepare(shape, self._constants(m, shape))))
         with self._lock:
-            found = self._prepared.get((prepare, shape))
-            if found is None:
-                found = prepare(shape, self._constants(m, shape))
-                while len(self._prepared) >= _SHAPES:
-                    self._prepared.pop(next(iter(self._prepared)))
-                self._prepared[prepare, shape] = found
-            return found
+            found = [self._kept((how, m, shape), make) for how, make in ways]
+        return [each for each in found if each is not None]
+
+    def _kept(self, key: tuple[Any, ...], make: Callable[[], Pass | None]) -> Pass | None:
+        if key not in self._prepared:
+            made = make()
+            while len(self._prepared) >= _SHAPES:
+                self._prepared.pop(next(iter(self._prepared)))
+            self._prepared[key] = made
+        return self._prepared[key]
+
+    def _device_for(self, m: int, pixels: int) -> _gpu.Device | None:
+        """Return the device for frames of this kind, if there is one; may wait for its check."""
+        if self._device is None or m > MOST_ROOTS:
+            return None
+        if not self._automatic:
+            self._device.require(m)
+            return self._device
+        worth = pixels >= _gpu.AUTO_PIXELS or m >= _gpu.AUTO_HARMONICS
+        return self._device if worth and self._device.is_ready(m) else None
 
     # -- preparing -----------------------------------------------------------------------------
 
@@ -468,6 +511,11 @@ class Reconstructor:
         return replacement.places, lambda raw: measure(
             replacement.values(raw), zeroth=zeroth, phases_rad=phases_rad
         )
+
+
+def _first(found: Iterable[Planes | None]) -> Planes | None:
+    """Return what the first pass gives that gives something."""
+    return next((each for each in found if each is not None), None)
 
 
 def _is_moments(data: Array | Sequence[Array]) -> bool:

@@ -9,6 +9,7 @@ import typer
 from transientcam.cli.options import JsonOption, TokenOption, require_suffix
 from transientcam.cli.terminal import Terminal, echo, progress_bars
 from transientcam_server.cli.cluster import DaskOption, WorkersOption
+from transientcam_server.cli.options import DeviceOption
 from transientcam_server.cli.reconstruct_recordings import (
     ReconstructionChoices,
     reconstruct_on_cluster,
@@ -96,6 +97,7 @@ def reconstruct(
         list[str] | None,
         typer.Option(help="Of a recording: what to compute; may be repeated.  [default: images]"),
     ] = None,
+    device: DeviceOption = "cpu",
     plot: Annotated[Path | None, typer.Option(help="Also draw a picture into this .png.")] = None,
     workers: WorkersOption = None,
     dask: DaskOption = None,
@@ -107,9 +109,11 @@ def reconstruct(
     Of a recording every frame is reconstructed; a second run goes on where the first stopped.
     `--workers` and `--dask` compute its frames on a cluster, each worker a part of them.
     """
+    import transientcam_moments as tm
     from transientcam_server import offline
     from transientcam_server.offline import plot as pictures
 
+    tm.kernels.use_device(device)
     if plot is not None:
         require_suffix(plot, ".png", hint="--plot")
         pictures.require("--plot")
@@ -121,6 +125,8 @@ def reconstruct(
     if clustered or "://" in input or _is_recording(Path(input)):
         wanted = ReconstructionChoices(tuple(product or ()), given, bins)
         if clustered:
+            if device != "cpu":
+                raise typer.BadParameter("on a cluster it is cpu", param_hint="--device")
             reconstruct_on_cluster(input, output, wanted, workers, dask, token, as_json=as_json)
         else:
             reconstruct_recording(input, Path(output), wanted, token, as_json=as_json)

@@ -43,6 +43,10 @@ def serve(
     config: Annotated[
         Path | None, typer.Option(help="Settings in TOML.  [default: ./transientcam.toml]")
     ] = None,
+    device: Annotated[
+        str | None,
+        typer.Option(help="What computes frames: cpu, gpu, gpu:NAME or auto.  [default: cpu]"),
+    ] = None,
     announce: Annotated[
         bool | None,
         typer.Option(
@@ -74,6 +78,7 @@ def serve(
         "calibration": calibration,
         "host": host,
         "port": port,
+        "device": device,
         "announce": None if announce is None else ("off", "on")[announce],
         "insecure": insecure or None,
         "tls_certificate": tls_certificate,
@@ -89,6 +94,7 @@ def serve(
 
 def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
     """Serve a camera until a signal; ``on_listening`` is given the address."""
+    import transientcam_moments as tm
     from transientcam_server.api import build_app
     from transientcam_server.camera import start_with
     from transientcam_server.daemon import (
@@ -101,6 +107,7 @@ def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
     )
 
     configure_logging(settings)
+    tm.kernels.use_device(settings.device)
     # the address first: if another daemon has it, the camera stays untouched
     with (
         exit_without_joining(),

@@ -31,6 +31,7 @@ Reported = tuple[str, str, str, str | None]
 _OLDEST: Final = (3, 11)
 _SPARE_DESCRIPTORS: Final = 64
 _ASK_S: Final = 2.0
+_CHECKED_HARMONICS: Final = 4
 _REINSTALL: Final = "pip install --force-reinstall 'transientcam[server]'"
 
 
@@ -38,6 +39,7 @@ def checks(config: Path | None = None) -> Iterator[Reported]:
     """Look at libraries, kernels, settings, directories, disk, limits and the port."""
     yield from _libraries()
     yield _kernels()
+    yield from _devices()
     yield _supervisor()
     yield from _estimators()
     try:
@@ -98,6 +100,18 @@ def _kernels() -> Reported:
         message = f"not compiled yet; the daemon does so as it starts, into {directory}"
         return "warning", "kernels", message, "transientcam compile does it now"
     return "ok", "kernels", f"{compiled} functions are kept in {directory}", None
+
+
+def _devices() -> Iterator[Reported]:
+    """Name the adapters, each of which computes a known frame."""
+    try:
+        found = tm.kernels.devices(_CHECKED_HARMONICS)
+    except tm.DeviceUnavailable as error:
+        yield "ok", "devices", f"frames are computed on the processor: {error.reason}", None
+        return
+    for each in found:
+        said = each.refused or f"{each.name} ({each.kind}, {each.backend}) can be used"
+        yield "warning" if each.refused else "ok", "devices", said, "docs/gpu.md"
 
 
 def _supervisor() -> Reported:

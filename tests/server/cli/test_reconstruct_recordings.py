@@ -7,8 +7,10 @@ import pytest
 import xarray
 from zarr.core.sync import cleanup_resources
 
+from tests.moments.gpu_devices import software_device
 from tests.server.recording.made import APPLIED, record
 from transientcam.cli import run
+from transientcam_moments import _gpu
 from transientcam_server import offline
 
 
@@ -100,3 +102,43 @@ def test_a_recording_is_reconstructed_with_what_was_recorded_unless_settings_are
         settings = json.loads(file.attrs["reconstruction"])
         assert (settings["bias"], settings["smoothing_px"]) == (0.05, 0.0)
         assert settings["estimator"] == "pisarenko"
+
+
+def test_a_device_computes_the_frames_of_a_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = record(tmp_path / "r.h5", frames=2)
+    given = ["reconstruct", str(recording), "--estimator", "pisarenko", "--product", "range"]
+    with software_device("llvmpipe") as device:
+        monkeypatch.setattr(_gpu, "device_of", lambda name: device)
+        assert run([*given, "-o", str(tmp_path / "gpu.npz"), "--device", "gpu"]) == 0
+        assert device.frames >= 2
+    monkeypatch.undo()
+    monkeypatch.setattr(offline, "load_kernels", lambda recipe: None)
+    assert run([*given, "-o", str(tmp_path / "cpu.npz")]) == 0
+
+    there, here = (np.load(tmp_path / f"{name}.npz")["range"] for name in ("gpu", "cpu"))
+    assert np.isclose(there, here, atol=1e-3, equal_nan=True).mean() > 0.98
+
+
+def test_without_a_gpu_one_sentence_says_what_was_found(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    software = [_gpu.Adapter("llvmpipe", "CPU", "Vulkan", "1.0")]
+    monkeypatch.setattr(_gpu.Device, "_adapters", lambda self: software)
+    monkeypatch.setattr(_gpu, "device_of", lambda name: _gpu.Device(name))
+    recording, out = record(tmp_path / "r.h5", frames=1), tmp_path / "out.npz"
+
+    code = run(["reconstruct", str(recording), "-o", str(out), "--device", "gpu"])
+
+    said = "transientcam: device = 'gpu' cannot be used: llvmpipe computes on the processor\n"
+    assert (code, capsys.readouterr().err, out.exists()) == (1, said, False)
+
+
+def test_another_device_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording = record(tmp_path / "r.h5", frames=1)
+
+    code = run(["reconstruct", str(recording), "-o", str(tmp_path / "o.npz"), "--device", "cuda"])
+
+    assert code == 1
+    assert "cpu, auto, gpu or gpu:NAME" in capsys.readouterr().err

@@ -5,14 +5,18 @@ import shutil
 import socket
 from pathlib import Path
 from types import SimpleNamespace
+from typing import NoReturn
 
 import pytest
 
 import transientcam_moments as tm
 from tests.serving import serving
+from transientcam_moments._gpu import Adapter
 from transientcam_server.daemon import _doctor as doctor
 from transientcam_server.daemon._configuration import ENVIRONMENT_PREFIX
 from transientcam_server.daemon._doctor import Reported, checks
+
+GPU = Adapter("Big GPU", "DiscreteGPU", "Vulkan", "1.0")
 
 
 @pytest.fixture(autouse=True)
@@ -24,6 +28,7 @@ def clean(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    monkeypatch.setattr(tm.kernels, "devices", lambda check: [GPU])
 
 
 def found(config: Path | None = None) -> dict[str, Reported]:
@@ -42,7 +47,7 @@ def test_a_machine_that_is_set_up_has_no_faults(tmp_path: Path) -> None:
     assert {each[0] for each in seen.values()} <= {"ok", "warning"}
     assert "numba" in seen["packages"][2]
     assert set(seen) == {
-        *("packages", "kernels", "supervisor", "settings", "recordings", "calibrations"),
+        *("packages", "kernels", "devices", "supervisor", "settings", "recordings", "calibrations"),
         *("light", "tokens", "disk", "files", "port"),
     }
 
@@ -75,6 +80,23 @@ def test_a_service_that_admits_every_client_is_warned_of(tmp_path: Path) -> None
 
     assert everybody["access"][0] == "warning"
     assert "access" not in local
+
+
+def test_devices_are_named_with_what_they_make_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert found()["devices"][:3] == ("ok", "devices", "Big GPU (DiscreteGPU, Vulkan) can be used")
+
+    monkeypatch.setattr(tm.kernels, "devices", lambda check: [GPU._replace(refused="it is wrong")])
+    wrong = found()["devices"]
+
+    def none(check: int) -> NoReturn:
+        raise tm.DeviceUnavailable("gpu", "wgpu is not installed")
+
+    monkeypatch.setattr(tm.kernels, "devices", none)
+    missing = found()["devices"]
+
+    assert wrong == ("warning", "devices", "it is wrong", "docs/gpu.md")
+    assert missing[0] == "ok"
+    assert "computed on the processor: wgpu is not installed" in missing[2]
 
 
 def test_kernels_are_counted_where_they_are_kept(tmp_path: Path) -> None:

@@ -1,0 +1,233 @@
+"""A device of this machine, in a process of its own: whatever it does, this one goes on.
+
+A frame that the device does not give is one that the processor computes. A device that computes
+known frames wrongly, or fails again and again, is asked no more.
+"""
+
+import mmap
+import os
+import tempfile
+import threading
+import weakref
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from transientcam_compiled import ChildProcess
+from transientcam_moments._gpu import _device as there
+from transientcam_moments._gpu._device import SOFTWARE, Adapter
+from transientcam_moments._gpu._golden import wrong
+from transientcam_moments._gpu._passes import DevicePass, Rows
+from transientcam_moments._kernels.one_pass import Constants
+from transientcam_moments.arrays import Array
+from transientcam_moments.errors import DeviceUnavailable, ParameterError
+
+AUTO_PIXELS: Final = 100_000
+"""Of a frame from which "auto" takes a GPU, whatever its order."""
+AUTO_HARMONICS: Final = 6
+"""m from which "auto" takes a GPU, however small the frames."""
+_MOST_ROOTS: Final = 8
+_FAILURES: Final = 3
+"""In a row, after which a device is asked no more."""
+_ASKS: Final = 480
+"""Times that a call is asked whether it goes on, four a second, until the device hangs."""
+_MEMORY_BYTES: Final = 1 << 40
+"""Drivers take much room that they do not use."""
+
+
+class Device:
+    """One adapter, by its name or as the first real GPU; several threads may use it.
+
+    ``wanted``: "gpu", or "gpu:" and a part of an adapter's name, which may be of software.
+    ``hostile``: have shaders spoilt, see `shader`.
+    """
+
+    def __init__(self, wanted: str = "gpu", *, hostile: bool = False) -> None:
+        self.wanted, self._hostile = wanted, hostile
+        self.adapter: Adapter | None = None
+        self._named = wanted.partition(":")[2]
+        # a child process is for one thread
+        self._thread = ThreadPoolExecutor(1, "transientcam-kernel-device")
+        self._child = ChildProcess(memory_bytes=_MEMORY_BYTES, nice=0)
+        self._lock = threading.Lock()
+        self._checks: dict[int, Future[str]] = {}
+        self._failures, self.failed, self._reason = 0, "", ""
+        self._most_bytes = 0
+        self._keys: set[int] = set()
+        self._dropped: list[int] = []
+        self._room: mmap.mmap | None = None
+        self._open = False
+
+    def adapters(self) -> list[Adapter]:
+        """Return what there is. Raises DeviceUnavailable where that cannot be found out."""
+        try:
+            found: list[Adapter] = self._thread.submit(self._adapters).result()
+        except (OSError, RuntimeError) as error:
+            raise DeviceUnavailable(self.wanted, str(error)) from None
+        return found
+
+    def require(self, m: int) -> None:
+        """Wait until frames of an order have been checked; with 0, until there is a device.
+
+        Raises DeviceUnavailable where there is no such device, or where it is wrong.
+        """
+        reason = self._check(m).result()
+        if reason:
+            raise DeviceUnavailable(self.wanted, reason)
+
+    def is_ready(self, m: int) -> bool:
+        """Say whether frames of an order have been found right; else that begins now."""
+        check = self._check(m)
+        return check.done() and not check.result() and not self._reason
+
+    def prepare(
+        self, m: int, shape: tuple[int, ...], constants: Constants, *, images: bool
+    ) -> DevicePass | None:
+        """Return the pass for frames that are alike; None where the device does not take them."""
+        if not 1 <= m <= _MOST_ROOTS or self._reason:
+            return None
+        made = DevicePass(self.frame, m, shape, constants, images=images, hostile=self._hostile)
+        return None if max(made.sizes) > self._most_bytes else made
+
+    def frame(self, one: DevicePass, given: Sequence[Array]) -> Rows | None:
+        """Return the rows of results of a frame; None where the device has failed."""
+        return self._thread.submit(self._frame, one, given).result()
+
+    def close(self) -> None:
+        """End its process."""
+        self._thread.submit(self._end).result()
+        self._thread.shutdown()
+
+    # -- on its thread -------------------------------------------------------------------------
+
+    def _check(self, m: int) -> "Future[str]":
+        with self._lock:
+            if m not in self._checks:
+                self._checks[m] = self._thread.submit(self._checked, m)
+            return self._checks[m]
+
+    def _checked(self, m: int) -> str:
+        """Return what is wrong with frames of an order; nothing, if they are right."""
+        try:
+            self._begin()
+        except (OSError, RuntimeError) as error:
+            self._end()
+            return str(error)
+        assert self.adapter is not None  # noqa: S101 - it has begun
+        if not m:
+            return ""
+
+        def make(*given: Any) -> DevicePass:
+            return DevicePass(self._frame, *given, images=True, hostile=self._hostile)
+
+        self.failed = ""
+        found = wrong(m, make)
+        if self.failed:
+            return f"{self.adapter.name} failed: {self.failed}"
+        return f"{self.adapter.name} computes known frames wrongly: {found}" if found else ""
+
+    def _begin(self) -> None:
+        """Start the process with its device, unless it is there."""
+        if self._open:
+            return
+        self.adapter = self._chosen(self._adapters())
+        self._most_bytes = self._call(there.take, self.adapter)
+        self._open = True
+
+    def _adapters(self) -> list[Adapter]:
+        if find_spec("wgpu") is None:
+            raise RuntimeError("wgpu is not installed: pip install 'transientcam[gpu]'")
+        found: list[Adapter] = self._call(there.adapters)
+        return found
+
+    def _chosen(self, found: list[Adapter]) -> Adapter:
+        named = [each for each in found if self._named.lower() in each.name.lower()]
+        real = [each for each in named if self._named or each.kind != SOFTWARE]
+        if real:
+            return real[0]
+        names = ", ".join(each.name for each in found)
+        if self._named:
+            raise RuntimeError(f"no adapter has that name; there are: {names or 'none'}")
+        raise RuntimeError(
+            f"{names} computes on the processor" if names else "no adapter was found"
+        )
+
+    def _frame(self, one: DevicePass, given: Sequence[Array]) -> Rows | None:
+        if self._reason:
+            return None
+        try:
+            self._begin()
+            found = self._computed(one, given)
+        except (OSError, RuntimeError, MemoryError) as error:
+            self._end()
+            self._failures += 1
+            self.failed = str(error)
+            if self._failures >= _FAILURES:
+                self._reason = f"it failed {_FAILURES} times in a row: {self.failed}"
+            return None
+        self._failures = 0
+        return found
+
+    def _computed(self, one: DevicePass, given: Sequence[Array]) -> Rows:
+        room = self._shared(max(sum(one.sizes[:2]) or one.sizes[2], one.sizes[3]))
+        while self._dropped:
+            self._call(there.forget, self._dropped.pop())
+        if one.key not in self._keys:
+            self._call(there.prepare, one.key, one.code, one.inputs, one.sizes)
+            self._keys.add(one.key)
+            weakref.finalize(one, self._dropped.append, one.key)
+        at = 0
+        for each in given:
+            bytes_ = np.ascontiguousarray(each).reshape(-1).view(np.uint8)
+            np.frombuffer(room, np.uint8, bytes_.size, at)[:] = bytes_
+            at += one.sizes[0] if len(given) > 1 else 0
+        self._call(there.run, one.key)
+        return one.rows_of(room)
+
+    def _shared(self, size: int) -> mmap.mmap:
+        """Return memory of at least so many bytes that both processes see."""
+        if self._room is None or len(self._room) < size:
+            # memory where there is such a directory; never larger than what it has room for
+            fast = Path("/dev/shm")  # noqa: S108 - nobody else can open what is made there
+            with tempfile.NamedTemporaryFile(dir=fast if fast.is_dir() else None) as file:
+                os.posix_fallocate(file.fileno(), 0, size)
+                room = mmap.mmap(file.fileno(), size)
+                self._call(there.share, file.name)
+            self._room = room
+        return self._room
+
+    def _call(self, function: Callable[..., Any], *arguments: object) -> Any:
+        asks = iter(range(_ASKS))
+
+        def ask() -> None:
+            if next(asks, None) is None:
+                raise OSError("it hangs")
+
+        return self._child.call(there.told, function, *arguments, ask=ask)
+
+    def _end(self) -> None:
+        self._open, self._room = False, None
+        self._keys.clear()
+        self._child.end()
+
+
+@lru_cache(maxsize=8)
+def device_of(name: str) -> Device | None:
+    """Return this process's device of a reconstructor's ``device``; None for the processor.
+
+    Raises ParameterError for another name.
+    """
+    if name not in ("cpu", "auto", "gpu") and not name.startswith("gpu:"):
+        raise ParameterError("device", name, "cpu, auto, gpu or gpu:NAME")
+    if name == "auto":
+        return device_of("gpu")
+    return None if name == "cpu" else Device(name)
+
+
+CHOICE: Final = ["cpu"]
+"""What reconstructors of this process use that are given no device."""

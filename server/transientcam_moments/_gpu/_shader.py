@@ -1,0 +1,247 @@
+"""The pass over a frame as a shader in WGSL: two entries, ``measure`` and ``analyse``.
+
+What is written here loads, stores and goes through neighbours; all that is computed of numbers is
+traced from the functions that state it (`_tracing`). One thread does one pixel.
+"""
+
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+
+from transientcam_moments._gpu._tracing import Traced, Writer, literal
+from transientcam_moments.arrays import larger
+from transientcam_moments.images import phasors
+from transientcam_moments.moment_problem import eigenvalue, half_turns, sparse, toeplitz
+
+GROUP: Final = 64
+"""Pixels of a workgroup."""
+ROW: Final = GROUP * 65535
+"""Pixels of a row of workgroups, of which WGSL allows no more."""
+STEPS: Final = 24
+"""Towards the roots at most, as kernels give to pixels that need more than others."""
+EPS: Final = float(np.finfo(np.float32).eps)
+PLANES: Final = (
+    "brightness",
+    "validity",
+    "uniform",
+    "direct",
+    "indirect",
+    "range",
+    "residual",
+    "packed",
+)
+"""Rows of the results, before phases, weights and moments; the last holds flags and count."""
+ZEROTH: Final = {"low-frequency": 4, "on-off": 2, "estimated": 0}
+NON_FINITE: Final = 8
+
+_HEAD = """
+struct Params {
+  width: u32, height: u32, radius: u32, stride: u32,
+  bad: u32, zero: u32, epsilon: f32, least: f32,
+  full_scale: f32, threshold: f32, metres: f32, nan: f32,
+}
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> raw: array<u32>;  // two u16 each, image after image
+@group(0) @binding(2) var<storage, read> inverse: array<vec2<f32>>;
+@group(0) @binding(3) var<storage, read> weights: array<f32>;  // of pixels, then taps
+@group(0) @binding(4) var<storage, read> places: array<u32>;  // of bad pixels in `replaced`, from 1
+@group(0) @binding(5) var<storage, read> replaced: array<vec2<f32>>;
+@group(0) @binding(6) var<storage, read_write> moments: array<vec2<f32>>;
+@group(0) @binding(7) var<storage, read_write> out: array<u32>;
+
+// A value as it was rounded: no compiler knows that `zero` is 0.
+fn rounded(x: f32) -> f32 { return bitcast<f32>(bitcast<u32>(x) ^ params.zero); }
+// 12 leading bits of a factor: products of such are exact.
+fn lost_by_squaring(x: f32, square: f32) -> f32 {
+  let high = bitcast<f32>(bitcast<u32>(x) & 0xfffff000u);
+  let low = rounded(x - high);
+  return (rounded(high * high - square) + 2.0 * high * low) + low * low;
+}
+// WGSL promises quotients and roots to 2.5 units and more: a step of Newton's makes it one.
+fn quotient(a: f32, b: f32) -> f32 {
+  let near = divide(1.0, b);
+  let y = near * (2.0 - b * near);
+  let q = a * y;
+  return q + y * (a - q * b);
+}
+fn root_of(x: f32) -> f32 {
+  let y = square_root(x);
+  return select(y, y + divide(0.5 * (x - y * y), y), y > 0.0);
+}
+fn finite(x: f32) -> bool { return (bitcast<u32>(x) & 0x7f800000u) != 0x7f800000u; }
+fn image(i: u32, p: u32, pixels: u32) -> f32 {
+  let at = i * pixels + p;
+  let word = raw[at >> 1u];
+  return f32(select(word & 0xffffu, word >> 16u, (at & 1u) == 1u));
+}
+"""
+_PLAIN = """
+fn divide(a: f32, b: f32) -> f32 { return a / b; }
+fn square_root(x: f32) -> f32 { return sqrt(x); }
+"""
+_HOSTILE = """
+fn spoilt(x: f32) -> f32 {
+  let bits = bitcast<u32>(x);
+  if (!finite(x) || (bits & 0x7f800000u) < 0x01000000u) { return x; }
+  return bitcast<f32>(bits + ((bits * 2654435761u) >> 16u) % 5u - 2u);
+}
+fn divide(a: f32, b: f32) -> f32 { return spoilt(a / b); }
+fn square_root(x: f32) -> f32 { return spoilt(sqrt(x)); }
+"""
+_ENTRY = f"""
+@compute @workgroup_size({GROUP})
+fn %s(@builtin(global_invocation_id) id: vec3<u32>) {{
+  let pixels = params.width * params.height;
+  let p = id.y * {ROW}u + id.x;
+  if (p >= pixels) {{ return; }}
+%s
+}}
+"""
+
+
+@lru_cache(maxsize=32)
+def shader(m: int, zeroth: str | None, *, images: bool, hostile: bool = False) -> str:
+    """Return the shader of an order.
+
+    ``zeroth``: how b_0 was measured; None for moments that are.
+    ``images``: for raw images; else for moments, which are not among the results.
+    ``hostile``: with each quotient and root wrong by up to two units in the last place, as WGSL
+    allows a device to have them.
+    """
+    found = _HEAD + (_HOSTILE if hostile else _PLAIN)
+    if images and zeroth is not None:
+        found += _ENTRY % ("measure", _measured(m, zeroth))
+    estimated = zeroth == "estimated"
+    here = _smoothed(m, estimated=estimated, kept=images) + _analysed(m, estimated=estimated)
+    return found + _ENTRY % ("analyse", here)
+
+
+def rows(m: int, *, images: bool) -> int:
+    """Return how many rows of a number a pixel the results have, those of moments at the end."""
+    return len(PLANES) + 2 * m + (2 * (m + 1) if images else 0)
+
+
+def _measured(m: int, zeroth: str) -> str:
+    """Return what makes calibrated moments of raw images, and their flag."""
+    writer = Writer()
+    first = ZEROTH[zeroth]
+    image = [writer.put(f"image({i}u, p, pixels)") for i in range(first + 4 * m)]
+    zero = 0.0 * image[0]
+    found: list[Any] = [(zero, zero)]
+    largest: Any = zero
+    if zeroth == "low-frequency":
+        x, y, largest = phasors.bucket(*image[:4])
+        found = [(phasors.low_frequency(x, y), zero)]
+    elif zeroth == "on-off":
+        x, largest = phasors.on_off(*image[:2])
+        found = [(x, zero)]
+    for j in range(first, len(image), 4):
+        x, y, here = phasors.bucket(*image[j : j + 4])
+        found.append((x, y))
+        largest = larger(largest, here)
+    saturated: Any = largest >= writer.put("params.full_scale")
+    writer.lines.append("let place = places[min(p, arrayLength(&places) - 1u)];")
+    for j, (x, y) in enumerate(found):
+        at = f"{j}u * select(1u, pixels, params.stride == 1u) + p * params.stride"
+        writer.lines += [
+            f"var z{j} = vec2<f32>({literal(x)}, {literal(y)});",
+            f"if (place > 0u) {{ z{j} = replaced[{j}u * params.bad + place - 1u]; }}",
+            f"let g{j} = inverse[{at}];",
+        ]
+        parts: Any = [Traced(writer, f"{name}{j}.{part}") for name in "zg" for part in "xy"]
+        u, v = phasors.calibrated(*parts)
+        moment = f"vec2<f32>({literal(u)}, {literal(v)})"
+        writer.lines.append(f"moments[{j}u * pixels + p] = {moment};")
+    flag = f"select(0u, 4u, {literal(saturated)} && place == 0u)"
+    writer.lines.append(f"out[{len(PLANES) - 1}u * pixels + p] = {flag};")
+    return "\n".join(writer.lines)
+
+
+def _smoothed(m: int, *, estimated: bool, kept: bool) -> str:
+    """Return what smooths the moments of a pixel into re and im, and whether they are finite."""
+    lines = ["let norm = weights[p];", "var sound = finite(norm);"]
+    lines += [f"var b{j} = vec2<f32>(0.0, 0.0);" for j in range(m + 1)]
+    sums = "\n".join(f"b{j} += weight * moments[{j}u * pixels + at];" for j in range(m + 1))
+    lines.append(f"""
+    let radius = i32(params.radius);
+    let here = vec2<i32>(i32(p % params.width), i32(p / params.width));
+    for (var dy = -radius; dy <= radius; dy++) {{
+      let y = here.y + dy;
+      if (y < 0 || y >= i32(params.height)) {{ continue; }}
+      for (var dx = -radius; dx <= radius; dx++) {{
+        let x = here.x + dx;
+        if (x < 0 || x >= i32(params.width)) {{ continue; }}
+        let weight = weights[pixels + u32(dy + radius)] * weights[pixels + u32(dx + radius)];
+        let at = u32(y) * params.width + u32(x);
+        {sums}
+      }}
+    }}""")
+    if estimated:
+        lines.append("b0 = vec2<f32>(0.0, 0.0);")
+    for j in range(m + 1):
+        lines.append(f"b{j} *= norm;")
+        lines.append(f"sound = sound && finite(b{j}.x) && finite(b{j}.y);")
+        at = f"({rows(m, images=False) + 2 * j}u * pixels + 2u * p)"
+        if kept:
+            lines += [
+                f"out[{at}] = bitcast<u32>(b{j}.x);",
+                f"out[{at} + 1u] = bitcast<u32>(b{j}.y);",
+            ]
+    lines += [f"b{j} = select(vec2<f32>(0.0, 0.0), b{j}, sound);" for j in range(m + 1)]
+    return "\n".join([*lines, ""])
+
+
+def _analysed(m: int, *, estimated: bool) -> str:
+    """Return what makes everything else of moments b0 .. bm, which are zero where unsound."""
+    writer, order = Writer(), (0,) * m
+    one = writer.put("1.0")
+    re: Any = [writer.put(f"b{j}.x") for j in range(m + 1)]
+    im: Any = [0.0 * one, *(writer.put(f"b{j}.y") for j in range(1, m + 1))]
+    epsilon, least = writer.put("params.epsilon"), writer.put("params.least")
+    if estimated:
+        re[0] = 0.0 * one
+    unit = list(re), list(im)
+    scale = toeplitz.relative(order, *unit)
+    smallest = scale * eigenvalue.smallest_eigenvalue(order, *unit)
+    if estimated:
+        re[0], smallest = eigenvalue.least_zeroth(smallest, epsilon)
+    finite, dark, biased, validity, brightness, uniform = eigenvalue.margin(
+        order, re, im, smallest, epsilon, least
+    )
+    re[0] = brightness
+    phases: Any = [one] * m
+    weights: Any = [one] * m
+    turns = half_turns(m, np.float32)
+    count, residual = sparse.returns(
+        order, turns, STEPS, EPS, one, uniform, re, im, phases, weights
+    )
+    threshold: Any = writer.put("params.threshold")
+    direct, indirect, angle = sparse.separate(order, threshold, one, phases, weights)
+    range_m: Any = angle * writer.put("params.metres")
+    sound = writer.put("sound", "bool")
+    valid: Any = sound & finite & ~dark
+    known = {"brightness": brightness, "validity": validity, "uniform": uniform}
+    values = {
+        name: writer.put(f"select(params.nan, {literal(value)}, sound)")
+        for name, value in known.items()
+    } | {
+        "direct": direct,
+        "indirect": indirect,
+        "range": writer.put(f"select(params.nan, {literal(range_m)}, {valid.name})"),
+        "residual": residual,
+    }
+    at = {name: f"out[{row}u * pixels + p]" for row, name in enumerate(PLANES)}
+    lines = [f"{at[name]} = bitcast<u32>({literal(value)});" for name, value in values.items()]
+    flags = [f"({at['packed']} & 4u)", f"select({NON_FINITE}u, 0u, sound && {literal(finite)})"]
+    flags += [
+        f"select(0u, 2u, sound && {literal(dark)})",
+        f"select(0u, 1u, sound && {literal(biased)})",
+    ]
+    lines.append(f"{at['packed']} = {' | '.join(flags)} | (u32({literal(count)}) << 8u);")
+    for k in range(m):
+        for row, value in ((k, phases[k]), (m + k, weights[k])):
+            lines.append(
+                f"out[{len(PLANES) + row}u * pixels + p] = bitcast<u32>({literal(value)});"
+            )
+    return "\n".join(writer.lines + lines)
