@@ -80,7 +80,7 @@ class RangeAccuracyDocument(Document):
     every_px: int = 1
     """The errors are those of one pixel in so many rows and columns: more than 1 where not all
     that predicts them is compiled."""
-    not_judged: list[str] = []
+    not_judged: tuple[str, ...] = ()
     """Reasons of `trust` that no pixel can have, as nothing known would tell them: the beam of the
     light, its place, images, or both temperatures."""
 
