@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.simulation.path_tracer import REPETITIONS, Tracer
 from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._facts import SceneFacts
 from transientcam_simulation.light._over_gloss import Glow, ShownByGloss
 from transientcam_simulation.light._paths import light_rays
 from transientcam_simulation.light._radiosity import Interreflection
@@ -101,3 +102,15 @@ def test_where_nothing_shines_gloss_shows_nothing() -> None:
     scene = room('kind = "diffuse"\nalbedo = 0.5')
     matt = replace(scene, surfaces=scene.surfaces[:2])
     assert ShownByGloss.of(matt, np.array([[0.0, 1.0, 0.0]]), 8) is None
+
+
+def test_gloss_counts_by_what_it_shines_on_where_no_highlight_is_seen() -> None:
+    scene = room('kind = "diffuse"\nalbedo = 0.0\ngloss = 0.5\ngloss_exponent = 200')
+    assert scene.camera is not None
+    up = replace(scene.camera, look_at_m=np.array([0.0, 2.0, 0.6]))
+    seen = replace(scene, camera=up, surfaces=scene.surfaces[:2])
+    facts = SceneFacts(seen, width=41, height=30)
+
+    (change,) = facts.changes("gloss", (F_HZ,))
+    (glimpse,) = facts.glimpses
+    assert change.max() > 0.02 * glimpse.brightness.max()
