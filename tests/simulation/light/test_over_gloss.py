@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from benchmarks.simulation.path_tracer import REPETITIONS, Tracer
 from transientcam_simulation.light._exchange import Exchange
@@ -12,7 +13,7 @@ from transientcam_simulation.light._over_gloss import Glow, ShownByGloss
 from transientcam_simulation.light._paths import light_rays
 from transientcam_simulation.light._radiosity import Interreflection
 from transientcam_simulation.light._rays import rays_through
-from transientcam_simulation.scene import Scene, parse_scene
+from transientcam_simulation.scene import Points, Scene, parse_scene
 
 SIZE = 163, 120
 PIXEL = np.arange(300, 163 * 120, 1100)
@@ -60,9 +61,10 @@ def test_light_by_gloss_is_what_a_path_tracer_finds(gloss: float, exponent: floa
     rays = rays_through(scene.camera, columns, rows, width=SIZE[0], height=SIZE[1])
     lit = light_rays(scene, rays)
 
-    def by(exchange: Exchange, rays: np.ndarray | None) -> np.ndarray:
+    def by(exchange: Exchange, rays: Points | None) -> NDArray[np.complex128]:
         light = Interreflection(scene, lit, width=len(rows), height=1, exchange=exchange, rays=rays)
-        return (lit.moments(F_HZ, None) + light.moments(F_HZ)).ravel()
+        moments: NDArray[np.complex128] = lit.moments(F_HZ, None) + light.moments(F_HZ).ravel()
+        return moments
 
     found = by(Exchange.of(scene, 16, mirrors=True), rays)
     traced = Tracer(scene, SIZE).moments(PIXEL, np.array([F_HZ]), paths=512)[:, 0]
