@@ -164,8 +164,7 @@ def tables(
         scene = scene_named(name)
         if scene.camera is None:
             continue
-        options = {"pixels": pixels, "paths": paths, "as_stated": not unlimited}
-        by = told(scene, sequences, **options)
+        by = told(scene, sequences, pixels=pixels, paths=paths, as_stated=not unlimited)
         for sequence in sequences:
             each = judge(scene, sequence, by)
             table.rows.append((*each[:-1], ", ".join(each.missing) or "-"))

@@ -47,12 +47,12 @@ class MirrorPaths(_InGeometry):
 
 
 class Gloss(_InGeometry):
-    """A highlight around the direction of reflection, as of a dull mirror."""
+    """A lobe around the direction of reflection, as of a dull mirror."""
 
     name = "gloss"
-    what = "highlights on glossy surfaces"
+    what = "highlights on glossy surfaces, and what they reflect"
     without = "all surfaces are matt"
-    where = "{share} of the pixels see a highlight"
+    where = "{share} of the pixels see light that gloss reflects"
 
 
 class Scattering(_InGeometry):

@@ -20,7 +20,8 @@ MISSING = [
     for each in (
         "mirrors-between | light over a mirror from one surface to another where some move | "
         "mirrors show {share} of the pixels' surfaces other lit ones",
-        "gloss-of-surroundings | gloss that reflects more than the lamp, or shines on surfaces | "
+        "gloss-of-surroundings | gloss that reflects more than the lamp where some move, or "
+        "the lamp from curved surfaces to others | "
         "gloss sends on light of surfaces, or to surfaces, in {share} of the pixels",
         "further-bounces | light over more surfaces than the scene's file lets it go | "
         "its transport.diffuse_bounces leaves out too much in {share} of the pixels",

@@ -177,7 +177,13 @@ class SceneFacts:
             return ()
         if effect not in self._left_out:
             self._left_out[effect] = others()
-        return self._apart(self._left_out[effect], frequencies_hz)
+        apart = self._apart(self._left_out[effect], frequencies_hz)
+        if effect == "gloss" and not self._scene.moves and self._further_light:
+            there, (direct,) = self._seen[0], apart
+            matt = replace(there, scene=without_gloss(there.scene))
+            shown = self._further_light[0] - _ROUGH_ERROR * self._further(matt, self._rough)
+            return (np.maximum(direct, np.abs(shown)),)
+        return apart
 
     def _moved(self, frequencies_hz: tuple[float, ...], during_s: float) -> tuple[Values, ...]:
         """Return how far moments of each pixel change within a time, at most.

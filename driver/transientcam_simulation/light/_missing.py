@@ -93,9 +93,9 @@ class SampledWays:
             normal = normals_at(scene, ends.point, ends.surface)
             albedo = ends.throughput * of_surfaces(scene, "reflectivity")[ends.surface]
             cut = _BOUNCES if most is not None and further > most else min(further - 1, _FOLLOWED)
+            kind = np.full(len(slot), cut)
             if moves:
-                cut = np.where(glossy, _GLOSS, np.where(over, _MIRRORS, cut))
-            kind = np.broadcast_to(cut, len(slot))
+                kind = np.where(glossy, _GLOSS, np.where(over, _MIRRORS, kind))
             for light in lights:
                 far_m, irradiance = light_on(scene, light, ends.point, normal)
                 gloss = highlight(scene, light, ends, normal)

@@ -107,7 +107,7 @@ def test_bad_input_is_reported_in_one_line(arguments: list[str], message: str) -
 
 
 def test_light_that_cannot_be_made_and_a_lens_that_scatters_are_named(tmp_path: Path) -> None:
-    """A varnished floor before a wall shows the wall, which gloss here does not."""
+    """A varnished floor before a wall shows the wall, but not where light goes no further."""
     path = tmp_path / "varnish.toml"
     path.write_text("""
         [camera]
@@ -118,6 +118,8 @@ def test_light_that_cannot_be_made_and_a_lens_that_scatters_are_named(tmp_path: 
         electrons_per_s = 6e7
         [device]
         lens_scatter = { share = 0.02 }
+        [transport]
+        diffuse_bounces = 0
         [[surface]]
         kind = "diffuse"
         centre_m = [0.0, 2.2, 0.0]
@@ -136,8 +138,8 @@ def test_light_that_cannot_be_made_and_a_lens_that_scatters_are_named(tmp_path: 
 
     text = run(str(path)).output
     called, lacks = text.split("Called for, and cannot be made:")
-    assert "gloss-of-surroundings" in lacks
-    assert "gloss-of-surroundings" not in called
+    assert "further-bounces" in lacks
+    assert "further-bounces" not in called
     assert "ideal (but for lens scatter) device" in " ".join(text.split())
     assert lacks.count("shot-noise") == 1
     assert "shot-noise" not in called

@@ -4,14 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from benchmarks.simulation.path_tracer import REPETITIONS, Tracer
 from transientcam_simulation.light._exchange import Exchange
+from transientcam_simulation.light._facts import SceneFacts
 from transientcam_simulation.light._over_gloss import Glow, ShownByGloss
 from transientcam_simulation.light._paths import light_rays
 from transientcam_simulation.light._radiosity import Interreflection
 from transientcam_simulation.light._rays import rays_through
-from transientcam_simulation.scene import Scene, parse_scene
+from transientcam_simulation.scene import Points, Scene, parse_scene
 
 SIZE = 163, 120
 PIXEL = np.arange(300, 163 * 120, 1100)
@@ -59,9 +61,10 @@ def test_light_by_gloss_is_what_a_path_tracer_finds(gloss: float, exponent: floa
     rays = rays_through(scene.camera, columns, rows, width=SIZE[0], height=SIZE[1])
     lit = light_rays(scene, rays)
 
-    def by(exchange: Exchange, rays: np.ndarray | None) -> np.ndarray:
+    def by(exchange: Exchange, rays: Points | None) -> NDArray[np.complex128]:
         light = Interreflection(scene, lit, width=len(rows), height=1, exchange=exchange, rays=rays)
-        return (lit.moments(F_HZ, None) + light.moments(F_HZ)).ravel()
+        moments: NDArray[np.complex128] = lit.moments(F_HZ, None) + light.moments(F_HZ).ravel()
+        return moments
 
     found = by(Exchange.of(scene, 16, mirrors=True), rays)
     traced = Tracer(scene, SIZE).moments(PIXEL, np.array([F_HZ]), paths=512)[:, 0]
@@ -101,3 +104,15 @@ def test_where_nothing_shines_gloss_shows_nothing() -> None:
     scene = room('kind = "diffuse"\nalbedo = 0.5')
     matt = replace(scene, surfaces=scene.surfaces[:2])
     assert ShownByGloss.of(matt, np.array([[0.0, 1.0, 0.0]]), 8) is None
+
+
+def test_gloss_counts_by_what_it_shines_on_where_no_highlight_is_seen() -> None:
+    scene = room('kind = "diffuse"\nalbedo = 0.0\ngloss = 0.5\ngloss_exponent = 200')
+    assert scene.camera is not None
+    up = replace(scene.camera, look_at_m=np.array([0.0, 2.0, 0.6]))
+    seen = replace(scene, camera=up, surfaces=scene.surfaces[:2])
+    facts = SceneFacts(seen, width=41, height=30)
+
+    (change,) = facts.changes("gloss", (F_HZ,))
+    (glimpse,) = facts.glimpses
+    assert change.max() > 0.02 * glimpse.brightness.max()
