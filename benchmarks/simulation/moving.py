@@ -6,6 +6,7 @@ are solved at steps of time, are held against a full solution for every image.
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from statistics import median
 
 import numpy as np
@@ -33,10 +34,8 @@ _ONE_RAY = {"mixed-pixels": "off"}  # as the full solution has
 
 
 def _world(scene: Scene, choices: dict[str, str], sequence: Sequence) -> World:
-    effects = scene.effects | choices
-    width, height = SIZE
-    fields = {name: getattr(scene, name) for name in Scene.__slots__} | {"effects": effects}
-    world = world_of(Scene(**fields), width=width, height=height, readout_s=READOUT_S)
+    changed, (width, height) = replace(scene, effects=scene.effects | choices), SIZE
+    world = world_of(changed, width=width, height=height, readout_s=READOUT_S)
     world.configure(sequence, sequence.labels)
     return world
 
