@@ -6,6 +6,7 @@ are solved at steps of time, are held against a full solution for every image.
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from statistics import median
 
 import numpy as np
@@ -33,10 +34,8 @@ _ONE_RAY = {"mixed-pixels": "off"}  # as the full solution has
 
 
 def _world(scene: Scene, choices: dict[str, str], sequence: Sequence) -> World:
-    effects = scene.effects | choices
-    width, height = SIZE
-    fields = {name: getattr(scene, name) for name in Scene.__slots__} | {"effects": effects}
-    world = world_of(Scene(**fields), width=width, height=height, readout_s=READOUT_S)
+    changed, (width, height) = replace(scene, effects=scene.effects | choices), SIZE
+    world = world_of(changed, width=width, height=height, readout_s=READOUT_S)
     world.configure(sequence, sequence.labels)
     return world
 
@@ -92,14 +91,15 @@ def error(scene: Scene, sequence: Sequence) -> tuple[float, float, float]:
         for axis in (0, 1):
             for by in (-1, 1):
                 np.logical_or(beside, np.roll(surface, by, axis) != surface, out=beside)
-        return (found_e - direct_e - scale_e * full.real).ravel()
+        off_e: NDArray[np.float64] = (found_e - direct_e - scale_e * full.real).ravel()
+        return off_e
 
-    off_e = np.abs(four_buckets(sequence, image)).max(axis=0) / 2
+    worst_e = np.abs(four_buckets(sequence, image)).max(axis=0)
     brightness = lit.truth(device_time_s=START_S).brightness.ravel()
     gain_e = sequence.exposure_s * scene.light.electrons_per_s / lit.sensor.gain_e_per_dn
     deviation_e = conditions.noise.deviation(brightness / gain_e, 1.0) * conditions.scale_e
     counted = (brightness > 0) & ~beside.ravel()
-    over = (off_e / deviation_e)[counted]
+    over = (worst_e / deviation_e)[counted]
     return float(np.sqrt(np.mean(over**2))), float(over.max()), float(np.mean(over > 0.5))
 
 

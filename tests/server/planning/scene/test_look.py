@@ -166,8 +166,6 @@ centre_m = [0.0, 1.2, 0.0]
 radius_m = 0.18
 albedo = 0.7
 motion = "roll"
-[transport]
-diffuse_bounces = 0
 """
 
 
