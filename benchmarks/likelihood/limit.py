@@ -49,9 +49,10 @@ def tables() -> Iterator[Table]:
     """Hold the likelihood to least squares with the right model, for returns and for tails."""
     for measured in (True, False):
         table = _table(f"Sharp returns, b_0 {'measured' if measured else 'not measured'}")
-        for m, (name, apart, weight) in itertools.product(ORDERS, _returns()):
-            if len(weight) <= m:
-                table.rows.append(_row(f"{m}, {name}", m, _sharp, measured, apart(m), weight))
+        for m in ORDERS:
+            for name, apart, weight in _returns(m):
+                if len(weight) <= m:
+                    table.rows.append(_row(f"{m}, {name}", m, _sharp, measured, apart, weight))
         yield table
     table = _table("A return with a tail, b_0 measured")
     for m, name in itertools.product((3, 4, 8), SHAPES):
@@ -65,16 +66,15 @@ def _table(title: str) -> Table:
     return Table(title, ("m, light", *(f"S = {snr}: RMS, 50 %, 90 %; z" for snr in SNRS)))
 
 
-def _returns() -> Iterator[tuple[str, Callable[[int], tuple[float, ...]], tuple[float, ...]]]:
+def _returns(m: int) -> Iterator[tuple[str, tuple[float, ...], tuple[float, ...]]]:
     """Yield names, distances from the first return in radians at order m, and weights."""
-    yield "one", lambda m: (), (1.0,)
+    yield "one", (), (1.0,)
     for share in (0.6, 1.0, 2.0):
-        yield f"two, {share}/m rad, 1 : 1", lambda m, share=share: (share / m,), (0.5, 0.5)
+        yield f"two, {share}/m rad, 1 : 1", (share / m,), (0.5, 0.5)
     for length in (0.5, 1.0, 3.0):
-        yield f"two, {length} m, 3 : 1", lambda m, at=length: (at / RAD_M,), (0.75, 0.25)
+        yield f"two, {length} m, 3 : 1", (length / RAD_M,), (0.75, 0.25)
     for first, last in ((0.8, 1.6), (0.4, 2.0)):
-        apart = first / RAD_M, last / RAD_M
-        yield f"three, 0, {first}, {last} m", lambda m, apart=apart: apart, (0.6, 0.25, 0.15)
+        yield f"three, 0, {first}, {last} m", (first / RAD_M, last / RAD_M), (0.6, 0.25, 0.15)
 
 
 def _sharp(unknowns: Array, m: int) -> Array:

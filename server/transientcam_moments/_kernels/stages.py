@@ -304,20 +304,19 @@ def fit_third(
             x[k], y[k], w[k] = points[3 * k], points[3 * k + 1], points[3 * k + 2]
         cost, far = simd.load(one, rooms, _COST * ROW + at), infinity(one)
         moving = active & (simd.load(one, rooms, _MOVING * ROW + at) < sharp.SETTLED)
-        tried = cost
-        if some(moving):
-            from_x[0], from_y[0], from_x[1], from_y[1] = x[0], y[0], x[1], y[1]
-            tried = fit_again(
-                order, (0, 0), (0, 0, 0, 0), data_r, data_i, weight, from_x, from_y, x, y, w, cost,
-                moving, far,
-            )  # fmt: skip
-        missed = active & choice.missed(tried, free)
-        if some(missed):
-            choice.split(x, y, w, cosine, sine, from_x, from_y)
-            tried = fit_again(
-                order, (0, 0), (0, 0, 0, 0), data_r, data_i, weight, from_x, from_y, x, y, w, tried,
-                missed, choice.bar_of_returns(4, penalty, found),
-            )  # fmt: skip
+        tried, bar = cost, far
+        for attempt in range(2):
+            if attempt == 0:
+                from_x[0], from_y[0], from_x[1], from_y[1] = x[0], y[0], x[1], y[1]
+            else:
+                choice.split(x, y, w, cosine, sine, from_x, from_y)
+                bar = choice.bar_of_returns(4, penalty, found)
+                moving = active & choice.missed(tried, free)
+            if some(moving):
+                tried = fit_again(
+                    order, (0, 0), (0, 0, 0, 0), data_r, data_i, weight, from_x, from_y, x, y, w,
+                    tried, moving, bar,
+                )  # fmt: skip
         choice.offer_returns(
             order, (0, 0), (0, 0, 0, 0), weight, x, y, w, tried, penalty, threshold,
             active & (tried < cost - 1.0), found,

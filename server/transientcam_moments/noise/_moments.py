@@ -113,14 +113,16 @@ def moment_noise(
         size = size.reshape((-1,) + (1,) * light.ndim)
     # signal(theta) + signal(theta + 180 degrees) = b_0 + 2 ambient
     mean = sensor.image_variance((light + 2 * ambient) / 2)
-    phasor = phase_noise(phases_rad) * mean + xp.zeros_like(light)
-    planes = [phasor / size[j] for j in range(gain.shape[0])]
+    phasor = (phase_noise(phases_rad) * mean + xp.zeros_like(light)).astype(light.dtype)
+    factor = (1 / (takes * size)).astype(light.dtype)
+    variance = phasor * factor
+    if zeroth == "low-frequency":
+        return MomentNoise(variance)
+    zero = xp.zeros_like(light)
     if zeroth == "on-off":
         on, off = sensor.image_variance(light / 2 + ambient), sensor.image_variance(ambient)
-        planes[0] = 4 * (on + off) / size[0]
-    elif zeroth == "estimated":
-        planes[0] = xp.zeros_like(light)
-    return MomentNoise((xp.stack(planes) / takes).astype(light.dtype))
+        zero = (4 * (on + off) * factor[0]).astype(light.dtype)
+    return MomentNoise(xp.concatenate([zero[None], variance[1:]]))
 
 
 def smoothing_factor(sigma_px: float = SIGMA_PX) -> float:
@@ -241,7 +243,7 @@ def smoothed_of(
     variance = _of_light(noise_of, around(brightness), other).variance
     xp = namespace(variance)
     rows, columns = (_factors(sigma_px, length) for length in brightness.shape)
-    left = xp.asarray(np.outer(rows, columns)).astype(variance.dtype)
+    left = xp.asarray(rows[:, None].astype(variance.dtype) * columns.astype(variance.dtype))
     return MomentNoise(variance * left)
 
 
