@@ -7,18 +7,19 @@ and bias of any sequence, and how many pixels are within a target; recommends th
 
 from transientcam_server.planning._front import FrontCache, front_goal
 from transientcam_server.planning._looks import Looks
-from transientcam_server.planning._map import map_files
-from transientcam_server.planning._planner import Planner
+from transientcam_server.planning._planner import Planner, map_files
 from transientcam_server.planning._prediction.takes import predict_takes, takes_of
 from transientcam_server.planning._process.process import PlanningProcess
-from transientcam_server.planning._process.progress import Progress, Report
-from transientcam_server.planning._process.queue import PlanningQueue
+from transientcam_server.planning._process.queue import PlanningQueue, Progress, Report
 from transientcam_server.planning._scene.estimation import ESTIMATORS
-from transientcam_server.planning._scene.region import Region
-from transientcam_server.planning._scene.scene import SceneStatistics, uniform_scene
+from transientcam_server.planning._scene.scene import Region, SceneStatistics, uniform_scene
 from transientcam_server.planning._search import families
-from transientcam_server.planning._search.choice import in_words
-from transientcam_server.planning._search.families import require_plannable
-from transientcam_server.planning._search.goal import SHARE, Goal
-from transientcam_server.planning._search.pareto import flat_from, front
+from transientcam_server.planning._search.families import (
+    SHARE,
+    Goal,
+    flat_from,
+    front,
+    require_plannable,
+)
 from transientcam_server.planning._search.plan import Plan
+from transientcam_server.planning._search.search import in_words

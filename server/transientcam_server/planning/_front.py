@@ -10,10 +10,9 @@ from transientcam_driver import AppliedSequence, Sequence
 from transientcam_server.imaging import Frame, Workers
 from transientcam_server.planning._looks import CACHED_S, Looks
 from transientcam_server.planning._planner import Planner, range_error
-from transientcam_server.planning._process.progress import Progress
-from transientcam_server.planning._process.queue import PlanningQueue
-from transientcam_server.planning._scene.region import Region
-from transientcam_server.planning._search.goal import Goal
+from transientcam_server.planning._process.queue import PlanningQueue, Progress
+from transientcam_server.planning._scene.scene import Region
+from transientcam_server.planning._search.families import Goal
 
 _WIDE: Final = 1e9  # a target that every sequence reaches: it only requests the prediction
 

@@ -9,8 +9,7 @@ from typing import Final, Protocol
 from transientcam_driver import Camera, Sequence
 from transientcam_server.imaging import Frame, Workers
 from transientcam_server.planning._planner import Planner
-from transientcam_server.planning._process.progress import Progress
-from transientcam_server.planning._process.queue import PlanningQueue
+from transientcam_server.planning._process.queue import PlanningQueue, Progress
 from transientcam_server.planning._scene.look import look_of_frame
 from transientcam_server.planning._scene.scene import SceneStatistics
 

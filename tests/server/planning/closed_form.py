@@ -8,7 +8,7 @@ import numpy as np
 
 from transientcam_driver import Capabilities, Sequence, SequenceError
 from transientcam_server.planning import Goal, Plan, uniform_scene
-from transientcam_server.planning._prediction.intervals import Figure
+from transientcam_server.planning._prediction.measures import Figure
 from transientcam_server.planning._prediction.prediction import Prediction, Predictor
 from transientcam_server.planning._search.families import EXPOSURES, HARMONICS, TAKES, families
 from transientcam_server.planning._search.plan import plan

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from transientcam_server.planning import map_files
-from transientcam_server.planning._map import error_map
+from transientcam_server.planning._planner import error_map
 
 
 def test_noise_is_shared_by_neighbours_and_light_and_bias_are_each_pixels_own() -> None:

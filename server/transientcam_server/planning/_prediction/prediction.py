@@ -19,21 +19,21 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_server.imaging import MEDIAN_OF_NORMAL, ranges_m
-from transientcam_server.planning._prediction.intervals import (
+from transientcam_server.planning._prediction.measures import (
     DISAGREEING,
     DOUBTFUL,
     KNOWN,
     RESAMPLED,
     UNKNOWN,
     Figure,
+    PixelErrors,
     between,
     figure,
+    pixel_errors,
 )
-from transientcam_server.planning._prediction.measures import PixelErrors, pixel_errors
 from transientcam_server.planning._prediction.resolving import Resolving
 from transientcam_server.planning._scene.estimation import MOST_HARMONICS
-from transientcam_server.planning._scene.sampling import resampled
-from transientcam_server.planning._scene.scene import SceneStatistics
+from transientcam_server.planning._scene.scene import SceneStatistics, resampled
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]

@@ -14,8 +14,7 @@ from typing import Any, TypeVar
 import transientcam_moments as tm
 from transientcam_compiled import ChildProcess, ProcessEnded, Tell
 from transientcam_server.errors import Problem, kinds
-from transientcam_server.planning._process.progress import Progress
-from transientcam_server.planning._process.queue import RETRY_AFTER_S
+from transientcam_server.planning._process.queue import RETRY_AFTER_S, Progress
 
 _T = TypeVar("_T")
 

@@ -12,8 +12,13 @@ import transientcam_moments as tm
 from transientcam_server.imaging import Recipe, nominal_gains
 from transientcam_server.planning._scene.estimation import direct_range
 from transientcam_server.planning._scene.plausible import plausible_ranges
-from transientcam_server.planning._scene.sampling import STRATUM, one_of_each, typical_pixels
-from transientcam_server.planning._scene.scene import PIXELS, SceneStatistics
+from transientcam_server.planning._scene.scene import (
+    PIXELS,
+    STRATUM,
+    SceneStatistics,
+    one_of_each,
+    typical_pixels,
+)
 from transientcam_server.settings import ReconstructionSettings
 
 _Array = NDArray[Any]

@@ -1,10 +1,11 @@
-"""The sequences that are searched: families of one set of frequencies and one estimator."""
+"""What is searched: goals, families of sequences for them, and what no other point beats."""
 
 import itertools
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from typing import Any, Final
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, TypeVar
 
 from transientcam_driver import AppliedSequence, Capabilities, Sequence, SequenceError
 from transientcam_moments.comparisons import TECHNIQUES
@@ -12,8 +13,165 @@ from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging import listed
 from transientcam_server.planning._prediction.prediction import OUTVOTED, Predictor
 from transientcam_server.planning._scene.estimation import MOST_HARMONICS, SEARCHED
-from transientcam_server.planning._search.goal import Goal
-from transientcam_server.planning._search.pareto import front
+from transientcam_server.planning._scene.scene import Region
+
+TARGETS: Final = ("range_error_m", "range_std_m", "separation_m", "bound_width")
+"""Accuracies that a goal may limit; choices are compared by the first by default."""
+SHARE: Final = 0.9
+"""Of the pixels that are to be within a target; a capture has two of three within the error of the
+median pixel."""
+BUDGETS: Final = ("capture_s", "frame_rate_hz", "computing_share")
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """Targets and budgets of a sequence.
+
+    ``range_error_m``: How far the range is off, noise and bias together, at most.
+    ``share``: Of the pixels of a capture whose ranges are to be within it; None for the error of
+    the median pixel, over many captures.
+    ``region``: Whose lit pixels count; None for all of the picture.
+    ``range_std_m``: Standard deviation of the range of a typical pixel, at most.
+    ``separation_m``: Distance at which two equal returns are both to be found in `separation_share`
+    of all captures.
+    ``bound_width``: Width of the bounds on the density over the mean density, at most.
+    ``capture_s``: Time of one capture, at most.
+    ``frame_rate_hz``: Frames a second back to back, at least.
+    ``computing_share``: Share of the time between two frames that reconstruction may take on this
+    machine.
+    ``base``: Sequence whose base frequency, half of it or a multiple, is used, and its sub-phases.
+    ``fixed``: Names of further fields of it that must stay.
+    ``estimator``: The only one that is planned with; None for any.
+    """
+
+    range_error_m: float | None = None
+    share: float | None = SHARE
+    region: Region | None = None
+    range_std_m: float | None = None
+    separation_m: float | None = None
+    separation_share: float = 0.9
+    bound_width: float | None = None
+    capture_s: float | None = None
+    frame_rate_hz: float | None = None
+    computing_share: float | None = None
+    base: Sequence = field(default_factory=Sequence)
+    fixed: frozenset[str] = frozenset()
+    estimator: str | None = None
+
+    @property
+    def empty(self) -> bool:
+        """Whether neither a target nor a budget is given."""
+        return not self.targets and not self.budgets
+
+    @property
+    def leading(self) -> str:
+        """The target that neighbours are compared by."""
+        return next(iter(self.targets), TARGETS[0])
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """The largest error that each target allows."""
+        limits = {name: float(getattr(self, name)) for name in self.targets}
+        if "separation_m" in limits:
+            limits["separation_m"] = 1.0 - self.separation_share
+        return limits
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """The targets that are given."""
+        return tuple(name for name in TARGETS if getattr(self, name) is not None)
+
+    @property
+    def budgets(self) -> tuple[str, ...]:
+        """The budgets that are given."""
+        return tuple(name for name in BUDGETS if getattr(self, name) is not None)
+
+    def without_budgets(self) -> "Goal":
+        """Return the goal of the same targets, whatever they cost."""
+        return replace(self, capture_s=None, frame_rate_hz=None, computing_share=None)
+
+    def affords(self, capture_s: float, computing_s: Callable[[], float | None]) -> bool:
+        """Return whether captures of this length, back to back, are within the budgets.
+
+        ``computing_s`` returns the computing time of a frame, if it is known; it is called where
+        that is limited.
+        """
+        if self.capture_s is not None and capture_s > self.capture_s:
+            return False
+        if self.frame_rate_hz is not None and capture_s * self.frame_rate_hz > 1 + 1e-9:
+            return False
+        if self.computing_share is None:
+            return True
+        reconstruct_s = computing_s()
+        return reconstruct_s is not None and reconstruct_s / capture_s <= self.computing_share
+
+    def require_sensible(self) -> None:
+        """Refuse a goal without target or budget, or with a value out of bounds.
+
+        Raises Problem: ``invalid-request``.
+        """
+        if self.empty:
+            raise Problem(
+                kinds.INVALID_REQUEST,
+                "Give a target or a budget.",
+                field="target",
+                value=None,
+                limit=f"at least one of {', '.join((*TARGETS, *BUDGETS))}",
+            )
+        positive = [(name, math.inf, "a number above 0") for name in (*TARGETS, *BUDGETS)]
+        shares = [(name, 1.0, "between 0 and 1") for name in ("share", "separation_share")]
+        for name, most, limit in [*positive, *shares]:
+            value = getattr(self, name)
+            if value is not None and not 0 < value < most:
+                detail = f"{name} = {value!r} must be {limit}."
+                raise Problem(kinds.INVALID_REQUEST, detail, field=name, value=value, limit=limit)
+
+
+_T = TypeVar("_T")
+LITTLE: Final = 2.0
+"""More time buys little where it leaves more than one over this of the error."""
+
+
+def front(
+    points: Iterable[_T], *, cost: Callable[[_T], float], error: Callable[[_T], float]
+) -> list[_T]:
+    """Return the points on the front, by rising cost and falling error.
+
+    Of points with the same cost and error the first one stays; points of which either is not
+    finite are on no front.
+    """
+    known = [
+        point for point in points if math.isfinite(cost(point)) and math.isfinite(error(point))
+    ]
+    best, chosen = math.inf, []
+    for point in sorted(known, key=lambda point: (cost(point), error(point))):
+        if error(point) < best:
+            best = error(point)
+            chosen.append(point)
+    return chosen
+
+
+def flat_from(errors: list[tuple[float, float, float]]) -> int | None:
+    """Return the first place of a front from which on bias rules and more time buys little.
+
+    Parameters
+    ----------
+    errors
+        Noise, bias, and both together, by rising time.
+
+    Returns
+    -------
+    int or None
+        None where noise rules the last one.
+    """
+    place = None
+    for k in reversed(range(len(errors))):
+        noise, bias, error = errors[k]
+        if bias <= noise or error > LITTLE * errors[-1][2]:
+            break
+        place = k
+    return place
+
 
 FREQUENCY_FACTORS: Final = (1.0, 2.0, 3.0, 0.5)
 """Base frequencies that are tried, over the one wanted."""

@@ -1,22 +1,338 @@
-"""The search: the best choice for targets, the quickest within the budgets that reaches them.
+"""The search for the choice that reaches a goal soonest, or comes nearest to it.
 
-Bounds rule families out before any draw, few draws all but the contenders, and many draws decide
-among these. The longer a capture, the less its noise; its bias may grow, as where the likelihood
-finds more returns the less noise there is. So the errors of a family fall to a least one, and may
-rise again.
+A candidate is a sequence and an estimator. A bound on the error of one costs nothing; few draws
+serve all that have its frequencies and its estimator; many draws are its own, and predict its
+`Choice`. Bounds rule families out before any draw, few draws all but the contenders, and many draws
+decide among these. The longer a capture, the less its noise; its bias may grow, as where the
+likelihood finds more returns the less noise there is. So the errors of a family fall to a least
+one, and may rise again.
 """
 
 import bisect
 import math
-from typing import Final, NamedTuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple
 
-from transientcam_server.planning._search.candidates import Candidate, Curve, Targets, longest
-from transientcam_server.planning._search.choice import Choice
-from transientcam_server.planning._search.finest import finest
+from transientcam_driver import AppliedSequence, Sequence
+from transientcam_server.planning._prediction.measures import TOLERANCES_M, Figure
+from transientcam_server.planning._prediction.prediction import Prediction, Predictor
+from transientcam_server.planning._search.families import Family, Goal, Member
+
+
+def in_words(sequence: Sequence, estimator: str) -> str:
+    """State a sequence and an estimator: frequencies, exposure, takes."""
+    takes = f" x {sequence.takes}" if sequence.takes > 1 else ""
+    return (
+        f"m = {sequence.harmonics} at {sequence.base_frequency_hz / 1e6:g} MHz, "
+        f"{sequence.exposure_s * 1e3:.3g} ms{takes}, {estimator}"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A sequence, an estimator, and their predicted accuracy and cost.
+
+    ``applied``: As the camera would set it.
+    ``estimator``: What its range is taken from.
+    ``predicted``: Errors of the range.
+    ``beyond_scene``: Whether it sees more than the look that describes the scene, so that the
+    prediction is a lower bound of the error.
+    ``timed``: Returns the computing time of one frame in s, measured on demand; None where its
+    kernels are not compiled yet.
+    ``bound_width``, ``separation_share``: Predicted where the goal has them.
+    ``settling_s``: Part of the capture in which the modulation settles.
+    ``share``, ``target_m``: Of the pixels, and the error that so many are to be within; None where
+    the goal has none.
+    """
+
+    applied: AppliedSequence
+    estimator: str
+    predicted: Prediction
+    beyond_scene: bool
+    timed: Callable[[], float | None] = field(compare=False)
+    bound_width: float | None = None
+    separation_share: float | None = None
+    settling_s: float = 0.0
+    share: float | None = None
+    target_m: float | None = None
+
+    @property
+    def range_error(self) -> Figure:
+        """The error that a target limits: of the share of the goal, or of the median pixel."""
+        return self.predicted.within or self.predicted.range_error
+
+    @property
+    def computing_share(self) -> float | None:
+        """Share of a core's time between two frames that goes into reconstruction, if known."""
+        reconstruct_s = self.timed()
+        return None if reconstruct_s is None else reconstruct_s * self.applied.frame_rate_hz
+
+    @property
+    def price(self) -> dict[str, float | None]:
+        """What a capture takes and leaves, item by item, as JSON; transport is told by frames."""
+        applied, computing_s = self.applied, self.timed()
+        light_s = applied.images * applied.sequence.exposure_s
+        return {
+            "light_s": light_s,
+            "readout_s": applied.capture_s - light_s - self.settling_s,
+            "settling_s": self.settling_s,
+            "transport_s": None,
+            "computing_s": computing_s,
+            "sum_s": applied.capture_s + (computing_s or 0.0),
+            "light_share": light_s / applied.capture_s,
+            "data_bytes": round(applied.data_rate_bytes_s * applied.capture_s),
+        }
+
+    def error(self, target: str) -> float:
+        """Return the error that a target limits, as it is expected."""
+        if target == "bound_width":
+            return math.inf if self.bound_width is None else self.bound_width
+        if target == "separation_m":
+            return 1.0 if self.separation_share is None else 1.0 - self.separation_share
+        figure = self.predicted.range_std if target == "range_std_m" else self.range_error
+        return figure.median
+
+    def error_with_margin(self, target: str) -> float:
+        """Return what most of the captures stay below."""
+        if target == "range_error_m":
+            return self.range_error.with_margin
+        if target == "range_std_m":
+            return self.predicted.range_std.with_margin
+        return self.error(target)
+
+    def relative_errors(self, targets: Mapping[str, float]) -> tuple[float, float]:
+        """Return the worst error, and the worst with margin, over the largest that targets allow.
+
+        Targets are reached where the latter is 1 at most.
+        """
+        error, with_margin = (
+            max((of(name) / limit for name, limit in targets.items()), default=0.0)
+            for of in (self.error, self.error_with_margin)
+        )
+        return error, with_margin
+
+    def to_document(self) -> dict[str, Any]:
+        """Return the choice as JSON; ``sequence`` is the body of a PUT."""
+        document = self.applied.to_document()
+        del document["sequence_id"]
+        figure, target_m = self.predicted.within, self.target_m
+        return {
+            "sequence": self.applied.sequence.to_document(),
+            "estimator": self.estimator,
+            "applied": document,
+            "capture_s": self.applied.capture_s,
+            "frame_rate_hz": self.applied.frame_rate_hz,
+            "reconstruct_s": self.timed(),
+            "computing_share": self.computing_share,
+            "price": self.price,
+            "predicted": {
+                "range_error_m": self.predicted.range_error.to_document(),
+                "range_std_m": self.predicted.range_std.to_document(),
+                "range_bias_m": self.predicted.range_bias_m,
+                "range_bias_most_m": self.predicted.most_bias_m,
+                "bias_known": self.predicted.bias_known,
+                "within": figure
+                and {
+                    "share": self.share,
+                    "error_m": figure.median,
+                    **{end: figure.to_document()[end] for end in ("low", "high")},
+                    "target_m": target_m,
+                    "target_share": target_m and self.predicted.share_within(target_m),
+                },
+                "beyond": {
+                    f"{each:g}": 1 - self.predicted.share_within(each)
+                    for each in TOLERANCES_M
+                    if self.predicted.off_m
+                },
+                "beyond_scene": self.beyond_scene,
+                "bound_width": self.bound_width,
+                "separation_share": self.separation_share,
+            },
+        }
+
+    def in_words(self) -> str:
+        """State the sequence and the estimator."""
+        return in_words(self.applied.sequence, self.estimator)
+
+
+Targets = Mapping[str, float]
+"""The largest error that each target allows."""
+ComputingTime = Callable[[Sequence, str], float | None]
+"""Computing time in s of a frame of a sequence with an estimator, if it is known."""
+
+
+@dataclass(slots=True, eq=False)
+class Candidate:
+    """One member of a family, with what is predicted of it for a goal."""
+
+    family: Family
+    member: Member
+    """``family``, ``member``: frequencies and estimator; exposure and takes."""
+    affordable: bool
+    """Whether it is within the budgets of the goal."""
+    goal: Goal
+    """Whose targets are predicted."""
+    predictor: Predictor
+    """Of the scene."""
+    reconstruct_s: Callable[[], float | None]
+    """Returns the computing time of a frame in s, if it is known."""
+    _choice: Choice | None = None
+
+    @property
+    def capture_s(self) -> float:
+        """Time of one capture."""
+        return self.member.capture_s
+
+    @property
+    def sequence(self) -> Sequence:
+        """As the camera would set it."""
+        return self.family.applied(self.member).sequence
+
+    def least_bias_m(self) -> float:
+        """Return what the bias of its family hardly falls below."""
+        return self.predictor.least_bias_m(self.family.estimator, self.family.first)
+
+    def least_error(self, target: str) -> float:
+        """Return a lower bound of the error that a target limits; 0 where none is known."""
+        if not target.startswith("range"):
+            return 0.0
+        family = self.family
+        return self.predictor.least_noise_m(family.estimator, family.first, self.member.scale)
+
+    def range_errors_m(self) -> tuple[float, float, float]:
+        """Return deviation, bias and error of the range, by few draws."""
+        family = self.family
+        return self.predictor.quick(family.estimator, family.first, self.member.scale)
+
+    def error(self, target: str) -> float:
+        """Return the error that a target limits, by few draws."""
+        if target == "bound_width":
+            return self.predictor.bound_width(self.sequence)
+        if target == "separation_m":
+            assert self.goal.separation_m is not None  # noqa: S101 - it is a target
+            return 1.0 - self.predictor.separation(self.sequence, self.goal.separation_m)
+        std_m, _, error_m = self.range_errors_m()
+        return std_m if target == "range_std_m" else error_m
+
+    def choice(self, *, closely: bool = False) -> Choice:
+        """Predict it by many draws, and ``closely`` for many pixels, too."""
+        if closely or self._choice is None:
+            self._choice = self._predicted(closely=closely)
+        return self._choice
+
+    def _predicted(self, *, closely: bool) -> Choice:
+        applied = self.family.applied(self.member)
+        sequence, estimator = applied.sequence, self.family.estimator
+        bounded, distance_m = self.goal.bound_width is not None, self.goal.separation_m
+        return Choice(
+            applied,
+            estimator,
+            self.predictor.predict(
+                estimator, sequence, closely=closely, capture_s=applied.capture_s
+            ),
+            self.predictor.beyond_scene(sequence),
+            self.reconstruct_s,
+            self.predictor.bound_width(sequence) if bounded else None,
+            None if distance_m is None else self.predictor.separation(sequence, distance_m),
+            self.family.capabilities.settle_s * sequence.frequency_changes,
+            self.goal.share,
+            self.goal.range_error_m,
+        )
+
+
+Curve = tuple[Candidate, ...]
+"""The candidates of one family by rising time: noise falls along it, onto the bias."""
+
+
+def curves(
+    families: list[Family], goal: Goal, predictor: Predictor, computing_s: ComputingTime
+) -> list[Curve]:
+    """Return the candidates of each family; nothing is predicted yet."""
+
+    def candidate(family: Family, member: Member) -> Candidate:
+        def reconstruct_s() -> float | None:
+            return computing_s(family.applied(member).sequence, family.estimator)
+
+        affordable = goal.affords(member.capture_s, reconstruct_s)
+        return Candidate(family, member, affordable, goal, predictor, reconstruct_s)
+
+    return [tuple(candidate(family, each) for each in family.members) for family in families]
+
+
+def longest(curve: Curve, within_s: float = math.inf) -> int | None:
+    """Return the place of the longest candidate that the budgets and a time allow."""
+    end = bisect.bisect_right(curve, within_s, key=lambda each: each.capture_s)
+    return next((place for place in range(end - 1, -1, -1) if curve[place].affordable), None)
+
 
 CONTENDERS: Final = 3
 """Families of which many draws decide."""
 NEAR: Final = 1.3
+"""A family stays a contender as long as it errs no more than so many times the finest."""
+HARDLY_MORE: Final = 1.05
+"""Growth of an error that half the time is taken for, where bias rules (decision 12)."""
+
+
+def finest(
+    curves: list[Curve], target: str, within_s: float = math.inf, *, contenders: int = CONTENDERS
+) -> Choice | None:
+    """Return the choice within the budgets, and a time, with the least error.
+
+    The longest candidate of each family stands for it. Bounds rule most of them out, few draws all
+    but the contenders, and many draws decide among these.
+    """
+    affordable = [
+        curve[place] for curve in curves if (place := longest(curve, within_s)) is not None
+    ]
+    bounded = [(each.least_error(target), each) for each in affordable]
+    drawn: list[tuple[float, Candidate]] = []
+    worst = math.inf
+    for least, candidate in sorted(bounded, key=lambda each: each[0]):
+        if least > worst:
+            break
+        if target == "range_error_m" and candidate.least_bias_m() > worst:
+            continue
+        error = candidate.error(target)
+        drawn.append((error, candidate))
+        worst = min(worst, NEAR * error)
+    drawn.sort(key=lambda each: (each[0], each[1].capture_s))
+    choices = [candidate.choice() for _, candidate in drawn[:contenders]]
+    return min(choices, key=lambda choice: choice.error(target), default=None)
+
+
+def shortened(
+    best: Choice, curves: list[Curve], targets: Targets, leading: str
+) -> tuple[Choice, Choice | None]:
+    """Return a choice without the time that buys nothing, and the finest in half its time.
+
+    Where bias rules, half the time will do as long as the error hardly grows, and stays below its
+    target without the margin.
+    """
+    while True:
+        half_time = finest(curves, leading, best.applied.capture_s / 2)
+        if half_time is None or not _as_good(half_time, best, targets):
+            return best, half_time
+        best = half_time
+
+
+def _as_good(quicker: Choice, best: Choice, targets: Targets) -> bool:
+    """Return whether a quicker choice errs hardly more than one whose bias rules.
+
+    It has to reach the targets, too, but by what is expected of it: with margin it just misses one.
+    """
+    return (
+        "range_error_m" in targets
+        and best.predicted.range_bias_m > best.predicted.range_std.median
+        and quicker.relative_errors(targets)[0] <= 1
+        and all(
+            quicker.error_with_margin(target) <= HARDLY_MORE * best.error_with_margin(target)
+            for target in targets
+        )
+    )
+
+
+"""Families of which many draws decide."""
 """A family stays a contender as long as it takes no longer than so many times the quickest."""
 TOLERANCE: Final = 1.25
 """Few draws of a contender may predict up to so many times the range error of a target."""

@@ -5,13 +5,11 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from transientcam_driver import Sequence
-from transientcam_server.planning._process.progress import Progress
+from transientcam_server.planning._process.queue import Progress
 from transientcam_server.planning._scene.scene import SceneStatistics
-from transientcam_server.planning._search.candidates import Curve
-from transientcam_server.planning._search.choice import Choice
-from transientcam_server.planning._search.finest import finest
-from transientcam_server.planning._search.pareto import front
-from transientcam_server.planning._search.summary import summary_of_front
+from transientcam_server.planning._search.families import front
+from transientcam_server.planning._search.plan import summary_of_front
+from transientcam_server.planning._search.search import Choice, Curve, finest
 
 ON_FRONT: Final = 12
 """Times that the front is made of."""

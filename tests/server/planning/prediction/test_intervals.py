@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from transientcam_server.planning._prediction.intervals import (
+from transientcam_server.planning._prediction.measures import (
     RESAMPLED,
     Figure,
     _widened,

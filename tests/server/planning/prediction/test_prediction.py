@@ -13,7 +13,7 @@ from transientcam_driver import Sequence
 from transientcam_server.errors import Problem
 from transientcam_server.planning import Goal, Planner, Region, SceneStatistics, uniform_scene
 from transientcam_server.planning._prediction.prediction import SWING, Prediction, Predictor
-from transientcam_server.planning._scene.sampling import one_of_each
+from transientcam_server.planning._scene.scene import one_of_each
 from transientcam_server.planning._search.search import TOLERANCE
 
 FREQUENCY_HZ = 23e6

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from transientcam_server.planning._scene.sampling import (
+from transientcam_server.planning._scene.scene import (
     STRATUM,
     coherence,
     one_of_each,

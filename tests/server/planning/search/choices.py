@@ -6,9 +6,9 @@ import math
 import numpy as np
 
 from transientcam_driver import Capabilities, Sequence
-from transientcam_server.planning._prediction.intervals import Figure
+from transientcam_server.planning._prediction.measures import Figure
 from transientcam_server.planning._prediction.prediction import Prediction
-from transientcam_server.planning._search.choice import Choice
+from transientcam_server.planning._search.search import Choice
 
 
 def figure(median_m: float, margin: float = 1.25) -> Figure:

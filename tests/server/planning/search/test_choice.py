@@ -6,7 +6,7 @@ import pytest
 
 from tests.server.planning.search.choices import choice
 from transientcam_driver import Capabilities, Sequence
-from transientcam_server.planning._search.choice import in_words
+from transientcam_server.planning._search.search import in_words
 
 
 def test_each_target_limits_its_own_error(capabilities: Capabilities) -> None:

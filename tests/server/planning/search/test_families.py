@@ -10,8 +10,8 @@ from transientcam_driver import Capabilities, Sequence
 from transientcam_server.errors import Problem
 from transientcam_server.planning import Goal
 from transientcam_server.planning._prediction.prediction import Predictor
-from transientcam_server.planning._search.candidates import Candidate, curves, longest
 from transientcam_server.planning._search.families import Family, families
+from transientcam_server.planning._search.search import Candidate, curves, longest
 
 BASE = Sequence(base_frequency_hz=20e6, harmonics=5, exposure_s=3e-3, takes=7)
 

@@ -10,7 +10,7 @@ from tests.server.planning.closed_form import MARGIN, ClosedForm, everything, pl
 from transientcam_driver import Capabilities, Sequence
 from transientcam_server.errors import Problem
 from transientcam_server.planning import Goal
-from transientcam_server.planning._prediction.intervals import Figure
+from transientcam_server.planning._prediction.measures import Figure
 from transientcam_server.planning._prediction.prediction import Prediction, Predictor
 from transientcam_server.planning._search.families import families
 from transientcam_server.planning._search.plan import plan

@@ -11,8 +11,8 @@ from tests.server.planning.closed_form import ClosedForm
 from transientcam_driver import Capabilities
 from transientcam_server.planning import Goal, Progress
 from transientcam_server.planning._prediction.prediction import Predictor
-from transientcam_server.planning._search.candidates import curves
 from transientcam_server.planning._search.families import families
+from transientcam_server.planning._search.search import curves
 from transientcam_server.planning._search.tradeoff import (
     _coarse_to_fine,
     _times_s,
