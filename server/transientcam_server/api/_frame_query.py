@@ -275,7 +275,6 @@ CSV_RESPONSES: Final[dict[int | str, dict[str, Any]]] = {
 PRODUCT_PROBLEMS: Final = (
     kinds.UNKNOWN_PRODUCT,
     kinds.NOT_ACCEPTABLE,
-    kinds.INVALID_REQUEST,
     kinds.ANSWER_TOO_LARGE,
     kinds.PRODUCT_FAILED,
     kinds.TOO_MANY_ANSWERS,

@@ -62,7 +62,7 @@ def add_frame_routes(
         path,
         summary=frame[0],
         description=frame[1],
-        responses=documented(kinds.INVALID_REQUEST, *missing),
+        responses=documented(*missing),
     )
     async def read_frame(chosen: ChosenFrame = chosen_of) -> FrameDocument:
         return FrameDocument.model_validate((await chosen.frame()).meta())
@@ -71,7 +71,7 @@ def add_frame_routes(
         f"{path}/pixel",
         summary=f"Everything about {pixel}",
         response_model=PixelDocument,
-        responses=documented(kinds.INVALID_REQUEST, kinds.PRODUCT_FAILED, *missing),
+        responses=documented(kinds.PRODUCT_FAILED, *missing),
     )
     async def read_pixel(
         *, chosen: ChosenFrame = chosen_of, x: X, y: Y, bins: PixelBins = 256
@@ -84,7 +84,7 @@ def add_frame_routes(
         f"{path}/pixel.csv",
         summary=f"The impulse response of {pixel} as a table",
         response_class=Response,
-        responses=CSV_RESPONSES | documented(kinds.INVALID_REQUEST, kinds.PRODUCT_FAILED, *missing),
+        responses=CSV_RESPONSES | documented(kinds.PRODUCT_FAILED, *missing),
     )
     async def read_pixel_csv(
         *, chosen: ChosenFrame = chosen_of, x: X, y: Y, bins: PixelBins = 256

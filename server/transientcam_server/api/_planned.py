@@ -21,7 +21,6 @@ FRAME_WITHIN_S: Final = 10.0
 LOOKED: Final = 0.5
 """Share of the progress after which the scene was looked at."""
 REFUSALS: Final = (
-    kinds.INVALID_REQUEST,
     kinds.TARGET_UNREACHABLE,
     kinds.ONLY_MOMENTS,
     kinds.NO_FRAME_YET,

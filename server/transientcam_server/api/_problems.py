@@ -101,11 +101,20 @@ def describe(app: FastAPI, *, prefix: str) -> None:
         schema = ProblemDocument.model_json_schema()
         document.setdefault("components", {}).setdefault("schemas", {})["ProblemDocument"] = schema
         for path, operations in document["paths"].items():
-            for operation in operations.values() if "{" in path else ():
-                if "400" not in operation["responses"]:  # control characters are no HTTP
-                    document_problems(operation, kinds.BAD_REQUEST)
-            if path.startswith(prefix) and "get" in operations:  # as `query.require_known`
-                document_problems(operations["get"], kinds.INVALID_REQUEST)
+            for method, operation in operations.items():
+                responses, body = operation["responses"], "requestBody" in operation
+                if "400" not in responses and (body or "{" in path):
+                    document_problems(operation, kinds.BAD_REQUEST)  # no JSON, or no HTTP
+                if "application/json" in responses.get("422", {}).get("content", ()):
+                    del responses["422"]  # the framework's own statement of what follows
+                if (
+                    body
+                    or "parameters" in operation
+                    or (method == "get" and path.startswith(prefix))
+                ):
+                    document_problems(operation, kinds.INVALID_REQUEST)
+        for name in ("HTTPValidationError", "ValidationError"):
+            document["components"]["schemas"].pop(name, None)
         return document
 
     app.openapi = openapi  # type: ignore[method-assign]  # as FastAPI's documentation extends it
@@ -141,7 +150,8 @@ def _of_http(error: HTTPException, request: Request) -> Problem:
     kind = _KIND_OF_STATUS.get(error.status_code)
     if kind is None:
         status = HTTPStatus(error.status_code)
-        kind = ProblemKind(status.phrase.lower().replace(" ", "-"), status, status.phrase, "")
+        slug = status.phrase.lower().replace(" ", "-")
+        kind = ProblemKind(status, status.phrase, "", slug)
     if kind is kinds.NOT_FOUND:
         return Problem(kind, f"Nothing is at {shortened(request.url.path)}.")
     if kind is kinds.METHOD_NOT_ALLOWED:

@@ -43,8 +43,6 @@ async def read_acquisition(service: ServiceOf) -> AcquisitionDocument:
     "/acquisition",
     summary="Start or stop capturing",
     responses=documented(
-        kinds.BAD_REQUEST,
-        kinds.INVALID_REQUEST,
         kinds.MAY_NOT_LIGHT,
         kinds.CAMERA_BUSY,
         kinds.START_OUTDATED,
@@ -80,9 +78,7 @@ async def change_acquisition(
 @router.post(
     "/acquisition/safe-off",
     summary="Switch the light off, now",
-    responses=documented(
-        kinds.INVALID_REQUEST, kinds.CAMERA_FAILED, kinds.CAMERA_LOST, kinds.LIGHT_UNCONFIRMED
-    ),
+    responses=documented(kinds.CAMERA_FAILED, kinds.CAMERA_LOST, kinds.LIGHT_UNCONFIRMED),
 )
 @needs(Role.VIEWER, lease=False)
 async def switch_off(service: ServiceOf, prefer: _Prefer = None) -> AcquisitionDocument:

@@ -80,8 +80,6 @@ async def read_calibrations(service: ServiceOf) -> CalibrationsDocument:
     summary="Measure a calibration",
     responses=ACCEPTED
     | documented(
-        kinds.BAD_REQUEST,
-        kinds.INVALID_REQUEST,
         kinds.CAMERA_BUSY,
         kinds.RECORDING_RUNS,
         kinds.TOO_MANY_JOBS,
@@ -120,8 +118,6 @@ async def read_active_calibration(service: ServiceOf) -> ActiveDocument:
     "/calibrations/active",
     summary="Use a calibration",
     responses=documented(
-        kinds.BAD_REQUEST,
-        kinds.INVALID_REQUEST,
         kinds.UNKNOWN_CALIBRATION,
         kinds.CALIBRATION_MISFIT,
         kinds.CALIBRATION_DOUBTED,
@@ -165,8 +161,6 @@ async def restore_calibration(service: ServiceOf) -> ActiveDocument:
     summary="Take a calibration in",
     openapi_extra=_FILE,
     responses=documented(
-        kinds.BAD_REQUEST,
-        kinds.INVALID_REQUEST,
         kinds.TOO_LARGE,
         kinds.INVALID_CALIBRATION,
         kinds.CALIBRATION_NOT_STORED,
@@ -195,7 +189,7 @@ async def import_calibration(service: ServiceOf, request: Request) -> Calibratio
 @router.get(
     "/calibrations/{calibration}",
     summary="A calibration",
-    responses=documented(kinds.UNKNOWN_CALIBRATION, kinds.INVALID_REQUEST),
+    responses=documented(kinds.UNKNOWN_CALIBRATION),
 )
 async def read_calibration(service: ServiceOf, calibration: _Calibration) -> CalibrationDocument:
     """Describe a calibration."""
@@ -209,7 +203,6 @@ async def read_calibration(service: ServiceOf, calibration: _Calibration) -> Cal
     responses=documented(
         kinds.UNKNOWN_CALIBRATION,
         kinds.CALIBRATION_IN_USE,
-        kinds.INVALID_REQUEST,
         kinds.CALIBRATION_NOT_STORED,
     ),
 )
@@ -224,7 +217,7 @@ async def delete_calibration(service: ServiceOf, calibration: _Calibration) -> C
     summary="The file of a calibration",
     response_class=FileResponse,
     responses=downloads.documented_file(NPZ)
-    | documented(kinds.UNKNOWN_CALIBRATION, kinds.RANGE_NOT_SATISFIABLE, kinds.INVALID_REQUEST),
+    | documented(kinds.UNKNOWN_CALIBRATION, kinds.RANGE_NOT_SATISFIABLE),
 )
 async def read_calibration_file(
     service: ServiceOf, calibration: _Calibration, wanted: downloads.Range = None

@@ -30,7 +30,7 @@ async def read_jobs(service: ServiceOf) -> JobsDocument:
 @router.get(
     "/jobs/{job}",
     summary="A job",
-    responses=documented(kinds.UNKNOWN_JOB, kinds.INVALID_REQUEST),
+    responses=documented(kinds.UNKNOWN_JOB),
 )
 async def read_job(
     service: ServiceOf,
@@ -49,7 +49,7 @@ async def read_job(
     "/jobs/{job}/map.{form}",
     summary="The predicted error of each pixel",
     response_class=Response,
-    responses=documented(kinds.UNKNOWN_JOB, kinds.NOT_FOUND, kinds.INVALID_REQUEST)
+    responses=documented(kinds.UNKNOWN_JOB, kinds.NOT_FOUND)
     | {200: {"description": "the map", "content": {each: {} for each in _MAP_TYPES.values()}}},
 )
 async def read_map(
@@ -75,9 +75,7 @@ async def read_map(
 @router.post(
     "/jobs/{job}/cancel",
     summary="Cancel a job",
-    responses=documented(
-        kinds.UNKNOWN_JOB, kinds.INVALID_REQUEST, kinds.ROLE_TOO_LOW, kinds.LEASE_HELD
-    ),
+    responses=documented(kinds.UNKNOWN_JOB, kinds.ROLE_TOO_LOW, kinds.LEASE_HELD),
 )
 @needs(Role.VIEWER, lease=False)
 async def cancel_job(service: ServiceOf, job: _Job, request: Request) -> JobDocument:

@@ -40,8 +40,6 @@ async def read_lease(service: ServiceOf) -> LeaseDocument:
     status_code=201,
     summary="Take control of the camera",
     responses=documented(
-        kinds.BAD_REQUEST,
-        kinds.INVALID_REQUEST,
         kinds.LEASE_HELD,
         kinds.CAMERA_FAILED,
         kinds.CAMERA_LOST,
@@ -76,7 +74,7 @@ async def take_lease(
 @router.put(
     "/lease",
     summary="Renew the lease",
-    responses=documented(kinds.BAD_REQUEST, kinds.INVALID_REQUEST, kinds.LEASE_LOST),
+    responses=documented(kinds.LEASE_LOST),
 )
 @needs(Role.OPERATOR, lease=False)
 async def renew_lease(
@@ -93,7 +91,7 @@ async def renew_lease(
 @router.delete(
     "/lease",
     summary="Give the lease back",
-    responses=documented(kinds.INVALID_REQUEST, kinds.LEASE_LOST),
+    responses=documented(kinds.LEASE_LOST),
 )
 @needs(Role.OPERATOR, lease=False)
 async def give_lease_back(service: ServiceOf, lease_id: _LeaseId = None) -> LeaseDocument:

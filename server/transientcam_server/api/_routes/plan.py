@@ -34,7 +34,7 @@ KIND: Final = "plan"
 @router.post(
     "/plan",
     summary="A sequence for a target accuracy or a budget of time",
-    responses=documented(kinds.BAD_REQUEST, *planned.REFUSALS, kinds.INVALID_SEQUENCE),
+    responses=documented(*planned.REFUSALS, kinds.INVALID_SEQUENCE),
 )
 @needs(Role.VIEWER, lease=False)
 async def make_plan(service: ServiceOf, request: PlanRequest, http: Request) -> PlanDocument:
@@ -55,8 +55,7 @@ async def make_plan(service: ServiceOf, request: PlanRequest, http: Request) -> 
     "/plan/jobs",
     status_code=status.HTTP_202_ACCEPTED,
     summary="Make a plan as a job, with progress",
-    responses=ACCEPTED
-    | documented(kinds.BAD_REQUEST, *planned.REFUSALS, kinds.INVALID_SEQUENCE, kinds.TOO_MANY_JOBS),
+    responses=ACCEPTED | documented(*planned.REFUSALS, kinds.INVALID_SEQUENCE, kinds.TOO_MANY_JOBS),
 )
 @needs(Role.VIEWER, lease=False)
 async def start_plan(

@@ -35,9 +35,7 @@ _RESPONSES: Final[dict[int | str, dict[str, Any]]] = {
     summary="A product as MJPEG",
     response_class=StreamingResponse,
     responses=_RESPONSES
-    | documented(
-        kinds.UNKNOWN_PRODUCT, kinds.NOT_ACCEPTABLE, kinds.INVALID_REQUEST, kinds.TOO_MANY_CLIENTS
-    ),
+    | documented(kinds.UNKNOWN_PRODUCT, kinds.NOT_ACCEPTABLE, kinds.TOO_MANY_CLIENTS),
     openapi_extra={"x-endless": True},
 )
 async def read_preview(

@@ -34,7 +34,6 @@ _PROBLEMS: Final = documented(
     kinds.DISK_STALLED,
     kinds.UNKNOWN_PRODUCT_STORE,
     kinds.PRODUCT_STORE_UNFINISHED,
-    kinds.INVALID_REQUEST,
 )
 
 

@@ -39,7 +39,7 @@ class ReconstructionDocument(ReconstructionSettings):
     "/reconstruction",
     summary="How frames are computed",
     response_model=ReconstructionDocument,
-    responses=etags.READING | documented(kinds.INVALID_REQUEST),
+    responses=etags.READING,
 )
 async def read_reconstruction(
     service: ServiceOf, response: Response, if_none_match: etags.IfNoneMatch = None
@@ -56,8 +56,6 @@ async def read_reconstruction(
     "/reconstruction",
     summary="Change how frames are computed",
     responses=documented(
-        kinds.BAD_REQUEST,
-        kinds.INVALID_REQUEST,
         kinds.ESTIMATOR_MISFIT,
         kinds.ONLY_MOMENTS,
         kinds.RECONSTRUCTION_CHANGED,

@@ -63,7 +63,7 @@ async def _chosen(
 @router.get(
     "",
     summary="Which frames a recording has",
-    responses=documented(kinds.INVALID_REQUEST, *_MISSING),
+    responses=documented(*_MISSING),
 )
 async def read_frames(service: ServiceOf, recording: RecordingName) -> TimelineDocument:
     """Return how many frames there are, and when they were captured; also while it is recorded."""

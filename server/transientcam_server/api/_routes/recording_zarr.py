@@ -37,7 +37,6 @@ _PROBLEMS: Final = documented(
     kinds.UNKNOWN_RECORDING,
     kinds.RECORDING_UNFINISHED,
     kinds.RECORDING_DAMAGED,
-    kinds.INVALID_REQUEST,
 )
 
 

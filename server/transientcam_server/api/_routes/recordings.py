@@ -24,7 +24,7 @@ from transientcam_server.recording import Limits, Order, RecordingOptions, selec
 router = APIRouter(tags=["recordings"])
 
 HDF5: Final = "application/x-hdf5"
-_OF_ONE: Final = (kinds.UNKNOWN_RECORDING, kinds.INVALID_REQUEST, kinds.DISK_STALLED)
+_OF_ONE: Final = (kinds.UNKNOWN_RECORDING, kinds.DISK_STALLED)
 _CHANGED: Final = (*_OF_ONE, kinds.RECORDING_UNFINISHED, kinds.RECORDING_NOT_STORED)
 RecordingName = Annotated[
     str,
@@ -39,7 +39,7 @@ RecordingName = Annotated[
 @router.get(
     "/recordings",
     summary="Recordings, a page at a time",
-    responses=documented(kinds.INVALID_REQUEST, kinds.DISK_STALLED),
+    responses=documented(kinds.DISK_STALLED),
 )
 async def read_recordings(
     service: ServiceOf,
@@ -70,11 +70,9 @@ async def read_recordings(
     status_code=status.HTTP_201_CREATED,
     summary="Start a recording",
     responses=documented(
-        kinds.BAD_REQUEST,
         kinds.RECORDING_RUNS,
         kinds.CAMERA_BUSY,
         kinds.ONLY_MOMENTS,
-        kinds.INVALID_REQUEST,
         kinds.RECORDING_NOT_STORED,
         kinds.DISK_STALLED,
     ),
@@ -105,7 +103,7 @@ async def read_recording(service: ServiceOf, recording: RecordingName) -> Record
 @router.patch(
     "/recordings/{recording}",
     summary="Annotate a recording",
-    responses=documented(kinds.BAD_REQUEST, *_CHANGED),
+    responses=documented(*_CHANGED),
 )
 @needs(Role.OPERATOR, lease=False)
 async def annotate_recording(

@@ -51,7 +51,7 @@ _Sequence = Annotated[
     "/sequence",
     summary="The running sequence",
     response_model=AppliedDocument,
-    responses=etags.READING | documented(kinds.INVALID_REQUEST),
+    responses=etags.READING,
 )
 async def read_sequence(
     service: ServiceOf,
@@ -70,8 +70,6 @@ async def read_sequence(
     "/sequence",
     summary="Change the sequence",
     responses=documented(
-        kinds.BAD_REQUEST,
-        kinds.INVALID_REQUEST,
         kinds.INVALID_SEQUENCE,
         kinds.SEQUENCE_CHANGED,
         kinds.ESTIMATOR_MISFIT,
@@ -102,7 +100,7 @@ async def change_sequence(
 @router.post(
     "/sequence/validate",
     summary="Check a sequence",
-    responses=documented(kinds.BAD_REQUEST, kinds.INVALID_REQUEST, kinds.INVALID_SEQUENCE),
+    responses=documented(kinds.INVALID_SEQUENCE),
 )
 @needs(Role.VIEWER, lease=False)
 async def validate_sequence(service: ServiceOf, sequence: _Sequence) -> AppliedDocument:

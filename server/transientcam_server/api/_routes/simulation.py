@@ -39,9 +39,7 @@ async def read_simulation(service: ServiceOf) -> SimulationDocument:
 @router.put(
     "/simulation",
     summary="Put the camera before another scene",
-    responses=documented(
-        kinds.NOT_SIMULATED, kinds.BAD_REQUEST, kinds.INVALID_REQUEST, kinds.SHUTTING_DOWN
-    ),
+    responses=documented(kinds.NOT_SIMULATED, kinds.SHUTTING_DOWN),
 )
 async def change_simulation(
     service: ServiceOf, wanted: SimulationRequest, http: Request
@@ -103,7 +101,7 @@ async def explain_simulation(service: ServiceOf) -> ExplanationDocument:
 @router.post(
     "/simulation/faults",
     summary="Let something go wrong",
-    responses=documented(kinds.NOT_SIMULATED, kinds.BAD_REQUEST, kinds.INVALID_REQUEST),
+    responses=documented(kinds.NOT_SIMULATED),
 )
 async def make_fault(service: ServiceOf, wanted: FaultRequest) -> SimulationDocument:
     """Unplug the simulated camera, plug it in again, or spoil or lose the next image."""

@@ -59,7 +59,7 @@ async def read_tradeoff(
     "/tradeoff/jobs",
     status_code=status.HTTP_202_ACCEPTED,
     summary="Compute what accuracy costs as a job, with progress",
-    responses=ACCEPTED | documented(*planned.REFUSALS, kinds.BAD_REQUEST, kinds.TOO_MANY_JOBS),
+    responses=ACCEPTED | documented(*planned.REFUSALS, kinds.TOO_MANY_JOBS),
 )
 @needs(Role.VIEWER, lease=False)
 async def start_tradeoff(
