@@ -1,5 +1,6 @@
-import type { DensityRenderer } from "./renderer";
-import { TypedArrayRenderer } from "./typedArray";
+import type { Coefficients } from "../physics/maximumEntropy";
+import { LightPainter } from "./paintLight";
+import type { DensityRenderer, Exposure } from "./renderer";
 import { WebGl2Renderer } from "./webgl2";
 
 /** Names of drivers that run shaders on the processor, where typed arrays take half as long. */
@@ -26,4 +27,46 @@ function drawsOnGraphics(): boolean {
   const driver = String(gl.getParameter(unmasked?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER));
   gl.getExtension("WEBGL_lose_context")?.loseContext();
   return !EMULATED.test(driver);
+}
+
+/** Draws with typed arrays on a 2D canvas, for browsers that refuse WebGL2 or emulate it. */
+class TypedArrayRenderer implements DensityRenderer {
+  readonly kind = "typed-array";
+  readonly #context: CanvasRenderingContext2D;
+  readonly #painter = new LightPainter();
+  #image: ImageData | null = null;
+
+  constructor(private readonly canvas: HTMLCanvasElement) {
+    const context = canvas.getContext("2d", { alpha: false });
+    if (context === null) throw new Error("This browser grants neither WebGL2 nor a 2D canvas.");
+    this.#context = context;
+  }
+
+  draw(coefficients: Coefficients, exposure: Exposure): void {
+    const { width, height } = coefficients;
+    const image = this.#imageOf(width, height);
+    this.#painter.paint(coefficients, exposure, new Uint32Array(image.data.buffer));
+    this.#context.putImageData(image, 0, 0);
+  }
+
+  readDensity(coefficients: Coefficients, phase_rad: number): Float32Array {
+    return this.#painter.density(coefficients, phase_rad).slice();
+  }
+
+  onLost(): void {
+    // A 2D canvas is never lost for good: the browser restores it by itself.
+  }
+
+  dispose(): void {
+    this.#image = null;
+  }
+
+  #imageOf(width: number, height: number): ImageData {
+    if (this.#image?.width !== width || this.#image.height !== height) {
+      this.canvas.width = width;
+      this.canvas.height = height;
+      this.#image = this.#context.createImageData(width, height);
+    }
+    return this.#image;
+  }
 }

@@ -2,14 +2,13 @@ import { useSignal } from "@preact/signals";
 import { engineering, fixed } from "../../scales/format";
 import { calibrationPath } from "../../store/api";
 import { useStore } from "../../store/store";
-import type { CalibrationDocument } from "../../stream/documents";
+import type { CalibrationDocument, VerdictDocument } from "../../stream/documents";
 import { ActionMenu } from "../../ui/ActionMenu";
 import { Button } from "../../ui/controls";
 import { download } from "../../ui/download";
 import { Steer } from "../../ui/Steer";
 import type { Task } from "../../ui/useTask";
 import { clock } from "../replay/words";
-import { Blocks } from "./Blocks";
 import { ageOf, doubtOf, driftOf } from "./words";
 import "../recordings/RecordingRow.css";
 
@@ -116,4 +115,27 @@ export function CalibrationRow({ calibration, task, onDelete }: { calibration: C
 
 function sequenceOf({ sequence, exposure_s }: CalibrationDocument): string {
   return `${engineering(Number(sequence.base_frequency_hz), "Hz")}, m = ${String(sequence.harmonics)}, ${engineering(exposure_s, "s")}`;
+}
+
+/** Which pixels speak against a diffuser, in blocks. */
+function Blocks({ verdict: { blocks, block_px } }: { verdict: VerdictDocument }) {
+  const [rows, columns] = [blocks.length, blocks[0]?.length ?? 0];
+  if (!blocks.some((row) => row.includes("#") || row.includes("?"))) return null;
+  return (
+    <svg
+      class="blocks"
+      viewBox={`0 0 ${columns} ${rows}`}
+      role="img"
+      aria-label={`Blocks of ${block_px} pixels that are unlike a diffuser`}
+    >
+      {blocks.flatMap((row, y) =>
+        [...row].map(
+          (character, x) =>
+            character !== "." && (
+              <rect key={`${x}.${y}`} class={character === "#" ? "block-unlike" : "block-unknown"} x={x} y={y} width={1} height={1} />
+            ),
+        ),
+      )}
+    </svg>
+  );
 }

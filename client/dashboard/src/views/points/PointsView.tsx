@@ -1,8 +1,7 @@
 import { signal, useComputed } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
-
 import { LightPainter } from "../../gl/paintLight";
-import { grouped } from "../../scales/format";
+import { fixed, grouped, numberOf } from "../../scales/format";
 import { LIVE, refusalIn } from "../../store/api";
 import type { Frame } from "../../store/frames";
 import { aBoolean, aNumber, oneOf, type Setting } from "../../store/settings";
@@ -17,14 +16,14 @@ import { Panel } from "../../ui/Panel";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { PinsRow } from "../map/PinsRow";
 import { backdropOf, LightBar } from "../transient/LightBar";
-import { byFlags, byPicture, byValue, colourCloud, fillCloud, type Painter } from "./cloud";
-import { FieldOfView } from "./FieldOfView";
-import { knownLens, lensOf } from "./lens";
+import { byFlags, byPicture, byValue, colourCloud, fieldOfView, fillCloud, type Painter } from "./cloud";
+import { FIELD_DEG, FIELDS_DEG, knownLens, lensOf } from "./lens";
 import { plyOf } from "./ply";
 import type { PointScene } from "./Scene";
 import { SceneStage } from "./SceneStage";
 import "../../ui/Ticks.css";
 import "./PointsView.css";
+import { DEGREE } from "../../physics/constants";
 
 const COLOURINGS = ["range", "light", "validity", "flight"] as const;
 type Colouring = (typeof COLOURINGS)[number];
@@ -226,5 +225,36 @@ export function PointsView() {
         {store.measures.pins.value.length > 0 && <PinsRow look={rangeLook} />}
       </footer>
     </Panel>
+  );
+}
+
+/** How wide the camera looks: as the service says, or to be set where it does not know. */
+function FieldOfView() {
+  const store = useStore();
+  const field_deg = store.settings.of(FIELD_DEG);
+  const known = knownLens(store);
+  if (known !== null) {
+    return (
+      <span title={`As the ${known.source} says`} data-field="field_of_view">
+        <span class="quiet">field of view</span> {fixed(fieldOfView(known.width, known) / DEGREE, 1, "°")}
+      </span>
+    );
+  }
+  return (
+    <label class="choice inline-row" title="How wide the camera looks, across: the service does not know">
+      <span class="quiet">field of view</span>
+      <input
+        class="limit"
+        type="text"
+        inputMode="decimal"
+        value={field_deg.value}
+        aria-label="Horizontal field of view in degrees"
+        onChange={(event) => {
+          const typed_deg = numberOf(event.currentTarget.value);
+          if (FIELDS_DEG.accepts(typed_deg)) field_deg.value = typed_deg;
+        }}
+      />
+      °
+    </label>
   );
 }

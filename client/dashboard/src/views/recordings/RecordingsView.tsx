@@ -1,20 +1,22 @@
 import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { grouped } from "../../scales/format";
-import { ORDERS, PAGE } from "../../store/recordings";
+import { ORDERS, PAGE, PAST_S } from "../../store/recordings";
 import { useStore } from "../../store/store";
 import type { RecordingDocument, RecordingsDocument } from "../../stream/documents";
-import { Button, Choice, TextField } from "../../ui/controls";
+import { Button, Choice, Form, keptAs, NumberField, TextField, Typed } from "../../ui/controls";
 import { Deletion } from "../../ui/Deletion";
 import { Panel } from "../../ui/Panel";
 import { TaskLine } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
 import { OpenButton } from "../files/FileDrop";
 import { bytes, duration } from "../replay/words";
-import { Annotations } from "./Annotations";
-import { RecordForm } from "./RecordForm";
 import { RecordingRow } from "./RecordingRow";
+import "./RecordForm.css";
 import "./RecordingsView.css";
+import { Dialog } from "../../ui/Dialog";
+import { limitsOf } from "./limits";
+import { annotationsOf, type Line, linesOf } from "./lines";
 
 /** Recordings: start and stop one, look through them, play them, take them home. */
 export function RecordingsView() {
@@ -133,5 +135,95 @@ function Running({ recording, task }: { recording: RecordingDocument; task: Task
       </Button>
       {limit_s !== null && <progress max={limit_s} value={recording.duration_s} aria-label="Share of the recording that is done" />}
     </div>
+  );
+}
+
+/** What to call a recording and when to end it; and a button that saves what just happened. */
+function RecordForm({ task }: { task: Task }) {
+  const { recordings } = useStore();
+  const name = useSignal("");
+  const duration_s = useSignal("");
+  const size_mb = useSignal("");
+  const frames = useSignal("");
+  const limits = limitsOf({ duration_s: duration_s.value, size_mb: size_mb.value, frames: frames.value });
+  const called = name.value.trim() === "" ? {} : { name: name.value.trim() };
+  const start = async (): Promise<void> => {
+    if (limits === null) return;
+    if (await task.run("Starting…", () => recordings.start({ ...called, ...limits }))) name.value = "";
+  };
+  const savePast = async (): Promise<void> => {
+    const saved = await task.run(`Saving the last ${PAST_S} s…`, () => recordings.savePast(called));
+    if (saved) name.value = "";
+  };
+  const busy = task.busy.value !== null;
+  return (
+    <Form class="record-form" onSubmit={() => void start()}>
+      <TextField label="Name" class="field record-name" name="name" maxLength={200} placeholder="named after the time" text={name} />
+      <fieldset class="record-limits">
+        <legend class="unseen">Ends after</legend>
+        <NumberField label="Duration" unit="s" name="duration_s" placeholder="none" text={duration_s} />
+        <NumberField label="Size" unit="MB" name="size_mb" placeholder="none" text={size_mb} />
+        <NumberField label="Frames" unit="" name="frames" placeholder="none" text={frames} />
+      </fieldset>
+      <div class="record-actions row">
+        <Button
+          type="submit"
+          class="strong"
+          disabled={busy || limits === null}
+          title={limits === null ? "A limit must be a number above 0" : "Record every frame, raw"}
+        >
+          <i class="dot bad" aria-hidden="true" /> Record
+        </Button>
+        <Button disabled={busy} title="Keep what the service still holds of the time that has just passed" onClick={() => void savePast()}>
+          Save the last {PAST_S} s
+        </Button>
+      </div>
+    </Form>
+  );
+}
+
+/** What is written about a recording: names and what they say, one a line. */
+function Annotations({ recording, onClose }: { recording: RecordingDocument; onClose: () => void }) {
+  const { recordings } = useStore();
+  const lines = useSignal<readonly Line[]>([...linesOf(recording.annotations), { name: "", text: "" }]);
+  const task = useTask();
+  const said = annotationsOf(lines.value);
+  const set = (at: number, change: Partial<Line>): void => {
+    lines.value = lines.peek().map((line, n) => (n === at ? { ...line, ...change } : line));
+  };
+  const write = async (): Promise<void> => {
+    if (said !== null && (await task.run("Writing…", () => recordings.annotate(recording.id, said)))) onClose();
+  };
+  return (
+    <Dialog open title={`Notes on ${recording.name}`} onClose={onClose}>
+      <Form class="control column" onSubmit={() => void write()}>
+        <div class="lines column spaced">
+          {lines.value.map(({ name, text }, at) => (
+            <div key={at} class="note">
+              <Typed aria-label={`Name of line ${at + 1}`} placeholder="sample" text={keptAs(name, (typed) => set(at, { name: typed }))} />
+              <Typed
+                aria-label={`Text of line ${at + 1}`}
+                placeholder="corner, white paint"
+                text={keptAs(text, (typed) => set(at, { text: typed }))}
+              />
+              <Button aria-label={`Remove line ${at + 1}`} onClick={() => (lines.value = lines.peek().filter((_, n) => n !== at))}>
+                ×
+              </Button>
+            </div>
+          ))}
+          <Button class="link" onClick={() => (lines.value = [...lines.peek(), { name: "", text: "" }])}>
+            Add a line
+          </Button>
+        </div>
+        {said === null && <p class="refusal">Each line needs a name of its own.</p>}
+        <TaskLine task={task} />
+        <div class="row at-end">
+          <Button onClick={onClose}>Cancel</Button>
+          <Button type="submit" class="primary" task={task} disabled={said === null}>
+            Save
+          </Button>
+        </div>
+      </Form>
+    </Dialog>
   );
 }

@@ -1,9 +1,8 @@
 import { effect, type ReadonlySignal, type Signal, untracked, useComputed, useSignal } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
-
 import { rangeOfTime_m } from "../../physics/constants";
 import { pixelOf } from "../../physics/reflection";
-import { fixed, significant } from "../../scales/format";
+import { deviation, fixed, significant } from "../../scales/format";
 import { autoLimits, type Span } from "../../scales/scale";
 import { type Frame, wasSent } from "../../store/frames";
 import { PIN_COLOURS } from "../../store/measures";
@@ -19,7 +18,6 @@ import { Panel } from "../../ui/Panel";
 import { usePlot } from "../plots/page";
 import { litOf, steady } from "../transient/arrivals";
 import { csvOf, drawnOf, type Subject } from "./curves";
-import { PixelFigures } from "./Figures";
 import { FlagHistory } from "./flagShares";
 import { richestPixel } from "./interesting";
 import { FlagWords, Found } from "./Listings";
@@ -29,6 +27,7 @@ import { ReturnHistory } from "./returns";
 import { ASPECTS, type Aspect, SIDE, SIDES } from "./sides";
 import { NO_STEMS, stemsOf } from "./stems";
 import "./ResponseView.css";
+import type { PixelDocument } from "../../stream/documents";
 
 const LOGARITHMIC: Setting<boolean> = { key: "response.logarithmic", initial: false, ...aBoolean() };
 /** Only the part of the period is plotted in which the picture has light. */
@@ -242,4 +241,36 @@ function Plot({ aspect, logarithmic: wanted, shown, returns, pointed }: PlotProp
 function sampleText(time_ns: number, value: number, aspect: Aspect): string {
   const range_m = rangeOfTime_m(time_ns * 1e-9);
   return `${fixed(time_ns, 2, "ns")} · ${fixed(range_m, 2, "m")} · ${significant(value, 3, aspect === "cumulative" ? "DN" : "DN/ns")}`;
+}
+
+/** Range, time and light of the first return of a pixel, by the service; of the range its error, of the light how it scatters. */
+function PixelFigures({ details }: { details: PixelDocument | null }) {
+  const { frames, noises, rangeErrors } = useStore();
+  const ofLight = frames.amplitude.value === "direct" ? "direct" : "brightness";
+  const noise = noises.of(ofLight);
+  void noise.frames.value; // read so that this follows what was measured
+  const range_m = details?.range_m ?? NaN;
+  const [error_m, light_std] =
+    details === null ? [NaN, NaN] : [rangeErrors.at("range_error", details), noise.std(details.y * details.meta.width + details.x)];
+  const row = (name: string, value: string, std: string, field: string) => (
+    <tr>
+      <th scope="row">{name}</th>
+      <td data-field={field}>{value}</td>
+      <td class="quiet" data-field={`${field}-std`}>
+        {std}
+      </td>
+    </tr>
+  );
+  return (
+    <table class="listing pixel-figures">
+      <caption class="quiet" title="Half of the 90 % interval of the range; standard deviation (1 σ) of the light over the last frames">
+        This pixel, range ± 90 %, light ± 1 σ
+      </caption>
+      <tbody>
+        {row("range", fixed(range_m, 3, "m"), deviation(error_m, "m"), "pixel-range")}
+        {row("time", fixed((range_m / rangeOfTime_m(1)) * 1e9, 2, "ns"), deviation(error_m / rangeOfTime_m(1), "s"), "pixel-time")}
+        {row(ofLight, fixed(details?.[ofLight], 0, "DN"), deviation(light_std, "DN"), "pixel-light")}
+      </tbody>
+    </table>
+  );
 }

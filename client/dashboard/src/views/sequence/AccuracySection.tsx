@@ -1,19 +1,19 @@
-import { engineering, fixed } from "../../scales/format";
+import { engineering, fixed, numberOf } from "../../scales/format";
 import { useStore } from "../../store/store";
-import type { AppliedDocument, ChoiceDocument } from "../../stream/documents";
-import { Button } from "../../ui/controls";
+import type { AppliedDocument, ChoiceDocument, PlanRequest } from "../../stream/documents";
+import { Button, Check, Form, NumberField } from "../../ui/controls";
 import { useProducts } from "../../ui/hooks";
 import { Obstacle, Steer } from "../../ui/Steer";
-import { useTask } from "../../ui/useTask";
+import { type Task, useTask } from "../../ui/useTask";
 import { ChoiceFacts, Summary } from "./Figures";
-import { Finding } from "./Finding";
 import { FrontPlot } from "./FrontPlot";
-import { FrontSlider } from "./FrontSlider";
-import { GoalForm } from "./GoalForm";
 import { PlannedMap, PriceBar } from "./PriceBar";
-import { sameSequence, standingOf } from "./place";
-import { errorWords } from "./words";
+import { sameSequence, standingOf, stepOf } from "./place";
+import { errorWords, goalWords } from "./words";
 import "./AccuracySection.css";
+import { useSignal } from "@preact/signals";
+import { useRef } from "preact/hooks";
+import { askedRegion } from "../../store/measures";
 
 /** What accuracy costs in time on the scene before the camera: the front, and a slider along it that sets the sequence. */
 export function AccuracySection({ applied }: { applied: AppliedDocument }) {
@@ -101,4 +101,140 @@ function NowFigures({ applied, truth_m }: { applied: AppliedDocument; truth_m: n
       </span>
     </>
   );
+}
+
+const HINT = "Predict shows what each sequence would give on this scene: some seconds of work for the service.";
+
+/** How far the service is with what was asked, and the way to end it; else what came of it, or of setting a sequence. Its height stays. */
+function Finding({ task }: { task: Task }) {
+  const { accuracy } = useStore();
+  const job = accuracy.job.value;
+  const problem = accuracy.problem.value;
+  if (job !== null) {
+    const share = `${Math.round(100 * job.progress)}\u202f%`;
+    return (
+      <div class="finding row" role="status" data-field="accuracy-status">
+        <progress value={job.progress} aria-label={job.kind === "tradeoff" ? "Prediction" : "Plan"} />
+        <span class="finding-words">
+          {share} <span class="quiet">{job.step}</span>
+        </span>
+        <Button onClick={() => void accuracy.cancel()}>Cancel</Button>
+      </div>
+    );
+  }
+  const refusal = task.refusal.value ?? (problem === null ? null : goalWords(problem));
+  const found = accuracy.outdated.value ? "The scene changed since: predict again." : (accuracy.tradeoff.value?.summary ?? HINT);
+  return (
+    <p class={`finding row ${refusal === null ? "quiet" : "refusal"}`} role="status" data-field="accuracy-status">
+      {task.busy.value ?? refusal ?? found}
+    </p>
+  );
+}
+
+/** A target, a budget, or both: for a share of the pixels, of the region that is marked or of all. */
+function GoalForm({ disabled, onGoal }: { disabled: boolean; onGoal: (goal: PlanRequest) => void }) {
+  const { measures } = useStore();
+  const error_mm = useSignal("");
+  const share_percent = useSignal("90");
+  const inRegion = useSignal(true);
+  const rate_hz = useSignal("");
+  const [error, rate] = [error_mm, rate_hz].map(({ value }) => (value.trim() === "" ? null : numberOf(value)));
+  const wanted = [error, rate];
+  const share = numberOf(share_percent.value) / 100;
+  const sensible = wanted.some((value) => value !== null) && wanted.every((value) => value === null || value > 0) && share > 0 && share < 1;
+  return (
+    <Form
+      class="goal"
+      onSubmit={() =>
+        onGoal({
+          target: error === null ? {} : { range_error_m: error * 1e-3 },
+          budget: rate === null ? {} : { frame_rate_hz: rate },
+          share,
+          region: inRegion.value ? askedRegion(measures.region.value) : null,
+        })
+      }
+    >
+      <NumberField label="Error at most" unit="mm" name="range_error_mm" text={error_mm} />
+      <NumberField label="in so many pixels" unit="%" name="share_percent" text={share_percent} />
+      <NumberField label="Frames at least" unit="Hz" name="frame_rate_hz" text={rate_hz} />
+      <Check
+        checked={inRegion.value && measures.region.value !== null}
+        title="Of the region that is drawn in a map"
+        onChange={(checked) => (inRegion.value = checked)}
+      >
+        {measures.region.value === null ? "no region is marked" : "in the region"}
+      </Check>
+      <Button type="submit" disabled={disabled || !sensible}>
+        Plan
+      </Button>
+    </Form>
+  );
+}
+
+interface FrontSliderProps {
+  /** By rising time and falling error. */
+  readonly front: readonly ChoiceDocument[];
+  /** Time of a capture with the sequence in use. */
+  readonly now_s: number;
+  readonly looked: ChoiceDocument | null;
+  readonly onLook: (choice: ChoiceDocument) => void;
+  /** The slider was let go at what is looked at. */
+  readonly onRelease: () => void;
+}
+
+/** Keys that move a slider; the page's own shortcuts are not meant then. */
+const MOVING: readonly string[] = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"];
+
+/** From fast to accurate along the front, a step a point; where the camera stands now is marked on it. */
+function FrontSlider({ front, now_s, looked, onLook, onRelease }: FrontSliderProps) {
+  const moved = useRef(false);
+  const key = useRef(false);
+  const release = (): void => {
+    key.current = false;
+    if (!moved.current) return;
+    moved.current = false;
+    onRelease();
+  };
+  const last = front.length - 1;
+  const ghost = last < 1 ? null : stepOf(front, now_s);
+  const at = front.findIndex((choice) => sameSequence(choice, looked));
+  const step = at >= 0 ? at : looked !== null && last > 0 ? Math.round(stepOf(front, looked.capture_s)) : Math.round(ghost ?? 0);
+  return (
+    <div class="row quiet">
+      <span aria-hidden="true">fast</span>
+      <div class="front-track grow">
+        {ghost !== null && <i class="front-ghost" data-field="ghost" style={{ "--place": ghost / last }} title="The present setting" />}
+        <input
+          type="range"
+          min={0}
+          max={Math.max(1, last)}
+          step={1}
+          value={step}
+          disabled={last < 1}
+          aria-label="From fast to accurate"
+          aria-valuetext={last < 1 ? "Not predicted yet" : choiceWords(at < 0 && looked !== null ? looked : front[step])}
+          onInput={(event) => {
+            moved.current = true;
+            onLook(front[event.currentTarget.valueAsNumber]);
+          }}
+          onChange={() => {
+            if (!key.current) release();
+          }}
+          onKeyDown={(event) => {
+            if (!MOVING.includes(event.key)) return;
+            event.stopPropagation();
+            key.current = true;
+          }}
+          onKeyUp={release}
+          onBlur={release}
+        />
+      </div>
+      <span aria-hidden="true">accurate</span>
+    </div>
+  );
+}
+
+/** What a choice gives and takes: "± 4.0 mm in 94 ms, 10.6 Hz". */
+function choiceWords(choice: ChoiceDocument): string {
+  return `± ${engineering(choice.predicted.range_error_m.median, "m", 2)} in ${engineering(choice.capture_s, "s", 2)}, ${fixed(choice.frame_rate_hz, 1, "Hz")}`;
 }

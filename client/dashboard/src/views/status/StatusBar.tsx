@@ -10,9 +10,9 @@ import { useTask } from "../../ui/useTask";
 import { shareWords } from "../sequence/words";
 import { Figures } from "./Figures";
 import { Steering } from "./Steering";
-import { Toasts } from "./Toasts";
 import { demandWords, exposureAdvice } from "./words";
 import "./StatusBar.css";
+import type { Happening } from "../../store/events";
 
 /** How things stand in three things: health, rate and deviation, and what one looks at; all else is behind a button. */
 export function StatusBar() {
@@ -168,4 +168,36 @@ function Subject() {
       {simulated && scene !== undefined ? `simulated ${scene}` : String(capabilities.model)}
     </span>
   );
+}
+
+/** How long a notice stays, one that something can be done about longer; and how many are seen together. */
+const STAYS_S = 6;
+const STAYS_TO_ACT_S = 20;
+const MOST = 2;
+
+/** What just happened, in the free part of the header: never over what can be pressed. It goes away by itself. */
+function Toasts() {
+  const { events } = useStore();
+  const now_s = useNow(1);
+  const fresh = events.all.value.filter((each) => now_s < endOf(each)).slice(-MOST);
+  return (
+    <div class="toasts column grow small" role="log" aria-label="What just happened">
+      {fresh.map(({ number, words, tone, remedy }) => (
+        <p key={number} class="toast row" title={words}>
+          <i class={`dot ${tone}`} aria-hidden="true" />
+          <span class="clipped">{words}</span>
+          {remedy !== undefined && (
+            <Button class="link" onClick={remedy.run}>
+              {remedy.word}
+            </Button>
+          )}
+        </p>
+      ))}
+    </div>
+  );
+}
+
+/** When a notice goes away. */
+function endOf({ at_s, remedy }: Happening): number {
+  return at_s + (remedy === undefined ? STAYS_S : STAYS_TO_ACT_S);
 }

@@ -1,6 +1,5 @@
 import { useComputed } from "@preact/signals";
 import { useEffect, useMemo, useRef } from "preact/hooks";
-
 import { rangeOfTime_m } from "../../physics/constants";
 import { densityAt } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
@@ -9,7 +8,7 @@ import { gateStart_rad, NAMES, type Play, type TransientLook } from "../../store
 import { AMPLITUDE } from "../../store/mapCatalogue";
 import { SPEEDS_NS } from "../../store/player";
 import { type Store, useStore } from "../../store/store";
-import { Button, Choice, Tabs } from "../../ui/controls";
+import { Button, Check, Choice, Tabs } from "../../ui/controls";
 import { savePicture } from "../../ui/download";
 import { captionOf, timeWords } from "../../ui/figure";
 import { type FigureParts, pictureFiles } from "../../ui/figureFiles";
@@ -19,12 +18,12 @@ import { Panel } from "../../ui/Panel";
 import { gapsOf, litOf, peaksOf, steady, turnsOf } from "./arrivals";
 import { Filming, FilmProgress } from "./Filming";
 import { LightBar, lightScale } from "./LightBar";
-import { LightSoFar } from "./LightSoFar";
-import { LookMenu } from "./LookMenu";
-import { Picture } from "./Picture";
+import { LightSoFar, Picture } from "./Picture";
 import { PICTURES, stripOf } from "./strip";
 import { Timeline, TimeReadout } from "./Timeline";
 import "./TransientView.css";
+import { ColourChoice, ToneChoice } from "../../ui/LookChoices";
+import { PopoverButton } from "../../ui/PopoverButton";
 
 const PLAY_TABS: readonly { readonly value: Play; readonly text: string; readonly hint: string }[] = [
   { value: "density", text: "In flight", hint: "The light that arrives at one time" },
@@ -166,4 +165,32 @@ function DensityReadout({ play }: { play: Play }) {
       {text}
     </span>
   );
+}
+
+const STOPS = [-4, -3, -2, -1, 0, 1, 2, 3, 4, 6, 8];
+
+/** How the light is shown, behind a button. */
+function LookMenu({ look }: { look: TransientLook }) {
+  return (
+    <PopoverButton face="Look" label="Look of the light" title="Tone, exposure and colours" kind="look">
+      <ToneChoice tone={look.tone} />
+      <Choice label="Exposure" chosen={look.stops} of={STOPS} text={stopsText} />
+      <ColourChoice colours={look.colours} />
+      {look.play.value === "density" && (
+        <Check
+          title="Show the still scene behind the light"
+          checked={look.backdrop.value}
+          onChange={(shown) => (look.backdrop.value = shown)}
+        >
+          Scene behind the light
+        </Check>
+      )}
+    </PopoverButton>
+  );
+}
+
+/** Exposure as photographers count it: a stop is a factor of two. */
+function stopsText(stops: number): string {
+  const count = Math.abs(stops);
+  return stops === 0 ? "as metered" : `${count} ${count === 1 ? "stop" : "stops"} ${stops > 0 ? "brighter" : "darker"}`;
 }
