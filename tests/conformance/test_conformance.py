@@ -26,7 +26,7 @@ from transientcam_conformance import (
     chosen,
     run,
 )
-from transientcam_conformance._rate import Rate, measured_rate
+from transientcam_conformance._running import Rate, measured_rate
 from transientcam_server.api import Role, utc_now
 from transientcam_server.api._auth.tokens import TokenFile
 

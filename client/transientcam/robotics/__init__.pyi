@@ -24,8 +24,6 @@ from ._rerun_bridge import (
     BINS as BINS,
     LOGGED as LOGGED,
     RerunBridge as RerunBridge,
-)
-from ._rerun_messages import (
     blueprint as blueprint,
 )
 from ._source import (

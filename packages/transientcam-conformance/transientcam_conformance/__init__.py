@@ -4,7 +4,14 @@
 leave the camera as they found it.
 """
 
-from transientcam_conformance._check import Check
 from transientcam_conformance._device import Device
-from transientcam_conformance._report import Report, Result
-from transientcam_conformance._running import CHECKS, GROUPS, SLOW, chosen, run
+from transientcam_conformance._running import (
+    CHECKS,
+    GROUPS,
+    SLOW,
+    Check,
+    Report,
+    Result,
+    chosen,
+    run,
+)

@@ -1,9 +1,12 @@
 """All checks, and the running of them against one camera."""
 
+import inspect
 import time
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
-from typing import Any, Final
+from dataclasses import dataclass, replace
+from types import ModuleType
+from typing import Any, Final, Literal
 
 from transientcam.errors import CheckSkipped, ParameterError, TransientcamError
 from transientcam_conformance import (
@@ -20,10 +23,143 @@ from transientcam_conformance import (
     _tags as tags,
     _unplugging as unplugging,
 )
-from transientcam_conformance._check import Check, checks
 from transientcam_conformance._device import API, Device
-from transientcam_conformance._rate import Rate, measured_rate
-from transientcam_conformance._report import Outcome, Report, Result
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One promise and the function that tries it."""
+
+    group: str
+    name: str
+    """``group``, ``name``: its name in reports and on the command line."""
+    promise: str
+    """The sentence of the contract."""
+    run: Callable[[Device], None]
+    """Returns if the promise is kept; else raises `PromiseBroken`, or `CheckSkipped` if it cannot
+    be tried."""
+
+
+def checks(group: str, module: ModuleType) -> tuple[Check, ...]:
+    """Return the public functions of a module as checks, in the order in which they stand.
+
+    The name of one is its name, its docstring the promise.
+    """
+    return tuple(
+        Check(group, name.replace("_", "-"), _sentence(each), each)
+        for name, each in vars(module).items()
+        if inspect.isfunction(each) and each.__module__ == module.__name__ and name[0] != "_"
+    )
+
+
+def _sentence(function: Callable[..., Any]) -> str:
+    return " ".join((inspect.getdoc(function) or "").split())
+
+
+_FRAMES: Final = 10
+KEPT_SHARE: Final = 0.7
+"""Share of the stated rate from which it counts as kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """Frames a second that arrive, and that the sequence states."""
+
+    delivered_hz: float
+    stated_hz: float
+
+    @property
+    def kept(self) -> bool:
+        """Whether about as many arrive as are stated."""
+        return self.delivered_hz >= KEPT_SHARE * self.stated_hz
+
+    def __str__(self) -> str:
+        """As in "the camera does not keep its rate: 2.1 of 10.6 frames/s arrive"."""
+        keeps = "keeps" if self.kept else "does not keep"
+        rates = f"{self.delivered_hz:.3g} of {self.stated_hz:.3g} frames/s arrive"
+        return f"the camera {keeps} its rate: {rates}"
+
+    def to_document(self) -> dict[str, float]:
+        """Return it as a map."""
+        return {"delivered_hz": self.delivered_hz, "stated_hz": self.stated_hz}
+
+
+def measured_rate(device: Device) -> Rate:
+    """Stream frames of one small product, and count those that come in the time of the camera.
+
+    Raises PromiseBroken if none come.
+    """
+    with device.capturing(), device.stream("flags") as stream:
+        stated_hz = float(device.sequence["frame_rate_hz"])
+        times_s = [float(stream.frame().meta["host_time_s"]) for _ in range(_FRAMES)]
+    elapsed_s = times_s[-1] - times_s[0]
+    delivered_hz = (_FRAMES - 1) / elapsed_s if elapsed_s > 0 else stated_hz
+    return Rate(delivered_hz, stated_hz)
+
+
+Outcome = Literal["passed", "failed", "skipped"]
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """The result of one check."""
+
+    check: Check
+    outcome: Outcome
+    reason: str | None
+    """Why it failed or was skipped; None if it passed."""
+    duration_s: float
+
+    def to_document(self) -> dict[str, Any]:
+        """Return it as a map."""
+        return {
+            "group": self.check.group,
+            "name": self.check.name,
+            "promise": self.check.promise,
+            "outcome": self.outcome,
+            "reason": self.reason,
+            "duration_s": round(self.duration_s, 3),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """The results of all checks."""
+
+    url: str
+    camera: Mapping[str, Any]
+    """Model, serial and firmware of the camera, name and version of its service; empty if they
+    could not be read."""
+    began_s: float
+    """Unix time."""
+    duration_s: float
+    results: Sequence[Result]
+    slow: Rate | None = None
+    """The camera's rate where it did not keep it, and checks were skipped for that."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many checks had each outcome."""
+        counted = Counter(each.outcome for each in self.results)
+        return {name: counted[name] for name in ("passed", "failed", "skipped")}
+
+    @property
+    def failed(self) -> tuple[Result, ...]:
+        """Promises that are not kept."""
+        return tuple(each for each in self.results if each.outcome == "failed")
+
+    def to_document(self) -> dict[str, Any]:
+        """Return it as a map that JSON can hold."""
+        return {
+            "url": self.url,
+            "camera": dict(self.camera),
+            "began_s": self.began_s,
+            "duration_s": round(self.duration_s, 3),
+            **self.counts,
+            "slow": None if self.slow is None else self.slow.to_document(),
+            "checks": [each.to_document() for each in self.results],
+        }
+
 
 CHECKS: Final[tuple[Check, ...]] = (
     *checks("routes", routes),

@@ -20,8 +20,7 @@ from tests.serving import Served, serving
 from transientcam import Camera, ParameterError, transient
 from transientcam.cli import rerun as verb
 from transientcam.robotics import Report, RerunBridge
-from transientcam.robotics._rerun_bridge import FLUSH_S
-from transientcam.robotics._scatter import FRAMES
+from transientcam.robotics._rerun_bridge import FLUSH_S, FRAMES
 
 SEQUENCE: dict[str, Any] = {"harmonics": 3, "zeroth": "estimated", "exposure_s": 0.0005}
 

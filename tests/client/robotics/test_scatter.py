@@ -3,7 +3,7 @@ import pytest
 
 from tests.client.conftest import frame_meta
 from transientcam import Frame
-from transientcam.robotics._scatter import FRAMES, Scatter
+from transientcam.robotics._rerun_bridge import FRAMES, Scatter
 
 
 def a_frame(values: object, *, sequence_id: int = 1) -> Frame:

@@ -23,7 +23,7 @@ from rerun.chunk import RrdReader
 import transientcam
 from tests.server.recording.made import CAPABILITIES, SEQUENCE, frame, header
 from transientcam.robotics import Pinhole, messages_of
-from transientcam.robotics._rerun_messages import POINTS, log_message
+from transientcam.robotics._rerun_bridge import POINTS, log_message
 from transientcam_server.imaging import ENCODINGS, Intrinsics, nominal_gains
 from transientcam_server.offline import BatchOptions, convert_recording, reconstruct_recording
 from transientcam_server.recording import Recording, RecordingWriter
