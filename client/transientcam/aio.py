@@ -14,7 +14,7 @@ from websockets.typing import Data
 from transientcam.base_camera import BaseCamera
 from transientcam.errors import ServerUnreachable, StreamClosed, TransientcamError
 from transientcam.frame import Frame
-from transientcam.lease import AsyncLease, OnLapse
+from transientcam.lease import AsyncLease
 from transientcam.requests import (
     MOST_DOCUMENT_BYTES,
     PROGRESS_EVERY_S,
@@ -29,10 +29,7 @@ from transientcam.requests import (
 from transientcam.stream import BaseStream
 from transientcam.stream_state import (
     DEFAULT_CREDITS,
-    NoticeHandler,
-    Reconnect,
     StreamState,
-    reconnect_policy,
     subscribe_message,
 )
 from transientcam.transport import (
@@ -56,7 +53,7 @@ _Frame = Coroutine[Any, Any, Frame]
 _Bytes = Coroutine[Any, Any, bytes]
 
 
-class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
+class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes, AsyncLease, "AsyncStream"]):
     """A camera behind a daemon, for asyncio; see `Camera` for its parameters and errors.
 
     ::
@@ -80,7 +77,6 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
         self._http = http_client(
             httpx.AsyncClient, token=token, timeout_s=timeout_s, transport=transport
         )
-        self._streams: list[AsyncStream] = []
 
     async def info(self) -> dict[str, Any]:
         """Return names and versions of the daemon."""
@@ -129,31 +125,6 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
         """Return whether the camera captures, and how fast."""
         return await self._ask(document("acquisition"))
 
-    def lease(
-        self,
-        holder: str,
-        *,
-        duration_s: float = 30.0,
-        on_lapse: OnLapse = "stop",
-        takeover: bool = False,
-    ) -> AsyncLease:
-        """Return a context manager in which no other client can change anything.
-
-        ::
-
-            async with camera.lease("alignment on bench 2"):
-                await camera.configure(harmonics=4)
-
-        Parameters as for `Camera.lease`.
-        """
-        terms = {
-            "holder": holder,
-            "duration_s": duration_s,
-            "on_lapse": on_lapse,
-            "takeover": takeover,
-        }
-        return AsyncLease(self._ask, partial(set_lease, self._http.headers), terms)
-
     async def frames(self) -> dict[str, Any]:
         """Return the numbers of the frames of the last seconds that the daemon still has."""
         return await self._ask(document("frames"))
@@ -179,24 +150,6 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
                         received.add(file.write(piece))
         part.rename(output)
 
-    def stream(
-        self,
-        *products: str | Subscription,
-        on_notice: NoticeHandler | None = None,
-        reconnect: bool | Reconnect = False,
-        credits: int | None = DEFAULT_CREDITS,  # noqa: A002 - the protocol calls them so
-        max_rate_hz: float | None = None,
-        start: int | None = None,
-    ) -> "AsyncStream":
-        """Return a stream of frames as they are captured; enter it to have it closed."""
-        subscribe = subscribe_message(
-            products, token=self._token, credits=credits, max_rate_hz=max_rate_hz, start=start
-        )
-        state = StreamState(subscribe, on_notice=on_notice, reconnect=reconnect_policy(reconnect))
-        stream = AsyncStream(self._address.stream, state, timeout_s=self._timeout_s)
-        self._streams = [*(each for each in self._streams if not each.closed), stream]
-        return stream
-
     async def close(self) -> None:
         """Close every connection and stream; the daemon keeps running."""
         for stream in self._streams:
@@ -209,14 +162,17 @@ class AsyncCamera(BaseCamera[_Document, _Frame, _Bytes]):
     async def __aexit__(self, *_: object) -> None:
         await self.close()
 
-    def __repr__(self) -> str:
-        return f"<AsyncCamera {self.url}>"
-
     async def _ask(self, request: Request[_T]) -> _T:
         with translated(self.url):
             url = f"{self._address.api}/{request.path}"
             answer = await exchange_async(self._http, url, request, timeout_s=self._timeout_s)
         return request.result(answer)
+
+    def _leased(self, terms: dict[str, Any]) -> AsyncLease:
+        return AsyncLease(self._ask, partial(set_lease, self._http.headers), terms)
+
+    def _streaming(self, state: StreamState) -> "AsyncStream":
+        return AsyncStream(self._address.stream, state, timeout_s=self._timeout_s)
 
 
 class AsyncStream(BaseStream):
@@ -227,15 +183,10 @@ class AsyncStream(BaseStream):
     """
 
     def __init__(self, url: str, state: StreamState, *, timeout_s: float) -> None:
-        super().__init__(url, state, timeout_s=timeout_s)
+        self._closed = asyncio.Event()
+        super().__init__(url, state, timeout_s=timeout_s, end=self._closed)
         self._stack = AsyncExitStack()
         self._connection: ClientConnection | None = None
-        self._closed = asyncio.Event()
-
-    @property
-    def closed(self) -> bool:
-        """Whether this client has closed it for good."""
-        return self._closed.is_set()
 
     async def receive(self, *, timeout_s: float | None = None) -> Frame:
         """Return the next frame, waiting for it; raises what `Stream.receive` raises."""

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final, Generic, TypeVar, overload
 
 from transientcam.frame import Frame
-from transientcam.lease import GIVE_BACK
+from transientcam.lease import GIVE_BACK, BaseLease, OnLapse
 from transientcam.requests import (
     Calibrations,
     Jobs,
@@ -18,7 +18,17 @@ from transientcam.requests import (
     planning,
     recording_path,
 )
+from transientcam.stream import BaseStream
+from transientcam.stream_state import (
+    DEFAULT_CREDITS,
+    NoticeHandler,
+    Reconnect,
+    StreamState,
+    reconnect_policy,
+    subscribe_message,
+)
 from transientcam.transport import parse_address
+from transientcam.wire import Subscription
 
 _SCENE_BUILT_S: Final = 60.0
 """The same of building a simulated scene."""
@@ -27,9 +37,11 @@ _WRITTEN_S: Final = 60.0
 _Document = TypeVar("_Document")
 _Frame = TypeVar("_Frame")
 _Bytes = TypeVar("_Bytes")
+_Lease = TypeVar("_Lease", bound=BaseLease)
+_Stream = TypeVar("_Stream", bound=BaseStream)
 
 
-class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
+class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes, _Lease, _Stream]):
     """The requests of a camera; what they return is up to `_ask`.
 
     From a `Camera` that is a document, a `Frame` or bytes, from an `AsyncCamera` a coroutine of
@@ -40,6 +52,7 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
         self._address = parse_address(url)
         self._token = token
         self._timeout_s = timeout_s
+        self._streams: list[_Stream] = []
 
     @overload
     @abstractmethod
@@ -53,6 +66,17 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
     @abstractmethod
     def _ask(self, request: Request[Any]) -> Any:
         """Send a request, and return the result of its answer."""
+
+    @abstractmethod
+    def _leased(self, terms: dict[str, Any]) -> _Lease:
+        """Return a lease on these terms."""
+
+    @abstractmethod
+    def _streaming(self, state: StreamState) -> _Stream:
+        """Return the stream of a state."""
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.url}>"
 
     @property
     def url(self) -> str:
@@ -173,6 +197,82 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes]):
     def give_lease_back(self) -> _Document:
         """End the lease whose id the requests of this object carry."""
         return self._ask(GIVE_BACK)
+
+    def lease(
+        self,
+        holder: str,
+        *,
+        duration_s: float = 30.0,
+        on_lapse: OnLapse = "stop",
+        takeover: bool = False,
+    ) -> _Lease:
+        """Return a context manager in which no other client can change anything.
+
+        ::
+
+            with camera.lease("alignment on bench 2"):
+                camera.configure(harmonics=4)
+
+        The lease is renewed meanwhile. Changes through this object carry it, also after it was
+        lost: they then raise a `ProblemError` of type ``/problems/lease-lost``.
+
+        Parameters
+        ----------
+        holder
+            Name shown to other clients as the one that controls the camera.
+        duration_s
+            How long the lease lasts if this process dies.
+        on_lapse
+            Whether the capture, and with it the light, stops then.
+        takeover
+            Take the lease from its present holder.
+        """
+        terms = {"holder": holder, "duration_s": duration_s, "on_lapse": on_lapse}
+        return self._leased(terms | {"takeover": takeover})
+
+    def stream(
+        self,
+        *products: str | Subscription,
+        on_notice: NoticeHandler | None = None,
+        reconnect: bool | Reconnect = False,
+        credits: int | None = DEFAULT_CREDITS,  # noqa: A002 - the protocol calls them so
+        max_rate_hz: float | None = None,
+        start: int | None = None,
+    ) -> _Stream:
+        """Return a stream of frames as they are captured.
+
+        Each product of a frame comes as a frame of its own, in the order of the products.
+
+        Parameters
+        ----------
+        products
+            Names, or `Subscription` where each has its own rate, region, decimation or encoding;
+            frames arrive decoded.
+        on_notice
+            Called with each notice, within ``receive``; `Stream.notices` keeps them too.
+        reconnect
+            Connect again when the daemon restarts or the network fails; the notices
+            ``connection-lost`` and ``reconnected`` report it.
+        credits
+            How many frames may be on their way at once; None leaves it to the network.
+        max_rate_hz
+            Maximum frames per second.
+        start
+            Number of the first frame; None for the next one. Frames that the daemon still keeps
+            come one after the other, and the notice ``gap`` names those that it does not.
+
+        Raises
+        ------
+        ParameterError
+            If there is no product, or a number is out of range.
+        """
+        subscribe = subscribe_message(
+            products, token=self._token, credits=credits, max_rate_hz=max_rate_hz, start=start
+        )
+        state = StreamState(subscribe, on_notice=on_notice, reconnect=reconnect_policy(reconnect))
+        stream = self._streaming(state)
+        self._streams = [*(each for each in self._streams if not each.closed), stream]
+        return stream
 
     def timeline(self, recording: str) -> _Document:
         """Return which frames a recording has, and when they were captured."""

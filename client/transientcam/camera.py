@@ -10,7 +10,7 @@ import httpx
 from transientcam.base_camera import BaseCamera
 from transientcam.errors import TransientcamError
 from transientcam.frame import Frame
-from transientcam.lease import Lease, OnLapse
+from transientcam.lease import Lease
 from transientcam.notebook import table_html
 from transientcam.requests import (
     MOST_DOCUMENT_BYTES,
@@ -25,12 +25,7 @@ from transientcam.requests import (
 )
 from transientcam.stream import Stream
 from transientcam.stream_state import (
-    DEFAULT_CREDITS,
-    NoticeHandler,
-    Reconnect,
     StreamState,
-    reconnect_policy,
-    subscribe_message,
 )
 from transientcam.transport import (
     DownloadProgress,
@@ -43,12 +38,11 @@ from transientcam.transport import (
     set_lease,
     translated,
 )
-from transientcam.wire import Subscription
 
 _T = TypeVar("_T")
 
 
-class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
+class Camera(BaseCamera[dict[str, Any], Frame, bytes, Lease, Stream]):
     """A camera behind a daemon.
 
     ::
@@ -85,7 +79,6 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
         self._http = bounded(
             http_client(httpx.Client, token=token, timeout_s=timeout_s, transport=transport)
         )
-        self._streams: list[Stream] = []
 
     @property
     def info(self) -> dict[str, Any]:
@@ -153,43 +146,6 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
         """Whether the camera captures, and how fast."""
         return self._ask(document("acquisition"))
 
-    def lease(
-        self,
-        holder: str,
-        *,
-        duration_s: float = 30.0,
-        on_lapse: OnLapse = "stop",
-        takeover: bool = False,
-    ) -> Lease:
-        """Return a context manager in which no other client can change anything.
-
-        ::
-
-            with camera.lease("alignment on bench 2"):
-                camera.configure(harmonics=4)
-
-        The lease is renewed meanwhile. Changes through this object carry it, also after it was
-        lost: they then raise a `ProblemError` of type ``/problems/lease-lost``.
-
-        Parameters
-        ----------
-        holder
-            Name shown to other clients as the one that controls the camera.
-        duration_s
-            How long the lease lasts if this process dies.
-        on_lapse
-            Whether the capture, and with it the light, stops then.
-        takeover
-            Take the lease from its present holder.
-        """
-        terms = {
-            "holder": holder,
-            "duration_s": duration_s,
-            "on_lapse": on_lapse,
-            "takeover": takeover,
-        }
-        return Lease(self._ask, partial(set_lease, self._http.headers), terms)
-
     @property
     def frames(self) -> dict[str, Any]:
         """Numbers of the frames of the last seconds that the daemon still has."""
@@ -224,50 +180,6 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
                     received.add(file.write(piece))
         part.rename(output)
 
-    def stream(
-        self,
-        *products: str | Subscription,
-        on_notice: NoticeHandler | None = None,
-        reconnect: bool | Reconnect = False,
-        credits: int | None = DEFAULT_CREDITS,  # noqa: A002 - the protocol calls them so
-        max_rate_hz: float | None = None,
-        start: int | None = None,
-    ) -> Stream:
-        """Return a stream of frames as they are captured.
-
-        Each product of a frame comes as a frame of its own, in the order of the products.
-
-        Parameters
-        ----------
-        products
-            Names, or `Subscription` where each has its own rate, region, decimation or encoding;
-            frames arrive decoded.
-        on_notice
-            Called with each notice, within ``receive``; `Stream.notices` keeps them too.
-        reconnect
-            Connect again when the daemon restarts or the network fails; the notices
-            ``connection-lost`` and ``reconnected`` report it.
-        credits
-            How many frames may be on their way at once; None leaves it to the network.
-        max_rate_hz
-            Maximum frames per second.
-        start
-            Number of the first frame; None for the next one. Frames that the daemon still keeps
-            come one after the other, and the notice ``gap`` names those that it does not.
-
-        Raises
-        ------
-        ParameterError
-            If there is no product, or a number is out of range.
-        """
-        subscribe = subscribe_message(
-            products, token=self._token, credits=credits, max_rate_hz=max_rate_hz, start=start
-        )
-        state = StreamState(subscribe, on_notice=on_notice, reconnect=reconnect_policy(reconnect))
-        stream = Stream(self._address.stream, state, timeout_s=self._timeout_s)
-        self._streams = [*(each for each in self._streams if not each.closed), stream]
-        return stream
-
     def close(self) -> None:
         """Close every connection and stream; the daemon keeps running."""
         for stream in self._streams:
@@ -279,9 +191,6 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-    def __repr__(self) -> str:
-        return f"<Camera {self.url}>"
 
     def _repr_html_(self) -> str:
         """Return the sequence that is captured as a table, for notebooks; it asks the daemon."""
@@ -295,3 +204,9 @@ class Camera(BaseCamera[dict[str, Any], Frame, bytes]):
             url = f"{self._address.api}/{request.path}"
             answer = exchange(self._http, url, request, timeout_s=self._timeout_s)
         return request.result(answer)
+
+    def _leased(self, terms: dict[str, Any]) -> Lease:
+        return Lease(self._ask, partial(set_lease, self._http.headers), terms)
+
+    def _streaming(self, state: StreamState) -> Stream:
+        return Stream(self._address.stream, state, timeout_s=self._timeout_s)

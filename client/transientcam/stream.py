@@ -1,5 +1,6 @@
 """A stream of frames as they are captured, read by a thread."""
 
+import asyncio
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -18,10 +19,23 @@ from transientcam.wire import Channel, CloseCode, Hello, Notice, Subscription
 class BaseStream:
     """What `Stream` and `AsyncStream` report of their state."""
 
-    def __init__(self, url: str, state: StreamState, *, timeout_s: float) -> None:
+    def __init__(
+        self,
+        url: str,
+        state: StreamState,
+        *,
+        timeout_s: float,
+        end: threading.Event | asyncio.Event,
+    ) -> None:
         self._url = url
         self._state = state
         self._timeout_s = timeout_s
+        self._end = end
+
+    @property
+    def closed(self) -> bool:
+        """Whether this client has closed it for good."""
+        return self._end.is_set()
 
     @property
     def hello(self) -> Hello | None:
@@ -59,16 +73,11 @@ class Stream(BaseStream):
     """
 
     def __init__(self, url: str, state: StreamState, *, timeout_s: float) -> None:
-        super().__init__(url, state, timeout_s=timeout_s)
+        self._closed = threading.Event()
+        super().__init__(url, state, timeout_s=timeout_s, end=self._closed)
         self._stack = ExitStack()
         self._connection: ClientConnection | None = None
         self._entered = False
-        self._closed = threading.Event()
-
-    @property
-    def closed(self) -> bool:
-        """Whether this client has closed it for good."""
-        return self._closed.is_set()
 
     def receive(self, *, timeout_s: float | None = None) -> Frame:
         """Return the next frame, waiting for it.
