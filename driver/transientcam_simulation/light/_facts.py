@@ -179,8 +179,8 @@ class SceneFacts:
             self._left_out[effect] = others()
         apart = self._apart(self._left_out[effect], frequencies_hz)
         if effect == "gloss" and not self._scene.moves and self._further_light:
-            there, (direct,) = self._seen[0], apart
-            matt = replace(there, scene=without_gloss(there.scene))
+            seen, (direct,) = self._seen[0], apart
+            matt = replace(seen, scene=without_gloss(seen.scene))
             shown = self._further_light[0] - _ROUGH_ERROR * self._further(matt, self._rough)
             return (np.maximum(direct, np.abs(shown)),)
         return apart

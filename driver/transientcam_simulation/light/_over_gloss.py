@@ -121,7 +121,8 @@ class ShownByGloss:
                 found.append((ray, by, light_on_ends(scene, lights, after, rays=len(ray))))
                 on = np.flatnonzero(glossy[after.surface])
                 before, ray, by, places = some(after, on), ray[on], by[on], places[on]
-        ray, by = (np.concatenate([each[k] for each in found]) for k in (0, 1))
+        ray = np.concatenate([each for each, _, _ in found])
+        by = np.concatenate([each for _, each, _ in found])
         return cls(ray, joined([each for *_, each in found]), scatter_of(scene, by))
 
     def of_rays(self, moments: NDArray[np.complex128], frequency_hz: float, rays: int) -> Any:

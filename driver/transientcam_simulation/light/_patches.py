@@ -112,18 +112,15 @@ def form_factors(
         towards = np.einsum("pnc,pc->pn", way, normal[block]) > 1e-9
         back = np.einsum("pnc,nc->pn", way, patches.normal) < -1e-9
         p, n = np.nonzero(towards & back)
+        seen = np.full(way.shape[:2], np.nan)
+        seen[p, n] = 1.0
         if hides:
-            clear = ~_blocked(scene, patches, at[block][p], n)
-            seen = np.full(way.shape[:2], np.nan)
-            seen[p, n] = clear
+            seen[p, n] = ~_blocked(scene, patches, at[block][p], n)
             if shares:
                 _share(scene, patches, at[block], seen)
             p, n = np.nonzero(seen > 0)
-        factors[block][p, n] = contour(
-            patches.corners[n] - at[block][p][:, None, :], normal[block][p]
-        )
-        if hides:
-            factors[block][p, n] *= seen[p, n]
+        corners = patches.corners[n] - at[block][p][:, None, :]
+        factors[block][p, n] = contour(corners, normal[block][p]) * seen[p, n]
     return factors
 
 

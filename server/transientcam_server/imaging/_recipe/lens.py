@@ -82,9 +82,9 @@ class Intrinsics(Pinhole):
             raise TypeError("true or false stands for a number")
         fx, fy, cx, cy = (float(document[name]) for name in ("fx", "fy", "cx", "cy"))
         distortion = tuple(float(each) for each in document.get("distortion", ()))
-        light_m = (float(document.get(name, 0.0)) for name in _LIGHT)
+        x_m, y_m, z_m = (float(document.get(name, 0.0)) for name in _LIGHT)
         beam = tuple(float(each) for each in document.get("beam", ()))
-        lens = Lens(fx, fy, cx, cy, distortion, *light_m, beam)
+        lens = Lens(fx, fy, cx, cy, distortion, x_m, y_m, z_m, beam)
         width, height = int(document["width"]), int(document["height"])
         return cls.of_lens(lens, width=width, height=height, source=source)
 
