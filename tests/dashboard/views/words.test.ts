@@ -56,9 +56,9 @@ describe("a frame with too much or too little light", () => {
 
 test("multiples of a camera's own are shown as these", () => {
   expect(measuredOf({ harmonics: 3, sampling: null })).toEqual({ name: "Harmonics m", value: "3" });
-  expect(measuredOf({ harmonics: 3, sampling: { multiples: [2, 10, 15], phases_rad: [] } })).toEqual({
+  expect(measuredOf({ harmonics: 3, sampling: { multiples: [2, 10, 15], phases_rad: [], max_range_m: null } })).toEqual({
     name: "Multiples",
     value: "2, 10, 15",
   });
-  expect(multiplesWords(3, { multiples: [2, 10, 15], phases_rad: [] })).toBe("multiples 2, 10, 15");
+  expect(multiplesWords(3, { multiples: [2, 10, 15], phases_rad: [], max_range_m: null })).toBe("multiples 2, 10, 15");
 });
