@@ -26,6 +26,7 @@ _PAGES = (
 _ELSEWHERE = {
     "README.md": "test_readme.py pastes it whole",
     "docs/add-a-camera.md": "tests/server/camera/plug_in.py runs its plug-in",
+    "docs/gpu.md": "needs a GPU; tests/moments/gpu call the same with software ones",
     "docs/operations.md": "looks for cameras in the whole network",
     "docs/plan-a-sequence.md": "tests/notebooks plans, with fewer sequences to choose from",
     "docs/robots.md": "needs a film that mitransient rendered",

@@ -176,4 +176,5 @@ def test_the_document_states_shares_and_the_median_pixel_with_a_range() -> None:
         "range_std_m": 3.0,
         "range_bias_m": 4.0,
         "every_px": 1,
+        "not_judged": [],
     }
