@@ -16,6 +16,11 @@ _PIXELS: Final = 32
 _WALL_M: Final = 0.01
 _APART: Final = 0.1
 """Least singular value of the walls' normals that tell a place."""
+_FLAT: Final = 0.05
+_WHITE: Final = 0.1
+"""By which part a wall may be off a plane, and its brightness off a beam."""
+_EVEN: Final = 0.02
+"""Power of the cosine below which nothing tells where a beam points."""
 
 
 def lens_of_walls(ranges: Sequence[_Array], start: Intrinsics) -> tuple[Lens, float, _Array]:
@@ -79,7 +84,8 @@ def beam_of_wall(
     """Return the beam of the light, as `Lens` has it, by one flat, white, matt wall.
 
     ``range_m`` and ``brightness_dn`` are (H, W). Where b_0 r^2 over the cosine to the wall's normal
-    falls off is the beam. Raises InputError if less than half of the pixels have a range.
+    falls off is the beam. Raises InputError if less than half of the pixels have a range, or more
+    than a tenth of these are off a plane, or are not as bright as a beam makes it.
     """
     from scipy.optimize import least_squares  # likewise
 
@@ -106,4 +112,12 @@ def beam_of_wall(
     low = [-np.inf, -np.inf, 0.0, -np.inf]
     start = [0.0, 0.0, 1.0, np.median(white)]
     found = least_squares(off, start, bounds=(low, np.inf), loss="soft_l1", f_scale=0.05).x
+    if found[2] < _EVEN:  # light that is as bright everywhere has no axis
+        found[:3] = 0.0
+    for what, parts, most in (
+        ("off a plane", plane @ points - 1, _FLAT),
+        ("brighter or darker than a beam makes it", off(found), _WHITE),
+    ):
+        if (share := np.mean(np.abs(parts) > most)) > 0.1:
+            raise InputError("--beam", "wall", f"{what} in {share:.0%} of it", "flat and white")
     return (*axis_of(found).tolist(), float(found[2]), float(np.exp(found[3])))

@@ -62,8 +62,25 @@ def test_one_white_wall_says_how_the_light_falls_off_and_how_bright_it_is() -> N
     np.testing.assert_allclose(found_axis, axis, atol=0.01)
     assert exponent == pytest.approx(12.0, rel=0.05)
     assert white_dn_per_s == pytest.approx(2e6, rel=0.05)
-    with pytest.raises(InputError, match="seen by half"):
-        beam_of_wall(np.full((HEIGHT, WIDTH), np.nan), light_dn, 1e-3, known)
+    striped = light_dn * np.where(np.arange(WIDTH) % 4 < 2, 1.0, 0.6)
+    bent_m = range_m * np.linspace(1.0, 1.5, HEIGHT)[:, None] ** 4
+    for seen_m, seen_dn, why in (
+        (np.full((HEIGHT, WIDTH), np.nan), light_dn, "seen by half"),
+        (range_m, striped, "brighter or darker"),
+        (bent_m, light_dn, "off a plane in"),
+    ):
+        with pytest.raises(InputError, match=why):
+            beam_of_wall(seen_m, seen_dn, 1e-3, known)
+
+
+def test_the_beam_of_light_that_is_as_bright_everywhere_points_ahead() -> None:
+    known = Intrinsics.of_lens(replace(TRUE, light_x_m=0.0, light_y_m=0.0), **SIZE, source="camera")
+    range_m = known.points(np.ones((HEIGHT, WIDTH)))[2] ** -1.0  # of a wall at z = 1 m
+    light_dn = 2e3 / range_m**3  # facing, and as far
+
+    found = beam_of_wall(range_m, light_dn, 1e-3, known)
+
+    assert found == pytest.approx((0.0, 0.0, 1.0, 0.0, 2e6), rel=1e-4)
 
 
 def test_a_wall_that_is_hardly_seen_is_refused() -> None:
