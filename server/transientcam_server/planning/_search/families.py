@@ -280,7 +280,9 @@ def _exposures(goal: Goal, capabilities: Capabilities, longest_s: float) -> list
         return []
     shortest_s = min(longest_s, max(SHORTEST_EXPOSURE_S, capabilities.min_exposure_s))
     ratio = (longest_s / shortest_s) ** (1 / (EXPOSURES - 1))
-    return sorted({round(shortest_s * ratio**k, 9) for k in range(EXPOSURES)})
+    least_s, most_s = capabilities.min_exposure_s, capabilities.max_exposure_s
+    rounded_s = (round(shortest_s * ratio**k, 9) for k in range(EXPOSURES))
+    return sorted({min(max(each_s, least_s), most_s) for each_s in rounded_s})
 
 
 def _zeroths(goal: Goal) -> tuple[Any, ...]:

@@ -141,6 +141,12 @@ def test_exposures_are_those_that_the_camera_has(capabilities: Capabilities) -> 
 
     assert exposures_s(bright) == [9e-5]
     assert (exposures_s(dark)[0], exposures_s(dark)[-1]) == (2e-4, capabilities.max_exposure_s)
+    # limits that are no whole number of nanoseconds, as of a duty cycle
+    odd = dataclasses.replace(
+        capabilities, min_exposure_s=1 / 30720, max_exposure_s=1 / 1536, exposure_step_s=1 / 30720
+    )
+    longest_s = exposures_s(found(Goal(base=BASE, capture_s=1.0), odd, saturating_s=9.0))[-1]
+    assert longest_s == odd.max_exposure_s < round(longest_s, 9)
     slow = dataclasses.replace(capabilities, min_exposure_s=1e-3)
     assert exposures_s(found(Goal(base=BASE, capture_s=1.0), slow))[0] == 1e-3
     just = dataclasses.replace(capabilities, min_exposure_s=9e-5)
