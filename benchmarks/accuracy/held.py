@@ -90,6 +90,6 @@ def tables_of(found: list[Outcome]) -> tuple[Table, Table]:
         )
     columns = heads(
         "camera | scene | target | plan | ms:.0f | 90 % within, mm | captured:.3g | "
-        "within the target:.0%| met | grid, ms:.0f"
+        "within the target:.0% | met | grid, ms:.0f"
     )
     return short, Table("", columns, [each.row() for each in found])
