@@ -24,9 +24,7 @@ from transientcam.requests import (
     recording_path,
 )
 from transientcam.stream import Stream
-from transientcam.stream_state import (
-    StreamState,
-)
+from transientcam.stream_state import StreamState
 from transientcam.transport import (
     DownloadProgress,
     Progress,
