@@ -1,14 +1,14 @@
 """How long a camera's light stays on where the daemon loses control of it.
 
-Each camera is a process of its own, and says itself when its light is on. The daemon is another one
-and reaches it by real calls of libusb; so does its supervisor. ``python -m
-tests.server.daemon.losing_control TIMES [KIND ...]`` does everything so many times, and prints how
-often the light was off in time and then stayed off until somebody started it, also over a restart,
-and how long it was on at most.
+Each camera is a process of its own, and says itself when its light went off. The daemon is another
+one and reaches it by real calls of libusb; so does its supervisor. `try_all` does everything many
+times, several cameras beside each other, and notes each try; ``python -m benchmarks
+losing_control`` makes a table of them.
 """
 
 import json
 import math
+import multiprocessing
 import os
 import select
 import signal
@@ -17,8 +17,10 @@ import sys
 import tempfile
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,13 +31,15 @@ from tests.driver.cameras.open_usb.usbfs.processes import EmulatedCamera, emulat
 from tests.server.relay.forwarder import Forwarder, forwarding
 from tests.serving import Served, serving
 from tests.waiting import wait_until
-from transientcam_driver.errors import CameraLost
 
 KINDS: Final = ("usb", "kinect2", "opt8241")
-LIMIT_S: Final = 2.0
+RELAYED: Final = ("usb", "opt8241")
+"""A Kinect v2 is not relayed yet."""
 DARK_S: Final = 0.3
 SURELY_DARK_S: Final = 1.5
 """Where it is counted: a laden machine requests no frame for a while, and then again."""
+DARK_BEFORE_S: Final = 0.3
+"""A camera that exposes on request is dark so long between two images."""
 PATIENCE_S: Final = 60.0
 STALLED_REQUESTS: Final = 12
 LIGHT: Final = {
@@ -107,6 +111,8 @@ class Control:
         self._fifos = 0
         self._client: httpx.Client | None = None
         self.url = ""
+        self.off_s = -math.inf
+        """When the light was last seen to have gone off."""
         self.process: psutil.Process | None = None
         self.supervisor: psutil.Process | None = None
 
@@ -122,9 +128,11 @@ class Control:
     def _lights(self) -> bool:
         assert self._client is not None
         assert self.process is not None
-        self._client.put("/api/v1/acquisition", json={"running": True}).raise_for_status()
+        answer = self._client.put("/api/v1/acquisition", json={"running": True})
+        if answer.status_code != httpx.codes.CONFLICT:  # it was switched off meanwhile
+            answer.raise_for_status()
         # some light for moments only: the camera is asked to wait for one
-        lit = self.camera.signal(self.process.pid, 0)
+        lit = self.camera.signal(self.process.pid, 0) is not None
         family = self.process.children()
         watching = [each for each in family if "transientcam_supervisor" in _command(each)]
         self.supervisor = watching[0] if watching else None
@@ -142,24 +150,30 @@ class Control:
         assert self._client is not None
         self._client.post("/api/v1/acquisition/safe-off")
 
+    def prepare_to_plan(self) -> None:
+        """Have the daemon start the process that plans."""
+        assert self._client is not None
+        self._client.get("/prepare").raise_for_status()
+
     def state(self) -> tuple[str, str | None]:
         """Return what the daemon says of the capture, and why."""
         assert self._client is not None
         document = self._client.get("/api/v1/acquisition").json()
         return document["state"], document["reason"]
 
-    def signal(self, number: signal.Signals) -> None:
-        """Send a signal while the light is on, to the microsecond.
+    def signal(self, number: signal.Signals) -> float:
+        """Send a signal while the light is on; return when, in s.
 
         A machine that is laden enough puts it out before that.
         """
         assert self.process is not None
-        while not self.camera.signal(self.process.pid, int(number)):
+        while (sent_s := self.camera.signal(self.process.pid, int(number))) is None:
             self.light()
+        return sent_s
 
     @contextmanager
-    def stuck(self, where: str) -> Iterator[None]:
-        """Let threads wait to the end of the block."""
+    def stuck(self, where: str) -> Iterator[float]:
+        """Let threads wait to the end of the block; yield since when they may do so, in s."""
         self._fifos += 1
         fifo = self._folder / f"fifo-{self._fifos}"
         os.mkfifo(fifo)
@@ -167,37 +181,31 @@ class Control:
         asking = threading.Thread(
             target=self._client.get, args=(f"/{where}",), kwargs={"params": {"fifo": str(fifo)}}
         )
+        begin_s = time.monotonic()
         asking.start()
         with fifo.open("wb"):  # opens once the other end is open: they wait
-            yield
+            yield begin_s
         asking.join()
 
     def stays_off(self) -> bool:
-        """Return whether it is dark, and is so after a restart, until somebody starts."""
+        """Return whether it stays dark, and does so over a restart, until somebody starts."""
         assert self.process is not None
+        off_s = self.off_s
         if self.process.is_running() and self.process.status() != psutil.STATUS_STOPPED:
             wait_until(lambda: self.state()[0] == "stopped")  # it may only now run again
         self.start()
-        lit_s, (state, _) = self.goes_off(), self.state()
+        self.goes_off(off_s)
+        stayed = self.off_s == off_s and self.state()[0] == "stopped"
         self.light()
-        return lit_s == 0.0 and state == "stopped"
+        return stayed
 
-    def goes_off(self) -> float:
-        """Wait until the camera says that its light stays off; return when it was on last, in s.
+    def goes_off(self, since_s: float) -> float:
+        """Wait until the light stays off; return how long after ``since_s`` it went off, in s.
 
         One that exposes on request is dark between two requests, too.
         """
-        begin_s = lit_s = time.monotonic()
-
-        def dark() -> bool:
-            nonlocal lit_s
-            asked_s = time.monotonic()
-            if self.camera.lit:
-                lit_s = asked_s
-            return time.monotonic() - lit_s > self._dark_s
-
-        wait_until(dark)
-        return lit_s - begin_s
+        self.off_s = self.camera.off_since(self._dark_s)
+        return self.off_s - since_s
 
     def end(self) -> None:
         """End the daemon, however it is, and see its supervisor end, as systemd does."""
@@ -226,18 +234,17 @@ def _command(process: psutil.Process) -> list[str]:
 
 
 def _killed(control: Control) -> float:
-    control.signal(signal.SIGKILL)
-    return control.goes_off()
+    return control.goes_off(control.signal(signal.SIGKILL))
 
 
 def _crashed(control: Control) -> float:
-    control.signal(signal.SIGSEGV)
-    return control.goes_off()
+    return control.goes_off(control.signal(signal.SIGSEGV))
 
 
 def _out_of_memory(control: Control) -> float:
     """Kill what the kernel would: the greatest ``oom_score`` first, until the daemon is gone."""
     assert control.process is not None
+    control.prepare_to_plan()
     daemon = control.process.pid
     children = {each.pid: each for each in control.process.children()}
     while True:
@@ -251,55 +258,52 @@ def _out_of_memory(control: Control) -> float:
 
 
 def _stopped(control: Control) -> float:
-    control.signal(signal.SIGSTOP)
-    took_s = control.goes_off()
-    return took_s
+    return control.goes_off(control.signal(signal.SIGSTOP))
 
 
 def _hung_disk(control: Control) -> float:
     """Nothing that waits for the disk comes back, and the daemon is asked to end."""
     with control.stuck("stuck-threads"):
-        control.signal(signal.SIGTERM)
-        return control.goes_off()
+        return control.goes_off(control.signal(signal.SIGTERM))
 
 
 def _stuck_loop(control: Control) -> float:
-    with control.stuck("stuck"):
-        return control.goes_off()
+    with control.stuck("stuck") as begin_s:
+        return control.goes_off(begin_s)
 
 
 def _stuck_camera(control: Control) -> float:
-    with control.stuck("stuck-camera"):
-        return control.goes_off()
+    with control.stuck("stuck-camera") as begin_s:
+        return control.goes_off(begin_s)
 
 
 def _stalled(control: Control) -> float:
     """The camera stalls requests, and somebody wants it off."""
-    control.camera.do("stall", STALLED_REQUESTS)
     begin_s = time.monotonic()
+    control.camera.do("stall", STALLED_REQUESTS)
     control.safe_off()
-    asked_s = time.monotonic() - begin_s
-    took_s = asked_s + control.goes_off()
+    took_s = control.goes_off(begin_s)
     control.camera.do("stall", 0)  # the next daemon could not open it
     return took_s
 
 
 def _restarted(control: Control) -> float:
     """Asked to end, as a service manager does before it starts the next one."""
-    control.signal(signal.SIGTERM)
-    return control.goes_off()
+    return control.goes_off(control.signal(signal.SIGTERM))
 
 
 def _supervisor_ended(control: Control) -> float:
     assert control.supervisor is not None
+    begin_s = time.monotonic()
     control.supervisor.terminate()
-    return control.goes_off()
+    return control.goes_off(begin_s)
 
 
 def _supervisor_killed(control: Control) -> float:
     assert control.supervisor is not None
+    begin_s = time.monotonic()
     control.supervisor.kill()
-    return control.goes_off()
+    return control.goes_off(begin_s)
 
 
 EVENTS: Final[dict[str, Callable[[Control], float]]] = {
@@ -322,12 +326,17 @@ ENDING: Final = {"SIGSTOP", "hung disk, SIGTERM", "restart", "out of memory", "S
 
 
 def lose(control: Control, event: str) -> float:
-    """Have the light on, let it happen, and return how long the light then stays on, in s."""
-    control.light()
-    took_s = EVENTS[event](control)
-    if event in ENDING:
-        control.end()
-    return took_s
+    """Have the light on, let it happen, and return how long the light then stays on, in s.
+
+    It is repeated where a machine that is laden had put the light out before.
+    """
+    took_s = -math.inf
+    while took_s < -DARK_BEFORE_S:
+        control.light()
+        took_s = EVENTS[event](control)
+        if event in ENDING:
+            control.end()
+    return max(took_s, 0.0)
 
 
 NETWORKS: Final = {"0 s": 0.0, "4 s": 4.0, "silent": math.inf}
@@ -349,7 +358,7 @@ class Relays:
             url = self._relays[-1].url
 
     def safe_off(self, hop: int, delay_s: float) -> tuple[bool, float]:
-        """Request it; return whether the light then stays off, and how long it was on.
+        """Request it; return whether the light then stays off, and how long it was on, in s.
 
         That is beyond what the networks take; of silent ones from when they speak.
         """
@@ -367,14 +376,18 @@ class Relays:
             begin_s = time.monotonic()
             for each in self._links:
                 each.speak()
-        asked_s = time.monotonic() - begin_s
-        took_s = asked_s + self._control.goes_off() - (0.0 if silent else hop * delay_s)
+        took_s = self._control.goes_off(begin_s) - (0.0 if silent else hop * delay_s)
+        off_s = self._control.off_s
         for each in self._links:
             each.delay_s = 0.0
-        services = [each.service.acquisition for each in self._relays]
-        wait_until(lambda: not any(each.status().switching_off for each in services))
-        dark = self._control.state()[0] == "stopped" and self._control.goes_off() == 0.0
-        return dark, took_s
+        wait_until(self._settled)
+        self._control.goes_off(off_s)
+        return self._control.off_s == off_s and self._control.state()[0] == "stopped", took_s
+
+    def _settled(self) -> bool:
+        """Return whether every relay knows that it is off, and no request is on its way."""
+        known = not any(each.service.acquisition.status().switching_off for each in self._relays)
+        return known and not any(each.waiting for each in self._links)
 
 
 @contextmanager
@@ -390,46 +403,72 @@ def controlled(
             control.close()
 
 
-def main() -> None:
-    """Do everything so many times as the command line says, and print a table."""
-    times = int(sys.argv[1])
-    kinds = sys.argv[2:] or KINDS
+SAFE_OFFS: Final = {
+    f"safe-off at relay {hop}, network {network}": (hop, delay_s)
+    for hop in range(1, HOPS + 1)
+    for network, delay_s in NETWORKS.items()
+}
+
+
+@dataclass(frozen=True)
+class Try:
+    """What became of one of many."""
+
+    kind: str
+    event: str
+    number: int
+    dark: bool
+    """Whether the light then stayed off until somebody started it."""
+    took_s: float
+    """How long it was on."""
+    why: str = ""
+    """What else went wrong."""
+
+
+def tries(noted: Path) -> list[Try]:
+    """Read what was noted, a JSON object a line."""
+    lines = noted.read_text().splitlines() if noted.exists() else ()
+    return [Try(**json.loads(each)) for each in lines]
+
+
+def try_all(times: int, noted: Path, *, cameras: int, kinds: tuple[str, ...] = KINDS) -> None:
+    """Try everything so many times that is not noted yet, with so many cameras at a time."""
+    done = {(each.kind, each.event, each.number) for each in tries(noted)}
+    parts = []
+    for first in range(0, times, 10):
+        for events, some in ((SAFE_OFFS, RELAYED), (EVENTS, KINDS)):
+            for kind in (each for each in some if each in kinds):
+                numbers = range(first, min(first + 10, times))
+                left = [(event, number) for number in numbers for event in events]
+                left = [each for each in left if (kind, *each) not in done]
+                parts.append((kind, left, noted))
+    spawning = multiprocessing.get_context("spawn")
+    with spawning.Pool(cameras, maxtasksperchild=1) as pool:
+        for _ in pool.imap_unordered(_try_some, [each for each in parts if each[1]], chunksize=1):
+            pass
+
+
+def _try_some(part: tuple[str, list[tuple[str, int]], Path]) -> None:
+    """Try one after another with one camera, and with the next where something went wrong."""
+    kind, left, noted = part[0], deque(part[1]), part[2]
     zygote = Zygote()
-    found: dict[str, dict[str, list[tuple[bool, float]]]] = {}
-
-    def note(event: str, kind: str, dark: bool, took_s: float) -> None:
-        found.setdefault(event, {}).setdefault(kind, []).append((dark, took_s))
-        print(kind, event, "dark" if dark else "NOT DARK", took_s, file=sys.stderr, flush=True)
-
-    for kind in kinds:
-        with controlled(zygote, kind, dark_s=SURELY_DARK_S) as control:
-            for _ in range(times):
-                for event in EVENTS:
-                    took_s = lose(control, event)
-                    note(event, kind, control.stays_off(), took_s)
-            with ExitStack() as stack:
+    while left:
+        with controlled(zygote, kind, dark_s=SURELY_DARK_S) as control, ExitStack() as stack:
+            control.light()
+            relays = Relays(control, stack) if left[0][0] in SAFE_OFFS else None
+            why = ""
+            while left and not why:
+                event, number = left.popleft()
+                dark, took_s = False, math.inf
                 try:
-                    relays = Relays(control, stack)
-                except CameraLost as error:  # a Kinect is not relayed yet
-                    print(kind, error, file=sys.stderr)
-                    continue
-                for _ in range(times):
-                    for hop in range(1, HOPS + 1):
-                        for network, delay_s in NETWORKS.items():
-                            event = f"safe-off at relay {hop}, network {network}"
-                            note(event, kind, *relays.safe_off(hop, delay_s))
+                    if relays is not None:
+                        dark, took_s = relays.safe_off(*SAFE_OFFS[event])
+                    else:
+                        took_s = lose(control, event)
+                        dark = control.stays_off()
+                except Exception as error:  # noqa: BLE001 - a finding, whatever it is
+                    why = repr(error)
+                line = json.dumps(asdict(Try(kind, event, number, dark, took_s, why)))
+                with noted.open("a") as file:
+                    file.write(line + "\n")
     zygote.close()
-    print("| event | " + " | ".join(kinds) + " |")
-    for event, each in found.items():
-        cells = (
-            f"{sum(dark and took_s < LIMIT_S for dark, took_s in tries)} of {len(tries)}, "
-            f"{max(took_s for _, took_s in tries):.2f} s"
-            if (tries := each.get(kind))
-            else "-"
-            for kind in kinds
-        )
-        print(f"| {event} | " + " | ".join(cells) + " |")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,7 +1,8 @@
 """``transientcam serve`` with more routes, by which threads wait until a file is closed.
 
 ``GET /stuck?fifo=PATH`` reads from a FIFO on the event loop, ``/stuck-camera`` on the thread of the
-camera, and ``/stuck-threads`` on all that requests have, as a disk does that does not answer.
+camera, and ``/stuck-threads`` on all that requests have, as a disk does that does not answer. The process
+for plans, which takes half a second of processor time, starts by ``GET /prepare``.
 """
 
 import asyncio
@@ -21,6 +22,12 @@ _build = application.build_app
 
 def _with_routes(camera: Camera, settings: Settings) -> FastAPI:
     app = _build(camera, settings)
+    planning = app.state.service.planning
+    prepare, planning.prepare = planning.prepare, lambda: None
+
+    @app.get("/prepare")
+    async def prepared() -> None:
+        prepare()
 
     @app.get("/stuck")
     async def stuck(fifo: str) -> None:

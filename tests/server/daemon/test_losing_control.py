@@ -72,8 +72,7 @@ def test_after_a_restart_it_stays_dark_until_somebody_starts(
 
 def test_after_a_pause_it_stays_dark_until_somebody_starts(opt8241: Control) -> None:
     opt8241.light()
-    opt8241.signal(signal.SIGSTOP)
-    opt8241.goes_off()
+    opt8241.goes_off(opt8241.signal(signal.SIGSTOP))
     opt8241.process.send_signal(signal.SIGCONT)  # type: ignore[union-attr]  # it is there
 
     wait_until(lambda: opt8241.state()[0] == "stopped")

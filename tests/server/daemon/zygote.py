@@ -12,7 +12,11 @@ import sys
 
 from stuck_daemon import run  # type: ignore[import-not-found]  # beside this script, no package
 
-for _each in ("transientcam_server.cli.serve", "transientcam_driver.cameras.kinect2"):
+for _each in (
+    *("transientcam_server.cli.serve", "transientcam_server.daemon._server", "uvloop"),
+    *("transientcam_driver.cameras.kinect2", "transientcam_opt8241.plugin"),
+    *("transientcam_simulation.entries", "uvicorn.protocols.http.httptools_impl"),
+):
     importlib.import_module(_each)
 
 

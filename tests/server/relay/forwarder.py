@@ -29,6 +29,7 @@ class Forwarder:
         self.delay_s = 0.0
         self.admitting = True
         self.seen = b""
+        self._queues: list[SimpleQueue[tuple[float, bytes]]] = []
         self._closing = threading.Event()
         self._passing = threading.Event()
         self._passing.set()
@@ -41,6 +42,11 @@ class Forwarder:
     def url(self) -> str:
         """Where clients connect."""
         return f"http://127.0.0.1:{self._listener.getsockname()[1]}"
+
+    @property
+    def waiting(self) -> int:
+        """How many pieces came and are not passed on yet."""
+        return sum(each.qsize() for each in list(self._queues))
 
     def silence(self) -> None:
         """Pass nothing on until `speak`: what is sent meanwhile waits, and nobody is told."""
@@ -91,6 +97,7 @@ class Forwarder:
 
     def _pass_on(self, source: socket.socket, sink: socket.socket) -> None:
         waiting: SimpleQueue[tuple[float, bytes]] = SimpleQueue()
+        self._queues.append(waiting)
         self._run(self._deliver, waiting, sink)
         with suppress(OSError):
             while data := source.recv(1 << 16):
@@ -104,6 +111,7 @@ class Forwarder:
                 self._closing.wait(max(0.0, item[0] - time.monotonic()))
                 self._passing.wait()
                 sink.sendall(item[1])
+        self._queues.remove(waiting)  # what nobody takes any more
         with suppress(OSError):
             sink.shutdown(socket.SHUT_RDWR)
 

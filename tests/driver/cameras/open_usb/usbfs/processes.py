@@ -71,9 +71,20 @@ class EmulatedCamera:
         """Let something happen to the camera."""
         assert self._ask(command, *arguments) == "done"
 
-    def signal(self, pid: int, number: int) -> bool:
-        """Send a signal to a process while the light is on; return False where it stays dark."""
-        return bool(self._ask("signal", pid, number))
+    def signal(self, pid: int, number: int) -> float | None:
+        """Send a signal to a process while the light is on; return when, by `time.monotonic`.
+
+        None where it stays dark.
+        """
+        sent_s: float | None = self._ask("signal", pid, number)
+        return sent_s
+
+    def off_since(self, dark_s: float) -> float:
+        """Wait until the light is off for so long from now on.
+
+        Return when it went off, as `signal` does; infinity where it does not.
+        """
+        return float(self._ask("off", dark_s))
 
     def close(self) -> None:
         """End the process; it must end well."""

@@ -4,9 +4,11 @@ A command is a JSON list: what to do, and its arguments.
 """
 
 import json
+import math
 import os
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -83,7 +85,42 @@ class Opt8241:
             self.device.requests_to_stall = requests
 
 
+class Watch:
+    """Sees the light go off, at most a moment later."""
+
+    def __init__(self, lit: Callable[[], bool]) -> None:
+        self._lit = lit
+        self.off_s = time.monotonic()
+        """When it was seen to have gone off, or while it is on, now."""
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._look)
+        self._thread.start()
+
+    def _look(self) -> None:
+        before = False
+        while not self._ending.wait(LOOK_EVERY_S):
+            lit = self._lit()
+            if lit or before:
+                self.off_s = time.monotonic()
+            before = lit
+
+    def off_since(self, dark_s: float) -> float:
+        """Wait until it is off for so long from now on; return since when, infinity for never."""
+        begin_s = time.monotonic()
+        while (left_s := max(self.off_s, begin_s) + dark_s - time.monotonic()) > 0.0:
+            if time.monotonic() > begin_s + PATIENCE_S:
+                return math.inf
+            time.sleep(left_s + 2 * LOOK_EVERY_S)
+        return self.off_s
+
+    def close(self) -> None:
+        self._ending.set()
+        self._thread.join()
+
+
 LIT_WITHIN_S = 5.0
+PATIENCE_S = 60.0
+LOOK_EVERY_S = 0.005
 KINDS = {"usb": Prototype, "kinect2": Kinect2, "opt8241": Opt8241}
 
 
@@ -91,6 +128,7 @@ def main() -> None:
     root, kind = Path(sys.argv[1]), sys.argv[2]
     camera: Any = KINDS[kind](root)
     device, mount = camera.device, camera.mount
+    watch = Watch(camera.lit)
 
     def obey(command: str, *arguments: Any) -> object:
         match command:
@@ -111,9 +149,12 @@ def main() -> None:
             case "signal":
                 with device.changed:  # no request is obeyed between the two
                     lit = device.changed.wait_for(camera.lit, LIT_WITHIN_S)
+                    sent_s = time.monotonic() if lit else None
                     if lit:
                         os.kill(arguments[0], arguments[1])
-                return lit
+                return sent_s
+            case "off":
+                return watch.off_since(arguments[0])
             case "light":
                 return camera.lit()
             case "watchdog":
@@ -125,6 +166,7 @@ def main() -> None:
     print(json.dumps("ready"), flush=True)  # noqa: T201 - the protocol of this process
     for line in sys.stdin:
         print(json.dumps(obey(*json.loads(line))), flush=True)  # noqa: T201 - the same
+    watch.close()
     mount.close()
 
 
