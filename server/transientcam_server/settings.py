@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping
+from functools import cache
 from ipaddress import ip_address
 from pathlib import Path
 from typing import (
@@ -39,6 +40,7 @@ from transientcam_moments.reconstruction import ESTIMATORS, least_harmonics
 _DEFAULTS = tm.Settings()
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Read = TypeVar("_Read")
+_reader_of: Callable[..., TypeAdapter[Any]] = cache(TypeAdapter)
 
 
 def no_switch_for_a_number(model: type[BaseModel], value: object, info: ValidationInfo) -> object:
@@ -56,7 +58,8 @@ def dataclass_of(kind: type[_Read], document: object) -> _Read:
     for name, value in document.items():
         if _is_misread(expected.get(name), value):
             raise ValueError(f"{name} is {value!r}, but must be a number")
-    return TypeAdapter(kind).validate_python(document)
+    read: _Read = _reader_of(kind).validate_python(document)
+    return read
 
 
 def _is_misread(annotation: Any, value: object) -> bool:

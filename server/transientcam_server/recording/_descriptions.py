@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from transientcam_server.errors import NotARecording, fenced
+from transientcam_server.errors import fenced
 from transientcam_server.recording import _lock as lock
 from transientcam_server.recording._directory import id_of
 from transientcam_server.recording._layout import Header
@@ -70,10 +70,10 @@ class Descriptions:
         return known[1]
 
 
-def of_recorder(recorder: Recorder, part: Path) -> dict[str, Any]:
-    """Describe a recording that runs and is written into ``part``."""
+def of_recorder(recorder: Recorder) -> dict[str, Any]:
+    """Describe a recording that runs."""
     progress = recorder.progress
-    document = _of_header(recorder.header) | {
+    return _of_header(recorder.header) | {
         "state": "recording" if progress.reason is None else "finishing",
         "frames": progress.frames,
         "synced_frames": progress.synchronised_frames,
@@ -83,13 +83,8 @@ def of_recorder(recorder: Recorder, part: Path) -> dict[str, Any]:
         "reason": progress.reason,
         "problem": progress.problem,
         "limits": asdict(recorder.limits),
+        "annotations": recorder.annotations,
     }
-    try:
-        with Recording(part) as recording:
-            document["annotations"] = recording.annotations
-    except (NotARecording, OSError):  # it was finished this moment
-        document["annotations"] = {}
-    return document
 
 
 def of_removed(recorder: Recorder) -> dict[str, Any]:

@@ -182,9 +182,8 @@ class Library:
             recorder = self._recorder(options, started_s)
             self._active = recorder
             recorder.start()
-        document = self._describe_active(recorder)
         self._notify("recording-started", {"recording": recorder.header.recording_id})
-        return document
+        return of_recorder(recorder)
 
     def precede(self, recording_id: str, past: Sequence[tuple[RawFrame, AppliedSequence]]) -> int:
         """Put frames of the history before a recording's own; return how many were taken.
@@ -315,6 +314,7 @@ class Library:
             writer,
             header,
             limits=self._limits(options.limits),
+            annotations=options.annotations,
             queue_frames=self._queue_frames(header),
             free_bytes=self._directory.free_bytes,
             on_dropped=self._dropped,
@@ -391,7 +391,7 @@ class Library:
     def _described(self, recording_id: str) -> dict[str, Any] | None:
         recorder = self._recorder_of(recording_id)
         if recorder is not None:
-            return self._describe_active(recorder)
+            return of_recorder(recorder)
         document = self._of_file(recording_id)
         if document is None:
             return self._removed.get(recording_id)
@@ -410,10 +410,6 @@ class Library:
             if document is not None:
                 return document
         return None
-
-    def _describe_active(self, recorder: Recorder) -> dict[str, Any]:
-        part = self.directory / (recorder.header.recording_id + layout.PART_SUFFIX)
-        return of_recorder(recorder, part)
 
     def _recover(self, parts: list[Path]) -> None:
         for part in parts:

@@ -97,6 +97,7 @@ class Recorder:
         header: Header,
         *,
         limits: Limits,
+        annotations: Mapping[str, Any] | None = None,
         queue_frames: int,
         free_bytes: Callable[[], int],
         on_dropped: Callable[[int, int], None] = lambda count, total: None,
@@ -108,6 +109,8 @@ class Recorder:
         self.header = header
         self.limits = limits
         self._writer = writer
+        self.annotations = dict(annotations or {})
+        """What people wrote about it, as JSON."""
         self._depth = queue_frames
         self._free_bytes = free_bytes
         self._on_dropped = on_dropped
@@ -185,6 +188,7 @@ class Recorder:
         with self._changed:
             if self._reason is not None:
                 return False
+            self.annotations = dict(annotations)
             self._work.append(lambda: self._writer.annotate(annotations))
             self._changed.notify()
             return True

@@ -1,8 +1,8 @@
 """``transientcam serve`` with more routes, by which threads wait until a file is closed.
 
 ``GET /stuck?fifo=PATH`` reads from a FIFO on the event loop, ``/stuck-camera`` on the thread of the
-camera, and ``/stuck-threads`` on all that requests have, as a disk does that does not answer. The process
-for plans, which takes half a second of processor time, starts by ``GET /prepare``.
+camera, and ``/stuck-threads`` on all that requests have, as a disk does that does not answer. The
+process for plans, which takes half a second of processor time, starts by ``GET /prepare``.
 """
 
 import asyncio
