@@ -83,6 +83,7 @@ _ALL: Final = (
     Measurement("service.cluster", "cluster", _OFFLINE, 3),
     Measurement("service.default_sequence", "measured/default-sequence", _CAMERA, timed=False),
     Measurement("service.autobahn", "measured/autobahn", _DAEMON, by_hand=True),
+    Measurement("service.losing_control", "operations", (*_DAEMON, "driver"), by_hand=True),
     # -- recordings
     Measurement("recordings.recording", "measured/recording-cost", _RECORDING),
     Measurement("recordings.by_hand", "recordings", (*_MOMENTS, *_IMAGING), 3),
