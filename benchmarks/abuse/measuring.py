@@ -30,7 +30,7 @@ _SAFE_OFFS: Final = 10
 COMES_BACK_S: Final = 3.0
 _FIRST_FRAMES_S: Final = 1.0
 _WAITING_S: Final = 0.1
-_HISTORY_S: Final = 2.0
+HISTORY_S: Final = 2.0
 """Frames are kept for so long, and memory grows until then."""
 
 
@@ -86,7 +86,7 @@ def served(checkout: Path | None, *, tls: bool) -> Iterator[Process]:
     program = Path(sys.executable).with_name("transientcam")
     command: list[str | Path] = [program, "serve", "--port", "0", "--camera", "sim:mirrors"]
     with tempfile.TemporaryDirectory() as name:
-        environment = {"XDG_DATA_HOME": name, "TRANSIENTCAM_HISTORY__SECONDS": f"{_HISTORY_S}"}
+        environment = {"XDG_DATA_HOME": name, "TRANSIENTCAM_HISTORY__SECONDS": f"{HISTORY_S}"}
         if checkout is not None:
             parts = ("client", "driver", "server")
             environment["PYTHONPATH"] = ":".join(str(checkout / part) for part in parts)
@@ -132,7 +132,8 @@ def measure(
         viewer = None if tls else Viewer(process.stream_url, RANGE)  # the viewers speak no TLS
         if viewer is not None:
             watch([viewer], duration_s=_FIRST_FRAMES_S)
-        before = _frames(viewer, client, duration_s)
+        # by its end memory does not grow any more
+        before = _frames(viewer, client, max(duration_s, HISTORY_S + 1.0))
         memory_bytes = process.resident_bytes()
         probe = Probe(process, client)
         with contextlib.ExitStack() as attack:
@@ -178,7 +179,6 @@ def prepare(process: Process, client: httpx.Client) -> float:
     client.get("/api/v1/frames/latest/transient", params={"bins": 100, "wait_s": 10.0})
     client.get("/api/v1/frames/latest/transient.tiff", params={"bins": 1})
     client.get("/openapi.json")
-    time.sleep(_HISTORY_S + 1.0)
     rate_hz: float = applied["frame_rate_hz"]
     return rate_hz
 

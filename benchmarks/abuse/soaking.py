@@ -8,7 +8,7 @@ from typing import Final
 
 import httpx
 
-from benchmarks.abuse.measuring import GIVE_UP_S, RANGE, attacked, prepare, served
+from benchmarks.abuse.measuring import GIVE_UP_S, HISTORY_S, RANGE, attacked, prepare, served
 from benchmarks.common.tables import Table, heads
 from benchmarks.service.soak import HELD, UNITS, Sample
 from benchmarks.service.viewers import Viewer, cut, watch
@@ -39,6 +39,7 @@ def soak(minutes: float) -> Soak:
         httpx.Client(base_url=process.url, timeout=GIVE_UP_S) as client,
     ):
         rate_hz = prepare(process, client)
+        time.sleep(HISTORY_S + 1.0)
         viewer = Viewer(process.stream_url, RANGE)
 
         def look(duration_s: float, samples: list[Sample]) -> float:
