@@ -29,7 +29,7 @@ def tables(times: int = 100, cameras: int = 6, noted: Path | None = None) -> Ite
         ]
         for event in (*EVENTS, *SAFE_OFFS)
     ]
-    note = f"{cameras} cameras at a time, each with a daemon and a supervisor of its own."
+    note = "Several cameras at a time, each with a daemon and a supervisor of its own."
     yield Table("", ("what was tried", *KINDS), rows, [note])
 
 
