@@ -1,6 +1,5 @@
 """How long a camera's light stays on where the daemon loses control of it."""
 
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,27 +9,18 @@ from tests.server.daemon.losing_control import EVENTS, KINDS, SAFE_OFFS, Try, tr
 LIMIT_S = 2.0
 
 
-def tables(times: int = 100, cameras: int = 6, noted: Path | None = None) -> Iterator[Table]:
+def tables(noted: Path, times: int = 100, cameras: int = 6) -> Iterator[Table]:
     """Lose control in every way, so many times of each kind of camera.
 
-    ``noted``: a file of tries, of which only what is missing is done.
+    ``noted``: keeps the tries; what it has is not tried again.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        file = noted or Path(folder) / "tries"
-        try_all(times, file, cameras=cameras)
-        found = tries(file)
-    rows = [
-        [
-            event,
-            *(
-                _cell([each for each in found if (each.event, each.kind) == (event, kind)])
-                for kind in KINDS
-            ),
-        ]
-        for event in (*EVENTS, *SAFE_OFFS)
-    ]
-    note = "Several cameras at a time, each with a daemon and a supervisor of its own."
-    yield Table("", ("what was tried", *KINDS), rows, [note])
+    try_all(times, noted, cameras=cameras)
+    found: dict[tuple[str, str], list[Try]] = {}
+    for each in tries(noted):
+        found.setdefault((each.event, each.kind), []).append(each)
+    events = (*EVENTS, *SAFE_OFFS)
+    rows = [[event, *(_cell(found.get((event, kind), [])) for kind in KINDS)] for event in events]
+    yield Table("", ("what was tried", *KINDS), rows)
 
 
 def _cell(found: list[Try]) -> str:
