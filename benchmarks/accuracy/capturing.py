@@ -79,7 +79,7 @@ def measured(
                 brightest = each.raw.images.max(axis=0).ravel()[lit]
                 full = float((brightest >= sensor.highest_dn).mean())
             found = recipe.reconstruct(each.raw)
-            b = tm.smooth(np.asarray(found.measured), SETTINGS.smoothing_px)
+            b = np.asarray(found.smoothed)
             variance = np.asarray(moment_noise(recipe, found).variance)
             part, noise = (of.reshape((len(of), -1))[:, pixels] for of in (b, variance))
             found_m = ranges_m(part, noise, estimator, recipe.base_frequency_hz, SETTINGS)

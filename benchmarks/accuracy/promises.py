@@ -330,7 +330,7 @@ def _captured(
                     random = np.random.default_rng(1)
                     pixels = random.choice(lit, min(PIXELS // 2, lit.size), replace=False)
                 found = recipe.reconstruct(frame.raw)
-                b = tm.smooth(np.asarray(found.measured), SETTINGS.smoothing_px)
+                b = np.asarray(found.smoothed)
                 variance = np.asarray(moment_noise(recipe, found).variance)
                 of_pixels = (
                     np.broadcast_to(each, b.shape).reshape((len(b), -1))[:, pixels]

@@ -17,7 +17,9 @@ from transientcam_moments.images import gaussian_taps
 Array = NDArray[Any]
 CORES = len(os.sched_getaffinity(0))
 BASE_FREQUENCY_HZ = 23e6
-SETTINGS = tm.Settings(BASE_FREQUENCY_HZ, "low-frequency", takes=1, estimator="pisarenko")
+SETTINGS = tm.Settings(
+    BASE_FREQUENCY_HZ, "low-frequency", takes=1, estimator="pisarenko", neighbours="gaussian"
+)
 PAPER = (120, 163)
 VGA = (480, 640)
 

@@ -137,7 +137,7 @@ def by_worker(path: Path) -> _Array:
 
 
 def _settings(file: h5py.File) -> ReconstructionSettings:
-    return ReconstructionSettings(**json.loads(file.attrs["reconstruction"]))
+    return ReconstructionSettings.recorded(json.loads(file.attrs["reconstruction"]))
 
 
 def differences(served: _Array, found: _Array) -> tuple[float, float, float]:

@@ -136,11 +136,11 @@ class ReconstructionSettings(_Group):
     """How images become moments and moments become returns."""
 
     neighbours: Neighbours = "gaussian"
-    """How moments are averaged over neighbouring pixels. `gaussian` is the paper's.
-    `edge-preserving` averages up to 69 pixels that differ by no more than noise, and none across
-    an edge: the noise falls two to four times further. Where the noise is not known, as of moments
-    alone, it is `gaussian`, as it is in plans; each frame names the one applied. Beyond 8 harmonics
-    and until its kernel is compiled it runs in NumPy, more slowly."""
+    """How moments are averaged over neighbouring pixels. `edge-preserving` averages up to 69 that
+    differ by no more than noise, and none across an edge: the noise falls two to four times further
+    than by `gaussian`, which is the paper's, and stands in where the noise is not known, as of
+    moments alone; each frame names the one applied. Beyond 8 harmonics and until its kernel is
+    compiled it runs in NumPy, more slowly."""
     still_frames: int = Field(default=1, ge=1, le=tm.noise.MOST_FRAMES)
     """How many frames of a stream are averaged, at most, in each pixel that stands still; 1 for
     none. A pixel begins anew in the frame in which it changes by more than noise, or has drifted:
@@ -173,6 +173,11 @@ class ReconstructionSettings(_Group):
     modulation_harmonics: Literal["take-out", "keep"] = "take-out"
     """Odd harmonics of the modulation, where the calibration has measured them: taken out of the
     moments, or kept in them."""
+
+    @classmethod
+    def recorded(cls, given: Mapping[str, Any]) -> Self:
+        """Return those of a recording; before there was `neighbours` it was a Gaussian."""
+        return cls.model_validate({"neighbours": "gaussian", **given})
 
     @property
     def gaussian_px(self) -> float:

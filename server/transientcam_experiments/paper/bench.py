@@ -154,7 +154,9 @@ class Bench:
             calibration.capture.require_fit(applied, camera.capabilities)
             full_scale = 2.0**camera.capabilities.bits - 1.0
             # "in videos we fill in data missing due to outliers" (Sec. 6)
-            settings = ReconstructionSettings(estimator="pisarenko", spoilt_images="fill")
+            settings = ReconstructionSettings(
+                estimator="pisarenko", neighbours="gaussian", spoilt_images="fill"
+            )
             recipe = Recipe(applied, settings, full_scale, calibration.gains)
             before: RawFrame | None = None
             assert camera.simulation is not None  # noqa: S101 - only simulated ones are opened

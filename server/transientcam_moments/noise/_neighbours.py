@@ -1,6 +1,7 @@
 """Averaging moments over neighbouring pixels, but not across edges: adaptive weights."""
 
 import math
+from collections.abc import Callable
 from functools import reduce
 from operator import add
 from typing import Final, NamedTuple
@@ -24,6 +25,12 @@ MOST_SHIFT: Final = 8.0
 MISFIT_OF_ONE: Final = 0.02
 SHIFT_OF_ONE: Final = 0.001
 """Weights of a neighbour alone beside those of its mean with its mirror image."""
+LONE: Final = 0.5
+"""Share of its variance left, above which a pixel agreed with no pair of neighbours."""
+OF_NOISE: Final = 4.0
+"""Deviations by which noise alone may put such a pixel off."""
+_BESIDE: Final = np.array([[0, 1, 1, 1], [1, 0, 1, -1]])[..., None]
+"""Rows and columns of four neighbours, opposite to four others."""
 EXPECTED: Final = 5.0
 """Chi-square of the clearest line of residuals that noise explains."""
 CLEAR: Final = 12.0
@@ -102,9 +109,11 @@ def average_neighbours(
     Propagation-separation (Polzehl and Spokoiny, 2006): in rounds of growing radius a neighbour's
     weight falls with its distance and with misfit over noise. The mean of a neighbour and its
     mirror image is held against the pixel, so that slanted surfaces pass; a second misfit is the
-    one in the direction d b_j = i j b_j, all light later, so that small steps in range show. What
-    is flattened leaves residuals of one sign along a line of nine pixels: where they are clear the
-    pixel gets their mean back, with its variance; else their square counts as noise.
+    one in the direction d b_j = i j b_j, all light later, so that small steps in range show. Of
+    pixels that agree with no pair noise has put more off than structure has: within `OF_NOISE`
+    deviations they get the average beside them, across a slope of both sides. What is flattened
+    leaves residuals of one sign along a line of nine pixels: where they are clear the pixel gets
+    their mean back, with its variance; else their square counts as noise.
     """
     moments = as_array(moments)
     if moments.ndim != 3:
@@ -134,6 +143,7 @@ def average_neighbours(
     raw = xp.where(present, moments, 0) * (1 / size)
     there = present.astype(real) if frames is None else xp.where(present, frames, 0).astype(real)
     found, share = _averaged(raw, weight, there, order, numbers, spread=spread)
+    found, share = _joined(raw, found, share, weight, there, order, numbers)
     found, share = _given_back(raw - found, found, share, weight, order)
     averaged = xp.where(present, found * size, moments)
     return Averaged(averaged, MomentNoise((variance * share).astype(share.dtype)), share)
@@ -188,6 +198,42 @@ def _averaged(
         total = xp.maximum(total, least)
         current, share = mean / total, xp.where(there > 0, there * square / total**2, 1)
     return current.astype(raw.dtype), share.astype(weight.dtype)
+
+
+def _joined(
+    raw: Array, found: Array, share: Array, weight: Array, there: Array,
+    multiples: tuple[int, ...], numbers: Array,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return averages and shares with those of neighbours where a pixel was left alone by noise."""
+    xp, lone = namespace(raw), (share > LONE) & (there > 0)
+    known_values = isinstance(lone, np.ndarray)  # few are looked at; else all, as there is no count
+    places = np.flatnonzero(lone) if known_values else xp.arange(lone.size)
+    row, column = (each + REACH for each in divmod(places, share.shape[1]))
+    sides = [(row + way * _BESIDE[0], column + way * _BESIDE[1]) for way in (1, -1)]
+
+    def beside(planes: Array, both: Callable[..., Array]) -> Array:
+        """Return what is on both sides (..., 12, P), and on each."""
+        ahead, behind = (_padded(planes)[..., r, c] for r, c in sides)
+        return xp.concatenate([both(ahead, behind), ahead, behind], axis=-2)
+
+    mean, its = (beside(each, lambda a, b: (a + b) / 2) for each in (found, share))
+    own, of_one = (each.reshape((len(each), 1, -1))[..., places] for each in (raw, weight))
+    order = xp.asarray(np.array(multiples, weight.dtype))[:, None, None]
+    off, tangent = own - mean, order * of_one * mean
+    misfit = (of_one * squared(off)).sum(0) / numbers
+    later = (tangent.conj() * off).imag.sum(0) ** 2
+    noise = (misfit < 1 + OF_NOISE * (2 / numbers) ** 0.5) & (its < LONE)
+    noise = noise & (later < OF_NOISE**2 * (order * (tangent.conj() * mean).real).sum(0))
+    misfit = xp.where(noise & (beside(there, xp.minimum) > 0), misfit, np.inf)
+    best, any_of_them = misfit.argmin(axis=0)[None], xp.isfinite(misfit.min(axis=0))
+    mean = xp.where(any_of_them, xp.take_along_axis(mean, best[None], axis=1)[:, 0], own[:, 0])
+    its = xp.where(any_of_them, xp.take_along_axis(its, best, axis=0)[0], share.reshape(-1)[places])
+    if known_values:
+        found, share = found.copy(), share.copy()
+        found.reshape((len(found), -1))[:, places], share.reshape(-1)[places] = mean, its
+        return found, share
+    mean, its = mean.reshape(found.shape), its.reshape(share.shape)
+    return xp.where(lone, mean, found), xp.where(lone, its, share)
 
 
 def _given_back(

@@ -90,11 +90,11 @@ class Settings:
         Least uniform part relative to b_0 (Sec. 4.3), 0 <= epsilon < 1.
     keep : {"harmonics", "brightness"}
         What biasing leaves as it is.
-    neighbours : {"gaussian", "edge-preserving", "none"}
-        How moments are averaged over neighbouring pixels: "gaussian" is the paper's (Sec. 6),
-        "edge-preserving" is `average_neighbours`, and the Gaussian where the noise is neither
-        stated nor told by images; those of a reconstruction say which was applied. There is none
-        without two image axes.
+    neighbours : {"edge-preserving", "gaussian", "none"}
+        How moments are averaged over neighbouring pixels: "edge-preserving" is
+        `average_neighbours`, and the Gaussian where the noise is neither stated nor told by images;
+        those of a reconstruction say which was applied. "gaussian" is the paper's (Sec. 6). There
+        is none without two image axes.
     still_frames : int
         How many frames of a stream `Reconstructor.average` averages where nothing changes, at most;
         1 to `noise.MOST_FRAMES`. A frame by itself never uses others.

@@ -38,7 +38,7 @@ from transientcam_server.recording import Header, RecordingWriter, open_unknown
 from transientcam_server.settings import ReconstructionSettings
 
 Progress = Callable[[int, int], None]
-SETTINGS: Final = ReconstructionSettings(estimator="two-returns", smoothing_px=0.0)
+SETTINGS: Final = ReconstructionSettings(estimator="two-returns", neighbours="none")
 """Of the reconstruction, for what is computed without haste."""
 LENS: Final = "leader_calibration_parameters"
 _FRAME: Final = re.compile(r"Frame_(\d{1,9})")

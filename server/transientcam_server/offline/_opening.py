@@ -68,9 +68,11 @@ class OpenedRecording(Sequence[ComputedFrame]):
         # where other processes find it
         self._place, self._token = place or str(recording.path), token
         header = recording.header
-        given = dict(header.reconstruction if settings is None else settings)
         try:
-            chosen = ReconstructionSettings.model_validate(given)
+            if settings is None:
+                chosen = ReconstructionSettings.recorded(header.reconstruction)
+            else:
+                chosen = ReconstructionSettings.model_validate(dict(settings))
         except ValidationError as error:
             mistake = error.errors()[0]
             place = ".".join(map(str, mistake["loc"]))

@@ -15,8 +15,6 @@ from transientcam_server.planning._scene.scene import Region
 from transientcam_server.planning._search.families import Goal
 
 _WIDE: Final = 1e9  # a target that every sequence reaches: it only requests the prediction
-
-
 _KEPT: Final = 8
 
 

@@ -139,7 +139,7 @@ class Planner:
         progress.at(0.0, "error of each pixel")
         every = scene.within(None, every=True)
         predictor = Predictor(every, self._sensor, self._settings, go_on=progress, closely=True)
-        found = *predictor.of_each(estimator, sequence), predictor.relative_noise(sequence)
+        found = predictor.of_each(estimator, sequence)
         planes = np.full((len(found), *every.shape), np.nan)
         planes.reshape((len(found), -1))[:, every.pixels] = found
         return error_map(*planes)

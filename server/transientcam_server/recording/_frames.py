@@ -103,7 +103,7 @@ class RecordedFrames:
         """Return the recorded settings, if this version has them all, or the present ones."""
         if settings == "recorded":
             with contextlib.suppress(ValidationError):
-                recorded = ReconstructionSettings.model_validate(dict(self._header.reconstruction))
+                recorded = ReconstructionSettings.recorded(self._header.reconstruction)
                 return SettingsVersion(_RECORDED_ID, recorded)
         return self._camera_pipeline.reconstruction
 

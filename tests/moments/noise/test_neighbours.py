@@ -100,6 +100,7 @@ def brute_force(b: Array, variance: Array, left_out: Array) -> tuple[Array, Arra
                 found[p] = 0 * raw[p], 1.0
         estimate = {p: each for p, (each, _) in found.items()}
         worth = {p: each if there[p] else 1.0 for p, (_, each) in found.items()}
+    worth, estimate = joined(raw, there, estimate, worth, variance)
     known = {p: there[p] * (j**2 * abs(estimate[p]) ** 2 / variance[:, *p]).sum() for p in pixels}
     late = {
         p: there[p]
@@ -130,6 +131,57 @@ def brute_force(b: Array, variance: Array, left_out: Array) -> tuple[Array, Arra
         [[given[y, x] if there[y, x] else b[:, y, x] for x in range(width)] for y in range(height)]
     )
     return np.moveaxis(moments, -1, 0), share
+
+
+def joined(
+    raw: dict[Any, Array],
+    there: dict[Any, bool],
+    estimate: dict[Any, Array],
+    worth: dict[Any, float],
+    variance: Array,
+) -> tuple[dict[Any, float], dict[Any, Array]]:
+    """What `brute_force` makes of pixels worth less than two that noise explains."""
+    planes = len(variance)
+    j, numbers = np.arange(planes), 2 * planes - 1
+    new_worth, new = dict(worth), dict(estimate)
+    for p in (p for p in raw if there[p] and worth[p] < 2):
+        candidates = []
+        for row, column in ((0, 1), (1, 0), (1, 1), (1, -1)):
+            sides = [(p[0] + row, p[1] + column), (p[0] - row, p[1] - column)]
+            sides = [q for q in sides if there.get(q)]
+            groups = [*([sides] if len(sides) == 2 else []), *([q] for q in sides)]
+            for group in groups:
+                mean = sum(estimate[q] for q in group) / len(group)
+                share = sum(1 / worth[q] for q in group) / len(group)
+                off = raw[p] - mean
+                misfit = (abs(off) ** 2 / variance[:, *p]).sum()
+                later = (np.conj(1j * j * mean) * off / variance[:, *p]).real.sum()
+                information = (abs(j * mean) ** 2 / variance[:, *p]).sum()
+                chance = misfit < numbers + 4 * math.sqrt(2 * numbers)
+                if chance and later**2 < 16 * information and share < 0.5:
+                    candidates.append((misfit, share, mean))
+        if candidates:
+            _, share, new[p] = min(candidates, key=lambda each: each[0])
+            new_worth[p] = 1 / share
+    return new_worth, new
+
+
+@pytest.mark.parametrize(("deviations", "kept"), [(3.0, False), (8.0, True)])
+def test_a_lone_pixel_is_taken_for_noise_as_long_as_noise_explains_it(
+    deviations: float, kept: bool
+) -> None:
+    rows, columns = np.mgrid[:24, :24]
+    slope = 1.5 + 0.004 * columns
+    surface = slope + 0.0
+    std_m = STD / math.sqrt(30) / RAD_PER_M  # of a pixel by itself: the sum of j^2 is 30
+    dots = (rows % 6 == 3) & (columns % 6 == 3)
+    surface[dots] += deviations * std_m
+    quiet = wall(surface, seed=None) + 0.3 * (wall(slope) - wall(slope, seed=None))
+
+    found = averaged(quiet)
+
+    off = np.abs(range_m(found.moments) - surface)[dots]
+    assert (off < 0.6 * std_m).all() == kept
 
 
 def test_it_is_what_a_loop_over_pixels_and_neighbours_makes() -> None:

@@ -49,6 +49,7 @@ def test_a_file_is_a_sequence_of_frames(path: Path) -> None:
             _ = recording[FRAMES]
         assert recording.sequence["harmonics"] == 2
         assert recording.settings["bias"] == 0.01
+        assert recording.settings["neighbours"] == "gaussian"  # all there was before the setting
         assert recording.labels["kind"].tolist() == ["modulated"] * 8
         np.testing.assert_allclose(recording.gains, nominal_gains(APPLIED.sequence))
         assert "4 frames of 16 x 12 pixels, m = 2 at 23 MHz" in repr(recording)

@@ -144,7 +144,7 @@ class Recipe:
         """Names of the kernels that its frames take longest without, the most urgent first."""
         harmonics = () if self.waveform is None else ("harmonics",)
         averaging = ("neighbours",) if self.settings.neighbours == "edge-preserving" else ()
-        return (*_KERNELS_OF.get(self.technique, ()), *averaging, "reconstruct", *harmonics)
+        return (*averaging, *_KERNELS_OF.get(self.technique, ()), "reconstruct", *harmonics)
 
     @property
     def waveform(self) -> NDArray[Any] | None:

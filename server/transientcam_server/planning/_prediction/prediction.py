@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_server.imaging import MEDIAN_OF_NORMAL, ranges_m
+from transientcam_server.planning._prediction.averaging import LEAST_SHARE, averaged
 from transientcam_server.planning._prediction.measures import (
     DISAGREEING,
     DOUBTFUL,
@@ -129,7 +130,8 @@ class Predictor:
         self.sensor = sensor
         self.settings = settings
         self._seed = seed
-        self._left = tm.noise.smoothing_factor(settings.gaussian_px)
+        self._averages = settings.neighbours == "edge-preserving"
+        self._left = tm.noise.smoothing_factor(0.0 if self._averages else settings.gaussian_px)
         self._nominal = self.relative_noise(NOMINAL)
         self._column = lru_cache(maxsize=None)(self._drawn_column)
         self._exact = lru_cache(maxsize=None)(self._bias_without_noise)
@@ -175,6 +177,7 @@ class Predictor:
         """
         m = self._harmonics(estimator, sequence)
         noise = float(np.median(self._nominal)) * scale
+        noise *= math.sqrt(LEAST_SHARE) if self._averages else 1.0
         contrast = self.scene.contrast_at(m, sequence.base_frequency_hz)
         std_rad = noise / float(np.linalg.norm(np.arange(m + 1) * contrast))
         if self._share is not None:
@@ -273,8 +276,8 @@ class Predictor:
         """What is expected of a drift that is known only to be no larger than so much."""
         return self.scene.drift_m / 2
 
-    def of_each(self, estimator: str, sequence: Sequence) -> tuple[_Array, _Array]:
-        """Predict noise over `relative_noise`, and bias in m, of each pixel of the scene (P)."""
+    def of_each(self, estimator: str, sequence: Sequence) -> tuple[_Array, _Array, _Array]:
+        """Predict deviation in m over `left_noise`, bias in m, and that noise, of each (P)."""
         harmonics, noise = self._harmonics(estimator, sequence), self.relative_noise(sequence)
         arguments = estimator, harmonics, sequence.base_frequency_hz, noise, MAP_DRAWS
         parts = [
@@ -284,7 +287,8 @@ class Predictor:
         std_m, bias_m = (
             np.concatenate([getattr(each, name) for each in parts]) for name in ("std_m", "bias_m")
         )
-        return std_m / noise, np.hypot(bias_m, self._drift_m)
+        left = self.left_noise(sequence)
+        return std_m / left, np.hypot(bias_m, self._drift_m), left
 
     def brighter(self, times: float) -> "Predictor":
         """Return the predictor of the same scene with so many times the camera's own light."""
@@ -302,7 +306,7 @@ class Predictor:
         scene = self.scene
         if scene.relative_noise is None:
             return False
-        finer = float(np.median(self.relative_noise(sequence) / scene.relative_noise)) < 0.5
+        finer = float(np.median(self.left_noise(sequence) / scene.relative_noise)) < 0.5
         return finer or not scene.covers(sequence.harmonics, sequence.base_frequency_hz)
 
     def bound_width(self, sequence: Sequence) -> float:
@@ -316,10 +320,48 @@ class Predictor:
     def _noise_of_all(self, sequence: Sequence) -> _Array:
         """Return the deviation (P) that stands for all frequencies, of those with less contrast."""
         contrast = self.scene.contrast_at(sequence.harmonics, sequence.base_frequency_hz)[1:]
-        return self.relative_noise(sequence) / float(np.sqrt(np.mean(contrast**2)))
+        return self.left_noise(sequence) / float(np.sqrt(np.mean(contrast**2)))
+
+    def left_noise(self, sequence: Sequence) -> _Array:
+        """Return `relative_noise` once neighbours are averaged that agree."""
+        noise = self.relative_noise(sequence)
+        how = sequence.harmonics, sequence.base_frequency_hz
+        parts = (slice(first, first + _AT_ONCE) for first in range(0, noise.size, _AT_ONCE))
+        return np.concatenate([self._averaged(*how, noise[part], part)[1] for part in parts])
+
+    def _averaged(
+        self, harmonics: int, base_frequency_hz: float, noise: _Array, pixels: slice
+    ) -> tuple[_Array, _Array]:
+        """Return relative moments (m + 1, P) of pixels, and their noise (P), as averaging has them.
+
+        ``noise``: Of these pixels, as of `relative_noise`.
+        """
+        scene = self.scene
+        b = scene.relative_moments(harmonics, base_frequency_hz)[:, pixels]
+        if not self._averages:
+            return b, noise
+        if scene.picture is None or scene.pixels is None or scene.relative_noise is None:
+            return b, noise * math.sqrt(LEAST_SHARE)  # all pixels are alike
+        # where the look has other frequencies, its nearest ones tell which neighbours agree
+        j = np.arange(harmonics + 1)
+        nearest = np.round(j * base_frequency_hz / scene.base_frequency_hz).astype(int)
+        picture = scene.picture[np.clip(nearest, np.minimum(j, 1), len(scene.picture) - 1)]
+        places, light = scene.pixels[pixels], scene.brightness_dn_per_s[pixels]
+        contrast = scene.contrast_at(harmonics, base_frequency_hz)[:, None]
+        variance = (noise * light / contrast) ** 2
+        variance[0] = 0
+        seen = (scene.relative_noise[pixels] / noise) ** 2
+        mean, share = averaged(picture, places, variance, seen)
+        if scene.covers(harmonics, base_frequency_hz):
+            mixed = mean - picture.reshape((len(picture), -1))[:, places]
+            b = (b + mixed / light).astype(b.dtype)
+        return b, noise * np.sqrt(share)
 
     def relative_noise(self, sequence: Sequence) -> _Array:
-        """Return the deviation (P) of the parts of the moments, over each pixel's brightness."""
+        """Return the deviation (P) of the parts of the moments, over each pixel's brightness.
+
+        Before neighbours are averaged that agree, but after a Gaussian.
+        """
         b0 = np.maximum(self.scene.brightness_dn_per_s * sequence.exposure_s, 1e-12)
         sub_phases = sequence.sub_phases
         noise = tm.noise.moment_noise(
@@ -376,8 +418,8 @@ class Predictor:
         lost: tuple[float, int] = (0.0, 1),
     ) -> PixelErrors:
         self._go_on()
-        b = self.scene.relative_moments(harmonics, base_frequency_hz)[:, pixels]
-        variance = np.broadcast_to(noise[pixels] ** 2, b.shape).astype(np.float32)
+        b, left = self._averaged(harmonics, base_frequency_hz, noise[pixels], pixels)
+        variance = np.broadcast_to(left**2, b.shape).astype(np.float32)
         if zeroth == "estimated":
             variance[0] = 0
         contrast = self.scene.contrast_at(harmonics, base_frequency_hz)[:, None]

@@ -43,7 +43,7 @@ def predict_takes(
     ``read_s``: How long the frame may take.
     Raises CameraError: The camera gives no frame.
     """
-    capabilities, settings = camera.capabilities, ReconstructionSettings(smoothing_px=0.0)
+    capabilities, settings = camera.capabilities, ReconstructionSettings(neighbours="none")
     applied = camera.configure(replace(camera.applied.sequence, takes=1))
     camera.start()
     try:

@@ -16,8 +16,8 @@ from transientcam_server.settings import ReconstructionSettings
 _REPEATED: Final = 3
 _ENOUGH_S: Final = 0.05
 """What takes longer is timed once."""
-_OF_FRAMES: Final = ("reconstruct", "measure", "smooth", "separate")
-"""Kernels that frames need, by the number of their harmonics."""
+_OF_FRAMES: Final = ("reconstruct", "measure", "separate")
+"""Kernels that frames need beside averaging, by the number of their harmonics."""
 _OF_ESTIMATOR: Final = {"likelihood": ("likelihood",), "maximum-entropy": ("peaks",)}
 """And their range."""
 _DEPTH: Final = 1000.0
@@ -53,7 +53,7 @@ class ReconstructionTimer:
         None as long as kernels that it needs are not compiled: without them it takes up to fifty
         times as long, which is no figure of the daemon, that compiles them when they are needed.
         """
-        if not tm.kernels.settled(_kernels_of(estimator), sequence.harmonics):
+        if not tm.kernels.settled(self._kernels_of(estimator), sequence.harmonics):
             return None
         once = self._measured(estimator, sequence.harmonics, 1)
         if sequence.takes == 1:
@@ -66,9 +66,13 @@ class ReconstructionTimer:
 
     def once_compiled(self, sequence: Sequence, estimator: str) -> float | None:
         """Compile what it needs first: up to half a minute an order, once on a machine."""
-        names = _kernels_of(estimator)
+        names = self._kernels_of(estimator)
         tm.kernels.compile([sequence.harmonics], ["float32"], names=names)
         return self(sequence, estimator)
+
+    def _kernels_of(self, estimator: str) -> tuple[str, ...]:
+        averaging = "neighbours" if self._settings.neighbours == "edge-preserving" else "smooth"
+        return (*_OF_FRAMES, averaging, *_OF_ESTIMATOR.get(estimator, ()))
 
     def _measured(self, estimator: str, harmonics: int, takes: int) -> float:
         key = (estimator, harmonics, takes)
@@ -79,6 +83,7 @@ class ReconstructionTimer:
                 zeroth="estimated",
                 takes=takes,
                 full_scale=self._full_scale,
+                sensor=tm.noise.Sensor(),
             )
             with ThreadPoolExecutor(1, initializer=tm.kernels.use_one_thread) as worker:
                 timed = worker.submit(self._least, images, settings, np.ones(harmonics + 1))
@@ -100,10 +105,6 @@ class ReconstructionTimer:
         found = tm.reconstruct(images, settings, calibration=gains)
         _ = found.range_m, found.direct, found.flags
         return self._clock() - begin_s
-
-
-def _kernels_of(estimator: str) -> tuple[str, ...]:
-    return (*_OF_FRAMES, *_OF_ESTIMATOR.get(estimator, ()))
 
 
 def timer_of(capabilities: Capabilities, settings: ReconstructionSettings) -> ReconstructionTimer:

@@ -200,13 +200,14 @@ def _described(
     there = np.flatnonzero(lit & ~moving if still and not every else lit)
     pixels = there if every else there[typical_pixels(averages.at(there)[0], PIXELS)]
     b, mean_dn = averages.at(pixels)
-    base_hz = averages.recipe.base_frequency_hz
+    base_hz, picture = averages.recipe.base_frequency_hz, averages.moments
     variance = averages.variance(mean_dn) * (1 / averages.frames + gain_noise)
     light_dn = _brightness(b if coarse is None else coarse.at(pixels)[0], b)
     contrast = averages.contrast
     if averages.recipe.gains is None and coarse is None:
         contrast = contrast_of_picture(b, variance)
         b, variance = b / contrast[:, None], variance / contrast[:, None] ** 2
+        picture = picture / contrast[:, None, None]
     elif coarse is not None and not still:
         b = _of_one_return(b, coarse, pixels, base_hz)
     told = 1 + int(np.flatnonzero(contrast >= LEAST_CONTRAST)[-1])
@@ -253,6 +254,7 @@ def _described(
             None if swings_m_per_s is None else _typical_swings(swings_m_per_s[:, lit], pixels.size)
         ),
         pixels=pixels,
+        picture=(picture[:told] / averages.exposure_s).astype(np.complex64),
     )
 
 

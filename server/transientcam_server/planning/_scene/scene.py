@@ -196,6 +196,8 @@ class SceneStatistics:
     ``of_one_frame``: Whether no look was taken, but one frame of another purpose.
     ``pixels``: (P) places of the pixels in the picture, row by row; None of a scene that is given.
     ``shape``: Height and width of the picture.
+    ``picture``: (M + 1, H, W) measured moments of all pixels, in DN for each second of exposure;
+    None of a scene that is given.
     ``seen``: Describes pixels within a mask (H, W), None for all: typical ones or, with ``every``,
     each lit one; None of a scene that is given, or if none is lit.
     """
@@ -225,6 +227,7 @@ class SceneStatistics:
     of_one_frame: bool = False
     pixels: _Array | None = None
     shape: tuple[int, int] = (0, 0)
+    picture: _Array | None = None
     seen: "Callable[..., SceneStatistics | None] | None" = None
 
     def few(self) -> "SceneStatistics":
@@ -237,7 +240,7 @@ class SceneStatistics:
         of_pixels: dict[str, Any] = {
             name: value[..., chosen]
             for name, value in values.items()
-            if isinstance(value, np.ndarray)
+            if isinstance(value, np.ndarray) and name != "picture"
         }
         return replace(self, **of_pixels)
 

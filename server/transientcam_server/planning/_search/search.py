@@ -332,8 +332,6 @@ def _as_good(quicker: Choice, best: Choice, targets: Targets) -> bool:
     )
 
 
-"""Families of which many draws decide."""
-"""A family stays a contender as long as it takes no longer than so many times the quickest."""
 TOLERANCE: Final = 1.25
 """Few draws of a contender may predict up to so many times the range error of a target."""
 _PREDICTIONS: Final = 5

@@ -12,6 +12,7 @@ from tests.server.planning.looks import SETTINGS, looked
 from transientcam_driver import Sequence
 from transientcam_server.errors import Problem
 from transientcam_server.planning import Goal, Planner, Region, SceneStatistics, uniform_scene
+from transientcam_server.planning._prediction.averaging import LEAST_SHARE
 from transientcam_server.planning._prediction.prediction import SWING, Prediction, Predictor
 from transientcam_server.planning._scene.scene import one_of_each
 from transientcam_server.planning._search.search import TOLERANCE
@@ -24,9 +25,16 @@ def wall() -> tuple[Planner, SceneStatistics]:
     return looked("sim:wall?seed=7")
 
 
-def test_deviation_of_one_return_at_one_frequency_is_the_closed_form() -> None:
+@pytest.mark.parametrize(
+    ("neighbours", "left"),
+    [("edge-preserving", LEAST_SHARE), ("gaussian", tm.noise.smoothing_factor(0.6)), ("none", 1)],
+)
+def test_deviation_of_one_return_at_one_frequency_is_the_closed_form(
+    neighbours: str, left: float
+) -> None:
     sensor = tm.noise.Sensor()
-    predictor = Predictor(uniform_scene(4e5, [(2.0, 1.0)]), sensor, SETTINGS)
+    settings = SETTINGS.model_copy(update={"neighbours": neighbours})
+    predictor = Predictor(uniform_scene(4e5, [(2.0, 1.0)]), sensor, settings)
     sequence = Sequence(harmonics=1, exposure_s=0.001, takes=2, zeroth="estimated")
 
     predicted = predictor.predict("single-frequency", sequence)
@@ -36,7 +44,7 @@ def test_deviation_of_one_return_at_one_frequency_is_the_closed_form() -> None:
         abs(tm.nominal_calibration(1, sequence.sub_phases.phases_rad, zeroth="on-off")[1]),
     )
     variance = (b0 / 9.0 + 2 * (30 / 9.0) ** 2 + 1 / 6) / gain**2 / 2
-    std_rad = np.sqrt(variance * tm.noise.smoothing_factor(0.6)) / b0
+    std_rad = np.sqrt(variance * left) / b0
     expected_m = tm.range_m(std_rad, FREQUENCY_HZ)
     assert predicted.range_std.median == pytest.approx(expected_m, rel=0.05)
     # the median over 30 draws is itself that noisy
