@@ -22,6 +22,7 @@ from pydantic import (
     ConfigDict,
     Field,
     TypeAdapter,
+    ValidationError,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     WrapValidator,
@@ -99,7 +100,12 @@ else:
 
 def _or_plugged(name: Any, known: ValidatorFunctionWrapHandler) -> Any:
     """Take the name of another package's estimator, too."""
-    return name if isinstance(name, str) and name in plugged_names() else known(name)
+    try:
+        return name if isinstance(name, str) and name in plugged_names() else known(name)
+    except ValidationError as error:
+        also = "".join(f", {each!r} of another package" for each in plugged_names())
+        listed = {"expected": f"{error.errors()[0]['ctx']['expected']}{also}"}
+        raise PydanticCustomError("literal_error", "Input should be {expected}", listed) from None
 
 
 def _with_plugged(schema: dict[str, Any]) -> None:

@@ -72,7 +72,7 @@ def measure(
     """Return the `QUANTITIES` of a technique, and the spread of its time.
 
     A technique that looks at neighbours has none in the sample.
-    Raises EstimatorFailed where one of another package does.
+    Raises PluginFailed where one of another package does.
     """
     lit = np.flatnonzero(np.isfinite(scene.truth_m))
     chosen = np.random.default_rng(seed).permutation(lit)[:SAMPLE_PIXELS]
@@ -113,7 +113,7 @@ def measure_any(
     """Do as `measure`; of another package's technique that fails no range is there."""
     try:
         return measure(technique, scene, repetitions=repetitions, seed=seed)
-    except tm.EstimatorFailed:
+    except tm.PluginFailed:
         nothing: dict[str, float | None] = dict.fromkeys(QUANTITIES)
         return nothing | {"range_missing": 1.0}, nothing
 

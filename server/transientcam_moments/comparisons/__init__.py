@@ -49,17 +49,9 @@ from transientcam_moments.comparisons._estimate import (
     grid_rad,
 )
 from transientcam_moments.comparisons._pixels import check_order
-from transientcam_moments.comparisons._plugins import (
-    SEPARATORS,
-    import_there,
-    load,
-    loaded,
-    plugged,
-    separated,
-    separated_there,
-)
+from transientcam_moments.comparisons._plugins import PLUGINS, separated
 from transientcam_moments.comparisons._technique import Technique, from_first, from_zeroth
-from transientcam_moments.errors import EstimatorFailed
+from transientcam_moments.errors import PluginFailed
 
 TECHNIQUES: dict[str, Technique] = {
     technique.name: technique
@@ -85,11 +77,12 @@ TECHNIQUES: dict[str, Technique] = {
     )
 }
 """Every technique by its name; the paper's first."""
+PLUGINS.taken.update(("automatic", *TECHNIQUES))
 
 
 def plugged_names() -> tuple[str, ...]:
     """Return the names of the estimators of other packages; ours cannot be taken."""
-    return tuple(name for name in plugged() if name not in TECHNIQUES)
+    return PLUGINS.names()
 
 
 def technique_of(name: str) -> Technique:
@@ -97,21 +90,21 @@ def technique_of(name: str) -> Technique:
 
     Raises
     ------
-    EstimatorFailed
+    PluginFailed
         Where another package's cannot be used.
     KeyError
         Where there is none of that name.
     """
-    return TECHNIQUES[name] if name in TECHNIQUES else load(name)
+    return TECHNIQUES[name] if name in TECHNIQUES else PLUGINS.load(name)
 
 
-def statements() -> dict[str, Technique | EstimatorFailed]:
+def statements() -> dict[str, Technique | PluginFailed]:
     """Return each estimator of other packages by its name, or why it cannot be used."""
-    return {name: loaded(name) for name in plugged_names()}
+    return {name: PLUGINS.loaded(name) for name in plugged_names()}
 
 
 __all__ = [
-    "SEPARATORS",
+    "PLUGINS",
     "TECHNIQUES",
     "Code",
     "Estimate",
@@ -126,11 +119,9 @@ __all__ = [
     "from_first",
     "from_zeroth",
     "grid_rad",
-    "import_there",
     "maximum_length_code",
     "plugged_names",
     "separated",
-    "separated_there",
     "statements",
     "technique_of",
 ]

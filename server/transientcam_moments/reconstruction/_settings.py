@@ -8,7 +8,7 @@ from numpy.typing import DTypeLike
 
 from transientcam_moments.arrays import MAX_HARMONICS, MAX_MULTIPLE, chosen, in_range
 from transientcam_moments.comparisons import TECHNIQUES, plugged_names, technique_of
-from transientcam_moments.errors import EstimatorFailed, ParameterError
+from transientcam_moments.errors import ParameterError, PluginFailed
 from transientcam_moments.images import FOUR_PHASES_RAD, SIGMA_PX, ZEROTH_IMAGES, phase_weights
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, EPSILON
 from transientcam_moments.noise import MOST_FRAMES, Sensor
@@ -59,7 +59,7 @@ def least_harmonics(estimator: str) -> int:
     """Return the smallest m that an estimator gives a range of; 1 where it cannot be used."""
     try:
         return technique_of(estimator).least_harmonics
-    except (KeyError, EstimatorFailed):
+    except (KeyError, PluginFailed):
         return 1
 
 

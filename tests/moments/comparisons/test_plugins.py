@@ -12,8 +12,8 @@ import pytest
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from transientcam_moments import comparisons
-from transientcam_moments.comparisons import SparseEstimate, Technique, _plugins as plugins
+from transientcam_moments import comparisons, plugins
+from transientcam_moments.comparisons import PLUGINS, SparseEstimate, Technique
 
 M, PHASE_RAD, WEIGHT = 4, np.array([[0.4, 2.0, 3.3]]), np.full((1, 3), 3.0)
 _Offer = Callable[..., None]
@@ -39,13 +39,13 @@ def offer(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Offer]:
     def make(what: object, name: str = "mine") -> None:
         attribute = f"OFFERED_{len(points)}"
         setattr(module, attribute, what)
-        points.append(EntryPoint(name, f"{module.__name__}:{attribute}", plugins.GROUP))
-        plugins.plugged.cache_clear()
-        plugins.loaded.cache_clear()
+        points.append(EntryPoint(name, f"{module.__name__}:{attribute}", PLUGINS.group))
+        PLUGINS.points.cache_clear()
+        PLUGINS.loaded.cache_clear()
 
     yield make
-    plugins.plugged.cache_clear()
-    plugins.loaded.cache_clear()
+    PLUGINS.points.cache_clear()
+    PLUGINS.loaded.cache_clear()
 
 
 def moments(dtype: type = np.complex128) -> Any:
@@ -122,7 +122,7 @@ def test_what_it_does_wrong_is_said_and_spoils_no_other_property(
     offer(with_estimate(estimate))
     found = tm.reconstruct(moments(), tm.Settings(base_frequency_hz=20e6, estimator="mine"))
 
-    with pytest.raises(tm.EstimatorFailed, match=f"mine .*{words}"):
+    with pytest.raises(tm.PluginFailed, match=f"mine .*{words}"):
         _ = found.range_m
 
     assert not (found.flags & int(tm.INVALID)).any()
@@ -161,9 +161,9 @@ def test_what_cannot_be_used_is_listed_with_the_reason(
 
     reason = comparisons.statements()["mine"]
 
-    assert isinstance(reason, tm.EstimatorFailed)
+    assert isinstance(reason, tm.PluginFailed)
     assert words in reason.reason
-    with pytest.raises(tm.EstimatorFailed, match="mine"):
+    with pytest.raises(tm.PluginFailed, match="mine"):
         comparisons.technique_of("mine")
 
 

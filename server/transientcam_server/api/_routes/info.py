@@ -69,10 +69,10 @@ def _kernels(recipe: Recipe) -> InfoDocument.KernelsDocument | None:
 
 
 def _estimator(
-    name: str, found: comparisons.Technique | tm.EstimatorFailed
+    name: str, found: comparisons.Technique | tm.PluginFailed
 ) -> InfoDocument.EstimatorDocument:
     stated = {each: getattr(found, each, None) for each in _STATED}  # a failure states nothing
-    unusable = found.reason if isinstance(found, tm.EstimatorFailed) else None
+    unusable = found.reason if isinstance(found, tm.PluginFailed) else None
     return InfoDocument.EstimatorDocument.model_validate(
         {"name": name, "unusable": unusable} | stated
     )
@@ -88,4 +88,8 @@ def _product(product: Product) -> InfoDocument.ProductDocument:
         formats=[name for name, encoding in ENCODINGS.items() if encoding.fits(product)],
         over_time=product.over_time,
         streamed=not product.over_time,
+        stated=product.stated
+        and InfoDocument.StatementDocument.model_validate(
+            {each: getattr(product.stated, each) for each in _STATED[-3:]}
+        ),
     )

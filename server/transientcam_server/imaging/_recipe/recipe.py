@@ -63,7 +63,7 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
             limit="unwrapped-phase" if fine else f"one of {', '.join(OF_ANY_MULTIPLES)}",
         )
     failed = statements().get(settings.estimator)
-    if isinstance(failed, tm.EstimatorFailed):
+    if isinstance(failed, tm.PluginFailed):
         limit = "one that can be used"
         at, value = "estimator", settings.estimator
         raise Problem(kinds.ESTIMATOR_MISFIT, f"{failed}.", field=at, value=value, limit=limit)

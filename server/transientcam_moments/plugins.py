@@ -1,0 +1,161 @@
+"""What other packages offer by entry points, and calls of it: estimators, and maps of their own.
+
+Their code is imported when it is first asked for, and what it does wrong is a `PluginFailed`.
+"""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Final, Generic, TypeVar
+
+import numpy as np
+
+from transientcam_moments.arrays import Array
+from transientcam_moments.errors import PluginFailed
+from transientcam_moments.noise import MomentNoise
+
+Offered = TypeVar("Offered")
+_NAME: Final = re.compile(r"[a-z][a-z0-9_-]{0,62}")
+GROUPS: "Final[dict[str, Plugins[Any]]]" = {}
+"""By the names of their entry points."""
+
+
+class Plugins(Generic[Offered]):
+    """What packages offer in the group ``transientcam.KINDs``: each a ``type_`` with a name.
+
+    ``misfit``: returns why something of that type cannot be used; "" where it can.
+    """
+
+    def __init__(
+        self, kind: str, type_: type[Offered], misfit: Callable[[Offered], str] = lambda _: ""
+    ) -> None:
+        self.kind, self.group = kind, f"transientcam.{kind}s"
+        self.taken: set[str] = set()
+        """Names of ours, and of what stands beside ours."""
+        self._type, self._misfit = type_, misfit
+        self.points, self.loaded = cache(self._points), cache(self._loaded)
+        GROUPS[self.group] = self
+
+    def _points(self) -> dict[str, tuple[EntryPoint, ...]]:
+        """Return the entries of all packages by their names; several are one too many."""
+        found: dict[str, dict[str, EntryPoint]] = {}
+        for point in entry_points(group=self.group):
+            found.setdefault(point.name, {})[point.value] = point
+        return {name: tuple(found[name].values()) for name in sorted(found)}
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of what may be there, of which some may not be usable."""
+        return tuple(name for name in self.points() if name not in self.taken)
+
+    def _loaded(self, name: str) -> Offered | PluginFailed:
+        """Return what a package offers by that name, or why it cannot be used."""
+        values = [point.value for point in self.points().get(name, ())]
+        if len(values) != 1:
+            several = f"several packages offer it: {', '.join(sorted(values))}"
+            return PluginFailed(self.kind, name, several if values else "gone")
+        try:
+            offered = self.points()[name][0].load()
+        except (Exception, SystemExit) as error:
+            return PluginFailed(
+                self.kind, name, f"{values[0]} cannot be imported: {in_words(error)}"
+            )
+        why = ""
+        if name in self.taken:
+            why = "its name is taken"
+        elif not isinstance(offered, self._type):
+            why = f"{values[0]} is a {type(offered).__name__}, not a {self._type.__name__}"
+        elif (stated := getattr(offered, "name", None)) != name:
+            why = f"it calls itself {stated!r}, not {name!r}"
+        elif not _NAME.fullmatch(name):
+            why = f"a name is of a to z, 0 to 9, - and _, at most 63: {name!r}"
+        why = why or self._misfit(offered)
+        return PluginFailed(self.kind, name, why) if why else offered
+
+    def load(self, name: str) -> Offered:
+        """Return it, or raise the PluginFailed."""
+        found = self.loaded(name)
+        if isinstance(found, PluginFailed):
+            raise PluginFailed(*found.args)
+        return found
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapProduct:
+    """A map of one number a pixel, which another package computes from the moments of a frame.
+
+    Attributes
+    ----------
+    name, unit, summary
+        What it is asked for by, the unit of its values ("1" for none), and what they are.
+    least_harmonics
+        How many frequencies it needs.
+    consecutive
+        Whether these must be f .. m f.
+    assumptions, cost, failure
+        As a `comparisons.Technique` states them.
+    compute
+        From moments (m + 1, ...) to values (...), NaN where there is none. It takes the keywords
+        ``noise``, a `noise.MomentNoise` or None, and ``frequencies_hz`` (m + 1,) of the moments.
+    """
+
+    name: str
+    unit: str
+    summary: str
+    least_harmonics: int = 1
+    consecutive: bool = False
+    assumptions: str
+    cost: str
+    failure: str
+    compute: Callable[..., Array]
+
+
+PRODUCTS: Final = Plugins("product", MapProduct)
+
+
+def mapped(name: str, b: Array, variance: Array | None, frequencies_hz: Array) -> Array:
+    """Return the map (...) of another package, of moments (m + 1, ...); infinite values are NaN.
+
+    Raises PluginFailed where it raises, or returns anything else.
+    """
+    product, m = PRODUCTS.load(name), len(b) - 1
+    if m < product.least_harmonics:
+        needs = f"it needs {product.least_harmonics} frequencies, and there are {m}"
+        raise PluginFailed(PRODUCTS.kind, name, needs)
+    noise = None if variance is None else MomentNoise(variance)
+    try:
+        with np.errstate(all="ignore"):  # of pixels without light
+            found = product.compute(b.copy(), noise=noise, frequencies_hz=frequencies_hz)
+        values = np.array(found, b.real.dtype)
+    except Exception as error:
+        raise PluginFailed(PRODUCTS.kind, name, in_words(error)) from error
+    if values.shape != b.shape[1:]:
+        shapes = f"its map has shape {values.shape}, and the pixels have {b.shape[1:]}"
+        raise PluginFailed(PRODUCTS.kind, name, shapes)
+    values[~np.isfinite(values)] = np.nan
+    return values
+
+
+def call_here(group: str, function: Callable[..., Any], name: str, *arguments: Any) -> Any:
+    """Return ``function(name, *arguments)``, which calls the code of a package of that group."""
+    return function(name, *arguments)
+
+
+CALLERS: list[Callable[..., Any]] = [call_here]
+"""The last one calls the code of other packages: in another process, say."""
+
+
+def import_there(group: str, name: str, *_: Any) -> None:
+    """Import what a package offers in another process; raise the PluginFailed."""
+    GROUPS[group].load(name)
+
+
+def call_there(function: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a function in another process, whose calls have one argument more."""
+    return function(*arguments[:-1])
+
+
+def in_words(error: BaseException) -> str:
+    """Return what an exception of another package says."""
+    return f"{type(error).__name__}: {error}"
