@@ -6,7 +6,7 @@ Their code is imported when it is first asked for, and what it does wrong is a `
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final, Generic, TypeVar
 
@@ -49,29 +49,28 @@ class Plugins(Generic[Offered]):
         """Return the names of what may be there, of which some may not be usable."""
         return tuple(name for name in self.points() if name not in self.taken)
 
+    def statements(self) -> dict[str, Offered | PluginFailed]:
+        """Return each by its name, or why it cannot be used."""
+        return {name: self.loaded(name) for name in self.points()}
+
     def _loaded(self, name: str) -> Offered | PluginFailed:
         """Return what a package offers by that name, or why it cannot be used."""
-        values = [point.value for point in self.points().get(name, ())]
+        failed = partial(PluginFailed, self.kind, name)
+        values = sorted(point.value for point in self.points().get(name, ()))
         if len(values) != 1:
-            several = f"several packages offer it: {', '.join(sorted(values))}"
-            return PluginFailed(self.kind, name, several if values else "gone")
+            return failed(f"several packages offer it: {', '.join(values)}" if values else "gone")
+        if name in self.taken or not _NAME.fullmatch(name):
+            return failed("its name is taken, or is not of a to z, 0 to 9, - and _, at most 63")
         try:
             offered = self.points()[name][0].load()
         except (Exception, SystemExit) as error:
-            return PluginFailed(
-                self.kind, name, f"{values[0]} cannot be imported: {in_words(error)}"
-            )
-        why = ""
-        if name in self.taken:
-            why = "its name is taken"
-        elif not isinstance(offered, self._type):
-            why = f"{values[0]} is a {type(offered).__name__}, not a {self._type.__name__}"
-        elif (stated := getattr(offered, "name", None)) != name:
-            why = f"it calls itself {stated!r}, not {name!r}"
-        elif not _NAME.fullmatch(name):
-            why = f"a name is of a to z, 0 to 9, - and _, at most 63: {name!r}"
-        why = why or self._misfit(offered)
-        return PluginFailed(self.kind, name, why) if why else offered
+            return failed(f"{values[0]} cannot be imported: {in_words(error)}")
+        if not isinstance(offered, self._type):
+            kinds = type(offered).__name__, self._type.__name__
+            return failed("{} is a {}, not a {}".format(values[0], *kinds))
+        if (stated := getattr(offered, "name", None)) != name:
+            return failed(f"it calls itself {stated!r}, not {name!r}")
+        return failed(why) if (why := self._misfit(offered)) else offered
 
     def load(self, name: str) -> Offered:
         """Return it, or raise the PluginFailed."""

@@ -62,6 +62,11 @@ def doctor(
             _of_client(),
             daemon_checks.of_daemon(url, token=token, seconds=seconds, timeout_s=timeout_s),
         )
+    conclude(found, as_json=as_json)
+
+
+def conclude(found: Iterable[Finding], *, as_json: bool) -> None:
+    """Print findings, and exit with 1 if there is a fault."""
     seen = _tell_as_json(found) if as_json else _tell(found)
     if any(each.level == "fault" for each in seen):
         raise typer.Exit(code=1)

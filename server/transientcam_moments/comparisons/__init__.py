@@ -51,7 +51,6 @@ from transientcam_moments.comparisons._estimate import (
 from transientcam_moments.comparisons._pixels import check_order
 from transientcam_moments.comparisons._plugins import PLUGINS, separated
 from transientcam_moments.comparisons._technique import Technique, from_first, from_zeroth
-from transientcam_moments.errors import PluginFailed
 
 TECHNIQUES: dict[str, Technique] = {
     technique.name: technique
@@ -80,11 +79,6 @@ TECHNIQUES: dict[str, Technique] = {
 PLUGINS.taken.update(("automatic", *TECHNIQUES))
 
 
-def plugged_names() -> tuple[str, ...]:
-    """Return the names of the estimators of other packages; ours cannot be taken."""
-    return PLUGINS.names()
-
-
 def technique_of(name: str) -> Technique:
     """Return a technique, ours or another package's.
 
@@ -96,11 +90,6 @@ def technique_of(name: str) -> Technique:
         Where there is none of that name.
     """
     return TECHNIQUES[name] if name in TECHNIQUES else PLUGINS.load(name)
-
-
-def statements() -> dict[str, Technique | PluginFailed]:
-    """Return each estimator of other packages by its name, or why it cannot be used."""
-    return {name: PLUGINS.loaded(name) for name in plugged_names()}
 
 
 __all__ = [
@@ -120,8 +109,6 @@ __all__ = [
     "from_zeroth",
     "grid_rad",
     "maximum_length_code",
-    "plugged_names",
     "separated",
-    "statements",
     "technique_of",
 ]

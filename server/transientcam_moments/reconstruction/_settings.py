@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from transientcam_moments.arrays import MAX_HARMONICS, MAX_MULTIPLE, chosen, in_range
-from transientcam_moments.comparisons import TECHNIQUES, plugged_names, technique_of
+from transientcam_moments.comparisons import PLUGINS, TECHNIQUES, technique_of
 from transientcam_moments.errors import ParameterError, PluginFailed
 from transientcam_moments.images import FOUR_PHASES_RAD, SIGMA_PX, ZEROTH_IMAGES, phase_weights
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, EPSILON
@@ -176,7 +176,7 @@ class Settings:
         in_range("least_range_m", self.least_range_m, -1000.0, 1000.0, "-1000 to 1000 m")
         in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
         if self.estimator not in ESTIMATORS:
-            chosen("estimator", self.estimator, ("automatic", *ESTIMATORS, *plugged_names()))
+            chosen("estimator", self.estimator, ("automatic", *ESTIMATORS, *PLUGINS.names()))
         chosen("spoilt_images", self.spoilt_images, CORRUPT_IMAGES)
 
     @property

@@ -82,7 +82,7 @@ def _libraries() -> Iterator[Reported]:
 
 def _plugins() -> Iterator[Reported]:
     for offered in GROUPS.values():
-        for name, found in ((name, offered.loaded(name)) for name in offered.points()):
+        for name, found in offered.statements().items():
             if isinstance(found, tm.PluginFailed):
                 yield "warning", f"{offered.kind}s", str(found), "docs/add-an-estimator.md"
             else:

@@ -65,7 +65,7 @@ def test_it_is_a_value_of_the_settings_and_gives_range_and_light(
     settings = tm.Settings(base_frequency_hz=20e6, estimator="mine", least_range_m=0.0)
     found = tm.reconstruct(moments(dtype), settings)
 
-    assert comparisons.plugged_names() == ("mine",)
+    assert PLUGINS.names() == ("mine",)
     assert found.range_m == pytest.approx(tm.range_m(PHASE_RAD[0], 20e6), rel=1e-5)
     assert found.direct == pytest.approx(WEIGHT[0], rel=1e-5)
     assert found.range_m.dtype == np.finfo(dtype).dtype
@@ -159,7 +159,7 @@ def test_what_cannot_be_used_is_listed_with_the_reason(
     for each in offered:
         offer(each)
 
-    reason = comparisons.statements()["mine"]
+    reason = PLUGINS.statements()["mine"]
 
     assert isinstance(reason, tm.PluginFailed)
     assert words in reason.reason
@@ -170,5 +170,5 @@ def test_what_cannot_be_used_is_listed_with_the_reason(
 def test_the_name_of_a_built_in_one_cannot_be_taken(offer: _Offer) -> None:
     offer(replace(GOOD, name="pisarenko"), "pisarenko")
 
-    assert comparisons.plugged_names() == ()
+    assert PLUGINS.names() == ()
     assert comparisons.technique_of("pisarenko") is comparisons.TECHNIQUES["pisarenko"]

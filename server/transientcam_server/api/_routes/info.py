@@ -47,7 +47,7 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
             InfoDocument.AbsentDocument(name=name, reason=reason)
             for name, reason in service.pipeline.absent.items()
         ],
-        estimators=[_estimator(*each) for each in comparisons.statements().items()],
+        estimators=[_estimator(*each) for each in comparisons.PLUGINS.statements().items()],
         caller=InfoDocument.CallerDocument.model_validate(
             {
                 "name": principal.name,

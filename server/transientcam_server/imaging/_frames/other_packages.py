@@ -34,7 +34,7 @@ class OtherPackages:
     def open(self) -> None:
         """Call for all reconstructions of this program; import what there is to say of each."""
         for offered in plugins.GROUPS.values():
-            for found in map(offered.loaded, offered.points()):
+            for found in offered.statements().values():
                 if isinstance(found, tm.PluginFailed):
                     _log.warning("%s", found)
         plugins.CALLERS.append(self)
