@@ -5,7 +5,7 @@ Their code is imported when it is first asked for, and what it does wrong is a `
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Final, Generic, TypeVar
@@ -23,27 +23,21 @@ GROUPS: "Final[dict[str, Plugins[Any]]]" = {}
 
 
 class Plugins(Generic[Offered]):
-    """What packages offer in the group ``transientcam.KINDs``: each a ``type_`` with a name.
+    """What packages offer in the group ``transientcam.KINDs``: each a ``type_`` with a name."""
 
-    ``misfit``: returns why something of that type cannot be used; "" where it can.
-    """
-
-    def __init__(
-        self, kind: str, type_: type[Offered], misfit: Callable[[Offered], str] = lambda _: ""
-    ) -> None:
-        self.kind, self.group = kind, f"transientcam.{kind}s"
+    def __init__(self, kind: str, type_: type[Offered]) -> None:
+        self.kind, self.group, self._type = kind, f"transientcam.{kind}s", type_
         self.taken: set[str] = set()
         """Names of ours, and of what stands beside ours."""
-        self._type, self._misfit = type_, misfit
         self.points, self.loaded = cache(self._points), cache(self._loaded)
         GROUPS[self.group] = self
 
-    def _points(self) -> dict[str, tuple[EntryPoint, ...]]:
-        """Return the entries of all packages by their names; several are one too many."""
+    def _points(self) -> dict[str, dict[str, EntryPoint]]:
+        """Return the entries of all packages by names and values; several are one too many."""
         found: dict[str, dict[str, EntryPoint]] = {}
-        for point in entry_points(group=self.group):
+        for point in sorted(entry_points(group=self.group), key=lambda each: each.name):
             found.setdefault(point.name, {})[point.value] = point
-        return {name: tuple(found[name].values()) for name in sorted(found)}
+        return found
 
     def names(self) -> tuple[str, ...]:
         """Return the names of what may be there, of which some may not be usable."""
@@ -56,21 +50,26 @@ class Plugins(Generic[Offered]):
     def _loaded(self, name: str) -> Offered | PluginFailed:
         """Return what a package offers by that name, or why it cannot be used."""
         failed = partial(PluginFailed, self.kind, name)
-        values = sorted(point.value for point in self.points().get(name, ()))
+        values = sorted(points := self.points().get(name, {}))
         if len(values) != 1:
             return failed(f"several packages offer it: {', '.join(values)}" if values else "gone")
         if name in self.taken or not _NAME.fullmatch(name):
             return failed("its name is taken, or is not of a to z, 0 to 9, - and _, at most 63")
         try:
-            offered = self.points()[name][0].load()
+            offered = points[values[0]].load()
         except (Exception, SystemExit) as error:
             return failed(f"{values[0]} cannot be imported: {in_words(error)}")
         if not isinstance(offered, self._type):
-            kinds = type(offered).__name__, self._type.__name__
-            return failed("{} is a {}, not a {}".format(values[0], *kinds))
-        if (stated := getattr(offered, "name", None)) != name:
-            return failed(f"it calls itself {stated!r}, not {name!r}")
-        return failed(why) if (why := self._misfit(offered)) else offered
+            found = f"{values[0]} is a {type(offered).__name__}"
+            return failed(f"{found}, not a {self._type.__name__}")
+        stated = {each.name: getattr(offered, each.name) for each in fields(self._type)}
+        if stated["name"] != name or stated.get("measures", "moments") != "moments":
+            measures = f" and measures {stated['measures']!r}" if "measures" in stated else ""
+            return failed(f"it calls itself {stated['name']!r}{measures}, not {name!r}")
+        for each in fields(self._type):
+            if each.type in (str, "str") and not isinstance(stated[each.name], str):
+                return failed(f"its {each.name} is no text: {stated[each.name]!r}")
+        return offered
 
     def load(self, name: str) -> Offered:
         """Return it, or raise the PluginFailed."""
@@ -86,21 +85,15 @@ class MapProduct:
 
     Attributes
     ----------
-    name, unit, summary
-        What it is asked for by, the unit of its values ("1" for none), and what they are.
-    least_harmonics
-        How many frequencies it needs.
-    consecutive
-        Whether these must be f .. m f.
-    assumptions, cost, failure
-        As a `comparisons.Technique` states them.
+    least_harmonics, consecutive
+        How many frequencies it needs, and whether these must be f .. m f.
     compute
         From moments (m + 1, ...) to values (...), NaN where there is none. It takes the keywords
         ``noise``, a `noise.MomentNoise` or None, and ``frequencies_hz`` (m + 1,) of the moments.
     """
 
     name: str
-    unit: str
+    unit: str  # "1" for none
     summary: str
     least_harmonics: int = 1
     consecutive: bool = False
@@ -118,22 +111,19 @@ def mapped(name: str, b: Array, variance: Array | None, frequencies_hz: Array) -
 
     Raises PluginFailed where it raises, or returns anything else.
     """
-    product, m = PRODUCTS.load(name), len(b) - 1
-    if m < product.least_harmonics:
-        needs = f"it needs {product.least_harmonics} frequencies, and there are {m}"
-        raise PluginFailed(PRODUCTS.kind, name, needs)
+    product, failed = PRODUCTS.load(name), partial(PluginFailed, PRODUCTS.kind, name)
+    if len(b) <= (least := product.least_harmonics):
+        raise failed(f"it needs {least} frequencies, and there are {len(b) - 1}")
     noise = None if variance is None else MomentNoise(variance)
     try:
         with np.errstate(all="ignore"):  # of pixels without light
             found = product.compute(b.copy(), noise=noise, frequencies_hz=frequencies_hz)
-        values = np.array(found, b.real.dtype)
+        values = np.asarray(found).astype(b.real.dtype, casting="same_kind")
     except Exception as error:
-        raise PluginFailed(PRODUCTS.kind, name, in_words(error)) from error
+        raise failed(in_words(error)) from error
     if values.shape != b.shape[1:]:
-        shapes = f"its map has shape {values.shape}, and the pixels have {b.shape[1:]}"
-        raise PluginFailed(PRODUCTS.kind, name, shapes)
-    values[~np.isfinite(values)] = np.nan
-    return values
+        raise failed(f"its map has shape {values.shape}, and the pixels have {b.shape[1:]}")
+    return np.where(np.isfinite(values), values, np.nan)
 
 
 def call_here(group: str, function: Callable[..., Any], name: str, *arguments: Any) -> Any:
@@ -145,8 +135,8 @@ CALLERS: list[Callable[..., Any]] = [call_here]
 """The last one calls the code of other packages: in another process, say."""
 
 
-def import_there(group: str, name: str, *_: Any) -> None:
-    """Import what a package offers in another process; raise the PluginFailed."""
+def import_there(group: str, name: str) -> None:
+    """Import what a package offers; raise the PluginFailed."""
     GROUPS[group].load(name)
 
 

@@ -65,6 +65,22 @@ def doctor(
     conclude(found, as_json=as_json)
 
 
+def kinect2(
+    check: Annotated[
+        bool, typer.Option("--check", help="Host, USB controller, cable and usbfs memory.")
+    ] = False,
+    root: Annotated[Path, typer.Option(help="Where /sys, /proc and /dev are.")] = Path("/"),
+    as_json: JsonOption = False,
+) -> None:
+    """Check what this machine allows a Kinect v2, whether one is plugged in or not.
+
+    Nothing is opened. Exits as `transientcam doctor` does.
+    """
+    if not check:
+        raise typer.BadParameter("is all this verb does", param_hint="--check")
+    conclude(findings.of_kinect2(root), as_json=as_json)
+
+
 def conclude(found: Iterable[Finding], *, as_json: bool) -> None:
     """Print findings, and exit with 1 if there is a fault."""
     seen = _tell_as_json(found) if as_json else _tell(found)

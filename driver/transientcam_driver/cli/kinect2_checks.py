@@ -32,14 +32,10 @@ _SUPER_SPEED_MBIT: Final = 5000.0
 _HUB_ID: Final = 0x02D9
 """Of the hub within a Kinect, which is also there without power or USB 3 (libfreenect2#186)."""
 _CABLE: Final = "use a USB 3 port, without a hub, and a cable with the wires of USB 3"
-_WORKS: Final = "known to work"
-_CONTROLLERS: Final = {
-    0x8086: ("Intel", _WORKS),
-    0x1033: ("NEC", _WORKS),
-    0x1912: ("Renesas", _WORKS),
-    0x1B21: ("ASMedia", "frames are lost with it"),
-}
-"""By vendor: libfreenect2's README, Hardware requirements; Renesas took over NEC's."""
+_CARD: Final = "add a PCIe card with a controller by Renesas"
+_ASMEDIA: Final = 0x1B21
+_WORKING: Final = {0x8086: "Intel", 0x1033: "NEC", 0x1912: "Renesas"}
+"""By vendor, as libfreenect2's README has it; Renesas took over NEC's."""
 _NEEDED_MB: Final = -(-TRANSFERS * PACKETS * PACKET_BYTES // 2**20)
 """Of one camera."""
 
@@ -84,6 +80,11 @@ def checks(
         yield "ok", f"{NAME}: rows={rows}{default}", meaning, None
 
 
+def of_host(root: Path) -> Iterator[Reported]:
+    """Check the host as well where no Kinect is plugged in."""
+    return checks(root=root, host=True)
+
+
 def _of_host(root: Path) -> Iterator[Reported]:
     """Judge the host's USB 3 controllers, by what owners told the authors of libfreenect2."""
     check, fast = f"{NAME}: controller", False
@@ -95,12 +96,14 @@ def _of_host(root: Path) -> Iterator[Reported]:
         except (OSError, ValueError):  # of no PCI device
             vendor = 0
         fast = True
-        by, verdict = _CONTROLLERS.get(vendor, (f"vendor {vendor:04x}", "few reports are known"))
-        level = "warning" if "lost" in verdict else "ok"
-        remedy = "use a port of another controller, as on a PCIe card by Renesas"
-        yield level, check, f"{bus.name}: {by}, {verdict}", remedy if level == "warning" else None
+        by = _WORKING.get(vendor, f"vendor {vendor:04x}")
+        if vendor == _ASMEDIA:
+            yield "warning", check, f"{bus.name}: ASMedia, frames are lost with it", _CARD
+        else:
+            known = "known to work" if vendor in _WORKING else "few reports are known"
+            yield "ok", check, f"{bus.name}: {by}, {known}", None
     if not fast:
-        yield "fault", check, "this machine has no USB 3", "add a PCIe card by Renesas"
+        yield "fault", check, "this machine has no USB 3", _CARD
     with suppress(OSError):
         if "hypervisor" in _text(root / "proc/cpuinfo"):
             message = "a virtual machine: frames are often lost on a device passed through"

@@ -1,5 +1,6 @@
 """Estimators of other packages: entries of ``transientcam.estimators``, each a `Technique`."""
 
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -11,11 +12,7 @@ from transientcam_moments.moment_problem import Separation
 from transientcam_moments.noise import MomentNoise
 from transientcam_moments.plugins import Plugins, in_words
 
-PLUGINS: Final = Plugins(
-    "estimator",
-    Technique,
-    lambda found: "" if found.measures == "moments" else f"it measures {found.measures!r}",
-)
+PLUGINS: Final = Plugins("estimator", Technique)
 
 
 def separated(
@@ -42,20 +39,18 @@ def separated(
         Where it raises, returns something else, or has no phase in any pixel that has light.
     """
     noise = None if variance is None else MomentNoise(variance)
-    technique = PLUGINS.load(name)
+    technique, failed = PLUGINS.load(name), partial(PluginFailed, PLUGINS.kind, name)
     try:
         with np.errstate(all="ignore"):  # of pixels without light
             parts = technique.of(b.copy(), noise, frequencies_hz).separate(threshold)
         direct, indirect, phase = (np.asarray(part, b.real.dtype) for part in parts)
     except Exception as error:
-        raise PluginFailed(PLUGINS.kind, name, in_words(error)) from error
+        raise failed(in_words(error)) from error
     for field, part in zip(Separation._fields, (direct, indirect, phase), strict=True):
         if part.shape != b.shape[1:]:
-            why = f"its {field} has shape {part.shape}, and the pixels have {b.shape[1:]}"
-            raise PluginFailed(PLUGINS.kind, name, why)
+            raise failed(f"its {field} has shape {part.shape}, and the pixels have {b.shape[1:]}")
     there = np.isfinite(direct) & np.isfinite(indirect) & np.isfinite(phase)
     if (b[0].real > 0).any() and not there.any():
-        why = "it has no finite phase and light in any pixel"
-        raise PluginFailed(PLUGINS.kind, name, why)
+        raise failed("it has no finite phase and light in any pixel")
     direct, indirect = np.where(there, direct, 0), np.where(there, indirect, 0)
     return Separation(direct, indirect, np.remainder(np.where(there, phase, np.nan), 2 * np.pi))

@@ -150,6 +150,7 @@ def test_pixels_that_are_not_finite_have_no_range(offer: _Offer) -> None:
         ([one_return], "is a function, not a Technique"),
         ([replace(GOOD, name="other")], "calls itself 'other'"),
         ([replace(GOOD, measures="code")], "measures 'code'"),
+        ([replace(GOOD, cost=7)], "its cost is no text: 7"),
         ([GOOD, GOOD], "several packages offer it"),
     ],
 )
@@ -165,6 +166,50 @@ def test_what_cannot_be_used_is_listed_with_the_reason(
     assert words in reason.reason
     with pytest.raises(tm.PluginFailed, match="mine"):
         comparisons.technique_of("mine")
+
+
+@pytest.mark.parametrize(
+    ("compute", "words"),
+    [
+        (lambda b, **_: b[1], "Cannot cast"),
+        (lambda b, **_: np.array(["a", "b", "c"]), "Cannot cast"),
+        (lambda b, **_: b[1:].real, r"shape \(4, 3\), and the pixels have \(3,\)"),
+        (lambda b, noise: b[1].real, "frequencies_hz"),
+        (lambda b, **_: None, "Cannot cast"),
+    ],
+)
+def test_a_map_that_is_none_is_refused_with_the_reason(
+    compute: Callable[..., Any], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = plugins.MapProduct(
+        name="a-map", unit="1", summary="", assumptions="", cost="", failure="", compute=compute
+    )
+    monkeypatch.setattr(plugins.PRODUCTS, "loaded", lambda name: made)
+
+    with pytest.raises(tm.PluginFailed, match=f"the product a-map .*{words}"):
+        plugins.mapped("a-map", moments(), None, 20e6 * np.arange(M + 1))
+
+
+def test_a_map_has_no_infinite_values_and_says_what_it_needs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = plugins.MapProduct(
+        name="a-map",
+        unit="1",
+        summary="",
+        least_harmonics=M,
+        assumptions="",
+        cost="",
+        failure="",
+        compute=lambda b, **_: np.array([1.0, np.inf, -np.inf]),
+    )
+    monkeypatch.setattr(plugins.PRODUCTS, "loaded", lambda name: made)
+
+    found = plugins.mapped("a-map", moments(), None, np.zeros(M + 1))
+
+    assert np.array_equal(found, [1.0, np.nan, np.nan], equal_nan=True)
+    with pytest.raises(tm.PluginFailed, match="needs 4 frequencies, and there are 3"):
+        plugins.mapped("a-map", moments()[:-1], None, np.zeros(M))
 
 
 def test_the_name_of_a_built_in_one_cannot_be_taken(offer: _Offer) -> None:

@@ -67,7 +67,7 @@ export class Comparison {
       const known = (at: number): boolean => trust_a[at] === 0 && trust_b[at] === 0;
       return Float32Array.from(error_a).map((error, at) => (known(at) ? Math.hypot(error, error_b[at]) : NaN));
     });
-    const shown = computed(() => frames.wanted.value.filter((product) => this.#maps().includes(product)).join());
+    const shown = computed(() => frames.wanted.value.filter((product) => frames.maps.value.some((map) => map.product === product)).join());
     effect(() => {
       void this.#changes.value;
       const [source, maps] = [this.source.value, shown.value.match(/[\w-]+/g) ?? []];
@@ -86,14 +86,10 @@ export class Comparison {
     return this.#b.value.find((each) => each.product === product) ?? null;
   }
 
-  #maps(): readonly string[] {
-    return this.frames.maps.value.map(({ product }) => product);
-  }
-
   /** Keeps all maps of the frame that is shown under a name, and compares with it. Raises RequestError. */
   async keep(shown: Frame, name: string): Promise<void> {
     const path = shown.origin === LIVE ? liveFrame(shown.meta.frame) : shown.origin;
-    const wanted = [...this.#maps(), "trust"].filter((product) => this.frames.absent.peek()[product] === undefined);
+    const wanted = [...this.frames.maps.peek().map(({ product }) => product), "trust"].filter((product) => this.frames.absent.peek()[product] === undefined);
     const frames = ((await this.loader?.(path, wanted)) ?? []).map((report) => frameOf(report, MADE));
     await stored(() => set(name, frames));
     this.source.value = { of: name, frame: null };

@@ -33,16 +33,8 @@ class InfoDocument(Document):
         """Whether it takes `time_s` or `bins`."""
         streamed: bool
         """Whether the stream offers it."""
-        stated: "InfoDocument.StatementDocument | None"
-        """Of another package's; null for ours."""
-
-    class StatementDocument(Document):
-        """What a product of another package states of itself."""
-
-        assumptions: str
-        cost: str
-        failure: str
-        """What happens where its assumptions do not hold."""
+        stated: dict[str, str] | None
+        """Of another package's its assumptions, cost and failure; null for ours."""
 
     class AbsentDocument(Document):
         """A product that frames of this camera do not have."""

@@ -88,8 +88,5 @@ def _product(product: Product) -> InfoDocument.ProductDocument:
         formats=[name for name, encoding in ENCODINGS.items() if encoding.fits(product)],
         over_time=product.over_time,
         streamed=not product.over_time,
-        stated=product.stated
-        and InfoDocument.StatementDocument.model_validate(
-            {each: getattr(product.stated, each) for each in _STATED[-3:]}
-        ),
+        stated=product.stated and {each: getattr(product.stated, each) for each in _STATED[-3:]},
     )

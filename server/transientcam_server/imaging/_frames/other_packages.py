@@ -55,8 +55,7 @@ class OtherPackages:
                 if not process.warm:
                     self._call(process, failed, START_S, plugins.import_there, group, name)
                     process.warm = True
-                there = plugins.call_there, function, name, *arguments
-                return self._call(process, failed, self._limit_s, *there)
+                return self._call(process, failed, self._limit_s, function, name, *arguments)
             except (TimeoutError, ProcessEnded) as error:
                 process.warm = False
                 ended = isinstance(error, ProcessEnded)
@@ -82,7 +81,7 @@ class OtherPackages:
             if self._clock() > ends_s:
                 raise TimeoutError(f"it took longer than {limit_s:g} s")
 
-        return process.child.call(function, *arguments, ask=ask)
+        return process.child.call(plugins.call_there, function, *arguments, ask=ask)
 
     def close(self) -> None:
         """End every process, and what is computed there."""
