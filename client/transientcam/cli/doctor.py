@@ -23,7 +23,7 @@ _STYLES: Final[dict[Level, str]] = {
     "not tried": "dim",
 }
 _WIDTH = 20
-_FORM: Final = """What I did, expected and saw (camera, cable, distance of a wall by tape and by program):
+_FORM: Final = """What I did and saw (camera, cable, distance of a wall by tape and by program):
 
 
 ```text
