@@ -13,7 +13,7 @@ from learned_range import NETWORK, M, features
 from onnx import TensorProto, helper, numpy_helper
 
 NODES = (7, 48, 48, 3)
-PIXELS, BATCH, EPOCHS, RATE = 40_000, 500, 60, 3e-3
+PIXELS, BATCH, EPOCHS, RATE = 60_000, 500, 80, 3e-3
 
 
 def simulated(pixels, rng):
@@ -28,7 +28,7 @@ def simulated(pixels, rng):
         there = (kind >= least) & (kind < 3)
         b += np.where(there, weight * np.exp(1j * j * (first + apart)), 0)
         light += np.where(there, weight, 0)
-    begins, decay = rng.uniform(0, 0.5, pixels), rng.uniform(0.1, 1.5, pixels)
+    begins, decay = rng.uniform(0, 2.0, pixels), rng.uniform(0.1, 1.5, pixels)
     weight = rng.uniform(0.1, 2.0, pixels)
     tail = weight * np.exp(1j * j * (first + begins)) / (1 - 1j * j * decay)
     b += np.where(kind == 3, tail, 0)
