@@ -1,4 +1,4 @@
-"""Trains the network of the package learned_range on simulated responses, and calibrates its deviation.
+"""Trains the network of learned_range on simulated responses, and calibrates its deviation.
 
 ``python train.py`` writes learned_range.onnx; it needs numpy and onnx, and some minutes.
 """

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any, Final, Generic, TypeVar
+from typing import Any, Final, Generic, TypeVar, cast
 
 import numpy as np
 
@@ -62,11 +62,12 @@ class Plugins(Generic[Offered]):
         if not isinstance(offered, self._type):
             found = f"{values[0]} is a {type(offered).__name__}"
             return failed(f"{found}, not a {self._type.__name__}")
-        stated = {each.name: getattr(offered, each.name) for each in fields(self._type)}
+        described = fields(cast("Any", self._type))
+        stated = {each.name: getattr(offered, each.name) for each in described}
         if stated["name"] != name or stated.get("measures", "moments") != "moments":
             measures = f" and measures {stated['measures']!r}" if "measures" in stated else ""
             return failed(f"it calls itself {stated['name']!r}{measures}, not {name!r}")
-        for each in fields(self._type):
+        for each in described:
             if each.type in (str, "str") and not isinstance(stated[each.name], str):
                 return failed(f"its {each.name} is no text: {stated[each.name]!r}")
         return offered

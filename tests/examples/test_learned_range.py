@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -18,9 +19,7 @@ pytest.importorskip("onnxruntime", reason="the learned estimator needs onnxrunti
 def learned() -> Iterator[ModuleType]:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(ROOT / "examples" / "learned_range"))
-        import learned_range
-
-        yield learned_range
+        yield import_module("learned_range")
         del sys.modules["learned_range"]
 
 
