@@ -52,14 +52,14 @@ class Frequencies:
         if len(self.multiples) == 1:
             return np.asarray(np.remainder(np.angle(b[0]), 2 * np.pi)) * radian_m
         noise = tm.noise.MomentNoise(np.full(b.shape, sigma**2))
-        estimate = {
-            "likelihood": lambda: tm.likelihood(
-                b, noise, harmonics=self.multiples, threads=1
-            ).separate(),
-            "two-returns": lambda: tm.two_returns(b, noise, harmonics=self.multiples).separate(),
-            "unwrapped-phase": lambda: tm.unwrap(b, noise, harmonics=self.multiples).separate(),
-        }[automatic(self.multiples)]
-        return np.asarray(estimate().phase_rad) * radian_m
+        name = automatic(self.multiples)
+        if name == "likelihood":
+            found = tm.likelihood(b, noise, harmonics=self.multiples, threads=1).separate()
+        elif name == "two-returns":
+            found = tm.two_returns(b, noise, harmonics=self.multiples).separate()
+        else:
+            found = tm.unwrap(b, noise, harmonics=self.multiples).separate()
+        return np.asarray(found.phase_rad) * radian_m
 
     def errors_m(self, apart_m: tuple[float, float] | None) -> _Array:
         """Return by how much the first range is wrong, at random ranges up to `FAR_M`."""

@@ -150,7 +150,7 @@ def test_pixels_that_are_not_finite_have_no_range(offer: _Offer) -> None:
         ([one_return], "is a function, not a Technique"),
         ([replace(GOOD, name="other")], "calls itself 'other'"),
         ([replace(GOOD, measures="code")], "measures 'code'"),
-        ([replace(GOOD, cost=7)], "its cost is no text: 7"),
+        ([replace(GOOD, cost=7)], "its cost is no text: 7"),  # type: ignore[arg-type]  # a faulty one
         ([GOOD, GOOD], "several packages offer it"),
     ],
 )
