@@ -89,7 +89,9 @@ export class Comparison {
   /** Keeps all maps of the frame that is shown under a name, and compares with it. Raises RequestError. */
   async keep(shown: Frame, name: string): Promise<void> {
     const path = shown.origin === LIVE ? liveFrame(shown.meta.frame) : shown.origin;
-    const wanted = [...this.frames.maps.peek().map(({ product }) => product), "trust"].filter((product) => this.frames.absent.peek()[product] === undefined);
+    const wanted = [...this.frames.maps.peek().map(({ product }) => product), "trust"].filter(
+      (product) => this.frames.absent.peek()[product] === undefined,
+    );
     const frames = ((await this.loader?.(path, wanted)) ?? []).map((report) => frameOf(report, MADE));
     await stored(() => set(name, frames));
     this.source.value = { of: name, frame: null };
