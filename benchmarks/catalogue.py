@@ -95,6 +95,7 @@ _ALL: Final = (
     ),
     Measurement("estimators.estimators", "estimators", _MOMENTS),
     Measurement("estimators.cameras", "cameras", _MOMENTS, 3, "camera_returns", timed=False),
+    Measurement("estimators.which_camera", "which-camera", _MOMENTS, 2, timed=False),
     Measurement("estimators.harmonics", "harmonics", (*_MOMENTS, *_IMAGING)),
     Measurement("estimators.lost_sync", "lost-synchronisation", (*_MOMENTS, "driver")),
     Measurement("estimators.stability", "measured/stability", _MOMENTS),

@@ -265,7 +265,7 @@ def compare(
     ESTIMATORS fails on a scene.
     """
     from transientcam_experiments import tradeoff as experiment
-    from transientcam_moments.comparisons import TECHNIQUES, plugged_names
+    from transientcam_moments.comparisons import PLUGINS, TECHNIQUES
     from transientcam_server.offline import plot as pictures
 
     if plot is not None:
@@ -274,8 +274,8 @@ def compare(
     names = list(dict.fromkeys((*estimators, *(against or experiment.rivals(harmonics)))))
     known = [each.name for each in TECHNIQUES.values() if each.measures == "moments"]
     for name in names:
-        if name not in (*known, *plugged_names()):
-            every = ", ".join((*known, *plugged_names()))
+        if name not in (*known, *PLUGINS.names()):
+            every = ", ".join((*known, *PLUGINS.names()))
             raise typer.BadParameter(f"{name!r} is none of {every}", param_hint="ESTIMATORS")
     scenes = scene or list(experiment.SCENES)
     found = []

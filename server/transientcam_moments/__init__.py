@@ -15,9 +15,9 @@ of pixels after them, single or double precision, NumPy, JAX or CuPy. ::
 from transientcam_moments import comparisons, kernels, noise
 from transientcam_moments.errors import (
     DeviceUnavailable,
-    EstimatorFailed,
     MomentsError,
     ParameterError,
+    PluginFailed,
     ShapeError,
     UnlabelledImages,
 )
@@ -97,7 +97,6 @@ __all__ = [
     "Coefficients",
     "Corrected",
     "DeviceUnavailable",
-    "EstimatorFailed",
     "Flags",
     "HarmonicCorrection",
     "Labels",
@@ -106,6 +105,7 @@ __all__ = [
     "MomentsError",
     "ParameterError",
     "Peaks",
+    "PluginFailed",
     "Reconstruction",
     "Reconstructor",
     "Repair",

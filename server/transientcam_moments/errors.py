@@ -4,7 +4,7 @@ MomentsError
 ├── ShapeError (also a ValueError)
 ├── ParameterError (also a ValueError)
 ├── DeviceUnavailable (also a RuntimeError)
-├── EstimatorFailed (also a RuntimeError)
+├── PluginFailed (also a RuntimeError)
 └── UnlabelledImages (also a ValueError)
 """
 
@@ -57,15 +57,16 @@ class ParameterError(MomentsError, ValueError):
 
 
 @dataclass(eq=False)
-class EstimatorFailed(MomentsError, RuntimeError):  # noqa: N818 - says what has happened
-    """The estimator ``name`` of another package cannot be used, for a ``reason``."""
+class PluginFailed(MomentsError, RuntimeError):  # noqa: N818 - says what has happened
+    """What another package offers cannot be used, for a ``reason``: ``kind`` "estimator", say."""
 
+    kind: str
     name: str
     reason: str
 
     def __str__(self) -> str:
-        """Name the estimator and what is wrong with it."""
-        return f"the estimator {self.name} of another package failed: {self.reason}"
+        """Name it and what is wrong with it."""
+        return f"the {self.kind} {self.name} of another package failed: {self.reason}"
 
 
 @dataclass(eq=False)

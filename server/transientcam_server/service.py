@@ -53,7 +53,7 @@ from transientcam_server.imaging import (
     Frame,
     History,
     Intrinsics,
-    OtherEstimators,
+    OtherPackages,
     Pipeline,
     SettingsVersion,
     Workers,
@@ -145,7 +145,7 @@ class Service:
         )
         self.planner = Planner(camera.capabilities, sensor, reconstruction)
         self.planning = PlanningQueue(PlanningProcess(settings.limits.plan_s))
-        self.estimators = OtherEstimators(settings.limits.estimator_s)
+        self.other_packages = OtherPackages(settings.limits.estimator_s)
         kept = CalibrationStore(settings.calibrations, given=settings.calibration)
         self.pipeline = Pipeline(
             camera,
@@ -234,7 +234,7 @@ class Service:
     async def running(self) -> AsyncIterator[None]:
         """Capture from entry to exit."""
         self._loop = asyncio.get_running_loop()
-        self.estimators.open()  # before frames, which what is imported would delay
+        self.other_packages.open()  # before frames, which what is imported would delay
         with contextlib.suppress(Problem):  # a disk that does not answer keeps nobody dark
             await self.recordings.disk.run(self.recordings.open)
         dark = await self._kept_dark()
@@ -262,7 +262,7 @@ class Service:
             if self._darkness is not None:
                 await asyncio.to_thread(self._darkness.close)
             await self.jobs.close()
-            await asyncio.to_thread(self.estimators.close)
+            await asyncio.to_thread(self.other_packages.close)
             await asyncio.to_thread(self.recordings.close)
             ended = await self.workers.close(within_s=_WORKERS_END_S)
             if not ended:

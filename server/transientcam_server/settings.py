@@ -23,6 +23,7 @@ from pydantic import (
     ConfigDict,
     Field,
     TypeAdapter,
+    ValidationError,
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     WrapValidator,
@@ -34,7 +35,7 @@ from pydantic_core import PydanticCustomError
 import transientcam_moments as tm
 from transientcam.wire import FIRST_MESSAGE_WITHIN_S, MAX_SUBSCRIPTIONS
 from transientcam_compiled import cores
-from transientcam_moments.comparisons import TECHNIQUES, plugged_names
+from transientcam_moments.comparisons import PLUGINS, TECHNIQUES
 from transientcam_moments.reconstruction import ESTIMATORS, least_harmonics
 
 _DEFAULTS = tm.Settings()
@@ -102,11 +103,16 @@ else:
 
 def _or_plugged(name: Any, known: ValidatorFunctionWrapHandler) -> Any:
     """Take the name of another package's estimator, too."""
-    return name if isinstance(name, str) and name in plugged_names() else known(name)
+    try:
+        return name if isinstance(name, str) and name in PLUGINS.names() else known(name)
+    except ValidationError as error:
+        also = "".join(f", {each!r} of another package" for each in PLUGINS.names())
+        listed = {"expected": f"{error.errors()[0]['ctx']['expected']}{also}"}
+        raise PydanticCustomError("literal_error", "Input should be {expected}", listed) from None
 
 
 def _with_plugged(schema: dict[str, Any]) -> None:
-    schema["enum"] = [*schema["enum"], *plugged_names()]
+    schema["enum"] = [*schema["enum"], *PLUGINS.names()]
 
 
 Neighbours = Literal["edge-preserving", "gaussian", "none"]

@@ -1,6 +1,7 @@
 """``transientcam doctor``: checks of this machine or of a daemon, with a remedy for each fault."""
 
 import json
+import os
 import platform
 from collections.abc import Iterable, Iterator
 from importlib.metadata import version
@@ -22,6 +23,12 @@ _STYLES: Final[dict[Level, str]] = {
     "not tried": "dim",
 }
 _WIDTH = 20
+_FORM: Final = """What I did and saw (camera, cable, distance of a wall by tape and by program):
+
+
+```text
+{told}```
+"""
 
 
 def doctor(
@@ -44,6 +51,9 @@ def doctor(
     timeout_s: Annotated[
         float, typer.Option(min=0.1, help="How long to wait for each of its answers.")
     ] = 10.0,
+    report: Annotated[
+        Path | None, typer.Option(help="Also write what was found into this .md, for an issue.")
+    ] = None,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -62,7 +72,33 @@ def doctor(
             _of_client(),
             daemon_checks.of_daemon(url, token=token, seconds=seconds, timeout_s=timeout_s),
         )
+    conclude(found, as_json=as_json, report=report)
+
+
+def kinect2(
+    check: Annotated[
+        bool, typer.Option("--check", help="Host, USB controller, cable and usbfs memory.")
+    ] = False,
+    root: Annotated[Path, typer.Option(help="Where /sys, /proc and /dev are.")] = Path("/"),
+    as_json: JsonOption = False,
+) -> None:
+    """Check what this machine allows a Kinect v2, whether one is plugged in or not.
+
+    Nothing is opened. Exits as `transientcam doctor` does.
+    """
+    if not check:
+        raise typer.BadParameter("is all this verb does", param_hint="--check")
+    conclude(findings.of_kinect2(root), as_json=as_json)
+
+
+def conclude(found: Iterable[Finding], *, as_json: bool, report: Path | None = None) -> None:
+    """Print findings, write them into a file for an issue, and exit with 1 if there is a fault."""
     seen = _tell_as_json(found) if as_json else _tell(found)
+    if report is not None:
+        told = "".join(f"- {each.level}, {each.check}: {each.message}\n" for each in seen)
+        for ours, shown in ((os.environ.get("HOME", ""), "~"), (platform.node(), "HOST")):
+            told = told.replace(ours, shown) if len(ours) > 1 else told
+        report.write_text(_FORM.format(told=told.replace("`", "'")), encoding="utf-8")
     if any(each.level == "fault" for each in seen):
         raise typer.Exit(code=1)
 

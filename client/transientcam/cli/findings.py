@@ -51,6 +51,11 @@ def of_camera(spec: str) -> Iterator[Finding]:
     yield from _installed(CAMERA_GROUP, spec)
 
 
+def of_kinect2(root: Path) -> Iterator[Finding]:
+    """Run the checks of what a Kinect v2 needs of a machine."""
+    yield from _installed("transientcam.kinect2-checks", root)
+
+
 def absent_in_words(reasons: Mapping[str, str]) -> Iterator[str]:
     """Yield a sentence for each reason why products are absent, with the names of these."""
     names: dict[str, list[str]] = {}

@@ -78,5 +78,5 @@ def draw(path: Path, found: Iterable[Compared]) -> None:
         panel.plot(most_mm, labels, "|", label="nine of ten pixels below")
         panel.set(xscale="log", title=scene, xlabel="error of the range / mm")
         panel.grid(alpha=0.3)
-    panels[0].legend(fontsize="small")
+    panels[0].legend(fontsize="small", loc="lower right")
     figure.savefig(path, dpi=120, format="png")

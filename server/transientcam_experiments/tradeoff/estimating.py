@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_experiments.tradeoff.capture import OUTLIER_M
-from transientcam_moments.comparisons import TECHNIQUES, Technique, separated, statements
+from transientcam_moments.comparisons import PLUGINS, TECHNIQUES, Technique, separated
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD
 
 _Array = NDArray[Any]
@@ -47,7 +47,7 @@ class Scene:
 
 def points(harmonics: int) -> Iterator[tuple[Technique, Mapping[str, Any]]]:
     """Yield the techniques that a number of harmonics is enough for, as points."""
-    others = (each for each in statements().values() if isinstance(each, Technique))
+    others = (each for each in PLUGINS.statements().values() if isinstance(each, Technique))
     for technique in (*TECHNIQUES.values(), *others):
         if technique.measures == "moments" and technique.least_harmonics <= harmonics:
             yield (
@@ -72,7 +72,7 @@ def measure(
     """Return the `QUANTITIES` of a technique, and the spread of its time.
 
     A technique that looks at neighbours has none in the sample.
-    Raises EstimatorFailed where one of another package does.
+    Raises PluginFailed where one of another package does.
     """
     lit = np.flatnonzero(np.isfinite(scene.truth_m))
     chosen = np.random.default_rng(seed).permutation(lit)[:SAMPLE_PIXELS]
@@ -113,7 +113,7 @@ def measure_any(
     """Do as `measure`; of another package's technique that fails no range is there."""
     try:
         return measure(technique, scene, repetitions=repetitions, seed=seed)
-    except tm.EstimatorFailed:
+    except tm.PluginFailed:
         nothing: dict[str, float | None] = dict.fromkeys(QUANTITIES)
         return nothing | {"range_missing": 1.0}, nothing
 

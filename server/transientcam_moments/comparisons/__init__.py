@@ -49,17 +49,8 @@ from transientcam_moments.comparisons._estimate import (
     grid_rad,
 )
 from transientcam_moments.comparisons._pixels import check_order
-from transientcam_moments.comparisons._plugins import (
-    SEPARATORS,
-    import_there,
-    load,
-    loaded,
-    plugged,
-    separated,
-    separated_there,
-)
+from transientcam_moments.comparisons._plugins import PLUGINS, separated
 from transientcam_moments.comparisons._technique import Technique, from_first, from_zeroth
-from transientcam_moments.errors import EstimatorFailed
 
 TECHNIQUES: dict[str, Technique] = {
     technique.name: technique
@@ -85,11 +76,7 @@ TECHNIQUES: dict[str, Technique] = {
     )
 }
 """Every technique by its name; the paper's first."""
-
-
-def plugged_names() -> tuple[str, ...]:
-    """Return the names of the estimators of other packages; ours cannot be taken."""
-    return tuple(name for name in plugged() if name not in TECHNIQUES)
+PLUGINS.taken.update(("automatic", *TECHNIQUES))
 
 
 def technique_of(name: str) -> Technique:
@@ -97,21 +84,16 @@ def technique_of(name: str) -> Technique:
 
     Raises
     ------
-    EstimatorFailed
+    PluginFailed
         Where another package's cannot be used.
     KeyError
         Where there is none of that name.
     """
-    return TECHNIQUES[name] if name in TECHNIQUES else load(name)
-
-
-def statements() -> dict[str, Technique | EstimatorFailed]:
-    """Return each estimator of other packages by its name, or why it cannot be used."""
-    return {name: loaded(name) for name in plugged_names()}
+    return TECHNIQUES[name] if name in TECHNIQUES else PLUGINS.load(name)
 
 
 __all__ = [
-    "SEPARATORS",
+    "PLUGINS",
     "TECHNIQUES",
     "Code",
     "Estimate",
@@ -126,11 +108,7 @@ __all__ = [
     "from_first",
     "from_zeroth",
     "grid_rad",
-    "import_there",
     "maximum_length_code",
-    "plugged_names",
     "separated",
-    "separated_there",
-    "statements",
     "technique_of",
 ]

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, partial
 from html import escape
 
 import numpy as np
@@ -10,10 +10,11 @@ import numpy as np
 from transientcam_compiled import Spread, at_once
 from transientcam_moments.arrays import Array, in_turn, map_html, namespace
 from transientcam_moments.comparisons import (
-    SEPARATORS,
+    PLUGINS,
     TECHNIQUES,
     Technique,
     check_order,
+    separated,
     technique_of,
 )
 from transientcam_moments.errors import ParameterError, UnlabelledImages
@@ -53,6 +54,7 @@ from transientcam_moments.noise import (
     scatter,
     smoothed_of,
 )
+from transientcam_moments.plugins import CALLERS
 from transientcam_moments.reconstruction._detection import undetected, undetected_pixels
 from transientcam_moments.reconstruction._flags import INVALID, Flags, flags
 from transientcam_moments.reconstruction._neighbours import (
@@ -524,7 +526,8 @@ class Reconstruction:
                 parts = technique.estimate(b).separate(at)
             else:
                 told = self._variance, self._frequencies_hz
-                parts = SEPARATORS[-1](technique.name, b, *told, at)
+                call = partial(CALLERS[-1], PLUGINS.group, separated, technique.name)
+                parts = call(b, *told, at)
             return self._lone(Separation(*(xp.asarray(part) for part in parts)))
         if self.settings.technique == "unwrapped-phase":
             return self._lone(self.unwrapped.separate())

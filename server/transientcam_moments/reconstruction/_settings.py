@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from transientcam_moments.arrays import MAX_HARMONICS, MAX_MULTIPLE, chosen, in_range
-from transientcam_moments.comparisons import TECHNIQUES, plugged_names, technique_of
-from transientcam_moments.errors import EstimatorFailed, ParameterError
+from transientcam_moments.comparisons import PLUGINS, TECHNIQUES, technique_of
+from transientcam_moments.errors import ParameterError, PluginFailed
 from transientcam_moments.images import FOUR_PHASES_RAD, SIGMA_PX, ZEROTH_IMAGES, phase_weights
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, EPSILON
 from transientcam_moments.noise import MOST_FRAMES, Sensor
@@ -59,7 +59,7 @@ def least_harmonics(estimator: str) -> int:
     """Return the smallest m that an estimator gives a range of; 1 where it cannot be used."""
     try:
         return technique_of(estimator).least_harmonics
-    except (KeyError, EstimatorFailed):
+    except (KeyError, PluginFailed):
         return 1
 
 
@@ -176,7 +176,7 @@ class Settings:
         in_range("least_range_m", self.least_range_m, -1000.0, 1000.0, "-1000 to 1000 m")
         in_range("threshold", self.threshold, 0.0, 1.0, "0 to 1")
         if self.estimator not in ESTIMATORS:
-            chosen("estimator", self.estimator, ("automatic", *ESTIMATORS, *plugged_names()))
+            chosen("estimator", self.estimator, ("automatic", *ESTIMATORS, *PLUGINS.names()))
         chosen("spoilt_images", self.spoilt_images, CORRUPT_IMAGES)
 
     @property

@@ -10,7 +10,6 @@ from fastapi import Depends, Path, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from pydantic import FiniteFloat
 
-from transientcam import wire
 from transientcam_server.api._middleware.answers import expect_bytes
 from transientcam_server.api._middleware.requests import asks_for_head
 from transientcam_server.api._negotiation import negotiate
@@ -31,6 +30,7 @@ from transientcam_server.imaging import (
     evenly,
     pixel_csv,
     pixel_json,
+    product_names,
     size_of,
 )
 
@@ -54,7 +54,7 @@ FrameName = Annotated[
 ProductName = Annotated[
     str,
     Path(
-        description=f"one of {_named(wire.PRODUCTS)}, without or with one of the suffixes "
+        description=f"one of {_named(product_names())}, without or with one of the suffixes "
         + _named(f".{name}" for name in ENCODINGS),
         examples=["range", "range.npy", "transient.npz", "pointcloud.ply"],
     ),

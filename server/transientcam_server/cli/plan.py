@@ -205,7 +205,8 @@ def _goal(asked: dict[str, Any], fixed: dict[str, Any]) -> "Goal":
     estimator = asked["estimator"]
     if estimator is not None and estimator not in ESTIMATORS:
         known = ", ".join(ESTIMATORS)
-        raise typer.BadParameter(f"{estimator!r} is none of {known}", param_hint="--estimator")
+        why = f"{estimator!r} is none of {known}; `transientcam compare` measures others"
+        raise typer.BadParameter(why, param_hint="--estimator")
     return Goal(**asked, base=Sequence.from_document(fixed), fixed=frozenset(fixed))
 
 

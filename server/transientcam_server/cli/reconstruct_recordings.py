@@ -29,11 +29,12 @@ class ReconstructionChoices:
 
     def options(self, header: "Header") -> "BatchOptions":
         """Return what to compute of a recording with this header."""
-        from transientcam_server.offline import KNOWN_PRODUCTS, BatchOptions, default_products
+        from transientcam_server.offline import BatchOptions, default_products, known_products
 
+        there = [name for name in known_products() if name != "raw"]
         for name in self.products:
-            if name not in KNOWN_PRODUCTS:
-                known = ", ".join(KNOWN_PRODUCTS)
+            if name not in there:
+                known = ", ".join(there)
                 raise typer.BadParameter(f"{name!r} is none of {known}", param_hint="--product")
         names = tuple(dict.fromkeys(self.products or default_products(header.applied)))
         settings = settings_of({**header.reconstruction, **self.changes})

@@ -20,6 +20,7 @@ import transientcam_moments as tm
 from transientcam.errors import TransientcamError
 from transientcam.transport import translated
 from transientcam_compiled import python
+from transientcam_moments.plugins import GROUPS
 from transientcam_server.daemon._configuration import load_settings
 from transientcam_server.daemon._server import listen
 from transientcam_server.errors import AddressUnavailable, SettingsError
@@ -41,7 +42,7 @@ def checks(config: Path | None = None) -> Iterator[Reported]:
     yield _kernels()
     yield from _devices()
     yield _supervisor()
-    yield from _estimators()
+    yield from _plugins()
     try:
         settings = load_settings({}, file=config, environment=os.environ)
     except SettingsError as error:
@@ -79,12 +80,14 @@ def _libraries() -> Iterator[Reported]:
     yield "ok", "packages", ", ".join(found), None
 
 
-def _estimators() -> Iterator[Reported]:
-    for name, found in tm.comparisons.statements().items():
-        if isinstance(found, tm.EstimatorFailed):
-            yield "warning", "estimators", str(found), "docs/add-an-estimator.md"
-        else:
-            yield "ok", "estimators", f"{name}, of another package: {found.label}", None
+def _plugins() -> Iterator[Reported]:
+    for offered in GROUPS.values():
+        for name, found in offered.statements().items():
+            if isinstance(found, tm.PluginFailed):
+                yield "warning", f"{offered.kind}s", str(found), "docs/add-an-estimator.md"
+            else:
+                says = getattr(found, "label", "") or found.summary
+                yield "ok", f"{offered.kind}s", f"{name}, of another package: {says}", None
 
 
 def _kernels() -> Reported:

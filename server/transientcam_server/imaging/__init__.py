@@ -32,7 +32,7 @@ from transientcam_server.imaging._frames.bands import BAND_BYTES, STREAMED_BYTES
 from transientcam_server.imaging._frames.frame import Frame
 from transientcam_server.imaging._frames.history import History
 from transientcam_server.imaging._frames.meta import frame_meta
-from transientcam_server.imaging._frames.other_estimators import OtherEstimators
+from transientcam_server.imaging._frames.other_packages import OtherPackages
 from transientcam_server.imaging._frames.pipeline import Pipeline
 from transientcam_server.imaging._frames.stages import FIRST, Computed, compute
 from transientcam_server.imaging._frames.workers import Workers
@@ -44,7 +44,12 @@ from transientcam_server.imaging._products.labelling import (
     parts_of,
 )
 from transientcam_server.imaging._products.pixel import pixel_csv, pixel_json
-from transientcam_server.imaging._products.products import PRODUCTS, Product
+from transientcam_server.imaging._products.products import (
+    PRODUCTS,
+    Product,
+    product_names,
+    product_of,
+)
 from transientcam_server.imaging._products.requirements import absent_products, unmet
 from transientcam_server.imaging._products.view import DEFAULT_BINS, WHOLE, Crop, View, evenly
 from transientcam_server.imaging._recipe.calibration import (

@@ -7,6 +7,7 @@ of another format. `offline.opening` has it as a sequence of frames, for `transi
 
 from transientcam_server.offline import _plot as plot
 from transientcam_server.offline._cluster import completed, reconstruct_on
+from transientcam_server.offline._computing import known_products
 from transientcam_server.offline._convert import convert_recording
 from transientcam_server.offline._impulse_responses import is_tal
 from transientcam_server.offline._job import installed, load_kernels, require_versions
@@ -21,7 +22,6 @@ from transientcam_server.offline._measurement import (
 )
 from transientcam_server.offline._place import recording_at
 from transientcam_server.offline._recording import (
-    KNOWN_PRODUCTS,
     BatchOptions,
     BatchReconstructor,
     default_products,

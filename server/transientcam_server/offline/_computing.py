@@ -24,16 +24,23 @@ from transientcam_server.imaging import (
     compute,
     evenly,
     frame_meta,
+    product_names,
+    product_of,
     unmet,
 )
 
-KNOWN: Final = {
-    name: product
+KNOWN: Final = tuple(
+    name
     for name, product in PRODUCTS.items()
     # there is no truth of a recording, and no sensor whose noise is known
     if product.needs != "truth" and not product.of_noise
-}
-"""Products that recorded frames have."""
+)
+"""Our products that recorded frames have."""
+
+
+def known_products() -> tuple[str, ...]:
+    """Return the names of all products that recorded frames have."""
+    return (*KNOWN, *(name for name in product_names() if name not in PRODUCTS))
 
 
 class ComputedFrame:
@@ -121,12 +128,13 @@ class ComputedFrame:
         )
 
     def __getattr__(self, name: str) -> NDArray[Any]:
-        if name.startswith("_") or name not in KNOWN:
-            raise AttributeError(f"a recorded frame has no {name!r}; products: {', '.join(KNOWN)}")
+        if name.startswith("_") or name not in known_products():
+            known = ", ".join(known_products())
+            raise AttributeError(f"a recorded frame has no {name!r}; products: {known}")
         return self.product(name).array
 
     def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *KNOWN})
+        return sorted({*super().__dir__(), *known_products()})
 
     def __repr__(self) -> str:
         images, height, width = self.raw.shape
@@ -170,7 +178,6 @@ class ComputedFrame:
 
 def known_product(name: str) -> Product:
     """Return a product that recorded frames have, or raise a ParameterError."""
-    try:
-        return KNOWN[name]
-    except KeyError:
-        raise ParameterError("product", name, f"one of {', '.join(KNOWN)}") from None
+    if name not in (known := known_products()):
+        raise ParameterError("product", name, f"one of {', '.join(known)}")
+    return product_of(name)

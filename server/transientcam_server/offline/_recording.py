@@ -22,7 +22,7 @@ from transientcam_server.imaging import (
     parts_of,
     unmet,
 )
-from transientcam_server.offline._computing import KNOWN, ComputedFrame
+from transientcam_server.offline._computing import ComputedFrame, known_product
 from transientcam_server.offline._formats import SINKS, Block, Content, Row, sink_of, write
 from transientcam_server.recording import (
     FORMAT,
@@ -36,7 +36,6 @@ from transientcam_server.recording import (
 from transientcam_server.settings import ReconstructionSettings
 
 DEFAULT_PRODUCTS: Final = ("range", "direct", "indirect", "brightness", "validity", "flags")
-KNOWN_PRODUCTS: Final = tuple(name for name in KNOWN if name != "raw")
 HDF5_SUFFIXES: Final = (".h5", ".hdf5")
 _DESCRIBED: Final = ("units", "long_name")
 _SERIES: Final = ("device_time_s", "host_time_s", "frame")
@@ -65,7 +64,7 @@ class BatchReconstructor:
         capabilities = recording.header.capabilities
         self.recipe = recorded_recipe(recording.header, SettingsVersion(1, options.settings))
         self._size = capabilities.height, capabilities.width
-        self.products = [PRODUCTS[name] for name in options.products]
+        self.products = [known_product(name) for name in options.products]
         self.time_s = np.arange(options.bins) / (options.bins * self.recipe.base_frequency_hz)
 
     def shape(self, product: Product) -> tuple[int, ...]:

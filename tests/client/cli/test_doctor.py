@@ -249,3 +249,19 @@ def test_the_daemon_s_clock_is_compared_as_far_as_its_seconds_allow(
 
     assert found.level == level
     assert words in found.message
+
+
+def test_a_report_for_an_issue_holds_findings_and_no_path_or_host_of_the_user(
+    offer: _Offer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", "/home/somebody")
+    monkeypatch.setattr("platform.node", lambda: "my-laptop")
+    offer([("warning", "disk", "/home/somebody/light on my-laptop is ```full", None)])
+
+    code = run(["doctor", "--json", "--report", str(tmp_path / "camera.md")])
+
+    written = (tmp_path / "camera.md").read_text("utf-8")
+    assert code == 0
+    assert "- warning, disk: ~/light on HOST is '''full" in written
+    assert written.count("```") == 2
+    assert "What I did" in written

@@ -24,13 +24,14 @@ const hello = (state: Hello["camera"]["state"]): Report => ({
 class Page {
   /** Products that the camera does not have, by the service. */
   absent: readonly { readonly name: string; readonly reason: string }[] = [];
+  products: readonly object[] = [];
   readonly sent: Command[] = [];
   readonly worker: WorkerPort = { onmessage: null, postMessage: (command) => this.sent.push(command) };
   readonly #requested: ((now_ms: number) => void)[] = [];
   readonly store = new Store({
     shelf: null,
     api: new Api(() =>
-      Promise.resolve(new Response(JSON.stringify({ ...CAMERA, absent_products: this.absent, active: null, recordings: [] }))),
+      Promise.resolve(new Response(JSON.stringify({ ...CAMERA, absent_products: this.absent, products: this.products, active: null, recordings: [] }))),
     ),
   });
   readonly client = new StreamClient(
@@ -308,4 +309,18 @@ describe("between worker and store", () => {
     changed({ sequence_id: 3, harmonics: 5 });
     expect(page.store.events.all.value).toHaveLength(2);
   });
+});
+
+test("products of other packages are maps beside ours, whichever the link names", async () => {
+  page.store.mapProduct.value = "range-apart";
+  expect(page.store.looks.of("range-apart").product.product).toBe("range");
+  page.products = [
+    { name: "uniform", unit: "DN", summary: "ours", stated: null },
+    { name: "range-apart", unit: "m", summary: "how far apart", stated: { assumptions: "", cost: "", failure: "" } },
+  ];
+  await page.client.learnAbsent();
+
+  expect(page.store.frames.maps.value.map(({ name }) => name).slice(5)).toEqual(["Error", "Range apart"]);
+  expect(page.store.looks.of("range-apart").product).toMatchObject({ unit: "m", hint: "how far apart" });
+  expect(page.store.looks.of("range-apart-difference").product.signed).toBe(true);
 });

@@ -54,7 +54,7 @@ class Page {
   }
 
   difference(): readonly number[] {
-    return [...(this.comparison.maps.range.difference.value?.values ?? [])];
+    return [...(this.comparison.of("range").difference.value?.values ?? [])];
   }
 }
 
@@ -102,7 +102,7 @@ describe("a frame of a recording as B", () => {
     page.comparison.source.value = { of: "rec", frame: 6 };
     page.comparison.source.value = { of: "rec", frame: 7 };
     await settled();
-    expect(page.comparison.maps.range.b.value?.meta.frame).toBe(7);
+    expect(page.comparison.of("range").b.value?.meta.frame).toBe(7);
     expect(page.asked.filter((each) => each.endsWith("trust"))).toHaveLength(1);
   });
 
@@ -113,15 +113,15 @@ describe("a frame of a recording as B", () => {
     page.comparison.source.value = { of: "rec", frame: 6 };
     await settled();
     expect(page.comparison.trouble.value).toBe("It was deleted.");
-    expect(page.comparison.maps.range.b.value).toBeNull();
+    expect(page.comparison.of("range").b.value).toBeNull();
   });
 
   test("has no difference from a picture of another size", async () => {
     page.show(9, [1, 2]);
     page.comparison.source.value = { of: "rec", frame: 5 };
     await settled();
-    expect(page.comparison.maps.range.b.value).not.toBeNull();
-    expect(page.comparison.maps.range.difference.value).toBeNull();
+    expect(page.comparison.of("range").b.value).not.toBeNull();
+    expect(page.comparison.of("range").difference.value).toBeNull();
   });
 
   test("is what a link says, and nothing else is", () => {

@@ -69,7 +69,7 @@ describe("an address", () => {
     store.mapProduct.value = "range";
     vi.advanceTimersByTime(1000);
     expect(target.location.hash).toBe("#map=range&map2=validity");
-    target.goto("#map2=gone");
+    target.goto("#map2=9");
     expect(store.secondMapProduct.value).toBe("validity");
   });
 
@@ -153,7 +153,7 @@ test.each([
   ...["#layout=1:secret.1", "#layout=:,/", "#layout=1:map.-1", "#layout=1:map.1,1_map.1", "#layout=1:1_"],
   ...["#look=range,neon,linear", "#look=range,viridis,linear,3,1", "#look=secret,viridis,linear", "#look=,"],
   ...[
-    "#map=gone",
+    "#map=9",
     "#pixel=1",
     "#pixel=-1,2",
     "#pixel=1,2,3",

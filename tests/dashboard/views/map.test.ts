@@ -79,7 +79,7 @@ describe("looks", () => {
   const looks = (): Looks => {
     const frames = new Frames();
     const beside = {
-      maps: Object.fromEntries(MAP_PRODUCTS.map(({ product }) => [product, { b: signal(null), difference: signal(null) }])),
+      of: () => ({ b: signal(null), difference: signal(null) }),
     } as unknown as Comparison;
     return new Looks(frames, new Settings(null), beside);
   };

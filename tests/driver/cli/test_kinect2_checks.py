@@ -1,10 +1,12 @@
 """What doctor says of Kinects v2, on file systems made for it."""
 
+import json
 import os
 from pathlib import Path
 
 import pytest
 
+from transientcam.cli import run as command
 from transientcam_driver import CameraError
 from transientcam_driver.cameras.kinect2 import UDEV_RULES
 from transientcam_driver.cli.kinect2_checks import Reported, checks
@@ -29,6 +31,16 @@ def memory(root: Path, text: str) -> None:
     file.write_text(text)
 
 
+def controller(root: Path, vendor: str, speed: str = "5000") -> None:
+    """A bus of a PCI device, as the kernel links it."""
+    device = root / "sys/devices/pci0000:00/0000:00:14.0"
+    (device / "usb2").mkdir(parents=True)
+    (device / "vendor").write_text(f"{vendor}\n")
+    (device / "usb2/speed").write_text(f"{speed}\n")
+    (root / "sys/bus/usb/devices").mkdir(parents=True, exist_ok=True)
+    (root / "sys/bus/usb/devices/usb2").symlink_to(device / "usb2")
+
+
 def found(root: Path) -> dict[str, Reported]:
     return {each[1]: each for each in checks(root=root, package=lambda: None)}
 
@@ -42,6 +54,7 @@ def test_without_a_kinect_there_is_one_line(tmp_path: Path) -> None:
 def test_a_machine_that_is_set_up_is_in_order(tmp_path: Path) -> None:
     plug(tmp_path)
     memory(tmp_path, "16\n")
+    controller(tmp_path, "0x8086")
 
     seen = found(tmp_path)
 
@@ -113,3 +126,55 @@ def test_a_missing_package_is_a_fault_with_what_installs_it(tmp_path: Path) -> N
 
     assert seen["Kinect v2: libusb"][0] == "fault"
     assert seen["Kinect v2: libusb"][3] == "pip install it"
+
+
+@pytest.mark.parametrize(
+    ("vendor", "speed", "level", "words"),
+    [
+        ("0x8086", "10000", "ok", "usb2: Intel, known to work"),
+        ("0x1b21", "5000", "warning", "usb2: ASMedia, frames are lost with it"),
+        ("0x10de", "5000", "ok", "usb2: vendor 10de, few reports are known"),
+        ("0x8086", "480", "fault", "this machine has no USB 3"),
+    ],
+)
+def test_a_host_is_judged_without_a_kinect(
+    tmp_path: Path, vendor: str, speed: str, level: str, words: str
+) -> None:
+    controller(tmp_path, vendor, speed)
+
+    seen = {each[1]: each for each in checks(root=tmp_path, package=lambda: None, host=True)}
+
+    assert seen["Kinect v2"][2] == "none is plugged in"
+    assert seen["Kinect v2: controller"][:3] == (level, "Kinect v2: controller", words)
+    assert (seen["Kinect v2: controller"][3] is None) == (level == "ok")
+
+
+def test_a_hub_without_its_camera_tells_of_power_or_cable(tmp_path: Path) -> None:
+    plug(tmp_path, product="02d9", speed="480")
+
+    (level, _, message, remedy), *_ = checks(root=tmp_path)
+
+    assert (level, message) == (
+        "fault",
+        "its hub is at /dev/bus/usb/002/001, but no camera behind it",
+    )
+    assert "power supply" in str(remedy)
+
+
+def test_a_virtual_machine_is_warned_of(tmp_path: Path) -> None:
+    (tmp_path / "proc").mkdir()
+    (tmp_path / "proc/cpuinfo").write_text("flags : fpu hypervisor lahf_lm\n")
+
+    seen = {each[1]: each for each in checks(root=tmp_path, package=lambda: None, host=True)}
+
+    assert seen["Kinect v2: host"][0] == "warning"
+
+
+def test_the_verb_prints_what_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    controller(tmp_path, "0x8086", "480")
+
+    code = command(["kinect2", "--check", "--root", str(tmp_path), "--json"])
+
+    assert code == 1
+    assert json.loads(capsys.readouterr().out)["verdict"] == "fault"
+    assert command(["kinect2"]) == 2

@@ -12,8 +12,8 @@ import pytest
 
 import transientcam_moments as tm
 from tests.moments import oracles
-from transientcam_moments import comparisons
-from transientcam_moments.comparisons import SparseEstimate, Technique, _plugins as plugins
+from transientcam_moments import comparisons, plugins
+from transientcam_moments.comparisons import PLUGINS, SparseEstimate, Technique
 
 M, PHASE_RAD, WEIGHT = 4, np.array([[0.4, 2.0, 3.3]]), np.full((1, 3), 3.0)
 _Offer = Callable[..., None]
@@ -39,13 +39,13 @@ def offer(monkeypatch: pytest.MonkeyPatch) -> Iterator[_Offer]:
     def make(what: object, name: str = "mine") -> None:
         attribute = f"OFFERED_{len(points)}"
         setattr(module, attribute, what)
-        points.append(EntryPoint(name, f"{module.__name__}:{attribute}", plugins.GROUP))
-        plugins.plugged.cache_clear()
-        plugins.loaded.cache_clear()
+        points.append(EntryPoint(name, f"{module.__name__}:{attribute}", PLUGINS.group))
+        PLUGINS.points.cache_clear()
+        PLUGINS.loaded.cache_clear()
 
     yield make
-    plugins.plugged.cache_clear()
-    plugins.loaded.cache_clear()
+    PLUGINS.points.cache_clear()
+    PLUGINS.loaded.cache_clear()
 
 
 def moments(dtype: type = np.complex128) -> Any:
@@ -65,7 +65,7 @@ def test_it_is_a_value_of_the_settings_and_gives_range_and_light(
     settings = tm.Settings(base_frequency_hz=20e6, estimator="mine", least_range_m=0.0)
     found = tm.reconstruct(moments(dtype), settings)
 
-    assert comparisons.plugged_names() == ("mine",)
+    assert PLUGINS.names() == ("mine",)
     assert found.range_m == pytest.approx(tm.range_m(PHASE_RAD[0], 20e6), rel=1e-5)
     assert found.direct == pytest.approx(WEIGHT[0], rel=1e-5)
     assert found.range_m.dtype == np.finfo(dtype).dtype
@@ -122,7 +122,7 @@ def test_what_it_does_wrong_is_said_and_spoils_no_other_property(
     offer(with_estimate(estimate))
     found = tm.reconstruct(moments(), tm.Settings(base_frequency_hz=20e6, estimator="mine"))
 
-    with pytest.raises(tm.EstimatorFailed, match=f"mine .*{words}"):
+    with pytest.raises(tm.PluginFailed, match=f"mine .*{words}"):
         _ = found.range_m
 
     assert not (found.flags & int(tm.INVALID)).any()
@@ -150,6 +150,7 @@ def test_pixels_that_are_not_finite_have_no_range(offer: _Offer) -> None:
         ([one_return], "is a function, not a Technique"),
         ([replace(GOOD, name="other")], "calls itself 'other'"),
         ([replace(GOOD, measures="code")], "measures 'code'"),
+        ([replace(GOOD, cost=7)], "its cost is no text: 7"),  # type: ignore[arg-type]  # a faulty one
         ([GOOD, GOOD], "several packages offer it"),
     ],
 )
@@ -159,16 +160,60 @@ def test_what_cannot_be_used_is_listed_with_the_reason(
     for each in offered:
         offer(each)
 
-    reason = comparisons.statements()["mine"]
+    reason = PLUGINS.statements()["mine"]
 
-    assert isinstance(reason, tm.EstimatorFailed)
+    assert isinstance(reason, tm.PluginFailed)
     assert words in reason.reason
-    with pytest.raises(tm.EstimatorFailed, match="mine"):
+    with pytest.raises(tm.PluginFailed, match="mine"):
         comparisons.technique_of("mine")
+
+
+@pytest.mark.parametrize(
+    ("compute", "words"),
+    [
+        (lambda b, **_: b[1], "Cannot cast"),
+        (lambda b, **_: np.array(["a", "b", "c"]), "Cannot cast"),
+        (lambda b, **_: b[1:].real, r"shape \(4, 3\), and the pixels have \(3,\)"),
+        (lambda b, noise: b[1].real, "frequencies_hz"),
+        (lambda b, **_: None, "Cannot cast"),
+    ],
+)
+def test_a_map_that_is_none_is_refused_with_the_reason(
+    compute: Callable[..., Any], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = plugins.MapProduct(
+        name="a-map", unit="1", summary="", assumptions="", cost="", failure="", compute=compute
+    )
+    monkeypatch.setattr(plugins.PRODUCTS, "loaded", lambda name: made)
+
+    with pytest.raises(tm.PluginFailed, match=f"the product a-map .*{words}"):
+        plugins.mapped("a-map", moments(), None, 20e6 * np.arange(M + 1))
+
+
+def test_a_map_has_no_infinite_values_and_says_what_it_needs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = plugins.MapProduct(
+        name="a-map",
+        unit="1",
+        summary="",
+        least_harmonics=M,
+        assumptions="",
+        cost="",
+        failure="",
+        compute=lambda b, **_: np.array([1.0, np.inf, -np.inf]),
+    )
+    monkeypatch.setattr(plugins.PRODUCTS, "loaded", lambda name: made)
+
+    found = plugins.mapped("a-map", moments(), None, np.zeros(M + 1))
+
+    assert np.array_equal(found, [1.0, np.nan, np.nan], equal_nan=True)
+    with pytest.raises(tm.PluginFailed, match="needs 4 frequencies, and there are 3"):
+        plugins.mapped("a-map", moments()[:-1], None, np.zeros(M))
 
 
 def test_the_name_of_a_built_in_one_cannot_be_taken(offer: _Offer) -> None:
     offer(replace(GOOD, name="pisarenko"), "pisarenko")
 
-    assert comparisons.plugged_names() == ()
+    assert PLUGINS.names() == ()
     assert comparisons.technique_of("pisarenko") is comparisons.TECHNIQUES["pisarenko"]

@@ -9,6 +9,7 @@ import type { AnimationLoop } from "./animation";
 import { kindOf, LIVE, liveFrame, RequestError, refusalIn } from "./api";
 import { inWords, lossWords, sequenceKey } from "./events";
 import { frameOf, isWhole } from "./frames";
+import { MAP_PRODUCTS, mapOf } from "./mapCatalogue";
 import type { Store } from "./store";
 
 /** What of a Worker is used. */
@@ -277,7 +278,9 @@ export class StreamClient {
   async learnAbsent(): Promise<void> {
     const { api, frames } = this.store;
     try {
-      const { absent_products } = await api.ask("GET /info");
+      const { absent_products, products } = await api.ask("GET /info");
+      const others = products.filter(({ stated }) => stated !== null).map(({ name, unit, summary }) => mapOf(name, unit, summary));
+      if (others.length > 0) frames.maps.value = [...MAP_PRODUCTS, ...others];
       const absent = Object.fromEntries(absent_products.map(({ name, reason }) => [name, reason]));
       if (JSON.stringify(absent) !== JSON.stringify(frames.absent.peek())) frames.absent.value = absent;
     } catch (error) {

@@ -6,7 +6,6 @@ import type { FrameMeta } from "../stream/documents";
 import { summariseMap } from "../stream/summary";
 import { LIVE, liveFrame, MADE, RequestError, recordingPath, refusalIn } from "./api";
 import { type Frame, type Frames, frameOf } from "./frames";
-import { MAP_PRODUCTS } from "./mapCatalogue";
 import type { RangeErrors } from "./rangeErrors";
 import type { FrameLoader } from "./replay";
 import { oneOf, type Settings } from "./settings";
@@ -20,7 +19,6 @@ export type Way = (typeof WAYS)[number];
 
 /** What says which differences of ranges mean something. */
 const ERRORS = ["range_error", "trust"] as const;
-const MAPS: readonly string[] = MAP_PRODUCTS.map(({ product }) => product);
 
 /** A map of B, and A - B: null where there is none yet, or the two are not of the same size. */
 type ComparedMap = Readonly<Record<"b" | "difference", ReadonlySignal<Frame | null>>>;
@@ -30,8 +28,6 @@ export class Comparison {
   readonly source: Signal<Source | null>;
   /** What the map panels show, by their views. */
   readonly ways: Readonly<Record<string, Signal<Way>>>;
-  /** By their products. */
-  readonly maps: Readonly<Record<string, ComparedMap>>;
   /** Names of the frames that this browser keeps. */
   readonly kept = signal<readonly string[]>([]);
   /** Why B cannot be had; null if it can. */
@@ -41,6 +37,7 @@ export class Comparison {
   /** Set by what talks to the worker. */
   loader: FrameLoader | null = null;
   readonly #b = signal<readonly Frame[]>([]);
+  readonly #compared: Record<string, ComparedMap> = {};
   readonly #changes = signal(0);
   #asked = 0;
 
@@ -61,31 +58,40 @@ export class Comparison {
     });
     const way = (link: string) => settings.of<Way>({ link, initial: "A", ...oneOf(WAYS), text: (now) => (now === "A" ? "" : now) });
     this.ways = { map: way("way"), "second-map": way("way2") };
-    const of = (product: string): Frame | null => this.#b.value.find((each) => each.product === product) ?? null;
-    const compared = (product: string): ComparedMap => ({
-      b: computed(() => of(product)),
-      difference: computed(() => minus(frames.of(product).value, of(product))),
-    });
-    this.maps = Object.fromEntries(MAPS.map((product) => [product, compared(product)]));
     this.error_m = computed(() => {
-      const maps = [...ERRORS.map((product) => errors.of(product).value), ...ERRORS.map(of)].flatMap((map) => map ?? []);
+      const maps = [...ERRORS.map((product) => errors.of(product).value), ...ERRORS.map((product) => this.#of(product))].flatMap(
+        (map) => map ?? [],
+      );
       const [error_a, trust_a, error_b, trust_b] = maps.map(({ values }) => values);
       if (maps.length < 4 || error_a.length !== error_b.length) return null;
       const known = (at: number): boolean => trust_a[at] === 0 && trust_b[at] === 0;
       return Float32Array.from(error_a).map((error, at) => (known(at) ? Math.hypot(error, error_b[at]) : NaN));
     });
-    const shown = computed(() => frames.wanted.value.filter((product) => MAPS.includes(product)).join());
+    const shown = computed(() => frames.wanted.value.filter((product) => frames.maps.value.some((map) => map.product === product)).join());
     effect(() => {
       void this.#changes.value;
-      const [source, maps] = [this.source.value, shown.value.match(/\w+/g) ?? []];
+      const [source, maps] = [this.source.value, shown.value.match(/[\w-]+/g) ?? []];
       untracked(() => void this.#load(source, maps));
     });
+  }
+
+  /** A map of B, and of A - B. */
+  of(product: string): ComparedMap {
+    const b = computed(() => this.#of(product));
+    this.#compared[product] ??= { b, difference: computed(() => minus(this.frames.of(product).value, b.value)) };
+    return this.#compared[product];
+  }
+
+  #of(product: string): Frame | null {
+    return this.#b.value.find((each) => each.product === product) ?? null;
   }
 
   /** Keeps all maps of the frame that is shown under a name, and compares with it. Raises RequestError. */
   async keep(shown: Frame, name: string): Promise<void> {
     const path = shown.origin === LIVE ? liveFrame(shown.meta.frame) : shown.origin;
-    const wanted = [...MAPS, "trust"].filter((product) => this.frames.absent.peek()[product] === undefined);
+    const wanted = [...this.frames.maps.peek().map(({ product }) => product), "trust"].filter(
+      (product) => this.frames.absent.peek()[product] === undefined,
+    );
     const frames = ((await this.loader?.(path, wanted)) ?? []).map((report) => frameOf(report, MADE));
     await stored(() => set(name, frames));
     this.source.value = { of: name, frame: null };

@@ -6,6 +6,7 @@ import { type Cut, has, type Numbers, spread } from "../stream/compact";
 import type { FrameDocument, FrameMeta } from "../stream/documents";
 import { coefficientsOf, type FrameReport, type LightSummary } from "../stream/summary";
 import { LIVE } from "./api";
+import { MAP_PRODUCTS } from "./mapCatalogue";
 import type { Pixel } from "./pixel";
 
 /** The newest frame of one product. */
@@ -33,6 +34,8 @@ export interface Frame {
 export class Frames {
   /** Why frames of this camera do not have a product, by its name. */
   readonly absent = signal<Readonly<Record<string, string | undefined>>>({});
+  /** The maps on offer: ours, and those of other packages. */
+  readonly maps = signal(MAP_PRODUCTS);
   /** Products that a view shows and that can be had, sorted. */
   readonly wanted = computed(() => this.#claimed.value.filter((product) => this.absent.value[product] === undefined));
   /** The product that says how much light a pixel has. */

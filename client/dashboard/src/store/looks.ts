@@ -1,11 +1,11 @@
 /** How each map is shown, wherever it is: as a picture, as points, on its colour bar. */
-import { computed, type ReadonlySignal, type Signal, signal } from "@preact/signals";
+import { computed, effect, type ReadonlySignal, type Signal, signal } from "@preact/signals";
 
 import { COLOUR_MAPS, type ColourMapName } from "../scales/colourMaps";
 import { autoLimits, joined, type Scale, type ScaleKind, type Span, symmetric } from "../scales/scale";
 import type { Comparison } from "./comparison";
 import type { Frame, Frames } from "./frames";
-import { differenceMap, MAP_PRODUCTS, type MapProduct } from "./mapCatalogue";
+import { differenceMap, type MapProduct } from "./mapCatalogue";
 import { type Kind, oneOf, type Setting, type Settings } from "./settings";
 
 /** Where the ends of a scale stand before anything was measured. */
@@ -58,20 +58,26 @@ export class Look {
 export class Looks {
   /** Maps of one unit keep the same limits, so that they can be compared. */
   readonly locked = signal(false);
-  readonly #all: ReadonlyMap<string, Look>;
+  readonly #all = new Map<string, Look>();
 
-  constructor(frames: Frames, settings: Settings, comparison: Comparison) {
-    const looks = MAP_PRODUCTS.flatMap((map) => [
-      new Look(map, frames.of(map.product), settings, comparison.maps[map.product].b),
-      new Look(differenceMap(map), comparison.maps[map.product].difference, settings),
-    ]);
-    this.#all = new Map(looks.map((look) => [look.product.product, look]));
+  constructor(
+    private readonly frames: Frames,
+    settings: Settings,
+    comparison: Comparison,
+  ) {
+    effect(() => {
+      const added = frames.maps.value.filter(({ product }) => !this.#all.has(product));
+      for (const map of added) {
+        const { b, difference } = comparison.of(map.product);
+        const looks = [new Look(map, frames.of(map.product), settings, b), new Look(differenceMap(map), difference, settings)];
+        for (const look of looks) this.#all.set(look.product.product, look);
+      }
+    });
   }
 
+  /** The look of a map, or of the first where there is none. */
   of(product: string): Look {
-    const look = this.#all.get(product);
-    if (look === undefined) throw new Error(`There is no map of ${product}.`);
-    return look;
+    return this.#all.get(product) ?? (this.#all.get(this.frames.maps.value[0].product) as Look);
   }
 
   /** Sets the limits of a map by hand, null to let them follow the data; of all maps of its unit while these are locked. */

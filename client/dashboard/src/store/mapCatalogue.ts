@@ -15,7 +15,7 @@ export interface MapProduct {
   readonly signed?: boolean;
 }
 
-/** The maps on offer, in the order of their tabs. */
+/** The maps of this project, in the order of their tabs. */
 export const MAP_PRODUCTS: readonly MapProduct[] = [
   { product: "range", name: "Range", hint: "Distance to what the first light came from", unit: "m", colours: "viridis", decimals: 3 },
   { product: "direct", name: "Direct", hint: "Light of the first return", unit: "DN", colours: "grey", decimals: 1 },
@@ -40,6 +40,12 @@ export const MAP_PRODUCTS: readonly MapProduct[] = [
     decimals: 4,
   },
 ];
+
+/** The map of another package's product, by what the service says of it. */
+export function mapOf(product: string, unit: string, hint: string): MapProduct {
+  const name = product.replace(/[-_]/g, " ").replace(/^./, (first) => first.toUpperCase());
+  return { product, name, hint, unit, colours: "viridis", decimals: 3 };
+}
 
 /** The map of A - B where two frames are compared. */
 export function differenceMap({ scale, ...map }: MapProduct): MapProduct {

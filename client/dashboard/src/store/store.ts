@@ -18,7 +18,6 @@ import { Lease } from "./lease";
 import { TransientLook } from "./lightLook";
 import { LightOff } from "./lightOff";
 import { Looks } from "./looks";
-import { MAP_PRODUCTS } from "./mapCatalogue";
 import { Measures } from "./measures";
 import { Noises } from "./noise";
 import { type Pixel, pixelOf, pixelText } from "./pixel";
@@ -28,7 +27,7 @@ import { Reconstruction } from "./reconstruction";
 import { Recordings } from "./recordings";
 import { Replay } from "./replay";
 import { Sequencing } from "./sequencing";
-import { aBoolean, browserShelf, oneOf, Settings, type Shelf } from "./settings";
+import { aBoolean, browserShelf, type Kind, oneOf, Settings, type Shelf } from "./settings";
 import { Simulation } from "./simulation";
 import { Status } from "./status";
 import { Theme } from "./theme";
@@ -44,7 +43,9 @@ class Ground {
   ) {}
 }
 
-const A_MAP = oneOf(MAP_PRODUCTS.map(({ product }) => product));
+/** By its name: which ones other packages have is known later. */
+const isMap = (value: unknown): value is string => typeof value === "string" && /^[a-z][\w-]{0,62}$/.test(value);
+const A_MAP: Kind<string> = { accepts: isMap, text: String, parse: (text) => (isMap(text) ? text : undefined) };
 
 /** All that the page knows. Views read and set it; what fills it is no concern of theirs. */
 export class Store extends Ground {

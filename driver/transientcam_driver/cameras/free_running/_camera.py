@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any, Final, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from transientcam_driver.camera import (
     AppliedSequence,
@@ -16,7 +17,7 @@ from transientcam_driver.cameras.free_running._frequencies import common_base
 from transientcam_driver.cameras.free_running._measurement import Capture, Description
 from transientcam_driver.cameras.free_running._rendering import BITS, Renderer
 from transientcam_driver.cameras.streamed import StreamedCamera, same
-from transientcam_driver.errors import CameraLost
+from transientcam_driver.errors import CameraLost, ProtocolError
 from transientcam_driver.sequence import Sampling
 from transientcam_supervisor import OffSwitch
 
@@ -85,9 +86,10 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
         self._arrived = threading.Condition()
         self._kept: Capture | CameraLost | None = None
         self._receiving: tuple[threading.Thread, threading.Event] | None = None
-        self._takes: list[Capture] = []
+        self._takes: list[tuple[Capture, NDArray[np.uint16]]] = []
         self._expected: int | None = None  # the device's number of the next frame
         self._number = self._lost = 0
+        self._spoilt = ""  # why the last frame was not whole
         self._clocks_s = 0.0, 0.0  # of the device and of this machine, at its last frame
         super().__init__(same(connect, lambda device: device.description.serial), **others)
 
@@ -109,6 +111,9 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
 
     def _check(self) -> float | None:
         return self._device.temperature_c()
+
+    def _silence(self) -> str:
+        return self._spoilt or "nothing"
 
     def _set(self, applied: AppliedSequence) -> None:
         again = self._lit and applied.sequence.exposure_s != self._applied.sequence.exposure_s
@@ -157,20 +162,22 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
         return found
 
     def _collected(self, arrival: Capture) -> RawFrame | None:
-        capture = arrival
-        applied = self._applied
+        capture, applied = arrival, self._applied
         each = applied.images // applied.sequence.takes
         missing = 0 if self._expected is None else max(0, capture.number - self._expected)
         self._expected = capture.number + 1
-        self.counters.images += each
+        try:
+            self._takes.append((capture, self._renderer.images(capture)))
+            self.counters.images += each
+        except (ProtocolError, TypeError, ValueError) as error:  # costs this frame alone
+            missing, self._spoilt = missing + 1, f"frames that do not fit: {error}"
         self.counters.lost += missing * each
         self._lost += missing * each
         self._number += missing
-        self._takes.append(capture)
         if len(self._takes) < applied.sequence.takes:
             return None
-        takes, self._takes = self._takes, []
-        made = [self._renderer.images(one) for one in takes]
+        (first, _), made = self._takes[0], [images for _, images in self._takes]
+        self._takes = []
         period_s = 1 / self._device.description.frame_rate_hz
         last_s = period_s if capture.capture_s is None else capture.capture_s
         frame = RawFrame(
@@ -178,9 +185,9 @@ class FreeRunningCamera(StreamedCamera[FreeRunningDevice, Capture]):
             epoch=applied.epoch,
             images=np.concatenate(made) if len(made) > 1 else made[0],
             labels=applied.labels,
-            device_time_s=takes[0].device_time_s,
+            device_time_s=first.device_time_s,
             host_time_s=self._clock.unix_s(),
-            capture_s=capture.device_time_s - takes[0].device_time_s + last_s,
+            capture_s=max(0.0, capture.device_time_s - first.device_time_s) + last_s,
             temperature_c=capture.temperature_c,
             lost_images=self._lost,
         )

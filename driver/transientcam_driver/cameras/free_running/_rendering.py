@@ -77,13 +77,17 @@ class Renderer:
 
     def images(self, capture: Capture) -> NDArray[np.uint16]:
         """Return the images of a frame. Raises ProtocolError where it does not fit."""
-        found, wanted = [np.shape(each) for each in capture.images], self._about.size
-        count = len(self._about.measurements)
-        require("images", found == count * [wanted], f"{count} of {wanted} a frame", found)
+        images, kinds = list(map(np.asarray, capture.images)), self._about.measurements
+        found, wanted = [each.shape for each in images], len(kinds) * [self._about.size]
+        require("images", found == wanted, f"a frame of {wanted}", found)
+        numbers = ["buifc" if isinstance(each, Moment) else "buif" for each in kinds]
+        types = [each.dtype for each in images]
+        fit = all(each.kind in allowed for each, allowed in zip(types, numbers, strict=True))
+        require("images", fit, "numbers, of exposures real ones", types)
+        time_s = capture.device_time_s
+        require("device_time_s", math.isfinite(time_s), "finite", time_s)
         made = [
-            self._of_frequency(
-                group, scale, [np.asarray(capture.images[at]) for at in group.places]
-            )
+            self._of_frequency(group, scale, [images[at] for at in group.places])
             for group, scale in zip(self._groups, self._scales, strict=True)
         ]
         return np.concatenate(made)
@@ -97,8 +101,9 @@ class Renderer:
             spoilt = abs(moment) > group.first.largest
             values = np.nan_to_num(np.stack([moment.real, moment.imag]))
         else:
-            spoilt = np.max(images, axis=0) >= (1 << self._about.bits) - 1
+            spoilt = ~(np.max(images, axis=0) < (1 << self._about.bits) - 1)  # as NaN is
             values = np.stack(list(map(self._light, group.places, images)))
+            values = np.where(np.isfinite(values), values, 0.0)
         made = np.rint(np.tensordot(group.matrix, values, 1) * scale + self._dark_dn)
         made = np.where(spoilt, _HIGHEST, np.clip(made, 0, _HIGHEST - 1))
         return np.asarray(made, np.uint16)

@@ -7,6 +7,7 @@ from pydantic import TypeAdapter
 from transientcam import wire
 from transientcam_server.api._documents.frame import FrameDocument
 from transientcam_server.errors import ProblemDocument
+from transientcam_server.imaging import product_names
 
 PATH: Final = "/asyncapi.json"
 _SCHEMAS: Final = "#/components/schemas/"
@@ -120,7 +121,7 @@ def _schemas() -> dict[str, _Schema]:
         ),
         "subscription": _map(
             {
-                "product": {"type": "string", "enum": sorted(wire.PRODUCTS)},
+                "product": {"type": "string", "enum": sorted(product_names())},
                 "max_rate_hz": _or_nil({"type": "number", "exclusiveMinimum": 0}),
                 "encoding": _or_nil({"type": "string", "enum": list(wire.encoding_names())}),
                 "region": _or_nil(_REGION),
@@ -175,7 +176,7 @@ def _frame() -> _Schema:
             "v": {"type": "integer", "const": wire.VERSION},
             "type": _constant("frame"),
             "channel": _integer(0),
-            "product": {"type": "string", "enum": sorted(wire.PRODUCTS)},
+            "product": {"type": "string", "enum": sorted(product_names())},
             "unit": {"type": "string"},
             "axes": {"type": "array", "items": {"type": "string"}},
             "meta": _reference("schemas", "meta"),

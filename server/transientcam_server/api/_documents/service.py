@@ -33,6 +33,8 @@ class InfoDocument(Document):
         """Whether it takes `time_s` or `bins`."""
         streamed: bool
         """Whether the stream offers it."""
+        stated: dict[str, str] | None
+        """Of another package's its assumptions, cost and failure; null for ours."""
 
     class AbsentDocument(Document):
         """A product that frames of this camera do not have."""
@@ -80,7 +82,7 @@ class InfoDocument(Document):
     stream: StreamDocument
     products: list[ProductDocument]
     absent_products: list[AbsentDocument]
-    """What other cameras have, and why this one does not."""
+    """What other cameras have, or other packages would, and why this one does not."""
     estimators: list[EstimatorDocument]
     """Those of other packages; what is offered is `reconstruction.estimator` of `GET
     /parameters`."""

@@ -47,7 +47,7 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
             InfoDocument.AbsentDocument(name=name, reason=reason)
             for name, reason in service.pipeline.absent.items()
         ],
-        estimators=[_estimator(*each) for each in comparisons.statements().items()],
+        estimators=[_estimator(*each) for each in comparisons.PLUGINS.statements().items()],
         caller=InfoDocument.CallerDocument.model_validate(
             {
                 "name": principal.name,
@@ -69,10 +69,10 @@ def _kernels(recipe: Recipe) -> InfoDocument.KernelsDocument | None:
 
 
 def _estimator(
-    name: str, found: comparisons.Technique | tm.EstimatorFailed
+    name: str, found: comparisons.Technique | tm.PluginFailed
 ) -> InfoDocument.EstimatorDocument:
     stated = {each: getattr(found, each, None) for each in _STATED}  # a failure states nothing
-    unusable = found.reason if isinstance(found, tm.EstimatorFailed) else None
+    unusable = found.reason if isinstance(found, tm.PluginFailed) else None
     return InfoDocument.EstimatorDocument.model_validate(
         {"name": name, "unusable": unusable} | stated
     )
@@ -88,4 +88,5 @@ def _product(product: Product) -> InfoDocument.ProductDocument:
         formats=[name for name, encoding in ENCODINGS.items() if encoding.fits(product)],
         over_time=product.over_time,
         streamed=not product.over_time,
+        stated=product.stated and {each: getattr(product.stated, each) for each in _STATED[-3:]},
     )

@@ -7,7 +7,7 @@ import numpy as np
 
 from transientcam import Frame
 from transientcam.notebook import palette
-from transientcam_server.imaging._products.products import PRODUCTS
+from transientcam_server.imaging._products.products import product_of
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -24,7 +24,7 @@ def png(frame: Frame) -> bytes:
     """
     from PIL import Image, PngImagePlugin  # 60 ms that the first frame need not wait for
 
-    steps_of = PRODUCTS[frame.product].png_steps
+    steps_of = product_of(frame.product).png_steps
     assert steps_of is not None  # noqa: S101 - `Encoding.fits` excludes it
     values = np.asarray(frame.array, dtype=np.float64)
     steps = np.rint(values * steps_of.per_unit)

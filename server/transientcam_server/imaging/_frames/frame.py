@@ -327,7 +327,7 @@ class Frame:
         self._require_size(product, view, min(MAX_WHOLE_BYTES, MAX_ANSWER_BYTES))
         with self._failure_of(product.name):
             given = await self._input(product)
-            run = self._workers.run_long if product.over_time else self._run
+            run = self._workers.run_long if product.long else self._run
             height, width = self.shape
             compute = partial(computed, height=height, width=width)
             array, _ = await run(compute, product, self.recipe, given, view)
@@ -339,7 +339,7 @@ class Frame:
         """Compute and encode in one hop; an array that is there already is only encoded."""
         self._require_size(product, view, min(MAX_WHOLE_BYTES, MAX_ANSWER_BYTES))
         beside = await asyncio.gather(*(self.product(PRODUCTS[name]) for name in encoding.beside))
-        run = self._workers.run_long if product.over_time or encoding.slow else self._run
+        run = self._workers.run_long if product.long or encoding.slow else self._run
         with self._failure_of(product.name):
             known = self._arrays(product).get(_array_key(product, view))
             array = None if known is None else await _shared(known)
@@ -448,7 +448,7 @@ def _failure_of(workers: Workers, number: int, name: str) -> Iterator[None]:
             value=error.value,
             limit=error.limit,
         ) from error
-    except tm.EstimatorFailed as error:
+    except tm.PluginFailed as error:
         workers.note_failure(name, number)
         raise Problem(
             kinds.PRODUCT_FAILED,

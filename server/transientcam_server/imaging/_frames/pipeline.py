@@ -18,7 +18,7 @@ from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging._frames.frame import Frame
 from transientcam_server.imaging._frames.still import StillFrames
 from transientcam_server.imaging._frames.workers import Workers
-from transientcam_server.imaging._products.products import PRODUCTS, Product
+from transientcam_server.imaging._products.products import Product, product_names, product_of
 from transientcam_server.imaging._products.requirements import absent_products
 from transientcam_server.imaging._recipe.calibration import Calibration, Gains, factory_gains
 from transientcam_server.imaging._recipe.lens import Intrinsics
@@ -97,7 +97,7 @@ class Pipeline:
             images_known=images_known,
         )
         self.products: dict[str, Product] = {
-            name: product for name, product in PRODUCTS.items() if name not in self.absent
+            name: product_of(name) for name in product_names() if name not in self.absent
         }
 
     def frame(self, raw: RawFrame, applied: AppliedSequence) -> Frame:

@@ -108,7 +108,7 @@ def _separated(image: tm.Reconstruction, at: tuple[Any, ...], flags: tm.Flags) -
     try:
         found: dict[str, Any] = {each: _number(getattr(image, each)[at]) or 0.0 for each in light}
         range_m = None if flags & tm.INVALID else _number(image.range_m[at])
-    except tm.EstimatorFailed:
+    except tm.PluginFailed:
         return {"range_m": None, **dict.fromkeys(light, 0.0)}
     return {"range_m": range_m, **found}
 

@@ -7,6 +7,7 @@ The functions here are pure, so any worker may run them.
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 import transientcam_moments as tm
 from transientcam import wire
 from transientcam_driver import AppliedSequence, RawFrame
+from transientcam_moments.plugins import CALLERS, PRODUCTS as OF_PACKAGES, MapProduct, mapped
 from transientcam_server.imaging._errors_of_range.noise import moment_noise
 from transientcam_server.imaging._products.labelling import (
     image_columns,
@@ -69,6 +71,8 @@ class Product:
     reads: tuple[str, ...] = ()
     """Attributes of its input that a product over time is computed from; it may be computed for
     long, and the rest of the frame need not stay for that."""
+    stated: MapProduct | None = None
+    """What it says of itself where another package computes it."""
     steps: Steps | None = None
     """Of a 16-bit PNG; None for steps of one unit."""
     fields: Callable[[Recipe, RawFrame, View], dict[str, Any]] = _no_fields
@@ -81,6 +85,11 @@ class Product:
     def name(self) -> str:
         """The name clients ask by."""
         return self.description.name
+
+    @property
+    def long(self) -> bool:
+        """Whether it may take so long that new frames must be computed beside it."""
+        return self.over_time or self.stated is not None
 
     @property
     def cropped(self) -> bool:
@@ -355,4 +364,39 @@ PRODUCTS: Final[dict[str, Product]] = {
         ),
     )
 }
-"""Every product by name: an entry here and one in `transientcam.wire.PRODUCTS` make a product."""
+"""Ours by name: an entry here and one in `transientcam.wire.PRODUCTS` make a product."""
+OF_PACKAGES.taken.update(PRODUCTS, *(each.axes for each in _WIRE.values()))
+OF_PACKAGES.taken.update(("frame", "pixel", "device_time_s", "host_time_s"))  # beside products
+
+
+def product_names() -> tuple[str, ...]:
+    """Return the names of our products, and of those that other packages offer."""
+    return (*PRODUCTS, *OF_PACKAGES.names())
+
+
+def product_of(name: str) -> Product:
+    """Return a product, ours or another package's.
+
+    Raises KeyError where there is none of that name, PluginFailed where it cannot be used.
+    """
+    if name in PRODUCTS or name not in product_names():
+        return PRODUCTS[name]
+    stated = OF_PACKAGES.load(name)
+    return Product(
+        wire.Product(name, stated.unit, ("y", "x"), "<f4", stated.summary),
+        "light",
+        partial(_mapped, name),
+        of_toeplitz=stated.consecutive,
+        stated=stated,
+        steps={"m": _MILLIMETRES, "1": Steps(1e4, "1e-4")}.get(stated.unit),
+    )
+
+
+def _mapped(name: str, recipe: Recipe, found: tm.Reconstruction, view: View) -> _Array:
+    """Return the map of another package, of the moments as they were measured."""
+    b, noise = np.asarray(found.smoothed), found.noise
+    variance = None if noise is None else np.broadcast_to(noise.variance, b.shape)
+    multiples = np.array((0, *recipe.applied.sequence.multiples))
+    told = variance, recipe.base_frequency_hz * multiples
+    array: _Array = CALLERS[-1](OF_PACKAGES.group, mapped, name, b, *told)
+    return array

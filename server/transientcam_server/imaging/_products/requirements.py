@@ -3,7 +3,8 @@
 from collections.abc import Collection
 
 from transientcam_driver import Capabilities, Sampling
-from transientcam_server.imaging._products.products import PRODUCTS, Product
+from transientcam_moments import PluginFailed
+from transientcam_server.imaging._products.products import Product, product_names, product_of
 from transientcam_server.imaging._recipe.recipe import listed
 
 
@@ -26,7 +27,13 @@ def absent_products(
             return "the noise of this camera's sensor is not known"
         return unmet(product, capabilities.sampling, capabilities.zeroths)
 
-    reasons = {name: lacks(product) for name, product in PRODUCTS.items()}
+    def why(name: str) -> str | None:
+        try:
+            return lacks(product_of(name))
+        except PluginFailed as failed:
+            return failed.reason
+
+    reasons = {name: why(name) for name in product_names()}
     return {name: reason for name, reason in reasons.items() if reason is not None}
 
 

@@ -12,7 +12,7 @@ import transientcam_moments as tm
 from transientcam_driver import AppliedSequence, RawFrame, Sampling, Sequence
 from transientcam_driver.camera import Lamp
 from transientcam_driver.sequence import MAX_HARMONICS
-from transientcam_moments.comparisons import plugged_names, statements
+from transientcam_moments.comparisons import PLUGINS
 from transientcam_moments.reconstruction import OF_ANY_MULTIPLES, automatic
 from transientcam_server.errors import Problem, kinds
 from transientcam_server.imaging._recipe.calibration import FACTORY_ID, Gains, nominal_gains
@@ -62,8 +62,8 @@ def require_estimator(settings: ReconstructionSettings, sequence: Sequence, *, f
             value=settings.estimator,
             limit="unwrapped-phase" if fine else f"one of {', '.join(OF_ANY_MULTIPLES)}",
         )
-    failed = statements().get(settings.estimator)
-    if isinstance(failed, tm.EstimatorFailed):
+    failed = PLUGINS.loaded(settings.estimator) if settings.estimator in PLUGINS.names() else None
+    if isinstance(failed, tm.PluginFailed):
         limit = "one that can be used"
         at, value = "estimator", settings.estimator
         raise Problem(kinds.ESTIMATOR_MISFIT, f"{failed}.", field=at, value=value, limit=limit)
@@ -137,7 +137,7 @@ class Recipe:
     @property
     def of_another_package(self) -> bool:
         """Whether that estimator is another package's, which may do anything."""
-        return self.technique in plugged_names()
+        return self.technique in PLUGINS.names()
 
     @property
     def kernels(self) -> tuple[str, ...]:

@@ -74,7 +74,7 @@ export function Compared({ source, look, way }: { source: Source; look: Look; wa
   const store = useStore();
   const { comparison, recordings } = store;
   const { product, unit, decimals } = look.product;
-  const compared = comparison.maps[product];
+  const compared = comparison.of(product);
   const [a, b, apart] = [look.frame.value, compared.b.value, compared.difference.value];
   const pixel = store.pointed.value ?? store.selected.value;
   const difference = valueAtPixel(apart, pixel);

@@ -4,7 +4,7 @@ import { useRef } from "preact/hooks";
 import { type Way, wiped } from "../../store/comparison";
 import { drawnOf, type Frame } from "../../store/frames";
 import type { Look } from "../../store/looks";
-import { MAP_PRODUCTS, type MapProduct } from "../../store/mapCatalogue";
+import type { MapProduct } from "../../store/mapCatalogue";
 import { useStore } from "../../store/store";
 import type { ViewName } from "../../store/viewNames";
 import { MapBar } from "../../ui/ColourBar";
@@ -37,9 +37,10 @@ function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) 
   const store = useStore();
   const absent = store.frames.absent.value;
   const obstacleOf = ({ product }: MapProduct): string | undefined => absent[product];
-  const shown = MAP_PRODUCTS.find((each) => each.product === choice.value && obstacleOf(each) === undefined) ?? MAP_PRODUCTS[0];
+  const maps = store.frames.maps.value;
+  const shown = maps.find((each) => each.product === choice.value && obstacleOf(each) === undefined) ?? maps[0];
   const base = store.looks.of(shown.product);
-  const [{ b }, way, source] = [store.comparison.maps[shown.product], store.comparison.ways[name], store.comparison.source.value];
+  const [{ b }, way, source] = [store.comparison.of(shown.product), store.comparison.ways[name], store.comparison.source.value];
   const now = b.value === null ? "A" : way.value;
   const look = now === "difference" ? store.looks.of(`${shown.product}-difference`) : base;
   const picture = usePicture(now, look, b);
@@ -72,7 +73,7 @@ function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) 
         <Tabs
           label={name === "map" ? "Map" : "Second map"}
           value={shown.product}
-          options={MAP_PRODUCTS.map((each) => ({ value: each.product, text: each.name, hint: each.hint, obstacle: obstacleOf(each) }))}
+          options={maps.map((each) => ({ value: each.product, text: each.name, hint: each.hint, obstacle: obstacleOf(each) }))}
           onChange={(product) => (choice.value = product)}
         />
       }

@@ -35,10 +35,10 @@ export function commandsOf(store: Store): Command[] {
   const scenes = steering ? (store.simulation.world.value?.scenes ?? []) : [];
   const applied = steering ? store.sequence.value : null;
   return [
-    ...MAP_PRODUCTS.map(({ product, name }, at) => ({
+    ...store.frames.maps.value.map(({ product, name }, at) => ({
       words: `Map: ${name}`,
       also: product === "range" ? "distance depth" : "",
-      key: String(at + 1),
+      key: at < MAP_PRODUCTS.length ? String(at + 1) : undefined,
       run: () => void (store.mapProduct.value = product),
     })),
     ...VIEWS.map(({ name, title }) => ({

@@ -1,34 +1,38 @@
-"""Estimators of other packages: offered everywhere, and no harm to others whatever they do."""
+"""Estimators and products of other packages: offered everywhere, and no harm to others."""
 
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from shutil import copy
 
 import httpx
 import numpy as np
 import pytest
 
+import transientcam
 import transientcam_moments as tm
 from tests.conftest import ROOT
-from tests.server.camera.plug_in import install_package
+from tests.server.camera.plug_in import install as install_wall, install_package
+from tests.server.recording.made import record
 from tests.serving import serving
 from transientcam import Camera
 from transientcam.cli import run as command
 from transientcam.errors import ProblemError
-from transientcam_moments import comparisons
-from transientcam_moments.comparisons import _plugins as plugins
+from transientcam_moments import comparisons, plugins
 from transientcam_server.api import _parameters as parameters
 from transientcam_server.daemon import _doctor as doctor
-from transientcam_server.imaging import OtherEstimators
+from transientcam_server.imaging import OtherPackages
 
 EXAMPLE = ROOT / "examples" / "matched_filter"
+MAP_EXAMPLE = ROOT / "examples" / "range_disagreement"
 PAGE = ROOT / "docs" / "add-an-estimator.md"
 FAULTY = """
 import os, threading
 from dataclasses import replace
 from pathlib import Path
 from matched_filter import ESTIMATOR, matched_filter
+from range_disagreement import PRODUCT
 
 BEGUN = Path(__file__).with_name("begun")
 
@@ -48,6 +52,7 @@ RAISES, HANGS, ENDS = (
     replace(ESTIMATOR, name=each.__name__.replace("_", "-"), estimate=each)
     for each in (raises, hangs_once, ends)
 )
+SMALL = replace(PRODUCT, name="small", compute=lambda b, **_: b[1, :2].real)
 """
 FAULTY_POINTS = """
 [transientcam.estimators]
@@ -55,15 +60,23 @@ raises = faulty:RAISES
 hangs-once = faulty:HANGS
 ends = faulty:ENDS
 absent = package_that_is_not_there:ESTIMATOR
+[transientcam.products]
+range-disagreement = range_disagreement:PRODUCT
+small = faulty:SMALL
+missing = package_that_is_not_there:PRODUCT
+range = faulty:SMALL
 """
 PHASE_RAD = np.array([0.4, 2.0])
 MOMENTS = np.exp(1j * np.arange(5)[:, None] * PHASE_RAD)
 GIVEN = (MOMENTS, None, 20e6 * np.arange(5), 0.1)
+CALL = comparisons.PLUGINS.group, comparisons.separated
 
 
 def forget() -> None:
-    for each in (plugins.plugged, plugins.loaded, parameters._properties):
-        each.cache_clear()
+    for offered in plugins.GROUPS.values():
+        offered.points.cache_clear()
+        offered.loaded.cache_clear()
+    parameters._properties.cache_clear()
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -74,15 +87,17 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     described = (EXAMPLE / "pyproject.toml").read_text("utf-8")
     found = install_package(directory, described, modules)
     (found / "faulty.py").write_text(FAULTY)
+    copy(MAP_EXAMPLE / "range_disagreement.py", found)
     about = found / "faulty-1.0.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: faulty\nVersion: 1.0\n")
     (about / "entry_points.txt").write_text(FAULTY_POINTS)
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(found))
+        for each in (found, install_wall(tmp_path_factory.mktemp("wall"))):
+            patch.syspath_prepend(str(each))
         forget()
         yield found
-        for name in ("matched_filter", "faulty"):
+        for name in ("matched_filter", "faulty", "range_disagreement"):
             sys.modules.pop(name, None)
     forget()
 
@@ -99,35 +114,35 @@ class ClockOfHanging:
 
 
 @pytest.fixture
-def others(site: Path) -> Iterator[OtherEstimators]:
+def others(site: Path) -> Iterator[OtherPackages]:
     clock = ClockOfHanging(site / "begun")
-    found = OtherEstimators(10.0, clock=clock)
+    found = OtherPackages(10.0, clock=clock)
     found.open()
     yield found
     found.close()
-    assert [comparisons.separated] == comparisons.SEPARATORS
+    assert [plugins.call_here] == plugins.CALLERS
 
 
 def test_one_that_hangs_is_ended_left_alone_for_a_while_and_asked_again(
-    others: OtherEstimators,
+    others: OtherPackages,
 ) -> None:
-    with pytest.raises(tm.EstimatorFailed, match=r"hangs-once .*longer than 10 s"):
-        others("hangs-once", *GIVEN)
-    with pytest.raises(tm.EstimatorFailed, match="longer than 10 s; it is asked again in"):
-        others("hangs-once", *GIVEN)
+    with pytest.raises(tm.PluginFailed, match=r"hangs-once .*longer than 10 s"):
+        others(*CALL, "hangs-once", *GIVEN)
+    with pytest.raises(tm.PluginFailed, match="longer than 10 s; it is asked again in"):
+        others(*CALL, "hangs-once", *GIVEN)
 
     clock = others._clock
     assert isinstance(clock, ClockOfHanging)
     clock.more_s = 1e8
 
-    assert others("hangs-once", *GIVEN).phase_rad == pytest.approx(PHASE_RAD)
+    assert others(*CALL, "hangs-once", *GIVEN).phase_rad == pytest.approx(PHASE_RAD)
 
 
-def test_one_that_ends_its_process_costs_its_own_range_alone(others: OtherEstimators) -> None:
-    with pytest.raises(tm.EstimatorFailed, match=r"ends .*its process has ended"):
-        others("ends", *GIVEN)
-    with pytest.raises(tm.EstimatorFailed, match=r"raises .*ZeroDivisionError: by hand"):
-        others("raises", *GIVEN)
+def test_one_that_ends_its_process_costs_its_own_range_alone(others: OtherPackages) -> None:
+    with pytest.raises(tm.PluginFailed, match=r"ends .*its process has ended"):
+        others(*CALL, "ends", *GIVEN)
+    with pytest.raises(tm.PluginFailed, match=r"raises .*ZeroDivisionError: by hand"):
+        others(*CALL, "raises", *GIVEN)
 
 
 def test_a_daemon_offers_them_and_its_other_products_go_on() -> None:
@@ -154,6 +169,7 @@ def test_a_daemon_offers_them_and_its_other_products_go_on() -> None:
             later = next(iter(frames))
         pixel = http.get("/frames/latest/pixel", params={"x": 80, "y": 60}).json()
         refused = http.put("/reconstruction", json={"estimator": "absent"})
+        unknown = http.put("/reconstruction", json={"estimator": "nonsense"})
 
     (allowed,) = (e["allowed"] for e in described if e["name"] == "reconstruction.estimator")
     assert {"matched-filter", "raises", "ends", "hangs-once", "likelihood"} <= set(allowed)
@@ -165,15 +181,69 @@ def test_a_daemon_offers_them_and_its_other_products_go_on() -> None:
     assert pixel["range_m"] is None
     assert max(pixel["cumulative"]) > 0
     assert refused.status_code == 409
+    assert "'matched-filter' of another package" in unknown.text
     assert "package_that_is_not_there" in refused.json()["detail"]
 
 
+def test_a_daemon_has_their_products_beside_its_own(tmp_path: Path) -> None:
+    (wall := tmp_path / "wall.txt").write_text("2.5")
+    with (
+        # 16, 80 and 120 MHz
+        serving(f"wall:{wall}?frequencies=fixed", limits={"estimator_s": 600.0}) as served,
+        Camera(served.url, timeout_s=600.0) as camera,
+    ):
+        info = camera.info
+        with camera.stream("range-disagreement", "range") as frames:
+            streamed = next(iter(frames))
+        with pytest.raises(ProblemError, match=r"small of another .*shape \(2, "):
+            camera.frame("small")
+        apart, moments = camera.frame("range-disagreement"), camera.frame("moments")
+        picture = httpx.get(f"{served.url}/api/v1/frames/latest/range-disagreement.png")
+        asyncapi = httpx.get(f"{served.url}/asyncapi.json").text
+
+    products = {each["name"]: each for each in info["products"]}
+    absent = {each["name"]: each["reason"] for each in info["absent_products"]}
+    assert products["range-disagreement"]["stated"]["failure"] == "Noise makes it larger, too."
+    assert products["range"]["stated"] is None
+    assert "package_that_is_not_there" in absent["missing"]
+    assert "not 'range'" not in absent.get("range", "")
+    assert streamed.product in ("range", "range-disagreement")
+    assert (apart.unit, apart.array.shape) == ("m", moments.array.shape[1:])
+    assert 0 <= np.nanmax(apart.array) < 5e-3  # of one return; a step of an image is 1 mm
+    assert picture.headers["Transientcam-Unit"] == "mm"
+    assert "range-disagreement" in asyncapi
+
+
+def test_a_recording_has_their_products(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output, recorded = tmp_path / "out.npz", record(tmp_path / "a.h5", 1)
+    asked = ["reconstruct", str(recorded), "-o", str(output), "--product", "range-disagreement"]
+
+    assert command(asked) == 0, capsys.readouterr().err
+
+    with np.load(output) as found, transientcam.open(recorded) as frames:
+        from_file, b = found["range-disagreement"][0], frames[0].reconstruction.smoothed
+        f_hz = frames[0].recipe.base_frequency_hz
+    # brute force: the whole turns that bring each range next to the lowest frequency's
+    turns_m = [299_792_458 / (2 * j * f_hz) for j in range(1, len(b))]
+    range_m = [
+        np.angle(plane) / (2 * np.pi) * turn_m for plane, turn_m in zip(b[1:], turns_m, strict=True)
+    ]
+    apart_m = [
+        np.min([np.abs(each - range_m[0] + k * turn_m) for k in range(-9, 10)], axis=0)
+        for each, turn_m in zip(range_m, turns_m, strict=True)
+    ]
+    assert from_file == pytest.approx(np.max(apart_m, axis=0), abs=1e-4)
+    assert command([*asked[:-1], "missing"]) != 0
+    assert "package_that_is_not_there" in capsys.readouterr().err
+
+
 def test_the_doctor_says_which_can_be_used() -> None:
-    found = {message: level for level, _, message, _ in doctor._estimators()}
+    found = {message: level for level, _, message, _ in doctor._plugins()}
 
     assert found["matched-filter, of another package: matched filter"] == "ok"
-    (why,) = (each for each in found if "package_that_is_not_there" in each)
-    assert found[why] == "warning"
+    assert [found[each] for each in found if "package_that_is_not_there" in each] == ["warning"] * 2
+    assert any("product range of another package failed: its name is" in each for each in found)
+    assert any("range-disagreement, of another package: how far" in each for each in found)
 
 
 def test_a_recording_is_reconstructed_by_it(
@@ -210,6 +280,7 @@ def test_they_are_held_against_built_in_ones_by_one_command(
 def test_the_page_shows_the_package_that_is_tested() -> None:
     page = PAGE.read_text("utf-8")
 
-    for name, language in (("pyproject.toml", "toml"), ("matched_filter.py", "python")):
-        assert f"```{language}\n{(EXAMPLE / name).read_text('utf-8')}```" in page
-    assert len((EXAMPLE / "matched_filter.py").read_text("utf-8").splitlines()) <= 40
+    for file in (*EXAMPLE.glob("*.*"), MAP_EXAMPLE / "range_disagreement.py"):
+        if file.suffix in (languages := {".toml": "toml", ".py": "python"}):
+            assert f"```{languages[file.suffix]}\n{file.read_text('utf-8')}```" in page
+            assert len(file.read_text("utf-8").splitlines()) <= 40
