@@ -19,10 +19,12 @@ from typing import Any, Final
 import numpy as np
 
 from transientcam_compiled import ChildProcess
+from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._gpu import _device as there
 from transientcam_moments._gpu._device import SOFTWARE, Adapter
-from transientcam_moments._gpu._golden import wrong
-from transientcam_moments._gpu._passes import DevicePass, Rows
+from transientcam_moments._gpu._fits import DeviceFits
+from transientcam_moments._gpu._golden import wrong, wrong_likelihood
+from transientcam_moments._gpu._passes import DevicePass
 from transientcam_moments._kernels.one_pass import Constants
 from transientcam_moments.arrays import Array
 from transientcam_moments.errors import DeviceUnavailable, ParameterError
@@ -32,6 +34,8 @@ AUTO_PIXELS: Final = 100_000
 AUTO_HARMONICS: Final = 6
 """m from which "auto" takes a GPU, however small the frames."""
 _MOST_ROOTS: Final = 8
+_KEPT: Final = 4
+"""Kinds of frames whose likelihoods are kept prepared."""
 _FAILURES: Final = 3
 """In a row, after which a device is asked no more."""
 _ASKS: Final = 480
@@ -55,7 +59,8 @@ class Device:
         self._thread = ThreadPoolExecutor(1, "transientcam-kernel-device")
         self._child = ChildProcess(memory_bytes=_MEMORY_BYTES, nice=0)
         self._lock = threading.Lock()
-        self._checks: dict[int, Future[str]] = {}
+        self._checks: dict[tuple[str, int], Future[str]] = {}
+        self._fits: dict[tuple[Any, ...], DeviceFits] = {}
         self._failures, self.failed, self._reason = 0, "", ""
         self._most_bytes = 0
         self._keys: set[int] = set()
@@ -76,13 +81,13 @@ class Device:
 
         Raises DeviceUnavailable where there is no such device, or where it is wrong.
         """
-        reason = self._check(m).result()
+        reason = self._check("pass", m).result()
         if reason:
             raise DeviceUnavailable(self.wanted, reason)
 
     def is_ready(self, m: int) -> bool:
         """Say whether frames of an order have been found right; else that begins now."""
-        check = self._check(m)
+        check = self._check("pass", m)
         return check.done() and not check.result() and not self._reason
 
     def prepare(
@@ -94,9 +99,35 @@ class Device:
         made = DevicePass(self.frame, m, shape, constants, images=images, hostile=self._hostile)
         return None if max(made.sizes) > self._most_bytes else made
 
-    def frame(self, one: DevicePass, given: Sequence[Array]) -> Rows | None:
-        """Return the rows of results of a frame; None where the device has failed."""
+    def frame(self, one: DevicePass | DeviceFits, given: Sequence[Array]) -> Any:
+        """Return the results of a frame, as `rows_of` has them; None where the device failed."""
         return self._thread.submit(self._frame, one, given).result()
+
+    def likelihood(
+        self, b: Array, variance: Array, *options: Any, wait: bool = True
+    ) -> tuple[Array, ...] | None:
+        """Estimate returns as the kernel of that name does.
+
+        None where the device does not take them, or fails; nor, unless it may ``wait``, until
+        its likelihoods of that order have been found right.
+        """
+        m, pixels = len(b) - 1, b.shape[1]
+        if b.dtype != np.complex64 or pixels < LEAST_PIXELS or m > _MOST_ROOTS or self._reason:
+            return None
+        check = self._check("likelihood", m)
+        if not (wait or check.done()) or check.result():
+            return None
+        key = m, pixels, *options
+        with self._lock:
+            if key not in self._fits:
+                while len(self._fits) >= _KEPT:
+                    self._fits.pop(next(iter(self._fits)))
+                self._fits[key] = DeviceFits(m, pixels, *options, hostile=self._hostile)
+            one = self._fits[key]
+        found: tuple[Array, ...] | None = None
+        if max(one.sizes) <= self._most_bytes:
+            found = self.frame(one, one.given(b, variance))
+        return found
 
     def close(self) -> None:
         """End its process."""
@@ -105,13 +136,13 @@ class Device:
 
     # -- on its thread -------------------------------------------------------------------------
 
-    def _check(self, m: int) -> "Future[str]":
+    def _check(self, kind: str, m: int) -> "Future[str]":
         with self._lock:
-            if m not in self._checks:
-                self._checks[m] = self._thread.submit(self._checked, m)
-            return self._checks[m]
+            if (kind, m) not in self._checks:
+                self._checks[kind, m] = self._thread.submit(self._checked, kind, m)
+            return self._checks[kind, m]
 
-    def _checked(self, m: int) -> str:
+    def _checked(self, kind: str, m: int) -> str:
         """Return what is wrong with frames of an order; nothing, if they are right."""
         try:
             self._begin()
@@ -125,8 +156,12 @@ class Device:
         def make(*given: Any) -> DevicePass:
             return DevicePass(self._frame, *given, images=True, hostile=self._hostile)
 
+        def estimate(b: Array, variance: Array, *options: Any) -> Any:
+            one = DeviceFits(m, b.shape[1], *options, hostile=self._hostile)
+            return self._frame(one, one.given(b, variance))
+
         self.failed = ""
-        found = wrong(m, make)
+        found = wrong(m, make) if kind == "pass" else wrong_likelihood(m, estimate)
         if self.failed:
             return f"{self.adapter.name} failed: {self.failed}"
         return f"{self.adapter.name} computes known frames wrongly: {found}" if found else ""
@@ -157,7 +192,7 @@ class Device:
             f"{names} computes on the processor" if names else "no adapter was found"
         )
 
-    def _frame(self, one: DevicePass, given: Sequence[Array]) -> Rows | None:
+    def _frame(self, one: DevicePass | DeviceFits, given: Sequence[Array]) -> Any:
         if self._reason:
             return None
         try:
@@ -173,7 +208,7 @@ class Device:
         self._failures = 0
         return found
 
-    def _computed(self, one: DevicePass, given: Sequence[Array]) -> Rows:
+    def _computed(self, one: DevicePass | DeviceFits, given: Sequence[Array]) -> Any:
         room = self._shared(max(sum(one.sizes[:2]) or one.sizes[2], one.sizes[3]))
         while self._dropped:
             self._call(there.forget, self._dropped.pop())

@@ -1,6 +1,6 @@
 """The likelihood estimate of every pixel, with what it is worth."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -259,8 +259,12 @@ def fitted(
     tail_shape: int | Sequence[int] = TAIL_SHAPES,
     model_error: float = 0.0,
     threshold: float = DIRECT_THRESHOLD,
+    elsewhere: Callable[..., tuple[Array, ...] | None] | None = None,
 ) -> Likelihood:
-    """Do what `likelihood` does, with the threads of a caller."""
+    """Do what `likelihood` does, with the threads of a caller.
+
+    `elsewhere` is a device's estimate, which stands in for the kernel's where it gives one.
+    """
     planes, trailing = moment_planes(b)
     if not 1 <= returns <= MOST_RETURNS:
         raise ParameterError("returns", returns, f"1 to {MOST_RETURNS}")
@@ -272,7 +276,11 @@ def fitted(
     in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
     planes, variance = dense(planes, noise, harmonics, trailing)
     options = returns, shapes, float(model_error), float(threshold)
-    found = _estimated(planes, variance, *options, spread=spread)
+    found = None
+    if elsewhere is not None and isinstance(planes, np.ndarray):
+        found = elsewhere(planes, variance, *options)
+    if found is None:
+        found = _estimated(planes, variance, *options, spread=spread)
     shaped = [part.reshape((*part.shape[:-1], *trailing)) for part in found]
     xp = namespace(planes)
     lead = xp.broadcast_to(xp.asarray(np.inf, dtype=shaped[0].dtype), trailing)
@@ -355,12 +363,6 @@ def results(
     found: list[Array], data: Data, scale: Array, usable: Array, slots: int
 ) -> tuple[Array, ...]:
     """Return the attributes of `Likelihood` of what was found, but for `lead` and `threshold`."""
-    xp = namespace(scale)
-    out = [scale] * (4 * slots + 10)
+    out = [scale] * scaled.rows(slots)
     scaled.attributes((0,) * slots, found, scale, data.numbers, usable, out)
-    *rest, shape, free, count = out[4 * slots :]
-    *rest, mean, std = rest
-    four = (xp.stack(out[k * slots : (k + 1) * slots]) for k in range(4))
-    whole = (part.astype(np.int32) for part in (free, count, shape))
-    free, count, shape = whole
-    return (*four, *rest, free, count, mean, std, shape)
+    return scaled.arranged(out, slots)

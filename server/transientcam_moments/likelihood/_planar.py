@@ -223,6 +223,7 @@ class SharpFit:
             (list(data.re), list(data.im), list(data.weight), bar),
             (damping < sharp.SETTLED, self._pr, self._pi, self.w, self._rr, self._ri, self.cost,
              damping),
+            alike=True,
         )  # fmt: skip
         _, self._pr, self._pi, self.w, self._rr, self._ri, self.cost, self.damping = state
         self.x, self.y = (part[:: len(self.order)] for part in (self._pr, self._pi))
@@ -295,6 +296,7 @@ def _fit_tail(
     state = repeat(
         _step_tail, steps, (order, power, unknowns), given,
         (damping < sharp.SETTLED, lag, qr, qi, rr, ri, x, y, w, v, d, t, cost, damping),
+        alike=True,
     )  # fmt: skip
     *state, _ = state[6:]
     x, y, w, v, d, t, cost = state

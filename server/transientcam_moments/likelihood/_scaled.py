@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from transientcam_moments.arrays import (
     Array,
     Bank,
@@ -13,6 +15,7 @@ from transientcam_moments.arrays import (
     largest,
     logarithm,
     magnitude,
+    namespace,
     not_a_number,
     root,
     select,
@@ -62,6 +65,11 @@ def prepare(
     return scale, numbers, logarithm(numbers) + choice.MARGIN, usable
 
 
+def rows(slots: int) -> int:
+    """Return how many planes `attributes` gives."""
+    return 4 * slots + 10
+
+
 def attributes(
     slots: Length, found: Bank, scale: Array, numbers: Array, usable: Any, out: Bank
 ) -> None:
@@ -71,7 +79,7 @@ def attributes(
     its deviation, delay, its deviation, chi-square, average, its deviation, shape, degrees of
     freedom and count.
     """
-    one = scale / scale
+    one = 1.0 + 0.0 * scale
     nan, far, zero = not_a_number(one), infinity(one), 0.0 * one
     size = len(slots)
     keys = bank(one, slots, 0)
@@ -115,3 +123,12 @@ def attributes(
     unknowns = select(with_tail, 4.0 * one, 2.0 * found[choice.COUNT])
     out[rest + 8] = select(usable, numbers - unknowns, zero)
     out[rest + 9] = there
+
+
+def arranged(out: list[Array], slots: int) -> tuple[Array, ...]:
+    """Return attributes of `Likelihood` of the planes of `attributes`, but for the last two."""
+    xp = namespace(out[0])
+    four = (xp.stack(out[k * slots : (k + 1) * slots]) for k in range(4))
+    *rest, mean, std, shape, free, count = out[4 * slots :]
+    free, count, shape = (part.astype(np.int32) for part in (free, count, shape))
+    return (*four, *rest, free, count, mean, std, shape)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from functools import cached_property
 from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -109,6 +110,8 @@ class Reconstruction:
         How many frames each pixel of the moments is the mean of; one, when left out.
     known_noise : Sensor or ImageNoise, optional
         Of the images, where it was looked for before; that of the settings, when left out.
+    device : callable, optional
+        The likelihood of a device, which stands in for the kernel's where it gives one.
 
     Raises
     ------
@@ -134,6 +137,7 @@ class Reconstruction:
         low: Array | None = None,
         frames: Array | None = None,
         known_noise: Sensor | ImageNoise | None = None,
+        device: Callable[..., Any] | None = None,
     ) -> None:
         if not (settings.consecutive or self._of_any_multiples):
             raise ParameterError("multiples", settings.multiples, "1 to m")
@@ -143,6 +147,7 @@ class Reconstruction:
             self.image_noise = known
         self._correction = correction
         self._spread = spread
+        self._device = device
         self._measured = moments
         self._saturated = saturated_pixels
         self._bad = bad_pixels
@@ -423,9 +428,15 @@ class Reconstruction:
         most = MOST_RETURNS
         if harmonics is not None:
             most = min(most, sum(j > 0 for j in harmonics))
-        at = self.settings.threshold
         return fitted(
-            moments, noise, self._spread, harmonics, most, model_error=error, threshold=at
+            moments,
+            noise,
+            self._spread,
+            harmonics,
+            most,
+            model_error=error,
+            threshold=self.settings.threshold,
+            elsewhere=self._device,
         )
 
     @cached_property

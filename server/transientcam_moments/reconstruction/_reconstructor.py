@@ -177,6 +177,7 @@ class Reconstructor:
                 repaired=repaired,
                 calibration=self._calibration,
                 spread=spread,
+                device=self._likelihood,
                 images=images,
                 low=self._low(takes[0]),
             )
@@ -294,6 +295,7 @@ class Reconstructor:
             "repaired": frame.repaired,
             "calibration": gains,
             "spread": spread,
+            "device": self._likelihood,
             "images": frame.images,
             "low": frame.low,
             "frames": frames,
@@ -475,6 +477,13 @@ class Reconstructor:
             return self._device
         worth = pixels >= _gpu.AUTO_PIXELS or m >= _gpu.AUTO_HARMONICS
         return self._device if worth and self._device.is_ready(m) else None
+
+    def _likelihood(self, b: Array, variance: Array, *options: Any) -> Any:
+        """Return the device's likelihood, if there is a device for frames of this kind."""
+        device = self._device_for(b.shape[0] - 1, b.shape[1])
+        if device is None:
+            return None
+        return device.likelihood(b, variance, *options, wait=not self._automatic)
 
     # -- preparing -----------------------------------------------------------------------------
 
