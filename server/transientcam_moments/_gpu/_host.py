@@ -4,17 +4,19 @@ A frame that the device does not give is one that the processor computes. A devi
 known frames wrongly, or fails again and again, is asked no more.
 """
 
+import math
 import mmap
 import os
 import tempfile
 import threading
+import time
 import weakref
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypedDict
 
 import numpy as np
 
@@ -29,10 +31,8 @@ from transientcam_moments._kernels.one_pass import Constants
 from transientcam_moments.arrays import Array
 from transientcam_moments.errors import DeviceUnavailable, ParameterError
 
-AUTO_PIXELS: Final = 100_000
-"""Of a frame from which "auto" takes a GPU, whatever its order."""
-AUTO_HARMONICS: Final = 6
-"""m from which "auto" takes a GPU, however small the frames."""
+_ROUNDS: Final = 3
+"""Frames that "auto" measures on device and processor each; the first of each does not count."""
 _MOST_ROOTS: Final = 8
 _KEPT: Final = 4
 """Kinds of frames whose likelihoods are kept prepared."""
@@ -42,6 +42,18 @@ _ASKS: Final = 480
 """Times that a call is asked whether it goes on, four a second, until the device hangs."""
 _MEMORY_BYTES: Final = 1 << 40
 """Drivers take much room that they do not use."""
+
+
+class DeviceState(TypedDict):
+    """What a device is, and how often its results were used."""
+
+    wanted: str
+    name: str | None
+    """Of the adapter; None until one was looked for, or where there is none."""
+    results: dict[str, int]
+    """By what computed them, of those that the device was asked for: "device" or "processor"."""
+    refused: str | None
+    """Why nothing, or not everything, is computed there."""
 
 
 class Device:
@@ -62,6 +74,7 @@ class Device:
         self._checks: dict[tuple[str, int], Future[str]] = {}
         self._fits: dict[tuple[Any, ...], DeviceFits] = {}
         self._failures, self.failed, self._reason = 0, "", ""
+        self._results = {"device": 0, "processor": 0}
         self._most_bytes = 0
         self._keys: set[int] = set()
         self._dropped: list[int] = []
@@ -101,7 +114,20 @@ class Device:
 
     def frame(self, one: DevicePass | DeviceFits, given: Sequence[Array]) -> Any:
         """Return the results of a frame, as `rows_of` has them; None where the device failed."""
-        return self._thread.submit(self._frame, one, given).result()
+        found = self._thread.submit(self._frame, one, given).result()
+        with self._lock:
+            self._results["processor" if found is None else "device"] += 1
+        return found
+
+    def state(self) -> "DeviceState":
+        """Say what it is and what it has done."""
+        checks = [check.result() for check in list(self._checks.values()) if check.done()]
+        return {
+            "wanted": self.wanted,
+            "name": None if self.adapter is None else self.adapter.name,
+            "results": dict(self._results),
+            "refused": next(filter(None, [*checks, self._reason]), None),
+        }
 
     def likelihood(
         self, b: Array, variance: Array, *options: Any, wait: bool = True
@@ -249,6 +275,35 @@ class Device:
         self._open, self._room = False, None
         self._keys.clear()
         self._child.end()
+
+
+class Race:
+    """For each kind of frame, device or processor, whichever computed the first ones faster."""
+
+    def __init__(self, clock_s: Callable[[], float] = time.perf_counter) -> None:
+        self._clock_s = clock_s
+        self._lock = threading.Lock()
+        self._took_s: dict[Any, tuple[list[float], list[float]]] = {}
+
+    def run(self, kind: Any, there: Callable[[], Any], here: Callable[[], Any]) -> Any:
+        """Return what a device gives, or else the processor; both take turns at first.
+
+        ``there`` returns None where the device failed.
+        """
+        with self._lock:
+            device_s, processor_s = times = self._took_s.setdefault(kind, ([], []))
+            if len(processor_s) < _ROUNDS:
+                on_device = len(device_s) <= len(processor_s)
+            else:
+                on_device = min(device_s[1:]) < min(processor_s[1:])
+        begin_s = self._clock_s()
+        found = (there if on_device else here)()
+        took_s = self._clock_s() - begin_s if found is not None else math.inf
+        with self._lock:
+            took = times[not on_device]
+            if len(took) < _ROUNDS:
+                took.append(took_s)
+        return here() if found is None else found
 
 
 @lru_cache(maxsize=8)

@@ -1,6 +1,7 @@
 """The likelihood estimate of every pixel, with what it is worth."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -259,11 +260,11 @@ def fitted(
     tail_shape: int | Sequence[int] = TAIL_SHAPES,
     model_error: float = 0.0,
     threshold: float = DIRECT_THRESHOLD,
-    elsewhere: Callable[..., tuple[Array, ...] | None] | None = None,
+    elsewhere: Callable[..., tuple[Array, ...]] | None = None,
 ) -> Likelihood:
     """Do what `likelihood` does, with the threads of a caller.
 
-    `elsewhere` is a device's estimate, which stands in for the kernel's where it gives one.
+    `elsewhere` may estimate on a device; it takes what gives the kernel's estimate as ``here``.
     """
     planes, trailing = moment_planes(b)
     if not 1 <= returns <= MOST_RETURNS:
@@ -276,11 +277,11 @@ def fitted(
     in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
     planes, variance = dense(planes, noise, harmonics, trailing)
     options = returns, shapes, float(model_error), float(threshold)
-    found = None
-    if elsewhere is not None and isinstance(planes, np.ndarray):
-        found = elsewhere(planes, variance, *options)
-    if found is None:
-        found = _estimated(planes, variance, *options, spread=spread)
+    here = partial(_estimated, planes, variance, *options, spread=spread)
+    if elsewhere is None or not isinstance(planes, np.ndarray):
+        found = here()
+    else:
+        found = elsewhere(planes, variance, *options, here=here)
     shaped = [part.reshape((*part.shape[:-1], *trailing)) for part in found]
     xp = namespace(planes)
     lead = xp.broadcast_to(xp.asarray(np.inf, dtype=shaped[0].dtype), trailing)
