@@ -7,7 +7,7 @@ import pytest
 from transientcam_moments._gpu import _shader
 from transientcam_moments._gpu._fits import likelihood_shader
 from transientcam_moments.images import phasors
-from transientcam_moments.likelihood import choice, linear, planar, scaled, sharp, start, tail
+from transientcam_moments.likelihood import choice, planar, scaled, sharp, start, tail
 from transientcam_moments.moment_problem import circle, eigenvalue, sparse, toeplitz
 
 ORDERS = range(1, 9)
@@ -58,10 +58,10 @@ def test_without_a_statement_there_is_no_shader(
         (sharp, "deviations"),
         (tail, "step"),
         (tail, "weigh"),
-        (linear, "decompose"),
+        (sharp, "decompose"),
         (choice, "join"),
-        (choice, "offer_tail"),
-        (choice, "split"),
+        (planar, "offer_tail"),
+        (planar, "split"),
         (planar, "fit"),
         (start, "pisarenko"),
     ],
