@@ -57,6 +57,7 @@ __all__ = [
     "at_once",
     "cache_directory",
     "compile",
+    "device_state",
     "devices",
     "load",
     "make_ready",
@@ -166,6 +167,16 @@ def use_device(name: str) -> None:
     if device is not None and name != "auto":
         device.require(0)
     _gpu.CHOICE[0] = name
+
+
+def device_state() -> _gpu.DeviceState | None:
+    """Return what `use_device` chose and how often its results were used; None for "cpu".
+
+    ``wanted``, the adapter's ``name`` or None, ``results`` by "device" and "processor", of those
+    that the device was asked for, and why it is ``refused``, or None.
+    """
+    device = _gpu.device_of(_gpu.CHOICE[0])
+    return None if device is None else device.state()
 
 
 def cache_directory() -> Path | None:

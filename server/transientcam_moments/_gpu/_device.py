@@ -34,6 +34,12 @@ class Adapter(NamedTuple):
     """What it makes wrong of a known frame; "" where it is right, or was not checked."""
 
 
+_BINDINGS: Final = {
+    "measure": (0, 1, 2, 4, 5, 6, 7),
+    "analyse": (0, 3, 6, 7),
+    "estimate": (0, 6, 7),
+}
+"""Of the entries of shaders."""
 _HERE: Final[Any] = SimpleNamespace(device=None, room=None, passes={}, pipelines={})
 """What this process keeps: a device, shared memory, passes by key, and pipelines by their text."""
 
@@ -126,7 +132,7 @@ def _pipelines(code: str) -> list[tuple[Any, tuple[int, ...]]]:
     device = _HERE.device
     module = device.create_shader_module(code=code)
     found: list[tuple[Any, tuple[int, ...]]] = []
-    for name, bindings in (("measure", (0, 1, 2, 4, 5, 6, 7)), ("analyse", (0, 3, 6, 7))):
+    for name, bindings in _BINDINGS.items():
         if f"fn {name}(" in code:
             stage = {"module": module, "entry_point": name}
             pipeline = device.create_compute_pipeline(layout="auto", compute=stage)

@@ -10,7 +10,9 @@ from transientcam_compiled import at_once
 from transientcam_moments._kernels.one_pass import Constants
 from transientcam_moments.arrays import Array
 from transientcam_moments.images import calibrate, gaussian_taps, inverse_gains, measure, smooth
+from transientcam_moments.likelihood import MODEL_ERROR, choice, likelihood
 from transientcam_moments.moment_problem import bias, pisarenko, separate, smallest_eigenvalue
+from transientcam_moments.noise import MomentNoise
 
 SHAPE: Final = (24, 37)
 _SIGMA_PX, _EPSILON, _FULL_SCALE, _THRESHOLD = 0.6, 4e-3, 4095.0, 0.1
@@ -18,6 +20,9 @@ _MOST_REDONE: Final = 0.25
 _LIMITS: Final = {"smoothed": 5e-6, "validity": 5e-5, "brightness": 5e-5, "direct": 1e-2}
 """Largest errors, of the largest value; ten times those of devices that are right."""
 _LIMIT_RAD: Final = 2e-3
+_NOISE_DN: Final = 25.0
+_MOST_OTHERS: Final = 0.03
+"""Share of the pixels in which rounding may lead a likelihood to another model."""
 
 
 def wrong(m: int, make: Callable[[int, tuple[int, ...], Constants], Any]) -> str:
@@ -60,6 +65,32 @@ def wrong(m: int, make: Callable[[int, tuple[int, ...], Constants], Any]) -> str
     return ""
 
 
+def wrong_likelihood(m: int, estimate: Callable[..., Any]) -> str:
+    """Say what a device's likelihood makes wrong of a known frame of an order; as `wrong`.
+
+    ``estimate``: returns that of a device.
+    """
+    b = calibrate(measure(_images(m).astype(float), zeroth="low-frequency"), _gains(m))
+    b = b.reshape(m + 1, -1).astype(np.complex64)
+    noise = MomentNoise(np.full(m + 1, _NOISE_DN**2, np.float32))
+    options = choice.MOST_RETURNS, choice.TAIL_SHAPES, MODEL_ERROR, _THRESHOLD
+    found = estimate(b, np.broadcast_to(noise.variance[:, None], b.shape), *options)
+    if found is None:
+        return "it gave none"
+    known = likelihood(b.astype(complex), noise, model_error=MODEL_ERROR, threshold=_THRESHOLD)
+    *_, chi_square, free, count, mean, std, _ = found
+    off = np.abs(np.angle(np.exp(1j * (mean - known.average_rad))))
+    for name, alike in (
+        ("phase", off <= 0.05 * known.average_std_rad + _LIMIT_RAD),
+        ("deviation", np.abs(std - known.average_std_rad) <= 0.05 * known.average_std_rad),
+        ("chi-square", np.abs(chi_square - known.chi_square) <= 0.05 * (1 + known.chi_square)),
+        ("number of returns", (count == known.count) & (free == known.degrees_of_freedom)),
+    ):
+        if (share := 1 - alike.mean()) > _MOST_OTHERS:
+            return f"{name} is another one in {share:.0%} of the pixels"
+    return ""
+
+
 def _gains(m: int) -> Array:
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
     order = np.arange(m + 1)[:, None, None]
@@ -77,7 +108,7 @@ def _images(m: int) -> Array:
     b = b * _gains(m)
     step = np.exp(-0.5j * np.pi * np.arange(4))[:, None, None]
     images = np.concatenate([60 + (b[0].real + np.real(each * step)) / 2 for each in b])
-    noise = np.random.default_rng(m).normal(0, 25, images.shape)
+    noise = np.random.default_rng(m).normal(0, _NOISE_DN, images.shape)
     images = np.clip(np.round(images + noise), 0, _FULL_SCALE).astype(np.uint16)
     images[5, 3, 4] = int(_FULL_SCALE)
     return images

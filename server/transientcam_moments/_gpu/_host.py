@@ -4,40 +4,56 @@ A frame that the device does not give is one that the processor computes. A devi
 known frames wrongly, or fails again and again, is asked no more.
 """
 
+import math
 import mmap
 import os
 import tempfile
 import threading
+import time
 import weakref
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypedDict
 
 import numpy as np
 
 from transientcam_compiled import ChildProcess
+from transientcam_moments._dispatch import LEAST_PIXELS
 from transientcam_moments._gpu import _device as there
 from transientcam_moments._gpu._device import SOFTWARE, Adapter
-from transientcam_moments._gpu._golden import wrong
-from transientcam_moments._gpu._passes import DevicePass, Rows
+from transientcam_moments._gpu._fits import DeviceFits
+from transientcam_moments._gpu._golden import wrong, wrong_likelihood
+from transientcam_moments._gpu._passes import DevicePass
 from transientcam_moments._kernels.one_pass import Constants
 from transientcam_moments.arrays import Array
 from transientcam_moments.errors import DeviceUnavailable, ParameterError
 
-AUTO_PIXELS: Final = 100_000
-"""Of a frame from which "auto" takes a GPU, whatever its order."""
-AUTO_HARMONICS: Final = 6
-"""m from which "auto" takes a GPU, however small the frames."""
+_ROUNDS: Final = 3
+"""Frames that "auto" measures on device and processor each; the first of each does not count."""
 _MOST_ROOTS: Final = 8
+_KEPT: Final = 4
+"""Kinds of frames whose likelihoods are kept prepared."""
 _FAILURES: Final = 3
 """In a row, after which a device is asked no more."""
 _ASKS: Final = 480
 """Times that a call is asked whether it goes on, four a second, until the device hangs."""
 _MEMORY_BYTES: Final = 1 << 40
 """Drivers take much room that they do not use."""
+
+
+class DeviceState(TypedDict):
+    """What a device is, and how often its results were used."""
+
+    wanted: str
+    name: str | None
+    """Of the adapter; None until one was looked for, or where there is none."""
+    results: dict[str, int]
+    """By what computed them, of those that the device was asked for: "device" or "processor"."""
+    refused: str | None
+    """Why nothing, or not everything, is computed there."""
 
 
 class Device:
@@ -55,8 +71,10 @@ class Device:
         self._thread = ThreadPoolExecutor(1, "transientcam-kernel-device")
         self._child = ChildProcess(memory_bytes=_MEMORY_BYTES, nice=0)
         self._lock = threading.Lock()
-        self._checks: dict[int, Future[str]] = {}
+        self._checks: dict[tuple[str, int], Future[str]] = {}
+        self._fits: dict[tuple[Any, ...], DeviceFits] = {}
         self._failures, self.failed, self._reason = 0, "", ""
+        self._results = {"device": 0, "processor": 0}
         self._most_bytes = 0
         self._keys: set[int] = set()
         self._dropped: list[int] = []
@@ -76,13 +94,13 @@ class Device:
 
         Raises DeviceUnavailable where there is no such device, or where it is wrong.
         """
-        reason = self._check(m).result()
+        reason = self._check("pass", m).result()
         if reason:
             raise DeviceUnavailable(self.wanted, reason)
 
     def is_ready(self, m: int) -> bool:
         """Say whether frames of an order have been found right; else that begins now."""
-        check = self._check(m)
+        check = self._check("pass", m)
         return check.done() and not check.result() and not self._reason
 
     def prepare(
@@ -94,9 +112,48 @@ class Device:
         made = DevicePass(self.frame, m, shape, constants, images=images, hostile=self._hostile)
         return None if max(made.sizes) > self._most_bytes else made
 
-    def frame(self, one: DevicePass, given: Sequence[Array]) -> Rows | None:
-        """Return the rows of results of a frame; None where the device has failed."""
-        return self._thread.submit(self._frame, one, given).result()
+    def frame(self, one: DevicePass | DeviceFits, given: Sequence[Array]) -> Any:
+        """Return the results of a frame, as `rows_of` has them; None where the device failed."""
+        found = self._thread.submit(self._frame, one, given).result()
+        with self._lock:
+            self._results["processor" if found is None else "device"] += 1
+        return found
+
+    def state(self) -> "DeviceState":
+        """Say what it is and what it has done."""
+        checks = [check.result() for check in list(self._checks.values()) if check.done()]
+        return {
+            "wanted": self.wanted,
+            "name": None if self.adapter is None else self.adapter.name,
+            "results": dict(self._results),
+            "refused": next(filter(None, [*checks, self._reason]), None),
+        }
+
+    def likelihood(
+        self, b: Array, variance: Array, *options: Any, wait: bool = True
+    ) -> tuple[Array, ...] | None:
+        """Estimate returns as the kernel of that name does.
+
+        None where the device does not take them, or fails; nor, unless it may ``wait``, until
+        its likelihoods of that order have been found right.
+        """
+        m, pixels = len(b) - 1, b.shape[1]
+        if b.dtype != np.complex64 or pixels < LEAST_PIXELS or m > _MOST_ROOTS or self._reason:
+            return None
+        check = self._check("likelihood", m)
+        if not (wait or check.done()) or check.result():
+            return None
+        key = m, pixels, *options
+        with self._lock:
+            if key not in self._fits:
+                while len(self._fits) >= _KEPT:
+                    self._fits.pop(next(iter(self._fits)))
+                self._fits[key] = DeviceFits(m, pixels, *options, hostile=self._hostile)
+            one = self._fits[key]
+        found: tuple[Array, ...] | None = None
+        if max(one.sizes) <= self._most_bytes:
+            found = self.frame(one, one.given(b, variance))
+        return found
 
     def close(self) -> None:
         """End its process."""
@@ -105,13 +162,13 @@ class Device:
 
     # -- on its thread -------------------------------------------------------------------------
 
-    def _check(self, m: int) -> "Future[str]":
+    def _check(self, kind: str, m: int) -> "Future[str]":
         with self._lock:
-            if m not in self._checks:
-                self._checks[m] = self._thread.submit(self._checked, m)
-            return self._checks[m]
+            if (kind, m) not in self._checks:
+                self._checks[kind, m] = self._thread.submit(self._checked, kind, m)
+            return self._checks[kind, m]
 
-    def _checked(self, m: int) -> str:
+    def _checked(self, kind: str, m: int) -> str:
         """Return what is wrong with frames of an order; nothing, if they are right."""
         try:
             self._begin()
@@ -125,8 +182,12 @@ class Device:
         def make(*given: Any) -> DevicePass:
             return DevicePass(self._frame, *given, images=True, hostile=self._hostile)
 
+        def estimate(b: Array, variance: Array, *options: Any) -> Any:
+            one = DeviceFits(m, b.shape[1], *options, hostile=self._hostile)
+            return self._frame(one, one.given(b, variance))
+
         self.failed = ""
-        found = wrong(m, make)
+        found = wrong(m, make) if kind == "pass" else wrong_likelihood(m, estimate)
         if self.failed:
             return f"{self.adapter.name} failed: {self.failed}"
         return f"{self.adapter.name} computes known frames wrongly: {found}" if found else ""
@@ -157,7 +218,7 @@ class Device:
             f"{names} computes on the processor" if names else "no adapter was found"
         )
 
-    def _frame(self, one: DevicePass, given: Sequence[Array]) -> Rows | None:
+    def _frame(self, one: DevicePass | DeviceFits, given: Sequence[Array]) -> Any:
         if self._reason:
             return None
         try:
@@ -173,7 +234,7 @@ class Device:
         self._failures = 0
         return found
 
-    def _computed(self, one: DevicePass, given: Sequence[Array]) -> Rows:
+    def _computed(self, one: DevicePass | DeviceFits, given: Sequence[Array]) -> Any:
         room = self._shared(max(sum(one.sizes[:2]) or one.sizes[2], one.sizes[3]))
         while self._dropped:
             self._call(there.forget, self._dropped.pop())
@@ -214,6 +275,35 @@ class Device:
         self._open, self._room = False, None
         self._keys.clear()
         self._child.end()
+
+
+class Race:
+    """For each kind of frame, device or processor, whichever computed the first ones faster."""
+
+    def __init__(self, clock_s: Callable[[], float] = time.perf_counter) -> None:
+        self._clock_s = clock_s
+        self._lock = threading.Lock()
+        self._took_s: dict[Any, tuple[list[float], list[float]]] = {}
+
+    def run(self, kind: Any, there: Callable[[], Any], here: Callable[[], Any]) -> Any:
+        """Return what a device gives, or else the processor; both take turns at first.
+
+        ``there`` returns None where the device failed.
+        """
+        with self._lock:
+            device_s, processor_s = times = self._took_s.setdefault(kind, ([], []))
+            if len(processor_s) < _ROUNDS:
+                on_device = len(device_s) <= len(processor_s)
+            else:
+                on_device = min(device_s[1:]) < min(processor_s[1:])
+        begin_s = self._clock_s()
+        found = (there if on_device else here)()
+        took_s = self._clock_s() - begin_s if found is not None else math.inf
+        with self._lock:
+            took = times[not on_device]
+            if len(took) < _ROUNDS:
+                took.append(took_s)
+        return here() if found is None else found
 
 
 @lru_cache(maxsize=8)

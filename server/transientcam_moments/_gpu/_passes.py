@@ -17,7 +17,7 @@ from transientcam_moments.arrays import Array
 from transientcam_moments.moment_problem import redo, sparse
 
 _SATURATED, _REPLACED = 4, 32  # transientcam_moments.Flags
-_KEYS = count()
+KEYS = count()
 
 
 class Rows(NamedTuple):
@@ -66,7 +66,7 @@ class DevicePass:
             8 * self._pixels * (m + 1),
             4 * self._pixels * rows(m, images=images),
         )
-        self.key = next(_KEYS)  # unlike that of any other
+        self.key = next(KEYS)  # unlike that of any other
         self.inputs = self._inputs(replaced)
 
     def _inputs(self, replaced: int) -> tuple[Array, ...]:

@@ -89,7 +89,7 @@ fn spoilt(x: f32) -> f32 {
 fn divide(a: f32, b: f32) -> f32 { return spoilt(a / b); }
 fn square_root(x: f32) -> f32 { return spoilt(sqrt(x)); }
 """
-_ENTRY = f"""
+ENTRY = f"""
 @compute @workgroup_size({GROUP})
 fn %s(@builtin(global_invocation_id) id: vec3<u32>) {{
   let pixels = params.width * params.height;
@@ -98,6 +98,11 @@ fn %s(@builtin(global_invocation_id) id: vec3<u32>) {{
 %s
 }}
 """
+
+
+def head(*, hostile: bool) -> str:
+    """Return what all shaders begin with: bindings, and words that stand for no operator."""
+    return _HEAD + (_HOSTILE if hostile else _PLAIN)
 
 
 @lru_cache(maxsize=32)
@@ -109,12 +114,12 @@ def shader(m: int, zeroth: str | None, *, images: bool, hostile: bool = False) -
     ``hostile``: with each quotient and root wrong by up to two units in the last place, as WGSL
     allows a device to have them.
     """
-    found = _HEAD + (_HOSTILE if hostile else _PLAIN)
+    found = head(hostile=hostile)
     if images and zeroth is not None:
-        found += _ENTRY % ("measure", _measured(m, zeroth))
+        found += ENTRY % ("measure", _measured(m, zeroth))
     estimated = zeroth == "estimated"
     here = _smoothed(m, estimated=estimated, kept=images) + _analysed(m, estimated=estimated)
-    return found + _ENTRY % ("analyse", here)
+    return found + ENTRY % ("analyse", here)
 
 
 def rows(m: int, *, images: bool) -> int:

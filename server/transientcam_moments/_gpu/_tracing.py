@@ -36,6 +36,17 @@ class Writer:
         self.lines.append(f"var {name}: {kind} = {literal(value)};")
         return name
 
+    def values_of(self, names: list[str], state: Any, when: str) -> list[Any]:
+        """Return what variables of the planes of a state have now."""
+        kinds = [getattr(plane, "kind", "f32") for plane in _planes(state)]
+        named = zip(names, kinds, strict=True)
+        return [self.put(f"{name} /* {when} */", kind) for name, kind in named]
+
+    def assign(self, names: list[str], state: Any) -> None:
+        """Give variables the values of the planes of a state."""
+        for name, plane in zip(names, _planes(state), strict=True):
+            self.lines.append(f"{name} = {literal(plane)};")
+
     @contextmanager
     def loop(self, head: str) -> Iterator[None]:
         """Write a loop; what is computed inside is not known behind it."""
@@ -121,31 +132,47 @@ class Words:
         return x.writer.put(f"lost_by_squaring({x.name}, {square.name})")
 
     @staticmethod
+    def asarray(values: Any) -> Any:
+        """Return numbers as they are: they stand in the shader."""
+        return values
+
+    @staticmethod
     def iterate(
-        body: Any, steps: int, fixed: tuple[Any, ...], given: tuple[Any, ...], state: Any
+        body: Any,
+        steps: int,
+        fixed: tuple[Any, ...],
+        given: tuple[Any, ...],
+        state: Any,
+        *,
+        alike: bool,
     ) -> Any:
-        """As `repeat`: a loop, before which the first step stands, which may be another one."""
+        """As `repeat`: a loop, before which the first step stands unless all are alike."""
         writer: Writer = state[0].writer
-        state = body(True, fixed, given, state)
+        if not alike:
+            state = body(True, fixed, given, state)
         names = [writer.variable(plane) for plane in _planes(state)]
-        kinds = [getattr(plane, "kind", "f32") for plane in _planes(state)]
         step = f"i{names[0]}"
-        with writer.loop(f"for (var {step} = 1; {step} < {steps} && {names[0]}; {step}++)"):
-            inside = [Traced(writer, *each) for each in zip(names, kinds, strict=True)]
+        head = f"for (var {step} = {int(not alike)}; {step} < {steps} && {names[0]}; {step}++)"
+        with writer.loop(head):
             # once a step: names of variables stand for other values in each
-            inside = [writer.put(f"{each.name} /* in {step} */", each.kind) for each in inside]
-            found = list(_planes(body(False, fixed, given, _formed(state, inside))))
-            for name, plane in zip(names, found, strict=True):
-                writer.lines.append(f"{name} = {literal(plane)};")
-        behind = [
-            writer.put(f"{name} /* behind {step} */", kind)
-            for name, kind in zip(names, kinds, strict=True)
-        ]
-        return _formed(state, behind)
+            inside = _formed(state, writer.values_of(names, state, f"in {step}"))
+            writer.assign(names, body(False, fixed, given, inside))
+        return _formed(state, writer.values_of(names, state, f"behind {step}"))
+
+    @staticmethod
+    def branch(mask: Traced, function: Callable[[], Any], otherwise: Any) -> Any:
+        """Return what a function gives where a mask is true, whose work is left out elsewhere."""
+        writer = mask.writer
+        names = [writer.variable(plane) for plane in otherwise]
+        with writer.loop(f"if ({mask.name})"):
+            writer.assign(names, (function(),))
+        return writer.values_of(names, otherwise, f"behind {mask.name}")
 
 
 def _planes(state: Any) -> list[Any]:
-    return [plane for part in state for plane in (part if isinstance(part, list) else [part])]
+    return [
+        plane for part in state for plane in (part if isinstance(part, list | tuple) else [part])
+    ]
 
 
 def _formed(state: Any, planes: list[Any]) -> tuple[Any, ...]:

@@ -6,25 +6,9 @@ from numba import njit
 
 from transientcam_moments._kernels import portable, simd
 from transientcam_moments._kernels.arrays import Complexes, Counts, Reals
-from transientcam_moments._kernels.portable import (
-    bank,
-    eps,
-    infinity,
-    larger,
-    largest,
-    logarithm,
-    magnitude,
-    not_a_number,
-    product_bank,
-    root,
-    select,
-    smaller,
-    some,
-    tiny,
-)
+from transientcam_moments._kernels.portable import bank, infinity, product_bank, select, some
 from transientcam_moments.arrays import Bank, Length, Mask, Plane
-from transientcam_moments.likelihood import choice, sharp, tail
-from transientcam_moments.moment_problem import phase_of
+from transientcam_moments.likelihood import choice, scaled, sharp, tail
 
 # portable gives arithmetic its meaning
 __all__ = ["fit", "fit_again", "fit_one", "portable", "write"]
@@ -32,43 +16,6 @@ __all__ = ["fit", "fit_again", "fit_one", "portable", "write"]
 _MEAN = choice.DELAY_RAD / choice.TAIL_SHAPES[0]
 DAMPING = 6
 """Place of the damping in the state of a tail: x, y, w, v, d, t, damping, chi-square."""
-
-
-@njit(forceinline=True, error_model="numpy")
-def _prepare(
-    order: Length, b: Complexes, variance: Reals, error: float, p: int, one: Plane, data_r: Bank,
-    data_i: Bank, weight: Bank,
-) -> Any:  # fmt: skip
-    """Load pixels, their largest moment made 1; return that, how many numbers, and their use."""
-    m = len(order)
-    zero = 0.0 * one
-    size, poison, numbers, waves = zero, zero, zero, zero
-    for j in range(m + 1):
-        x, y = simd.load_complex(one, b[j], p)
-        v = simd.load(one, variance[j], p)
-        seen = (v > 0.0) & (v < infinity(one))
-        x = select(seen, x, 0.0)
-        y = select(seen, y, 0.0) if j > 0 else zero
-        size = larger(size, larger(magnitude(x), magnitude(y)))
-        poison = poison + x * 0.0 + y * 0.0
-        numbers = numbers + select(seen, one * (2.0 if j > 0 else 1.0), 0.0)
-        waves = waves + select(seen, one * (1.0 if j > 0 else 0.0), 0.0)
-        data_r[j], data_i[j] = x, y
-        weight[j] = select(seen, v, 0.0)
-    usable = (poison >= 0.0) & (size > 16.0 * tiny(one)) & (size < (largest(one) * eps(one)))
-    usable = usable & (waves > 0.0) & ~((weight[0] > 0.0) & ~(data_r[0] > 0.0))
-    scale = select(usable, size, one)
-    inverse = select(usable, 1.0 / scale, 0.0)
-    rounding = 4.0 * eps(one)
-    for j in range(m + 1):
-        data_r[j] = select(usable, data_r[j] * inverse, one)
-        data_i[j] = select(usable, data_i[j] * inverse, 0.0)
-        seen = weight[j] > 0.0
-        std = root(select(seen, weight[j], one)) * inverse
-        std = smaller(larger(std, rounding), 1.0 / rounding)
-        each = 1.0 / (std * std + error * error)
-        weight[j] = select(usable, select(seen, each, 0.0), one)
-    return scale, select(usable, numbers, one), usable
 
 
 @njit(error_model="numpy")
@@ -204,66 +151,13 @@ def write(
     free: Counts, count: Counts,
 ) -> None:  # fmt: skip
     """Write the attributes of `Likelihood`, its returns sorted by phase."""
-    one = scale / scale
-    nan, far = not_a_number(one), infinity(one)
-    size = len(slots)
-    keys, values = bank(one, slots, 0), bank(one, slots, 0)
-    first, second = bank(one, slots, 0), bank(one, slots, 0)
-    with_tail = found[choice.LENGTH] > 0.0
-    there = 0.0 * one
-    for k in range(size):
-        used = (
-            usable
-            & (found[choice.COUNT] > float(k))
-            & ((found[choice.WEIGHT + k] > 0.0) | with_tail)
-        )
-        keys[k] = select(used, phase_of(found[choice.X + k], found[choice.Y + k]), far)
-        values[k] = select(used, found[choice.WEIGHT + k] * scale, 0.0)
-        first[k] = select(used, root(found[choice.PHASE_VARIANCE + k]), nan)
-        second[k] = select(used, root(found[choice.WEIGHT_VARIANCE + k]) * scale, nan)
-        there = there + select(used, one, 0.0)
-    for i in range(size - 1):
-        for k in range(size - 1 - i):
-            swap = keys[k] > keys[k + 1]
-            low, high = smaller(keys[k], keys[k + 1]), larger(keys[k], keys[k + 1])
-            keys[k], keys[k + 1] = low, high
-            low, high = (
-                select(swap, values[k + 1], values[k]),
-                select(swap, values[k], values[k + 1]),
-            )
-            values[k], values[k + 1] = low, high
-            low, high = (
-                select(swap, first[k + 1], first[k]),
-                select(swap, first[k], first[k + 1]),
-            )
-            first[k], first[k + 1] = low, high
-            low, high = (
-                select(swap, second[k + 1], second[k]),
-                select(swap, second[k], second[k + 1]),
-            )
-            second[k], second[k + 1] = low, high
-    for k in range(size):
-        simd.store(planes[k], p, select(keys[k] < far, keys[k], nan))
-        simd.store(planes[size + k], p, values[k])
-        simd.store(planes[2 * size + k], p, first[k])
-        simd.store(planes[3 * size + k], p, second[k])
-    tailed = usable & with_tail & (found[choice.TAIL] > 0.0)
-    delay = found[choice.SHAPE] * found[choice.LENGTH]
-    rest = 4 * size
-    simd.store(planes[rest], p, select(tailed, found[choice.TAIL] * scale, 0.0))
-    std = root(found[choice.TAIL_VARIANCE]) * scale
-    simd.store(planes[rest + 1], p, select(tailed, std, nan))
-    simd.store(planes[rest + 2], p, select(tailed, delay, nan))
-    std = delay * root(found[choice.LENGTH_VARIANCE])
-    simd.store(planes[rest + 3], p, select(tailed, std, nan))
-    simd.store(planes[rest + 4], p, select(usable, found[choice.CHI_SQUARE], nan))
-    std = root(choice.average_variance(numbers, found))
-    simd.store(planes[rest + 5], p, select(keys[0] < far, found[choice.MEAN], nan))
-    simd.store(planes[rest + 6], p, select(keys[0] < far, std, nan))
-    simd.store(planes[rest + 7], p, select(tailed, found[choice.SHAPE], 0.0))
-    unknowns = select(with_tail, 4.0 * one, 2.0 * found[choice.COUNT])
-    simd.store(free, p, select(usable, numbers - unknowns, 0.0))
-    simd.store(count, p, there)
+    out = bank(scale, (), 22)  # of three slots
+    scaled.attributes(slots, found, scale, numbers, usable, out)
+    last = 4 * len(slots) + 8
+    for row in range(last):
+        simd.store(planes[row], p, out[row])
+    simd.store(free, p, out[last])
+    simd.store(count, p, out[last + 1])
 
 
 @njit(forceinline=True, error_model="numpy")
@@ -274,8 +168,10 @@ def fit_one(
 ) -> Any:  # fmt: skip
     """Load pixels and put one return in `found`; return their scale, numbers, use and penalty."""
     far = infinity(one)
-    scale, numbers, usable = _prepare(order, b, variance, error, p, one, data_r, data_i, weight)
-    penalty = logarithm(numbers) + choice.MARGIN
+    for j in range(len(order) + 1):
+        data_r[j], data_i[j] = simd.load_complex(one, b[j], p)
+        weight[j] = simd.load(one, variance[j], p)
+    scale, numbers, penalty, usable = scaled.prepare(order, error, one, data_r, data_i, weight)
     choice.nothing(one, far, found)
     cost, _ = fit(
         order, (0,), (0, 0), choice.STEPS[0], turns, data_r, data_i, weight, x, y, w, pr, pi, rr,

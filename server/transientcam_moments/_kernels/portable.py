@@ -55,7 +55,15 @@ from transientcam_moments.arrays import (
     tiny,
 )
 from transientcam_moments.images import phasors
-from transientcam_moments.likelihood import choice, linear, pair_fit, sharp, start, tail
+from transientcam_moments.likelihood import (
+    choice,
+    linear,
+    pair_fit,
+    scaled,
+    sharp,
+    start,
+    tail,
+)
 from transientcam_moments.moment_problem import (
     circle,
     eigenvalue,
@@ -277,7 +285,7 @@ def _compile_statements(module: ModuleType, *, inline: bool) -> None:
 
 
 extending.register_jitable(**_CALLED_BY_KERNELS)(logarithm)
-for _module in (choice, linear, pair_fit, sharp, start, tail):
+for _module in (choice, linear, pair_fit, scaled, sharp, start, tail):
     _compile_statements(_module, inline=False)
 for _module in (
     toeplitz,

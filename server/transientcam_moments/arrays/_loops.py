@@ -22,6 +22,8 @@ def repeat(
     fixed: State,
     given: State,
     state: State,
+    *,
+    alike: bool = False,
 ) -> State:
     """Apply ``state = body(first, fixed, given, state)`` until no pixel moves.
 
@@ -40,6 +42,8 @@ def repeat(
     state : tuple
         What it starts from: the mask of the pixels that move, then planes and banks. The banks may
         be changed.
+    alike : bool
+        Whether the first step is as the others are: ``first`` doesn't matter to the body.
 
     Returns
     -------
@@ -52,7 +56,7 @@ def repeat(
         return _repeat_jax(body, steps, fixed, given, state)
     own = getattr(namespace(state[0]), "iterate", None)  # of what isn't computed here
     if own is not None:
-        found: State = own(body, steps, fixed, given, state)
+        found: State = own(body, steps, fixed, given, state, alike=alike)
         return found
     for step in range(steps):
         state = body(step == 0, fixed, given, state)

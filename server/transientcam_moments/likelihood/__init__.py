@@ -4,6 +4,8 @@ from transientcam_moments.likelihood import (
     _choice as choice,
     _linear as linear,
     _pair_fit as pair_fit,
+    _planar as planar,
+    _scaled as scaled,
     _sharp as sharp,
     _start as start,
     _tail as tail,

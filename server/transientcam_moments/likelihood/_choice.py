@@ -20,6 +20,7 @@ from transientcam_moments.arrays import (
     least,
     logarithm,
     magnitude,
+    root_eps,
     select,
     smaller,
 )
@@ -84,7 +85,7 @@ def nothing(like: Array, score: Array, found: Bank) -> None:
 
 def decay(x: Array) -> Array:
     """Return exp(-x), x >= 0, to single precision or 1e-15."""
-    t = 0.0625 * x
+    t = smaller(0.0625 * x, 1.0 / root_eps(x))  # beyond it, nothing is left
     inverse = 1.0 / (1.0 + t * (1.0 + t * (0.5 + t * (1 / 6 + t * (1 / 24 + t * (1 / 120))))))
     for _ in range(4):
         inverse = inverse * inverse

@@ -1,6 +1,7 @@
 """The likelihood estimate of every pixel, with what it is worth."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,21 +14,19 @@ from transientcam_moments.arrays import (
     as_array,
     by_blocks,
     in_range,
-    in_turn,
-    logarithm,
     moment_planes,
     namespace,
     summary,
 )
 from transientcam_moments.errors import ParameterError, ShapeError
-from transientcam_moments.likelihood import _choice as choice
+from transientcam_moments.likelihood import _scaled as scaled
 from transientcam_moments.likelihood._chi_square import (
     SIGNIFICANCE,
     ambiguous,
     explained,
     reduced,
 )
-from transientcam_moments.likelihood._choice import MARGIN, MOST_RETURNS, TAIL_SHAPES
+from transientcam_moments.likelihood._choice import MOST_RETURNS, TAIL_SHAPES
 from transientcam_moments.likelihood._planar import Data, fit
 from transientcam_moments.moment_problem import DIRECT_THRESHOLD, Returns, Separation, separate
 from transientcam_moments.noise import MomentNoise, free_of_scale
@@ -261,8 +260,12 @@ def fitted(
     tail_shape: int | Sequence[int] = TAIL_SHAPES,
     model_error: float = 0.0,
     threshold: float = DIRECT_THRESHOLD,
+    elsewhere: Callable[..., tuple[Array, ...]] | None = None,
 ) -> Likelihood:
-    """Do what `likelihood` does, with the threads of a caller."""
+    """Do what `likelihood` does, with the threads of a caller.
+
+    `elsewhere` may estimate on a device; it takes what gives the kernel's estimate as ``here``.
+    """
     planes, trailing = moment_planes(b)
     if not 1 <= returns <= MOST_RETURNS:
         raise ParameterError("returns", returns, f"1 to {MOST_RETURNS}")
@@ -274,7 +277,11 @@ def fitted(
     in_range("threshold", threshold, 0.0, 1.0, "0 to 1")
     planes, variance = dense(planes, noise, harmonics, trailing)
     options = returns, shapes, float(model_error), float(threshold)
-    found = _estimated(planes, variance, *options, spread=spread)
+    here = partial(_estimated, planes, variance, *options, spread=spread)
+    if elsewhere is None or not isinstance(planes, np.ndarray):
+        found = here()
+    else:
+        found = elsewhere(planes, variance, *options, here=here)
     shaped = [part.reshape((*part.shape[:-1], *trailing)) for part in found]
     xp = namespace(planes)
     lead = xp.broadcast_to(xp.asarray(np.inf, dtype=shaped[0].dtype), trailing)
@@ -345,86 +352,18 @@ def _estimate(
 
 
 def prepared(b: Array, variance: Array, error: float) -> tuple[Data, Array, Array]:
-    """Return data with the largest moment 1, what they were divided by, and where there is light.
-
-    A pixel that cannot be used is fitted to one return, which comes to nothing.
-    """
-    xp = namespace(b)
-    seen = (variance > 0) & (variance < np.inf)
-    first = xp.zeros(b.shape, dtype=bool)
-    first = first | (xp.arange(b.shape[0]) == 0)[:, None]
-    re = xp.where(seen, b.real, 0)
-    im = xp.where(seen & ~first, b.imag, 0)
-    size = xp.maximum(abs(re), abs(im)).max(axis=0)
-    # the squares of deviations over it must neither over- nor underflow
-    limits = np.finfo(size.dtype)
-    usable = (
-        xp.isfinite(size)
-        & (size > float(limits.tiny) * 16)
-        & (size < float(limits.max * limits.eps))
-    )
-    usable = usable & (seen & ~first).any(axis=0)
-    usable = usable & ~(seen[0] & ~(re[0] > 0))
-    scale = xp.where(usable, size, 1).astype(size.dtype)
-    inverse = xp.where(usable, 1 / scale, 0).astype(size.dtype)
-    re, im = xp.where(usable, re * inverse, 1), xp.where(usable, im * inverse, 0)
-    std = xp.sqrt(xp.where(seen, variance, 1)) * inverse
-    rounding = 4 * float(limits.eps)
-    std = xp.minimum(xp.maximum(std, rounding), 1 / rounding)
-    weight = xp.where(usable, xp.where(seen, 1 / (std * std + error**2), 0), 1)
-    numbers = xp.where(usable, (2 * seen).sum(axis=0) - seen[0], 1).astype(size.dtype)
-    unlikely: Array = logarithm(numbers)
-    penalty = (unlikely + MARGIN).astype(size.dtype)
-    re, im, weight = (part.astype(size.dtype) for part in (re, im, weight))
-    data = Data(re, im, weight, penalty, numbers)
-    return data, scale, usable
+    """Return data with the largest moment 1, what divided them, and where there is light."""
+    re, im, weight = (list(part) for part in (b.real, b.imag, variance.astype(b.real.dtype)))
+    one = namespace(b).ones_like(weight[0])
+    order = (0,) * (len(re) - 1)
+    scale, numbers, penalty, usable = scaled.prepare(order, error, one, re, im, weight)
+    return Data(re, im, weight, penalty, numbers), scale, usable
 
 
-def results(found: Array, data: Data, scale: Array, usable: Array, slots: int) -> tuple[Array, ...]:
+def results(
+    found: list[Array], data: Data, scale: Array, usable: Array, slots: int
+) -> tuple[Array, ...]:
     """Return the attributes of `Likelihood` of what was found, but for `lead` and `threshold`."""
-    xp = namespace(found)
-
-    def three(first: int) -> Array:
-        return found[first : first + slots]
-
-    weight = three(choice.WEIGHT)
-    count = found[choice.COUNT]
-    has_tail = found[choice.LENGTH] > 0
-    slot = xp.arange(slots)[:, None]
-    # a return that was driven to 0 is none; that of a tail stays, its phase is the tail's
-    used = usable & (slot < count) & ((weight > 0) | has_tail)
-    phase = in_turn(xp.arctan2(three(choice.Y), three(choice.X)))
-    phase = xp.where(used, phase, np.nan).astype(scale.dtype)
-    order = xp.argsort(phase, axis=0)
-
-    def sorted_planes(planes: Array, unused: float) -> Array:
-        planes = xp.where(used, planes, unused).astype(scale.dtype)
-        return xp.take_along_axis(planes, order, axis=0)
-
-    averaged = used.any(axis=0)
-    tailed = usable & has_tail & (found[choice.TAIL] > 0)
-
-    def where_tail(plane: Array, otherwise: float) -> Array:
-        return xp.where(tailed, plane, otherwise).astype(scale.dtype)
-
-    shape = found[choice.SHAPE]
-    delay = shape * found[choice.LENGTH]
-    unknowns = xp.where(has_tail, 4, 2 * count)
-    std = xp.sqrt(choice.average_variance(data.numbers, found))
-    free = xp.where(usable, data.numbers - unknowns, 0)
-    return (
-        sorted_planes(phase, np.nan),
-        sorted_planes(weight * scale, 0.0),
-        sorted_planes(xp.sqrt(three(choice.PHASE_VARIANCE)), np.nan),
-        sorted_planes(xp.sqrt(three(choice.WEIGHT_VARIANCE)) * scale, np.nan),
-        where_tail(found[choice.TAIL] * scale, 0.0),
-        where_tail(xp.sqrt(found[choice.TAIL_VARIANCE]) * scale, np.nan),
-        where_tail(delay, np.nan),
-        where_tail(delay * xp.sqrt(found[choice.LENGTH_VARIANCE]), np.nan),
-        xp.where(usable, found[choice.CHI_SQUARE], np.nan).astype(scale.dtype),
-        free.astype(np.int32),
-        used.sum(axis=0).astype(np.int32),
-        xp.where(averaged, found[choice.MEAN], np.nan).astype(scale.dtype),
-        xp.where(averaged, std, np.nan).astype(scale.dtype),
-        xp.where(tailed, shape, 0).astype(np.int32),
-    )
+    out = [scale] * scaled.rows(slots)
+    scaled.attributes((0,) * slots, found, scale, data.numbers, usable, out)
+    return scaled.arranged(out, slots)

@@ -144,31 +144,30 @@ def _estimate(b: Array, variance: Array, error: float, threshold: float) -> tupl
         return *results(found, data, scale, usable, slots), lead.astype(scale.dtype)
 
 
-def _fit(data: Data, threshold: float) -> tuple[Array, Array]:
-    """Return what is found of every pixel (PLANES, P), as `choice` lays it out, and its lead."""
+def _fit(data: Data, threshold: float) -> tuple[list[Array], Array]:
+    """Return what is found of every pixel, planes as `choice` lays them out, and its lead."""
     found = [data.re[0]] * PLANES
     far = np.inf + 0 * data.penalty
     nothing(data.penalty, far, found)
     one = SharpFit.start(data, 1, None, far)
     one.offer(found, data.numbers >= 0, threshold)
-    planes = np.stack([*found, far])
 
-    def more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
-        found = list(planes[:-1])
+    def more(data: Data, before: tuple[Array, ...], planes: list[Array]) -> list[Array]:
+        *found, _ = planes
         pair, lead = _best_pair(data)
         pair.offer(found, data.numbers >= 4, threshold)
-        return np.stack([*found, np.where(found[COUNT] == 2, lead, np.inf)])
+        return [*found, np.where(found[COUNT] == 2, lead, np.inf)]
 
     # chi-square cannot become less than 0: no model with more unknowns is better below
     if len(data.re) > 2:
-        planes = where(planes[SCORE] > 4 * data.penalty, more, data, (), planes)
-    return planes[:-1], planes[-1]
+        *found, far = where(found[SCORE] > 4 * data.penalty, more, data, (), [*found, far])
+    return found, far
 
 
 class _Pairs:
     """Fits of two returns (S, P), several of each pixel, at the multiples that were measured."""
 
-    def __init__(self, data: Data, phases: Sequence[Array]) -> None:
+    def __init__(self, data: Any, phases: Sequence[Array]) -> None:
         self.places = _measured(data)
         self.weight = data.weight[self.places]
         share = self.weight / data.weight.sum(axis=0)
@@ -210,7 +209,9 @@ class _Pairs:
 
 def _best_pair(data: Data) -> tuple[SharpFit, Array]:
     """Return the best fit of two returns (P), and the lead over those with another range (P)."""
-    pairs = _Pairs(data, _starts(data))
+    banks = (np.stack(each) for each in data[:3])
+    stacked = Data(*banks, data.penalty, data.numbers)
+    pairs = _Pairs(stacked, _starts(stacked))
     pairs.improve(FIRST_STEPS)
     pairs.keep(FINALISTS)
     pairs.improve(LAST_STEPS)
@@ -224,12 +225,12 @@ def _best_pair(data: Data) -> tuple[SharpFit, Array]:
     return best, lead
 
 
-def _measured(data: Data) -> NDArray[np.intp]:
+def _measured(data: Any) -> NDArray[np.intp]:
     """Return the multiples that were measured in any pixel."""
     return np.flatnonzero((data.weight > 0).any(axis=1))
 
 
-def _starts(data: Data) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
+def _starts(data: Any) -> tuple[NDArray[np.floating[Any]], NDArray[np.floating[Any]]]:
     """Return the phases (STARTS, P) of the most promising pairs, the earlier ones first."""
     phase = grid(len(data.re) - 1)
     count = len(phase)

@@ -3,11 +3,11 @@
 import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from transientcam_moments.arrays import Array, namespace, some
+from transientcam_moments.arrays import Array, namespace, repeat, select, some
 from transientcam_moments.likelihood import (
     _sharp as sharp,
     _start as start,
@@ -38,15 +38,19 @@ from transientcam_moments.likelihood._choice import (
 )
 from transientcam_moments.moment_problem import half_turns
 
+Planes = list[Array]
+State = tuple[Any, ...]
+"""Planes, and banks of planes."""
+
 
 class Data(NamedTuple):
     """What is fitted: planes of pixels, the moments over `scale`.
 
     Attributes
     ----------
-    re, im : array, shape (m + 1, P)
+    re, im : m + 1 arrays, shape (P)
         0 where not measured.
-    weight : array, shape (m + 1, P)
+    weight : m + 1 arrays, shape (P)
         Inverse variance of each part; 0 where not measured.
     penalty : array, shape (P)
         What an unknown has to lower chi-square by.
@@ -54,52 +58,49 @@ class Data(NamedTuple):
         How many real numbers were measured.
     """
 
-    re: Array
-    im: Array
-    weight: Array
+    re: Planes
+    im: Planes
+    weight: Planes
     penalty: Array
     numbers: Array
 
 
-def fit(data: Data, most: int, shapes: tuple[int, ...], threshold: float) -> Array:
-    """Return what is found of every pixel (PLANES, P), as `choice` lays it out.
+def fit(data: Data, most: int, shapes: tuple[int, ...], threshold: float) -> Planes:
+    """Return what is found of every pixel: planes as `choice` lays them out.
 
     `most` is the largest number of sharp returns, 1 to 3; `shapes` are those of the tail, the first
     one tried first; `threshold` is that of the direct return.
     """
-    xp = namespace(data.re)
-    m = data.re.shape[0] - 1
+    m = len(data.re) - 1
     most = min(most, m)
     found = [data.re[0]] * PLANES
     far = np.inf + 0 * data.penalty
     nothing(data.penalty, far, found)
     one = SharpFit.start(data, 1, None, far)
     one.offer(found, data.numbers >= 0, threshold)
-    planes = xp.stack(found)
     if most < 2 and not (shapes and m >= 2):
-        return planes
+        return found
 
-    def of_two(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
-        found = list(planes)
+    def of_two(data: Data, before: State, found: Planes) -> Planes:
         enough = data.numbers >= 4
         two = SharpFit.start(data, 2, before, np.inf + 0 * data.penalty)
         if most >= 2:
             two.offer(found, enough, threshold)
-        late: tuple[Array, ...] = ()
+        late: State = ()
         if shapes:
             x1, y1, w, v, ratio, t = start_of_tail(two.x, two.y, two.w, DELAY_RAD)
             late = x1, y1, w, v, ratio * (DELAY_RAD / shapes[0]), t
             late = _fit_tail(data, late, shapes[0], TAIL_STEPS, len(shapes), found)
 
-        def of_shapes(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
-            found, state = list(planes), before
+        def of_shapes(data: Data, before: State, found: Planes) -> Planes:
+            state = before
             for last, shape in pairwise(shapes):
                 state = *state[:4], state[4] * (last / shape), state[5]
                 state = _fit_tail(data, state, shape, MORE_TAIL_STEPS, len(shapes), found)
-            return xp.stack(found)
+            return found
 
-        def of_more(data: Data, before: tuple[Array, ...], planes: Array) -> Array:
-            found, free = list(planes), data.numbers - 4
+        def of_more(data: Data, before: State, found: Planes) -> Planes:
+            free = data.numbers - 4
             two, cost = SharpFit.of(data, *before), before[3]
             x, y = [cost] * 3, [cost] * 3
             far = np.inf + 0 * cost
@@ -118,43 +119,52 @@ def fit(data: Data, most: int, shapes: tuple[int, ...], threshold: float) -> Arr
                 moving = three.damping < sharp.SETTLED
                 three.try_also(x, y, missed(three.cost, free - 2), bar)
                 three.try_also(three.x, three.y, moving, bar)
-                turns = xp.asarray(half_turns(m, data.re.dtype))
+                turns = namespace(cost).asarray(half_turns(m, cost.dtype))
                 start.pisarenko(three.order, turns, list(data.re), list(data.im), x, y)
                 three.try_also(x, y, missed(three.cost, free - 2), bar)
                 three.offer(found, free >= 2, threshold)
-            return xp.stack(found)
+            return found
 
-        done = xp.stack(found)
         if len(shapes) > 1:
-            worth = worth_more_shapes(late[6], done) & enough
-            done = where(worth, of_shapes, data, late, done)
-        still = (
-            worth_more_returns(data.penalty, list(done)) | (two.damping < sharp.SETTLED)
-        ) & enough
-        return where(still, of_more, data, two.state(), done)
+            worth = worth_more_shapes(late[6], found) & enough
+            found = where(worth, of_shapes, data, late, found)
+        still = (worth_more_returns(data.penalty, found) | (two.damping < sharp.SETTLED)) & enough
+        return where(still, of_more, data, two.state(), found)
 
     # chi-square cannot become less than 0: no model with more unknowns is better below
-    return where(planes[SCORE] > 4 * data.penalty, of_two, data, one.state(), planes)
+    return where(found[SCORE] > 4 * data.penalty, of_two, data, one.state(), found)
 
 
 def where(
     mask: Array,
-    function: Callable[[Data, tuple[Array, ...], Array], Array],
+    function: Callable[[Data, State, Planes], Planes],
     data: Data,
-    before: tuple[Array, ...],
-    planes: Array,
-) -> Array:
-    """Apply a function of pixels to those of a mask; to all where arrays cannot be cut."""
-    if namespace(mask) is not np:
-        return namespace(mask).where(mask, function(data, before, planes), planes)
-    at = np.flatnonzero(mask)
+    before: State,
+    found: Planes,
+) -> Planes:
+    """Apply a function of pixels to those of a mask; to all where arrays cannot be cut.
+
+    It may change the planes that it is given.
+    """
+    xp = namespace(mask)
+    branch = getattr(xp, "branch", None)  # of what isn't computed here
+    if branch is not None:
+        return cast(Planes, branch(mask, lambda: function(data, before, list(found)), found))
+    if xp is not np:
+        changed = function(data, before, list(found))
+        return [xp.where(mask, new, old) for new, old in zip(changed, found, strict=True)]
+    planes, at = np.stack(found), np.flatnonzero(mask)
     if at.size:
-        planes[:, at] = function(
-            Data(*(part[..., at] for part in data)),
-            tuple(part[..., at] for part in before),
-            planes[:, at],
-        )
-    return planes
+        planes[:, at] = function(Data._make(cut(data, at)), cut(before, at), cut(found, at))
+    return list(planes)
+
+
+def cut(state: Any, at: Array) -> Any:
+    """Return the pixels `at` of planes, and of banks of planes."""
+    if not isinstance(state, list | tuple):
+        return state[at]
+    parts = [cut(part, at) for part in state]
+    return parts if isinstance(state, list) else tuple(parts)
 
 
 class SharpFit:
@@ -166,7 +176,7 @@ class SharpFit:
     def __init__(
         self, data: Data, x: Sequence[Array], y: Sequence[Array], w: Sequence[Array]
     ) -> None:
-        m, count = data.re.shape[0] - 1, len(x)
+        m, count = len(data.re) - 1, len(x)
         self.data = data
         self.order, self.returns = (0,) * m, (0,) * count
         self.unknowns = (0,) * (2 * count)
@@ -177,9 +187,7 @@ class SharpFit:
             sharp.powers(self.order, x[k], y[k], k, self._pr, self._pi)
 
     @classmethod
-    def start(
-        cls, data: Data, count: int, before: tuple[Array, ...] | None, bar: Array
-    ) -> "SharpFit":
+    def start(cls, data: Data, count: int, before: State | None, bar: Array) -> "SharpFit":
         """Add a return to those of another fit, and fit all of them; `bar` as in `sharp.judge`."""
         x, y, w = before[:3] if before else ((), (), ())
         point = cls(data, x, y, w).new_return()
@@ -189,7 +197,7 @@ class SharpFit:
         return fit
 
     @classmethod
-    def of(cls, data: Data, *state: Array) -> "SharpFit":
+    def of(cls, data: Data, *state: Any) -> "SharpFit":
         """Return the fit that had a `state`."""
         fit = cls(data, *state[:3])
         fit.cost, fit.damping = state[3:]
@@ -206,24 +214,19 @@ class SharpFit:
 
     def improve(self, steps: int, bar: Array, active: Array | None = None) -> None:
         """Take at most so many steps to a lower chi-square, of the pixels that are `active`."""
-        data = self.data
-
-        def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
-            pr, pi, w, rr, ri = (list(part) for part in state[:5])
-            cost, damping = sharp.step(
-                self.order, self.returns, self.unknowns, data.re, data.im, data.weight,
-                pr, pi, w, rr, ri, state[5], state[6], bar,
-            )  # fmt: skip
-            return tuple(pr), tuple(pi), tuple(w), tuple(rr), tuple(ri), cost, damping
-
-        banks = (tuple(part) for part in (self._pr, self._pi, self.w, self._rr, self._ri))
         damping = sharp.FIRST_DAMPING + 0 * self.cost
         if active is not None:
-            damping = namespace(damping).where(active, damping, sharp.SETTLED + 0 * damping)
-        state = _times(steps, step, (*banks, self.cost, damping), _moving)
-        self._pr, self._pi, self.w, self._rr, self._ri = (list(part) for part in state[:5])
-        self.x, self.y = (list(part[:: len(self.order)]) for part in (self._pr, self._pi))
-        self.cost, self.damping = state[5:]
+            damping = select(active, damping, sharp.SETTLED)
+        data = self.data
+        state = repeat(
+            _step_returns, steps, (self.order, self.returns, self.unknowns),
+            (list(data.re), list(data.im), list(data.weight), bar),
+            (damping < sharp.SETTLED, self._pr, self._pi, self.w, self._rr, self._ri, self.cost,
+             damping),
+            alike=True,
+        )  # fmt: skip
+        _, self._pr, self._pi, self.w, self._rr, self._ri, self.cost, self.damping = state
+        self.x, self.y = (part[:: len(self.order)] for part in (self._pr, self._pi))
 
     def _look(self) -> None:
         """Find what the returns leave."""
@@ -231,7 +234,7 @@ class SharpFit:
         sharp.remains(self.order, self.returns, data.re, data.im, *given)
         self.cost = sharp.chi_square(self.order, data.weight, self._rr, self._ri)
 
-    def new_return(self) -> tuple[Array, Array, Array]:
+    def new_return(self) -> State:
         """Return point and weight of the best return for what these leave."""
         self._look()
         order, weight, xp = self.order, self.data.weight, namespace(self.cost)
@@ -242,24 +245,19 @@ class SharpFit:
         sharp.overlaps(order, returns, weight, total, self._pr, self._pi, kr, ki)
         turns = xp.asarray(turns_of(len(order)).astype(total.dtype))
 
-        def attempt(state: tuple[Array, ...]) -> tuple[Array, ...]:
-            row = state[0]
-            best = sharp.try_phases(order, returns, turns, row, re, im, kr, ki, *state[1:])
-            return row + 1, *best
-
         zero = 0 * total
-        state = _times(len(turns), attempt, (0, zero, 1 + zero, 1 + zero, zero))
-        _, along, apart, x, y = state
+        best = zero, 1 + zero, 1 + zero, zero
+        for row in range(len(turns)):
+            best = sharp.try_phases(order, returns, turns, row, re, im, kr, ki, *best)
+        along, apart, x, y = best
         return x, y, along / (apart * total)
 
-    def state(self) -> tuple[Array, ...]:
+    def state(self) -> State:
         """Return points, weights, chi-square and damping."""
-        xp = namespace(self.cost)
-        return *(xp.stack(part) for part in (self.x, self.y, self.w)), self.cost, self.damping
+        return self.x, self.y, self.w, self.cost, self.damping
 
     def try_also(self, x: list[Array], y: list[Array], where: Array, bar: Array) -> None:
         """Fit from other points on as well, and keep the better one, `where` that may help."""
-        xp = namespace(self.cost)
         if not some(where):
             return
         other = SharpFit.at(self.data, x, y)
@@ -267,8 +265,8 @@ class SharpFit:
         better = (other.cost < self.cost) & where
         for mine, theirs in ((self.x, other.x), (self.y, other.y), (self.w, other.w)):
             for k, plane in enumerate(theirs):
-                mine[k] = xp.where(better, plane, mine[k])
-        self.cost = xp.where(better, other.cost, self.cost)
+                mine[k] = select(better, plane, mine[k])
+        self.cost = select(better, other.cost, self.cost)
 
     def offer(self, found: list[Array], allowed: Array, threshold: float) -> None:
         """Put the returns where they are the better model, and into the average."""
@@ -279,8 +277,8 @@ class SharpFit:
 
 
 def _fit_tail(
-    data: Data, state: tuple[Array, ...], power: int, steps: int, shapes: int, found: list[Array]
-) -> tuple[Array, ...]:
+    data: Data, state: State, power: int, steps: int, shapes: int, found: Planes
+) -> State:
     """Fit a return with a tail, put it where it is the better model, and into the average.
 
     Returns what it has become, and chi-square with the prior.
@@ -293,46 +291,33 @@ def _fit_tail(
     w, v = tail.weigh(order, data.weight, ur, ui, qr, qi)
     tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
     cost = sharp.chi_square(order, data.weight, rr, ri) + PRIOR * t * t
-
-    def step(state: Any) -> Any:
-        lag, qr, qi, rr, ri = (list(part) for part in state[:5])
-        x, y, w, v, d, t, cost, damping = state[5:]
-        new = tail.step(
-            order, power, unknowns, data.re, data.im, data.weight, PRIOR,
-            x, y, w, v, d, t, lag, qr, qi, rr, ri, cost, damping, bar,
-        )  # fmt: skip
-        return tuple(lag), tuple(qr), tuple(qi), tuple(rr), tuple(ri), *new
-
-    banks = (tuple(part) for part in (lag, qr, qi, rr, ri))
     damping = sharp.FIRST_DAMPING + 0 * cost
-    bar = bar_of_tail(data.penalty, found)
-    state = _times(steps, step, (*banks, x, y, w, v, d, t, cost, damping), _moving)[5:12]
+    given = list(data.re), list(data.im), list(data.weight), bar_of_tail(data.penalty, found)
+    state = repeat(
+        _step_tail, steps, (order, power, unknowns), given,
+        (damping < sharp.SETTLED, lag, qr, qi, rr, ri, x, y, w, v, d, t, cost, damping),
+        alike=True,
+    )  # fmt: skip
+    *state, _ = state[6:]
     x, y, w, v, d, t, cost = state
     offer_tail(
         order, power, unknowns, data.weight, PRIOR, shapes, x, y, w, v, d, t, cost, data.penalty,
         data.numbers >= 4, found,
     )  # fmt: skip
-    return state
+    return tuple(state)
 
 
-def _moving(state: Any) -> bool:
-    """Say whether any pixel takes a further step."""
-    return bool((state[-1] < sharp.SETTLED).any())
+def _step_returns(first: bool, fixed: State, given: State, state: State) -> State:
+    _, pr, pi, w, rr, ri, cost, damping = state
+    *data, bar = given
+    cost, damping = sharp.step(*fixed, *data, pr, pi, w, rr, ri, cost, damping, bar)
+    return damping < sharp.SETTLED, pr, pi, w, rr, ri, cost, damping
 
 
-def _times(
-    times: int,
-    step: Callable[[Any], Any],
-    state: Any,
-    going_on: Callable[[Any], bool] = lambda state: True,
-) -> Any:
-    """Apply a step so many times, or until nothing goes on; JAX compiles all of them once."""
-    if namespace(state[-1]).__name__ == "jax.numpy":
-        from jax import lax
-
-        return lax.fori_loop(0, times, lambda _, inner: step(inner), state)
-    for _ in range(times):
-        if not going_on(state):
-            break
-        state = step(state)
-    return state
+def _step_tail(first: bool, fixed: State, given: State, state: State) -> State:
+    _, lag, qr, qi, rr, ri, x, y, w, v, d, t, cost, damping = state
+    *data, bar = given
+    *found, damping = tail.step(
+        *fixed, *data, PRIOR, x, y, w, v, d, t, lag, qr, qi, rr, ri, cost, damping, bar
+    )
+    return damping < sharp.SETTLED, lag, qr, qi, rr, ri, *found, damping

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from functools import cached_property, partial
 from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -111,6 +112,8 @@ class Reconstruction:
         How many frames each pixel of the moments is the mean of; one, when left out.
     known_noise : Sensor or ImageNoise, optional
         Of the images, where it was looked for before; that of the settings, when left out.
+    device : callable, optional
+        The likelihood of a device, which stands in for the kernel's where it gives one.
 
     Raises
     ------
@@ -136,6 +139,7 @@ class Reconstruction:
         low: Array | None = None,
         frames: Array | None = None,
         known_noise: Sensor | ImageNoise | None = None,
+        device: Callable[..., Any] | None = None,
     ) -> None:
         if not (settings.consecutive or self._of_any_multiples):
             raise ParameterError("multiples", settings.multiples, "1 to m")
@@ -145,6 +149,7 @@ class Reconstruction:
             self.image_noise = known
         self._correction = correction
         self._spread = spread
+        self._device = device
         self._measured = moments
         self._saturated = saturated_pixels
         self._bad = bad_pixels
@@ -425,9 +430,15 @@ class Reconstruction:
         most = MOST_RETURNS
         if harmonics is not None:
             most = min(most, sum(j > 0 for j in harmonics))
-        at = self.settings.threshold
         return fitted(
-            moments, noise, self._spread, harmonics, most, model_error=error, threshold=at
+            moments,
+            noise,
+            self._spread,
+            harmonics,
+            most,
+            model_error=error,
+            threshold=self.settings.threshold,
+            elsewhere=self._device,
         )
 
     @cached_property

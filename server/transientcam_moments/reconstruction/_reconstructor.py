@@ -2,7 +2,7 @@
 
 import math
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -75,11 +75,11 @@ class Reconstructor:
         Odd harmonics of the modulation, from `waveform_of`, that are taken out of the moments; none
         are known, when left out. Needs the calibration.
     device : str, optional
-        What computes the pass over a frame; as `kernels.use_device` said, when left out. "cpu":
-        compiled kernels. "gpu": the first GPU that there is, or "gpu:NAME" the adapter with this in
+        What computes a frame; as `kernels.use_device` said, when left out. "cpu": compiled kernels.
+        "gpu": the first GPU that there is, or "gpu:NAME" the adapter with this in
         its name, which may be one of software, as `kernels.devices` lists them; frames that it does
-        not take or give are computed as by "cpu". "auto": the first GPU, for frames of 100,000
-        pixels or m >= 6, once it has computed a known frame rightly.
+        not take or give are computed as by "cpu". "auto": the first GPU, once it has computed
+        known frames rightly, or "cpu": whichever was faster on the first frames of a kind.
 
     Raises
     ------
@@ -101,6 +101,7 @@ class Reconstructor:
     ) -> None:
         device = _gpu.CHOICE[0] if device is None else device
         self._device, self._automatic = _gpu.device_of(device), device == "auto"
+        self._race = _gpu.Race()
         if self._device is not None and not self._automatic and calibration is not None:
             self._device.require(len(calibration) - 1)
         self.settings = Settings() if settings is None else settings
@@ -169,7 +170,8 @@ class Reconstructor:
         behind = self._waveform is not None or keeps_edges
         passes = () if behind else self._passes_of_images(takes)
         given = takes[0], saturated_pixels, spread
-        if (planes := _first(each.images(*given) for each in passes)) is not None:
+        planes = self._passed(takes.shape, passes, lambda each: each.images(*given))
+        if planes is not None:
             return PassedReconstruction(
                 planes,
                 self.settings,
@@ -177,6 +179,7 @@ class Reconstructor:
                 repaired=repaired,
                 calibration=self._calibration,
                 spread=spread,
+                device=self._likelihood,
                 images=images,
                 low=self._low(takes[0]),
             )
@@ -294,6 +297,7 @@ class Reconstructor:
             "repaired": frame.repaired,
             "calibration": gains,
             "spread": spread,
+            "device": self._likelihood,
             "images": frame.images,
             "low": frame.low,
             "frames": frames,
@@ -309,7 +313,7 @@ class Reconstructor:
             if correction is not None:
                 smoothed, corrected = correction(smoothed, spread=spread)
             own = smoothed, frame.saturated, spread
-            planes = _first(each.moments(*own) for each in passes)
+            planes = self._passed(moments.shape, passes, lambda each: each.moments(*own))
         if planes is not None:
             behind = {"corrected": corrected, "share": share}
             found: Reconstruction = PassedReconstruction(
@@ -473,8 +477,29 @@ class Reconstructor:
         if not self._automatic:
             self._device.require(m)
             return self._device
-        worth = pixels >= _gpu.AUTO_PIXELS or m >= _gpu.AUTO_HARMONICS
-        return self._device if worth and self._device.is_ready(m) else None
+        return self._device if self._device.is_ready(m) else None
+
+    def _passed(
+        self, kind: tuple[int, ...], passes: Sequence[Pass], run: Callable[[Pass], Planes | None]
+    ) -> Planes | None:
+        """Return what the first pass gives that gives anything; of "auto", the faster one's."""
+        if self._automatic and len(passes) == 2:
+            device, kernel = passes
+            raced: Planes = self._race.run(kind, lambda: run(device), lambda: run(kernel))
+            return raced
+        return next((found for each in passes if (found := run(each)) is not None), None)
+
+    def _likelihood(self, b: Array, variance: Array, *options: Any, here: Callable[[], Any]) -> Any:
+        """Estimate likelihoods on the device, if there is one for frames of this kind."""
+        m, pixels = b.shape[0] - 1, b.shape[1]
+        device = self._device_for(m, pixels)
+        if device is None:
+            return here()
+        there = partial(device.likelihood, b, variance, *options, wait=not self._automatic)
+        if self._automatic and lookup("likelihood", m, pixels) is not None:
+            return self._race.run(("likelihood", *b.shape), there, here)
+        found = there()
+        return here() if found is None else found
 
     # -- preparing -----------------------------------------------------------------------------
 
@@ -511,11 +536,6 @@ class Reconstructor:
         return replacement.places, lambda raw: measure(
             replacement.values(raw), zeroth=zeroth, phases_rad=phases_rad
         )
-
-
-def _first(found: Iterable[Planes | None]) -> Planes | None:
-    """Return what the first pass gives that gives something."""
-    return next((each for each in found if each is not None), None)
 
 
 def _is_moments(data: Array | Sequence[Array]) -> bool:

@@ -166,6 +166,13 @@ class _ServiceCollector(Collector):
         status = self._service.acquisition.status()
         yield _counter("frames_captured", "Frames since the service started.", status.frames)
         yield _gauge("frame_age_seconds", "Since the last frame arrived.", status.frame_age_s)
+        if (device := tm.kernels.device_state()) is not None:
+            yield _counter(
+                "device_results",
+                "Passes and likelihoods that a GPU was asked for, by what computed them.",
+                device["results"],
+                by="device",
+            )
         latest = self._service.hub.latest
         if latest is None:
             return

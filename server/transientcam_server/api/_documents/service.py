@@ -66,6 +66,18 @@ class InfoDocument(Document):
         asyncapi: str = Field(description="where its messages are described, as AsyncAPI 3")
         encodings: list[str] = Field(description="which a subscription may request")
 
+    class DeviceDocument(Document):
+        """A device that was asked for; see `serve --device`."""
+
+        wanted: str
+        name: str | None
+        """Of the adapter; null until one was looked for, or where there is none."""
+        results: dict[str, int]
+        """Passes and likelihoods that the device was asked for, by what computed them: `device`,
+        or `processor` where it failed."""
+        refused: str | None
+        """Why nothing, or not everything, is computed there."""
+
     class KernelsDocument(Document):
         """Compiled code for the present sequence and estimator that is still being prepared."""
 
@@ -94,6 +106,8 @@ class InfoDocument(Document):
     kernels: KernelsDocument | None = None
     """What frames are computed without until it is compiled: more slowly, with the same results;
     null where nothing is being prepared."""
+    device: DeviceDocument | None = None
+    """Null where frames are computed on the processor."""
     reconstruction: dict[str, float | str]
     """Settings of the reconstruction."""
 

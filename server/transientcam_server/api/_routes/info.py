@@ -58,8 +58,14 @@ async def read_info(service: ServiceOf, principal: PrincipalOf) -> InfoDocument:
         history=HistoryDocument.model_validate(service.history),
         clients=service.hub.clients,
         kernels=_kernels(service.pipeline.recipe_of(service.applied)),
+        device=_device(),
         reconstruction=service.pipeline.reconstruction.settings.model_dump(),
     )
+
+
+def _device() -> InfoDocument.DeviceDocument | None:
+    state = tm.kernels.device_state()
+    return None if state is None else InfoDocument.DeviceDocument.model_validate(state)
 
 
 def _kernels(recipe: Recipe) -> InfoDocument.KernelsDocument | None:

@@ -1,5 +1,7 @@
 import httpx
+import pytest
 
+import transientcam_moments as tm
 from transientcam import wire
 
 
@@ -33,3 +35,20 @@ def test_the_versions_of_the_interface_are_reported_at_a_path_without_version(
     versions = http.get("/api/versions").json()
 
     assert versions["api"] == [{"name": "v1", "path": "/api/v1"}]
+
+
+def test_the_device_that_computes_is_stated_with_what_it_was_asked_for(
+    http: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert http.get("/api/v1/info").json()["device"] is None
+    assert "transientcam_device_results" not in http.get("/metrics").text
+    state = {
+        "wanted": "gpu",
+        "name": "Big GPU",
+        "results": {"device": 41, "processor": 2},
+        "refused": "it failed",
+    }
+    monkeypatch.setattr(tm.kernels, "device_state", lambda: state)
+
+    assert http.get("/api/v1/info").json()["device"] == state
+    assert 'device_results_total{device="processor"} 2.0' in http.get("/metrics").text
