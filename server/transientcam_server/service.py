@@ -14,9 +14,10 @@ from typing import Any, Final, Protocol
 
 import transientcam_moments as tm
 from transientcam import wire
-from transientcam_driver import AppliedSequence, Camera
+from transientcam_driver import AppliedSequence, Camera, DriverError
 from transientcam_server.broadcast import Channel, Hub
 from transientcam_server.camera import (
+    AbsentCamera,
     Acquisition,
     CalibrationStore,
     Calibrator,
@@ -44,6 +45,7 @@ from transientcam_server.camera import (
     Supervision,
     Timer,
     calibration_of,
+    open_chosen,
     sensor_of,
     snapshot_of,
     stated_sensor,
@@ -133,6 +135,8 @@ class Service:
         self.closing = threading.Event()
         self.simulating = asyncio.Lock()
         self._superseded: list[Frame] = []
+        self._successor: tuple[str, Camera] | None = None
+        self._opening = False
         self._executor = ThreadPoolExecutor(
             settings.workers, WORKER_THREADS, initializer=tm.kernels.use_one_thread
         )
@@ -268,6 +272,38 @@ class Service:
             if not ended:
                 _log.warning("a worker does not end; what it computes is dropped")
             self._executor.shutdown(wait=ended, cancel_futures=True)
+
+    @property
+    def successor(self) -> tuple[str, Camera] | None:
+        """Name and camera, open, that this process is to serve next; None to go on with this."""
+        camera = self.camera
+        return (
+            camera.found if isinstance(camera, AbsentCamera) and camera.found else self._successor
+        )
+
+    async def change_camera(self, spec: str) -> None:
+        """Open another camera; once it is open, switch the light of this one off and end with it.
+
+        Raises Problem ``camera-failed`` where it cannot be opened, ``camera-busy`` while another
+        one is: this one goes on.
+        """
+        if self._opening or self.successor is not None:
+            raise Problem(kinds.CAMERA_BUSY, "Another camera is being opened.")
+        self._opening = True
+        try:
+            opened = await asyncio.to_thread(open_chosen, spec)
+        except DriverError as error:
+            raise Problem(
+                kinds.CAMERA_FAILED,
+                f"{spec} cannot be opened, so that nothing was changed: {error}",
+                field="camera",
+                value=spec,
+                limit="a camera that can be opened",
+            ) from error
+        finally:
+            self._opening = False
+        await asyncio.to_thread(self.acquisition.stop)
+        self._successor = spec, opened
 
     async def close_streams(self) -> None:
         """Close every stream, and give clients that still read the time to receive the reason."""

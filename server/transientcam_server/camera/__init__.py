@@ -5,6 +5,7 @@ which client may change it; `Jobs` run long work one after another; `Calibrator`
 """
 
 from transientcam_server.camera import _lease as lease
+from transientcam_server.camera._absent import NO_CAMERA, AbsentCamera, open_chosen
 from transientcam_server.camera._acquisition import Acquisition, outdated
 from transientcam_server.camera._calibration_store import (
     CalibrationStore,

@@ -1,6 +1,7 @@
 """The verb ``serve`` of the ``transientcam`` command."""
 
 import json
+import logging
 import os
 import time
 from collections.abc import Callable
@@ -14,9 +15,11 @@ from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import Terminal, Text, echo
 
 if TYPE_CHECKING:
-    from transientcam_driver import Camera
+    from transientcam_driver import Camera, CameraError
     from transientcam_server.settings import Settings
 
+_log = logging.getLogger("transientcam_server.serve")
+_OF_ONE_CAMERA: Final = ("calibration", "sequence", "sensor", "lens")
 _AGAIN_S: Final = 0.1
 _HANDED_OVER_S: Final = 10.0
 """The supervisor of a daemon that has ended holds the camera until its light is off, or so long."""
@@ -26,7 +29,8 @@ def serve(
     camera: Annotated[
         str | None,
         typer.Option(
-            help="NAME:ADDRESS, as `transientcam devices` lists them.  [default: sim:mirrors]",
+            help="NAME:ADDRESS, as `transientcam devices` lists them; or none.  "
+            "[default: sim:mirrors]",
             autocompletion=lambda: _camera_names(),
         ),
     ] = None,
@@ -93,8 +97,12 @@ def serve(
 
 
 def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
-    """Serve a camera until a signal; ``on_listening`` is given the address."""
+    """Serve a camera, and others in its place, until a signal; ``on_listening`` gets the address.
+
+    One that cannot be opened, or fails as it starts, is waited for.
+    """
     import transientcam_moments as tm
+    from transientcam_driver import CameraError
     from transientcam_server.api import build_app
     from transientcam_server.camera import start_with
     from transientcam_server.daemon import (
@@ -114,17 +122,62 @@ def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
         listen(settings.host, settings.port) as listener,
     ):
         url = address(listener, tls=settings.tls_certificate is not None)
-        with open_after_others(settings.camera) as opened:
-            start_with(opened, settings.sequence)
-            app = build_app(opened, settings)
+        told = False
+
+        def serve_one(spec: str, opened: "Camera") -> "tuple[str, Camera] | None":
+            own = settings_for(settings, spec)
+            start_with(opened, own.sequence)
+            app = build_app(opened, own)
             service = app.state.service
             freeze_startup_objects(service.pipeline.prepare_kernels(service.applied))
 
             def listening() -> None:
-                on_listening(url)
+                nonlocal told
+                if not told:
+                    on_listening(url)
+                told = True
                 service.planning.prepare()
 
-            serve_app(app, settings, listener, on_listening=listening)
+            return serve_app(app, own, listener, on_listening=listening)
+
+        following: tuple[str, Camera] | None = _opened(settings.camera)
+        while following is not None:
+            spec, opened = following
+            with opened:
+                try:
+                    following = serve_one(spec, opened)
+                except CameraError as error:
+                    following = _awaited(spec, error)
+
+
+def _opened(spec: str) -> "tuple[str, Camera]":
+    """Return name and camera to begin with: a missing one's place, where it cannot be opened."""
+    from transientcam_driver import CameraError
+    from transientcam_server.camera import NO_CAMERA, AbsentCamera
+
+    try:
+        return spec, AbsentCamera() if spec == NO_CAMERA else open_after_others(spec)
+    except CameraError as error:
+        return _awaited(spec, error)
+
+
+def _awaited(spec: str, error: "CameraError") -> "tuple[str, Camera]":
+    from transientcam_server.camera import NO_CAMERA, AbsentCamera
+
+    _log.warning("%s cannot be opened, and is waited for: %s", spec, error)
+    return NO_CAMERA, AbsentCamera(f"{spec} cannot be opened: {error}", wanted=spec)
+
+
+def settings_for(settings: "Settings", spec: str) -> "Settings":
+    """Return the settings that hold for a camera: another one has nothing of the first one's own.
+
+    These are its calibration, sequence, sensor and lens.
+    """
+    if spec == settings.camera:
+        return settings
+    defaults = type(settings)()
+    own = {name: getattr(defaults, name) for name in _OF_ONE_CAMERA}
+    return settings.model_copy(update={**own, "camera": spec})
 
 
 def open_after_others(spec: str, *, pause: Callable[[float], None] = time.sleep) -> "Camera":

@@ -40,6 +40,7 @@ KINDS: Final[dict[str, Kind]] = {
     "POST /recordings/{recording}/stop": "change",
     "PUT /sequence": "change",
     "POST /sequence/validate": "read",
+    "PUT /camera": "light",
     "PUT /simulation": "change",
     "POST /simulation/faults": "change",
 }
