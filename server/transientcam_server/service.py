@@ -276,10 +276,8 @@ class Service:
     @property
     def successor(self) -> tuple[str, Camera] | None:
         """Name and camera, open, that this process is to serve next; None to go on with this."""
-        camera = self.camera
-        return (
-            camera.found if isinstance(camera, AbsentCamera) and camera.found else self._successor
-        )
+        waited = self.camera.found if isinstance(self.camera, AbsentCamera) else None
+        return waited or self._successor
 
     async def change_camera(self, spec: str) -> None:
         """Open another camera; once it is open, switch the light of this one off and end with it.
@@ -469,6 +467,13 @@ class Service:
                 f"{done} at the origin, {url}: only moments come from there.",
                 origin=url,
             )
+
+    def require_no_recording(self, what: str) -> None:
+        """Refuse what has the camera for itself, where a recording runs: ``recording-runs``."""
+        running = self.recordings.active_id
+        if running is not None:
+            detail = f"{what} would end it; stop it first."
+            raise Problem(kinds.RECORDING_RUNS, detail, recording=running)
 
     def _happened(self, event: Event) -> None:
         for observer in self.observers:

@@ -33,6 +33,7 @@ KINDS: Final[dict[str, Kind]] = {
     "POST /plan": "read",
     "POST /plan/jobs": "read",
     "POST /tradeoff/jobs": "read",
+    "POST /series/jobs": "light",
     "PUT /reconstruction": "change",
     "POST /recordings": "change",
     "PATCH /recordings/{recording}": "change",
@@ -196,6 +197,7 @@ def test_nothing_but_the_gate_lights() -> None:
         "camera/_acquisition.py: self._camera.start()",
         "camera/_acquisition.py: self._camera.reconnect()",
         "camera/_calibrator.py: return capture_calibration(",  # within `Acquisition.occupy`
+        "camera/_series.py: camera.start()",  # within it, too
         # of a camera that no daemon has
         "camera/_photon_transfer.py: capture = capture_calibration("
         "camera, takes=frames, average=average)",
