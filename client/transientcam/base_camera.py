@@ -175,11 +175,9 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes, _Lease, _Stream]):
     def start_series(
         self, settings: Sequence[Mapping[str, Any]], frames: int = 100, **more: Any
     ) -> _Document:
-        """Begin to capture frames at each of the settings, and return the job.
+        """Begin to capture frames at each of the settings; returns the job, with ``rows``.
 
-        Each has ``sequence`` and ``reconstruction``, with the fields that differ from the present
-        ones; ``more`` are ``target_m`` and a ``region``. The ``rows`` of the job's result have
-        noise, bias and shares of each. ::
+        ``more`` are ``target_m`` and a ``region``. ::
 
             job = camera.start_series([{"sequence": {"harmonics": m}} for m in (3, 4)])
             rows = camera.wait_for(job["id"])["result"]["rows"]
@@ -188,15 +186,12 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes, _Lease, _Stream]):
         return self._ask(document("series/jobs", method="POST", body=body))
 
     def change_camera(self, camera: str) -> _Document:
-        """Have the daemon serve another camera, as ``"sim:corner"``; ``"none"`` serves none.
+        """Have the daemon open another camera, as ``"sim:corner"``, and serve that one instead.
 
-        Returns once that is opened. The daemon then begins anew, within a second or two, with
-        another ``service_id`` of `info`; this camera's lease, streams and recording end.
+        It begins anew within a second or two, with another ``service_id`` in `info`.
         """
-        body = {"camera": camera}
-        return self._ask(
-            document("camera", method="PUT", body=body, extra_timeout_s=_SCENE_BUILT_S)
-        )
+        body, extra_s = {"camera": camera}, _SCENE_BUILT_S
+        return self._ask(document("camera", method="PUT", body=body, extra_timeout_s=extra_s))
 
     @property
     def calibrations(self) -> Calibrations[_Document, _Bytes]:

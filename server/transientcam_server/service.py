@@ -17,7 +17,6 @@ from transientcam import wire
 from transientcam_driver import AppliedSequence, Camera, DriverError
 from transientcam_server.broadcast import Channel, Hub
 from transientcam_server.camera import (
-    AbsentCamera,
     Acquisition,
     CalibrationStore,
     Calibrator,
@@ -136,7 +135,7 @@ class Service:
         self.simulating = asyncio.Lock()
         self._superseded: list[Frame] = []
         self._successor: tuple[str, Camera] | None = None
-        self._opening = False
+        self._changing = asyncio.Lock()
         self._executor = ThreadPoolExecutor(
             settings.workers, WORKER_THREADS, initializer=tm.kernels.use_one_thread
         )
@@ -276,32 +275,23 @@ class Service:
     @property
     def successor(self) -> tuple[str, Camera] | None:
         """Name and camera, open, that this process is to serve next; None to go on with this."""
-        waited = self.camera.found if isinstance(self.camera, AbsentCamera) else None
-        return waited or self._successor
+        return self._successor or getattr(self.camera, "found", None)
 
     async def change_camera(self, spec: str) -> None:
         """Open another camera; once it is open, switch the light of this one off and end with it.
 
-        Raises Problem ``camera-failed`` where it cannot be opened, ``camera-busy`` while another
-        one is: this one goes on.
+        Raises Problem ``camera-failed`` where it cannot be opened: this one goes on.
         """
-        if self._opening or self.successor is not None:
-            raise Problem(kinds.CAMERA_BUSY, "Another camera is being opened.")
-        self._opening = True
-        try:
-            opened = await asyncio.to_thread(open_chosen, spec)
-        except DriverError as error:
-            raise Problem(
-                kinds.CAMERA_FAILED,
-                f"{spec} cannot be opened, so that nothing was changed: {error}",
-                field="camera",
-                value=spec,
-                limit="a camera that can be opened",
-            ) from error
-        finally:
-            self._opening = False
-        await asyncio.to_thread(self.acquisition.stop)
-        self._successor = spec, opened
+        async with self._changing:
+            if self.successor is not None:
+                raise Problem(kinds.CAMERA_BUSY, "The camera is changed already.")
+            try:
+                opened = await asyncio.to_thread(open_chosen, spec)
+            except DriverError as error:
+                detail = f"{spec} cannot be opened, so that nothing was changed: {error}"
+                raise Problem(kinds.CAMERA_FAILED, detail, field="camera", value=spec) from error
+            await asyncio.to_thread(self.acquisition.stop)
+            self._successor = spec, opened
 
     async def close_streams(self) -> None:
         """Close every stream, and give clients that still read the time to receive the reason."""

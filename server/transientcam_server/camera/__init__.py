@@ -39,7 +39,7 @@ from transientcam_server.camera._lease import (
 from transientcam_server.camera._light import LightGuard
 from transientcam_server.camera._origin_lease import OriginLease
 from transientcam_server.camera._photon_transfer import PhotonTransfer, measure_photon_transfer
-from transientcam_server.camera._series import Setting, measured, start_series
+from transientcam_server.camera._series import MAX_VALUES, measured, start_series
 from transientcam_server.camera._shared import SharedAcquisition
 from transientcam_server.camera._source import (
     LightRules,

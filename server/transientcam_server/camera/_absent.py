@@ -1,24 +1,15 @@
 """The place of a camera that is not there: what the service serves until there is one."""
 
-from typing import Final
+from typing import Final, NoReturn
 
-from transientcam_driver import (
-    AppliedSequence,
-    Camera,
-    CameraError,
-    CameraLost,
-    CameraState,
-    Capabilities,
-    RawFrame,
-    Sequence,
-    Status,
-    open_camera,
-)
+from transientcam_driver import Camera, CameraError, CameraLost, Capabilities, Sequence, open_camera
 from transientcam_driver.camera import HostCamera
 from transientcam_driver.clock import RealClock
 
 NO_CAMERA: Final = "none"
 """The name that stands for it."""
+_LIMITS: Final = {"min_frequency_hz": 1e6, "max_frequency_hz": 1e8, "tuning_step_hz": 1.0}
+_LIMITS_S: Final = {"min_exposure_s": 1e-6, "max_exposure_s": 1.0, "readout_s": 0.0}
 
 
 class CameraAbsent(CameraLost):
@@ -28,89 +19,43 @@ class CameraAbsent(CameraLost):
 
 
 class AbsentCamera(HostCamera):
-    """Has the methods of `transientcam_driver.Camera`, all of which raise that it is not there.
+    """A `Camera` that is lost, with one pixel in an image that it never makes.
 
-    Its image has one pixel, and it never makes one.
-
-    ``wanted``: the camera that each `reconnect` tries to open, which becomes ``found`` with its
-    name; None waits for none.
+    ``wanted``: what each `reconnect` tries to open, which becomes ``found``, with its name.
     """
+
+    off_switch = None
+    found: tuple[str, Camera] | None = None
 
     def __init__(self, reason: str = "no camera is chosen", *, wanted: str | None = None) -> None:
         super().__init__(RealClock(), None)
-        self.found: tuple[str, Camera] | None = None
         self._reason, self._wanted = reason, wanted
-        self._state = CameraState.DISCONNECTED
-        self._capabilities = Capabilities(
-            model=NO_CAMERA,
-            serial="",
-            firmware="",
-            protocol_version=0,
-            width=1,
-            height=1,
-            bits=16,
-            readout_s=0.0,
-            streaming_readout_s=0.0,
-            tuning_step_hz=1.0,
-            min_frequency_hz=1e6,
-            max_frequency_hz=400e6,
-            max_harmonics=12,
-            min_exposure_s=1e-9,
-            max_exposure_s=1.0,
-        )
+        named = {"model": NO_CAMERA, "serial": "", "firmware": "", "protocol_version": 0}
+        size = {"width": 1, "height": 1, "bits": 16, "max_harmonics": 12}
+        limits = {**_LIMITS, **_LIMITS_S, "streaming_readout_s": 0.0}
+        self._capabilities = Capabilities(**named, **size, **limits)  # type: ignore[arg-type]
         self._applied = self._capabilities.apply(self._capabilities.nearest(Sequence()), epoch=1)
 
-    @property
-    def off_switch(self) -> None:
-        """None: there is no light."""
-        return
+    def _lost(self, *_: object, **__: object) -> NoReturn:
+        raise CameraAbsent(self._reason)
 
-    def configure(self, sequence: Sequence) -> AppliedSequence:
-        """Raise CameraAbsent, as all do that need a camera."""
-        raise self._absent()
-
-    def start(self) -> None:
-        """As `configure`."""
-        raise self._absent()
-
-    def status(self) -> Status:
-        """As `configure`."""
-        raise self._absent()
-
-    def read_frame(self, *, timeout_s: float = 10.0) -> RawFrame:
-        """As `configure`."""
-        raise self._absent()
+    configure = start = status = read_frame = _lost
 
     def reconnect(self) -> None:
-        """Look whether the wanted camera can be opened by now; raises CameraError while not."""
+        """Try to open the wanted camera; raises CameraLost also where it is found."""
         if self.found is None and self._wanted is not None:
             try:
                 self.found = self._wanted, open_camera(self._wanted)
             except CameraError as error:
                 self._reason = f"{self._wanted} cannot be opened: {error}"
-        raise self._absent()
+        self._lost()
 
     def stop(self) -> None:
-        """Do nothing: there is no light."""
+        """Do nothing: there is no light, and nothing to give back."""
 
-    def close(self) -> None:
-        """Do nothing."""
-
-    def _absent(self) -> CameraAbsent:
-        return CameraAbsent(self._reason)
+    close = stop
 
 
 def open_chosen(spec: str) -> Camera:
-    """Open a camera that is chosen while the service runs, with its first sequence.
-
-    Raises DriverError as `open_camera`; none is left open then.
-    """
-    if spec == NO_CAMERA:
-        return AbsentCamera()
-    camera = open_camera(spec)
-    try:
-        camera.status()
-    except BaseException:
-        camera.close()
-        raise
-    return camera
+    """Open a camera as `open_camera` does, or the place of one."""
+    return AbsentCamera() if spec == NO_CAMERA else open_camera(spec)

@@ -2,71 +2,60 @@
 
 import csv
 import json
-from collections.abc import Callable
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 
 from transientcam.cli.options import JsonOption, TokenOption
 from transientcam.cli.terminal import echo
 
+_List = Annotated[str | None, typer.Option(metavar="A,B,...", help="[default: as it is]")]
+_UNIT: Final = {"exposure_s": 1e-6, "base_frequency_hz": 1e6}
+
 
 def series(
     url: Annotated[str, typer.Argument(metavar="URL", help="The daemon whose camera captures.")],
-    m: Annotated[str | None, typer.Option(help="Harmonics, as in 3,4.")] = None,
-    exposure_us: Annotated[str | None, typer.Option(help="Exposures of an image.")] = None,
-    base_frequency_mhz: Annotated[str | None, typer.Option(help="Base frequencies.")] = None,
-    takes: Annotated[str | None, typer.Option(help="Takes of each image.")] = None,
-    estimator: Annotated[str | None, typer.Option(help="Estimators of the range.")] = None,
-    neighbours: Annotated[
-        str | None, typer.Option(help="gaussian, edge-preserving or none.")
-    ] = None,
-    frames: Annotated[int, typer.Option(min=2, max=10_000, help="At each setting.")] = 100,
-    target_m: Annotated[
-        float | None, typer.Option(min=0.0, help="Also count the ranges that are so close.")
-    ] = None,
+    m: _List = None,
+    exposure_us: _List = None,
+    base_frequency_mhz: _List = None,
+    takes: _List = None,
+    estimator: _List = None,
+    neighbours: _List = None,
+    frames: Annotated[int, typer.Option(min=2, help="At each setting.")] = 100,
+    target_m: Annotated[float | None, typer.Option(help="Count ranges that are so close.")] = None,
     region: Annotated[
-        str | None,
-        typer.Option(metavar="X,Y,WIDTH,HEIGHT", help="The pixels that count.  [default: all]"),
+        str | None, typer.Option(metavar="X,Y,WIDTH,HEIGHT", help="[default: all pixels]")
     ] = None,
-    file: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE", help="Write the table there.")
-    ] = None,
+    file: Annotated[Path | None, typer.Option("--csv", help="Write the table there.")] = None,
     token: TokenOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Capture frames at every combination of settings, and compare how far their ranges are off.
 
-    Lists are separated by commas; what is not given stays as it is. The sequence in use returns at
-    the end, also after Ctrl-C, which ends the series.
+    The sequence in use returns at the end, also after Ctrl-C, which ends the series.
     """
     from transientcam import Camera
     from transientcam_server.cli.progress import followed
 
     columns = [
-        _column("--m", m, "sequence", "harmonics", int),
-        _column("--exposure-us", exposure_us, "sequence", "exposure_s", _micro),
-        _column("--base-frequency-mhz", base_frequency_mhz, "sequence", "base_frequency_hz", _mega),
-        _column("--takes", takes, "sequence", "takes", int),
-        _column("--estimator", estimator, "reconstruction", "estimator", str),
-        _column("--neighbours", neighbours, "reconstruction", "neighbours", str),
+        _numbers("--m", m, "harmonics"),
+        _numbers("--exposure-us", exposure_us, "exposure_s"),
+        _numbers("--base-frequency-mhz", base_frequency_mhz, "base_frequency_hz"),
+        _numbers("--takes", takes, "takes"),
+        [{"estimator": each} for each in estimator.split(",")] if estimator else [{}],
+        [{"neighbours": each} for each in neighbours.split(",")] if neighbours else [{}],
     ]
-    settings = []
-    for row in product(*filter(None, columns)):
-        setting: dict[str, dict[str, Any]] = {"sequence": {}, "reconstruction": {}}
-        for group, field, value in row:
-            setting[group][field] = value
-        settings.append(setting)
-    corners = (
-        None if region is None else [x for _, _, x in _column("--region", region, "", "", int)]
-    )
+    settings = [
+        {"sequence": f | e | b | t, "reconstruction": of | averaged}
+        for f, e, b, t, of, averaged in product(*columns)
+    ]
+    box = [each[""] for each in _numbers("--region", region, "")] if region else None
     with Camera(url, token=token) as camera:
-        start = partial(camera.start_series, settings, frames, target_m=target_m, region=corners)
+        start = partial(camera.start_series, settings, frames, target_m=target_m, region=box)
         job = followed(camera, start)
-        shown = f"{camera.url}/?series={job['id']} shows it in the page"
     rows = job["result"]["rows"]
     if file is not None:
         with file.open("w", newline="", encoding="utf-8") as out:
@@ -77,28 +66,22 @@ def series(
         echo(json.dumps(job["result"] | {"job": job["id"]}))
         return
     for row in rows:
-        echo(
-            ", ".join(f"{name} {_short(value)}" for name, value in row.items() if value is not None)
-        )
-    echo(shown, err=True)
+        given = {name: value for name, value in row.items() if value is not None}
+        echo(", ".join(f"{name} {_short(value)}" for name, value in given.items()))
+    echo(f"in the page: {camera.url}/?view=series&series={job['id']}", err=True)
 
 
-def _column(
-    option: str, text: str | None, group: str, field: str, read: Callable[[str], Any]
-) -> list[tuple[str, str, Any]]:
-    """Return what the words of an option set, each as group, field and value."""
+def _numbers(option: str, text: str | None, field: str) -> list[dict[str, Any]]:
+    """Return what each number of a list sets; nothing once without a list."""
+    if text is None:
+        return [{}]
+    scale = _UNIT.get(field, 1)
     try:
-        return [(group, field, read(each.strip())) for each in (text or "").split(",") if each]
+        return [
+            {field: scale * (float if field in _UNIT else int)(each)} for each in text.split(",")
+        ]
     except ValueError as error:
-        raise typer.BadParameter(f"{text!r} is no list of numbers", param_hint=option) from error
-
-
-def _micro(text: str) -> float:
-    return float(text) * 1e-6
-
-
-def _mega(text: str) -> float:
-    return float(text) * 1e6
+        raise typer.BadParameter(f"{text!r}: must be numbers, as 3,4", param_hint=option) from error
 
 
 def _short(value: object) -> str:

@@ -15,7 +15,7 @@ from transientcam.cli.options import JsonOption
 from transientcam.cli.terminal import Terminal, Text, echo
 
 if TYPE_CHECKING:
-    from transientcam_driver import Camera, CameraError
+    from transientcam_driver import Camera
     from transientcam_server.settings import Settings
 
 _log = logging.getLogger("transientcam_server.serve")
@@ -104,7 +104,7 @@ def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
     import transientcam_moments as tm
     from transientcam_driver import CameraError
     from transientcam_server.api import build_app
-    from transientcam_server.camera import start_with
+    from transientcam_server.camera import NO_CAMERA, AbsentCamera, start_with
     from transientcam_server.daemon import (
         address,
         configure_logging,
@@ -122,7 +122,7 @@ def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
         listen(settings.host, settings.port) as listener,
     ):
         url = address(listener, tls=settings.tls_certificate is not None)
-        told = False
+        tell = iter([on_listening])
 
         def serve_one(spec: str, opened: "Camera") -> "tuple[str, Camera] | None":
             own = settings_for(settings, spec)
@@ -132,47 +132,26 @@ def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
             freeze_startup_objects(service.pipeline.prepare_kernels(service.applied))
 
             def listening() -> None:
-                nonlocal told
-                if not told:
-                    on_listening(url)
-                told = True
+                next(tell, lambda url: None)(url)  # of the first camera alone
                 service.planning.prepare()
 
             return serve_app(app, own, listener, on_listening=listening)
 
-        following: tuple[str, Camera] | None = _opened(settings.camera)
+        none = AbsentCamera() if settings.camera == NO_CAMERA else None
+        following: tuple[str, Camera | None] | None = settings.camera, none
         while following is not None:
-            spec, opened = following
-            with opened:
-                try:
+            spec, found = following
+            try:
+                with found or open_after_others(spec) as opened:
                     following = serve_one(spec, opened)
-                except CameraError as error:
-                    following = _awaited(spec, error)
-
-
-def _opened(spec: str) -> "tuple[str, Camera]":
-    """Return name and camera to begin with: a missing one's place, where it cannot be opened."""
-    from transientcam_driver import CameraError
-    from transientcam_server.camera import NO_CAMERA, AbsentCamera
-
-    try:
-        return spec, AbsentCamera() if spec == NO_CAMERA else open_after_others(spec)
-    except CameraError as error:
-        return _awaited(spec, error)
-
-
-def _awaited(spec: str, error: "CameraError") -> "tuple[str, Camera]":
-    from transientcam_server.camera import NO_CAMERA, AbsentCamera
-
-    _log.warning("%s cannot be opened, and is waited for: %s", spec, error)
-    return NO_CAMERA, AbsentCamera(f"{spec} cannot be opened: {error}", wanted=spec)
+            except CameraError as error:
+                reason = f"{spec} cannot be opened: {error}"
+                _log.warning("%s; it is waited for", reason)
+                following = NO_CAMERA, AbsentCamera(reason, wanted=spec)
 
 
 def settings_for(settings: "Settings", spec: str) -> "Settings":
-    """Return the settings that hold for a camera: another one has nothing of the first one's own.
-
-    These are its calibration, sequence, sensor and lens.
-    """
+    """Return the settings that hold for a camera: those of `_OF_ONE_CAMERA` for the first alone."""
     if spec == settings.camera:
         return settings
     defaults = type(settings)()

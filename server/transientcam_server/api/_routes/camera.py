@@ -13,17 +13,12 @@ from transientcam_driver import CameraError, Status
 from transientcam_driver.camera import light_warning
 from transientcam_driver.cli.doctor import checks
 from transientcam_server.api._auth import Role
-from transientcam_server.api._auth.permissions import PrincipalOf, needs
+from transientcam_server.api._auth.permissions import needs
 from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._documents.camera import CameraDocument
-from transientcam_server.api._documents.choices import (
-    CameraChangeDocument,
-    CameraChoicesDocument,
-    CameraRequest,
-)
+from transientcam_server.api._documents.choices import CameraChangeDocument, CameraChoicesDocument
 from transientcam_server.api._problems import documented
-from transientcam_server.camera import NO_CAMERA
-from transientcam_server.errors import Problem, kinds
+from transientcam_server.errors import kinds
 from transientcam_server.relay import RelayCamera
 
 router = APIRouter(tags=["camera"])
@@ -54,12 +49,19 @@ async def read_camera(service: ServiceOf) -> CameraDocument:
 
 @router.get("/camera/choices", summary="Cameras to choose from")
 async def read_choices(service: ServiceOf) -> CameraChoicesDocument:
-    """Look for cameras at this machine and on the network, and for what they lack.
+    """Look for cameras at this machine and on the network, which takes about a second.
 
-    It takes about a second. Services of other cameras are in `GET /cameras`.
+    Services of other cameras are in `GET /cameras`.
     """
-    found, missing = await asyncio.to_thread(_looked)
-    return CameraChoicesDocument(current=service.settings.camera, missing=missing, **found)
+    return CameraChoicesDocument(
+        current=service.settings.camera,
+        missing=[each for each in await asyncio.to_thread(_checked) if each["level"] != "ok"],
+        **await asyncio.to_thread(cameras_here, network=True),
+    )
+
+
+def _checked() -> list[dict[str, Any]]:
+    return [each.to_document() for each in guarded("USB", checks)]
 
 
 @router.put(
@@ -68,37 +70,17 @@ async def read_choices(service: ServiceOf) -> CameraChoicesDocument:
     summary="Serve another camera",
     responses=documented(kinds.CAMERA_FAILED, kinds.CAMERA_BUSY),
 )
-@needs(Role.OPERATOR, lease=True, light=True)
-async def change_camera(
-    service: ServiceOf, wanted: CameraRequest, principal: PrincipalOf
-) -> CameraChangeDocument:
+@needs(Role.ADMIN, lease=True, light=True)
+async def change_camera(service: ServiceOf, wanted: CameraChangeDocument) -> CameraChangeDocument:
     """Open another camera; once that is done end with the present one, its light first.
 
-    Jobs, recordings, streams and the lease end with it. It goes on where the other one cannot be
-    opened. Settings of the first camera (calibration, sequence, sensor, lens) are not applied to
-    another. It takes the right `may_light`; only an admin may name what is not among the choices,
-    as a name can be a file or an address.
+    Its jobs, recording, streams and lease end with it; where the other one cannot be opened it goes
+    on. Within a second or two a service with another `service_id` answers. Settings of the first
+    camera (calibration, sequence, sensor, lens) do not hold for another. It takes an admin, as a
+    name may be a file or an address, with the right `may_light`.
     """
-    if principal.role < Role.ADMIN and wanted.camera != NO_CAMERA:
-        found, _ = await asyncio.to_thread(_looked)
-        listed = [*found["simulated"], *(each["spec"] for each in found["cameras"])]
-        if wanted.camera not in listed:
-            limit = "one of GET /camera/choices, unless an admin asks"
-            raise Problem(
-                kinds.INVALID_REQUEST,
-                f"camera = {wanted.camera[:200]!r}: must be {limit}",
-                field="camera",
-                value=wanted.camera[:200],
-                limit=limit,
-            )
     await service.change_camera(wanted.camera)
-    return CameraChangeDocument(camera=wanted.camera)
-
-
-def _looked() -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    found = cameras_here(network=True)
-    missing = [each.to_document() for each in guarded("USB", checks) if each.level != "ok"]
-    return found, missing
+    return wanted
 
 
 def _origin(relay: RelayCamera | None) -> CameraDocument.OriginDocument | None:

@@ -14,7 +14,7 @@ from transientcam_server.api import TokenFile
 from transientcam_server.api._auth import Role
 
 NOW = datetime(2030, 1, 1, tzinfo=UTC)
-Kind = Literal["read", "off", "change", "delete", "light"]
+Kind = Literal["read", "off", "change", "delete", "light", "camera"]
 PREFIX: Final = "/api/v1"
 # Whatever is not GET: a route that is not here fails a test until somebody says what it does.
 # "light" is what switches the light on at once or after a while, "off" what only switches it off.
@@ -41,17 +41,21 @@ KINDS: Final[dict[str, Kind]] = {
     "POST /recordings/{recording}/stop": "change",
     "PUT /sequence": "change",
     "POST /sequence/validate": "read",
-    "PUT /camera": "light",
+    "PUT /camera": "camera",
     "PUT /simulation": "change",
     "POST /simulation/faults": "change",
 }
 REFUSED: Final[dict[str, dict[Kind, str]]] = {
-    "none": dict.fromkeys(("read", "off", "change", "delete", "light"), "token-required"),
-    "viewer": dict.fromkeys(("change", "delete", "light"), "role-too-low"),
-    "operator": {"delete": "role-too-low"},
-    "operator without light": {"delete": "role-too-low", "light": "may-not-light"},
+    "none": dict.fromkeys(("read", "off", "change", "delete", "light", "camera"), "token-required"),
+    "viewer": dict.fromkeys(("change", "delete", "light", "camera"), "role-too-low"),
+    "operator": {"delete": "role-too-low", "camera": "role-too-low"},
+    "operator without light": {
+        "delete": "role-too-low",
+        "light": "may-not-light",
+        "camera": "role-too-low",
+    },
     "admin": {},
-    "admin without light": {"light": "may-not-light"},
+    "admin without light": {"light": "may-not-light", "camera": "may-not-light"},
 }
 """What each client is refused, by the kind of what it wants."""
 

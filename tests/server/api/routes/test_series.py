@@ -112,7 +112,7 @@ def test_what_cannot_be_captured_is_refused_by_its_name(served: Served) -> None:
             ({"settings": [{"sequence": {"harmonics": 99}}]}, "harmonics"),
             ({"settings": [{"sequence": {"exposure_s": 9.0}}]}, "exposure_s"),
             ({"settings": [{}], "region": [0, 0, 9999, 2]}, "region"),
-            ({"settings": [{}], "frames": 10_000}, "frames"),
+            ({"settings": [{}], "frames": 20_000}, "frames"),
         ):
             problem = http.post("/api/v1/series/jobs", json=wanted).json()
             assert problem["status"] == 422, problem
