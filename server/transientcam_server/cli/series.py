@@ -68,18 +68,16 @@ def series(
     for row in rows:
         given = {name: value for name, value in row.items() if value is not None}
         echo(", ".join(f"{name} {_short(value)}" for name, value in given.items()))
-    echo(f"in the page: {camera.url}/?view=series&series={job['id']}", err=True)
+    echo(f"in the page: {camera.url}/#view=series&series={job['id']}", err=True)
 
 
 def _numbers(option: str, text: str | None, field: str) -> list[dict[str, Any]]:
     """Return what each number of a list sets; nothing once without a list."""
     if text is None:
         return [{}]
-    scale = _UNIT.get(field, 1)
+    scale, read = _UNIT.get(field, 1), float if field in _UNIT else int
     try:
-        return [
-            {field: scale * (float if field in _UNIT else int)(each)} for each in text.split(",")
-        ]
+        return [{field: scale * read(each)} for each in text.split(",")]
     except ValueError as error:
         raise typer.BadParameter(f"{text!r}: must be numbers, as 3,4", param_hint=option) from error
 
