@@ -76,8 +76,8 @@ def test_a_camera_that_cannot_be_opened_is_taken_once_it_can() -> None:
     assert camera.found is None
 
     there = AbsentCamera(wanted="sim:wall")
-    service = build_app(there, Settings(camera="none")).state.service
-    assert service.successor is None
+    service: Any = build_app(there, Settings(camera="none")).state.service
+    assert not service.successor
     with pytest.raises(CameraLost):
         there.reconnect()
     name, opened = service.successor

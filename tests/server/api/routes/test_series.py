@@ -143,7 +143,7 @@ def test_without_a_truth_ranges_are_held_against_the_plane_that_fits_best() -> N
 
 
 def _recipe(lens: Intrinsics) -> Recipe:
-    limits = {"readout_s": 0.0, "streaming_readout_s": 0.0, "max_harmonics": 3}
+    limits: dict[str, Any] = {"readout_s": 0.0, "streaming_readout_s": 0.0, "max_harmonics": 3}
     limits |= {"tuning_step_hz": 1.0, "min_frequency_hz": 1e6, "max_frequency_hz": 1e8}
     camera: Any = Capabilities(
         model="", serial="", firmware="", protocol_version=0, width=16, height=12, bits=12,
