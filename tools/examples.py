@@ -126,6 +126,7 @@ def _answers(http: httpx.Client) -> Iterator[tuple[str, Any]]:
     for name, path in (
         ("InfoDocument", "info"),
         ("CameraDocument", "camera"),
+        ("CameraChoicesDocument", "camera/choices"),
         ("AcquisitionDocument", "acquisition"),
         ("ReconstructionDocument", "reconstruction"),
         ("HistoryDocument", "frames"),

@@ -172,6 +172,27 @@ class BaseCamera(ABC, Generic[_Document, _Frame, _Bytes, _Lease, _Stream]):
         """Begin what `tradeoff` returns as a job, for a ``share`` and a ``region``, too."""
         return self._ask(planning.start_tradeoff(by=by, **more))
 
+    def start_series(
+        self, settings: Sequence[Mapping[str, Any]], frames: int = 100, **more: Any
+    ) -> _Document:
+        """Begin to capture frames at each of the settings; returns the job, with ``rows``.
+
+        ``more`` are ``target_m`` and a ``region``. ::
+
+            job = camera.start_series([{"sequence": {"harmonics": m}} for m in (3, 4)])
+            rows = camera.wait_for(job["id"])["result"]["rows"]
+        """
+        body = given(settings=[dict(each) for each in settings], frames=frames, **more)
+        return self._ask(document("series/jobs", method="POST", body=body))
+
+    def change_camera(self, camera: str) -> _Document:
+        """Have the daemon open another camera, as ``"sim:corner"``, and serve that one instead.
+
+        It begins anew within a second or two, with another ``service_id`` in `info`.
+        """
+        body, extra_s = {"camera": camera}, _SCENE_BUILT_S
+        return self._ask(document("camera", method="PUT", body=body, extra_timeout_s=extra_s))
+
     @property
     def calibrations(self) -> Calibrations[_Document, _Bytes]:
         """The calibrations that the daemon keeps: to measure, use, export and import."""

@@ -14,7 +14,7 @@ from typing import Any, Final, Protocol
 
 import transientcam_moments as tm
 from transientcam import wire
-from transientcam_driver import AppliedSequence, Camera
+from transientcam_driver import AppliedSequence, Camera, DriverError
 from transientcam_server.broadcast import Channel, Hub
 from transientcam_server.camera import (
     Acquisition,
@@ -44,6 +44,7 @@ from transientcam_server.camera import (
     Supervision,
     Timer,
     calibration_of,
+    open_chosen,
     sensor_of,
     snapshot_of,
     stated_sensor,
@@ -133,6 +134,8 @@ class Service:
         self.closing = threading.Event()
         self.simulating = asyncio.Lock()
         self._superseded: list[Frame] = []
+        self._successor: tuple[str, Camera] | None = None
+        self._changing = asyncio.Lock()
         self._executor = ThreadPoolExecutor(
             settings.workers, WORKER_THREADS, initializer=tm.kernels.use_one_thread
         )
@@ -268,6 +271,27 @@ class Service:
             if not ended:
                 _log.warning("a worker does not end; what it computes is dropped")
             self._executor.shutdown(wait=ended, cancel_futures=True)
+
+    @property
+    def successor(self) -> tuple[str, Camera] | None:
+        """Name and camera, open, that this process is to serve next; None to go on with this."""
+        return self._successor or getattr(self.camera, "found", None)
+
+    async def change_camera(self, spec: str) -> None:
+        """Open another camera; once it is open, switch the light of this one off and end with it.
+
+        Raises Problem ``camera-failed`` where it cannot be opened: this one goes on.
+        """
+        async with self._changing:
+            if self.successor is not None:
+                raise Problem(kinds.CAMERA_BUSY, "The camera is changed already.")
+            try:
+                opened = await asyncio.to_thread(open_chosen, spec)
+            except DriverError as error:
+                detail = f"{spec} cannot be opened, so that nothing was changed: {error}"
+                raise Problem(kinds.CAMERA_FAILED, detail, field="camera", value=spec) from error
+            await asyncio.to_thread(self.acquisition.stop)
+            self._successor = spec, opened
 
     async def close_streams(self) -> None:
         """Close every stream, and give clients that still read the time to receive the reason."""
@@ -433,6 +457,13 @@ class Service:
                 f"{done} at the origin, {url}: only moments come from there.",
                 origin=url,
             )
+
+    def require_no_recording(self, what: str) -> None:
+        """Refuse what has the camera for itself, where a recording runs: ``recording-runs``."""
+        running = self.recordings.active_id
+        if running is not None:
+            detail = f"{what} would end it; stop it first."
+            raise Problem(kinds.RECORDING_RUNS, detail, recording=running)
 
     def _happened(self, event: Event) -> None:
         for observer in self.observers:

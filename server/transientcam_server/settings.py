@@ -405,7 +405,8 @@ class Settings(_Group):
 
     camera: str = Field(default="sim:mirrors", min_length=1)
     """Which camera, as NAME:ADDRESS: ``usb:SERIAL``, ``sim:SCENE``, ``tofcam660:ADDRESS``,
-    ``recording:FILE``, or one of another package; `transientcam devices` lists them."""
+    ``recording:FILE``, or one of another package, as `transientcam devices` lists them; or
+    ``none``, to choose one later. One that cannot be opened is waited for."""
     capture_at_start: bool | None = None
     """Capture from the start, unless the light was switched off before; without it only a camera
     does so that is simulated, emulated or replayed. A relay does what its origin does."""

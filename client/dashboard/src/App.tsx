@@ -6,6 +6,7 @@ import { SwitchedDialog } from "./ui/Dialog";
 import { Help } from "./ui/Help";
 import { shortcuts } from "./ui/shortcuts";
 import { Arrangement } from "./views/Arrangement";
+import { CameraDialog } from "./views/camera/CameraDialog";
 import { FileDrop } from "./views/files/FileDrop";
 import { Palette } from "./views/palette/Palette";
 import { ReplayBar } from "./views/replay/ReplayBar";
@@ -36,6 +37,7 @@ export function App({ onRetry }: { onRetry: () => void }) {
       <SwitchedDialog open={store.palette} title="All commands" inside={Palette} />
       <SwitchedDialog open={store.asksForLayout} title="Layouts" inside={LayoutDialog} />
       <SwitchedDialog open={store.asksForControl} title="Control" inside={ControlDialog} />
+      <SwitchedDialog open={store.asksForCamera} title="Camera" inside={CameraDialog} />
       <SwitchedDialog open={store.asksForToken} title="Authentication required" inside={TokenDialog} />
       <FileDrop />
     </>

@@ -50,7 +50,7 @@ def devices(
     """
     if watch:
         presence.watch(lambda: _searched(timeout_s, interface), now=datetime.now, as_json=as_json)
-    document = {**_found(network=network), "network": [], "network_problem": None}
+    document = {**cameras_here(network=network), "network": [], "network_problem": None}
     console = Terminal(stderr=True)
     if network:
         with console.status("listening on the network"):
@@ -62,7 +62,7 @@ def devices(
         _print(document, network=network)
 
 
-def _found(*, network: bool) -> dict[str, Any]:
+def cameras_here(*, network: bool) -> dict[str, Any]:
     """Return the kinds of cameras, what each finds, and why one could not look."""
     document: dict[str, Any] = {"kinds": [], "cameras": [], "problems": {}, "simulated": []}
     for point in sorted(entry_points(group=GROUP), key=lambda each: each.name):

@@ -41,6 +41,7 @@ from transientcam_server.api._routes import (
     recording_zarr,
     recordings,
     sequence,
+    series,
     simulation,
     tradeoff,
 )
@@ -67,6 +68,7 @@ _RESOURCES = (
     simulation,
     plan,
     tradeoff,
+    series,
     parameters,
     jobs,
 )

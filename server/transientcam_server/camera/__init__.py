@@ -5,6 +5,7 @@ which client may change it; `Jobs` run long work one after another; `Calibrator`
 """
 
 from transientcam_server.camera import _lease as lease
+from transientcam_server.camera._absent import NO_CAMERA, AbsentCamera, open_chosen
 from transientcam_server.camera._acquisition import Acquisition, outdated
 from transientcam_server.camera._calibration_store import (
     CalibrationStore,
@@ -38,6 +39,7 @@ from transientcam_server.camera._lease import (
 from transientcam_server.camera._light import LightGuard
 from transientcam_server.camera._origin_lease import OriginLease
 from transientcam_server.camera._photon_transfer import PhotonTransfer, measure_photon_transfer
+from transientcam_server.camera._series import MAX_VALUES, measured, start_series
 from transientcam_server.camera._shared import SharedAcquisition
 from transientcam_server.camera._source import (
     LightRules,

@@ -85,7 +85,7 @@ class SharedAcquisition(Acquisition):
         Raises Problem ``camera-busy``, always.
         """
         url = self._origin.url
-        raise Problem(kinds.CAMERA_BUSY, f"The camera belongs to {url}: calibrate it there.")
+        raise Problem(kinds.CAMERA_BUSY, f"The camera belongs to {url}: do it there.")
 
     def _end_uncontrolled(self) -> None:
         self._act_on_lapse()  # the origin guards its light by itself

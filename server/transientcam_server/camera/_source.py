@@ -19,6 +19,7 @@ from transientcam_driver import (
 )
 from transientcam_driver.calibration import DEVICE_FIELDS
 from transientcam_driver.clock import VirtualClock
+from transientcam_server.camera._absent import NO_CAMERA, AbsentCamera
 from transientcam_server.camera._calibration_store import CalibrationStore, load_given
 from transientcam_server.errors import Problem
 from transientcam_server.imaging import NOMINAL_ID, Calibration, load_calibration
@@ -87,10 +88,10 @@ class LightRules:
     def of(cls, camera: Camera, settings: Settings) -> Self:
         """Return those of the settings, else those that suit the camera."""
         name, about, light = CameraName.parse(settings.camera), camera.capabilities, settings.light
-        shines = name.kind not in ("sim", "recording")
+        shines = name.kind not in ("sim", "recording", NO_CAMERA)
         capture, delay_s, unused_s = settings.capture_at_start, light.delay_s, light.unused_s
         unused_s = unused_s if unused_s is not None else UNUSED_S if shines else 0.0
-        simulated = None if name.kind == "recording" else settings.camera
+        simulated = None if name.kind in ("recording", NO_CAMERA) else settings.camera
         simulates = camera.simulation is not None
         return cls(
             unit=f"{about.model} {about.serial}" if shines else simulated,
@@ -106,7 +107,7 @@ def start_with(camera: Camera, settings: SequenceSettings) -> None:
 
     A recording that is replayed stays as it was captured, a relayed camera as its origin has it.
     """
-    if isinstance(camera, ReplayCamera | RelayCamera):
+    if isinstance(camera, AbsentCamera | ReplayCamera | RelayCamera):
         return
     wanted = Sequence(**settings.model_dump())
     nearest = camera.capabilities.nearest(wanted)

@@ -1,6 +1,7 @@
 """The verb ``serve`` of the ``transientcam`` command."""
 
 import json
+import logging
 import os
 import time
 from collections.abc import Callable
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from transientcam_driver import Camera
     from transientcam_server.settings import Settings
 
+_log = logging.getLogger("transientcam_server.serve")
+_OF_ONE_CAMERA: Final = ("calibration", "sequence", "sensor", "lens")
 _AGAIN_S: Final = 0.1
 _HANDED_OVER_S: Final = 10.0
 """The supervisor of a daemon that has ended holds the camera until its light is off, or so long."""
@@ -26,7 +29,8 @@ def serve(
     camera: Annotated[
         str | None,
         typer.Option(
-            help="NAME:ADDRESS, as `transientcam devices` lists them.  [default: sim:mirrors]",
+            help="NAME:ADDRESS, as `transientcam devices` lists them; or none.  "
+            "[default: sim:mirrors]",
             autocompletion=lambda: _camera_names(),
         ),
     ] = None,
@@ -93,10 +97,14 @@ def serve(
 
 
 def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
-    """Serve a camera until a signal; ``on_listening`` is given the address."""
+    """Serve a camera, and others in its place, until a signal; ``on_listening`` gets the address.
+
+    One that cannot be opened, or fails as it starts, is waited for.
+    """
     import transientcam_moments as tm
+    from transientcam_driver import CameraError
     from transientcam_server.api import build_app
-    from transientcam_server.camera import start_with
+    from transientcam_server.camera import NO_CAMERA, AbsentCamera, start_with
     from transientcam_server.daemon import (
         address,
         configure_logging,
@@ -114,17 +122,41 @@ def run(settings: "Settings", on_listening: Callable[[str], None]) -> None:
         listen(settings.host, settings.port) as listener,
     ):
         url = address(listener, tls=settings.tls_certificate is not None)
-        with open_after_others(settings.camera) as opened:
-            start_with(opened, settings.sequence)
-            app = build_app(opened, settings)
+        tell = iter([on_listening])
+
+        def serve_one(spec: str, opened: "Camera") -> "tuple[str, Camera] | None":
+            own = settings_for(settings, spec)
+            start_with(opened, own.sequence)
+            app = build_app(opened, own)
             service = app.state.service
             freeze_startup_objects(service.pipeline.prepare_kernels(service.applied))
 
             def listening() -> None:
-                on_listening(url)
+                next(tell, lambda url: None)(url)  # of the first camera alone
                 service.planning.prepare()
 
-            serve_app(app, settings, listener, on_listening=listening)
+            return serve_app(app, own, listener, on_listening=listening)
+
+        none = AbsentCamera() if settings.camera == NO_CAMERA else None
+        following: tuple[str, Camera | None] | None = settings.camera, none
+        while following is not None:
+            spec, found = following
+            try:
+                with found or open_after_others(spec) as opened:
+                    following = serve_one(spec, opened)
+            except CameraError as error:
+                reason = f"{spec} cannot be opened: {error}"
+                _log.warning("%s; it is waited for", reason)
+                following = NO_CAMERA, AbsentCamera(reason, wanted=spec)
+
+
+def settings_for(settings: "Settings", spec: str) -> "Settings":
+    """Return the settings that hold for a camera: those of `_OF_ONE_CAMERA` for the first alone."""
+    if spec == settings.camera:
+        return settings
+    defaults = type(settings)()
+    own = {name: getattr(defaults, name) for name in _OF_ONE_CAMERA}
+    return settings.model_copy(update={**own, "camera": spec})
 
 
 def open_after_others(spec: str, *, pause: Callable[[float], None] = time.sleep) -> "Camera":

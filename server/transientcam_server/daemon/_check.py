@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from transientcam_driver import DriverError
 from transientcam_driver.camera import check_camera
-from transientcam_server.camera import load_given
+from transientcam_server.camera import NO_CAMERA, load_given
 from transientcam_server.daemon._configuration import Configuration
 from transientcam_server.errors import ServerError, SettingsError, SettingsMistake
 from transientcam_server.settings import Settings
@@ -22,7 +22,7 @@ def require_usable(configuration: Configuration) -> None:
     settings = configuration.settings
     mistakes = []
     for name, value, read in (
-        ("camera", settings.camera, lambda read: check_camera(read.camera)),
+        ("camera", settings.camera, _check_camera),
         ("calibration", settings.calibration, _read_calibration),
     ):
         try:
@@ -32,6 +32,11 @@ def require_usable(configuration: Configuration) -> None:
             mistakes.append(SettingsMistake(place, str(value), str(error)))
     if mistakes:
         raise SettingsError(mistakes)
+
+
+def _check_camera(settings: Settings) -> None:
+    if settings.camera != NO_CAMERA:
+        check_camera(settings.camera)
 
 
 def _read_calibration(settings: Settings) -> None:

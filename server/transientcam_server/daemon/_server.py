@@ -19,6 +19,7 @@ from fastapi import FastAPI
 import transientcam_moments as tm
 from transientcam.cli import INTERRUPTED
 from transientcam.wire import MAX_CLIENT_MESSAGE_BYTES
+from transientcam_driver import Camera
 from transientcam_server import logs
 from transientcam_server.daemon._acceptor import Acceptor
 from transientcam_server.daemon._announcement import announced
@@ -152,7 +153,7 @@ class Server(uvicorn.Server):
     async def on_tick(self, counter: int) -> bool:
         """Do what is due every 0.1 s; a Date header has no words for the years from 10000 on."""
         try:
-            return await super().on_tick(counter)
+            return await super().on_tick(counter) or self._service.successor is not None
         except (ValueError, OverflowError):
             return self.should_exit
 
@@ -212,16 +213,19 @@ def serve_app(
     listener: socket.socket,
     *,
     on_listening: Callable[[], None],
-) -> None:
+) -> tuple[str, Camera] | None:
     """Serve on a listening socket until a signal ends it; ``on_listening`` once it answers.
 
+    Returns name and camera to go on with, if it ended for another one.
     Raises KeyboardInterrupt if the signal was SIGINT.
     """
     give_back_large_blocks()
     server = Server(app, settings, on_listening=on_listening)
-    server.run(sockets=[listener])
+    server.run(sockets=[listener.dup()])  # it closes what it is given
     if signal.SIGINT in server.signals:
         raise KeyboardInterrupt
+    service: Service = app.state.service
+    return None if server.signals else service.successor
 
 
 def freeze_startup_objects(compiling: threading.Thread | None) -> threading.Thread:
@@ -242,6 +246,7 @@ def freeze_startup_objects(compiling: threading.Thread | None) -> threading.Thre
 
 
 def _freeze() -> None:
+    gc.unfreeze()  # of the camera before
     gc.collect()
     gc.freeze()
 

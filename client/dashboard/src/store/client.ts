@@ -152,6 +152,7 @@ export class StreamClient {
     } else {
       this.#session = hello.session;
       status.sessionOpened(hello.camera.state, this.now_s());
+      this.store.simulation.world.value = null; // of what may be another camera by now
       void this.#readCamera();
       void this.learnAbsent();
       void this.store.caller.look();

@@ -27,6 +27,7 @@ import { Reconstruction } from "./reconstruction";
 import { Recordings } from "./recordings";
 import { Replay } from "./replay";
 import { Sequencing } from "./sequencing";
+import { Series } from "./series";
 import { aBoolean, browserShelf, type Kind, oneOf, Settings, type Shelf } from "./settings";
 import { Simulation } from "./simulation";
 import { Status } from "./status";
@@ -65,6 +66,8 @@ export class Store extends Ground {
   readonly simulation = new Simulation(this.api);
   /** What accuracy costs in time. */
   readonly accuracy = new Accuracy(this.api);
+  /** Settings that are compared by captured frames. */
+  readonly series = new Series(this.api, this.settings);
   /** What only the service knows of the selected pixel. */
   readonly details = new Details(this.api);
   /** A recording in the place of the camera. */
@@ -103,6 +106,8 @@ export class Store extends Ground {
   readonly asksForControl = signal(false);
   /** Whether a token is asked for. */
   readonly asksForToken = signal(false);
+  /** Whether a camera is asked for: also where the service has none. */
+  readonly asksForCamera = signal(false);
   /** Whether the list of all commands is open. */
   readonly palette = signal(false);
   /** Whether a name for the layout is asked for. */
@@ -163,6 +168,10 @@ export class Store extends Ground {
       this.caller.forget();
       this.asksForToken.value = true;
     };
+    const absent = computed(() => this.camera.value?.capabilities.model === "none");
+    effect(() => {
+      this.asksForCamera.value = absent.value;
+    });
     effect(() => {
       const seesLight = this.frames.absent.value.coefficients === undefined;
       if (!seesLight && JSON.stringify(this.layout.peek()) === JSON.stringify(OVERVIEW)) this.layout.value = SPACE;

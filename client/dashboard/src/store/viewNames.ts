@@ -9,6 +9,7 @@ export const VIEW_NAMES = [
   "points",
   "validity",
   "sequence",
+  "series",
   "recordings",
   "reconstruction",
   "calibration",

@@ -28,6 +28,7 @@ export const VIEWS: readonly View[] = [
   { name: "points", title: "Points in space", view: later(() => import("./points/PointsView")) },
   { name: "validity", title: "Validity", view: later(() => import("./validity/ValidityView")) },
   { name: "sequence", title: "Sequence and accuracy", view: SequenceView },
+  { name: "series", title: "Series", view: later(() => import("./series/SeriesView")) },
   { name: "recordings", title: "Recordings", view: later(() => import("./recordings/RecordingsView")) },
   { name: "reconstruction", title: "Reconstruction", view: later(() => import("./reconstruction/ReconstructionView")) },
   { name: "calibration", title: "Calibration", view: later(() => import("./calibration/CalibrationView")) },

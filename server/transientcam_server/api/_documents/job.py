@@ -12,7 +12,8 @@ class JobDocument(Document):
 
     id: str
     kind: str
-    """What it does: `calibration` measures one, `plan` makes one, `tradeoff` finds the front."""
+    """What it does: `calibration` measures one, `plan` makes one, `tradeoff` finds the front,
+    `series` compares settings."""
     state: Literal["queued", "running", "done", "failed", "cancelled"]
     progress: float = Field(ge=0.0, le=1.0)
     step: str

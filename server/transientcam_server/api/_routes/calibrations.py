@@ -99,10 +99,7 @@ async def measure_calibration(
     `force`: `activated` says whether it is. `harmonics` has those of the modulation, from a phase
     sweep, or `no_harmonics` why there are none.
     """
-    running = service.recordings.active_id
-    if running is not None:
-        detail = "A calibration would end it; stop it first."
-        raise Problem(kinds.RECORDING_RUNS, detail, recording=running)
+    service.require_no_recording("A calibration")
     order = CalibrationOptions(**wanted.model_dump())
     job = service.calibrations.measure(order, lambda: service.applied, offs=offs)
     return accepted(job, response)

@@ -5,12 +5,20 @@ import contextlib
 from dataclasses import asdict
 from typing import Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, status
 
+from transientcam.cli.devices import cameras_here
+from transientcam.cli.findings import guarded
 from transientcam_driver import CameraError, Status
 from transientcam_driver.camera import light_warning
+from transientcam_driver.cli.doctor import checks
+from transientcam_server.api._auth import Role
+from transientcam_server.api._auth.permissions import needs
 from transientcam_server.api._dependencies import ServiceOf
 from transientcam_server.api._documents.camera import CameraDocument
+from transientcam_server.api._documents.choices import CameraChangeDocument, CameraChoicesDocument
+from transientcam_server.api._problems import documented
+from transientcam_server.errors import kinds
 from transientcam_server.relay import RelayCamera
 
 router = APIRouter(tags=["camera"])
@@ -37,6 +45,42 @@ async def read_camera(service: ServiceOf) -> CameraDocument:
         status=status,
         counters=asdict(camera.counters),
     )
+
+
+@router.get("/camera/choices", summary="Cameras to choose from")
+async def read_choices(service: ServiceOf) -> CameraChoicesDocument:
+    """Look for cameras at this machine and on the network, which takes about a second.
+
+    Services of other cameras are in `GET /cameras`.
+    """
+    return CameraChoicesDocument(
+        current=service.settings.camera,
+        missing=[each for each in await asyncio.to_thread(_checked) if each["level"] != "ok"],
+        **await asyncio.to_thread(cameras_here, network=True),
+    )
+
+
+def _checked() -> list[dict[str, Any]]:
+    return [each.to_document() for each in guarded("USB", checks)]
+
+
+@router.put(
+    "/camera",
+    status_code=status.HTTP_202_ACCEPTED,
+    summary="Serve another camera",
+    responses=documented(kinds.CAMERA_FAILED, kinds.CAMERA_BUSY),
+)
+@needs(Role.ADMIN, lease=True, light=True)
+async def change_camera(service: ServiceOf, wanted: CameraChangeDocument) -> CameraChangeDocument:
+    """Open another camera; once that is done end with the present one, its light first.
+
+    Its jobs, recording, streams and lease end with it; where the other one cannot be opened it goes
+    on. Within a second or two a service with another `service_id` answers. Settings of the first
+    camera (calibration, sequence, sensor, lens) do not hold for another. It takes an admin, as a
+    name may be a file or an address, with the right `may_light`.
+    """
+    await service.change_camera(wanted.camera)
+    return wanted
 
 
 def _origin(relay: RelayCamera | None) -> CameraDocument.OriginDocument | None:

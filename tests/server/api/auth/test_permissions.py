@@ -14,7 +14,7 @@ from transientcam_server.api import TokenFile
 from transientcam_server.api._auth import Role
 
 NOW = datetime(2030, 1, 1, tzinfo=UTC)
-Kind = Literal["read", "off", "change", "delete", "light"]
+Kind = Literal["read", "off", "change", "delete", "light", "camera"]
 PREFIX: Final = "/api/v1"
 # Whatever is not GET: a route that is not here fails a test until somebody says what it does.
 # "light" is what switches the light on at once or after a while, "off" what only switches it off.
@@ -33,6 +33,7 @@ KINDS: Final[dict[str, Kind]] = {
     "POST /plan": "read",
     "POST /plan/jobs": "read",
     "POST /tradeoff/jobs": "read",
+    "POST /series/jobs": "light",
     "PUT /reconstruction": "change",
     "POST /recordings": "change",
     "PATCH /recordings/{recording}": "change",
@@ -40,16 +41,21 @@ KINDS: Final[dict[str, Kind]] = {
     "POST /recordings/{recording}/stop": "change",
     "PUT /sequence": "change",
     "POST /sequence/validate": "read",
+    "PUT /camera": "camera",
     "PUT /simulation": "change",
     "POST /simulation/faults": "change",
 }
 REFUSED: Final[dict[str, dict[Kind, str]]] = {
-    "none": dict.fromkeys(("read", "off", "change", "delete", "light"), "token-required"),
-    "viewer": dict.fromkeys(("change", "delete", "light"), "role-too-low"),
-    "operator": {"delete": "role-too-low"},
-    "operator without light": {"delete": "role-too-low", "light": "may-not-light"},
+    "none": dict.fromkeys(("read", "off", "change", "delete", "light", "camera"), "token-required"),
+    "viewer": dict.fromkeys(("change", "delete", "light", "camera"), "role-too-low"),
+    "operator": {"delete": "role-too-low", "camera": "role-too-low"},
+    "operator without light": {
+        "delete": "role-too-low",
+        "light": "may-not-light",
+        "camera": "role-too-low",
+    },
     "admin": {},
-    "admin without light": {"light": "may-not-light"},
+    "admin without light": {"light": "may-not-light", "camera": "may-not-light"},
 }
 """What each client is refused, by the kind of what it wants."""
 
@@ -195,6 +201,7 @@ def test_nothing_but_the_gate_lights() -> None:
         "camera/_acquisition.py: self._camera.start()",
         "camera/_acquisition.py: self._camera.reconnect()",
         "camera/_calibrator.py: return capture_calibration(",  # within `Acquisition.occupy`
+        "camera/_series.py: camera.start()",  # within it, too
         # of a camera that no daemon has
         "camera/_photon_transfer.py: capture = capture_calibration("
         "camera, takes=frames, average=average)",

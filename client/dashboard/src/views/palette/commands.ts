@@ -25,6 +25,7 @@ const ALSO: Readonly<Partial<Record<ViewName, string>>> = {
   points: "3d cloud distance measure",
   sequence: "exposure frequency plan",
   validity: "mask invalid flags trust",
+  series: "compare noise bias accuracy frames csv",
   recordings: "export download hdf5",
   events: "log messages",
 };

@@ -9,7 +9,7 @@ import "./Banner.css";
 
 /** Says at once what is wrong, and what is being done about it; goes away with it. */
 export function Banner({ onRetry }: { onRetry: () => void }) {
-  const { api, status, lease, lightOff, asksForToken } = useStore();
+  const { api, status, lease, lightOff, camera, asksForCamera, asksForToken } = useStore();
   const connection = status.connection.value;
   const off = lightOff.state.value;
   if (off !== null && off.kind !== "sent") {
@@ -35,6 +35,13 @@ export function Banner({ onRetry }: { onRetry: () => void }) {
     );
   }
   const loss = status.cameraLoss.value;
+  if (loss !== null && camera.value?.capabilities.model === "none" && connection.kind === "open") {
+    return (
+      <Alert about="camera" word="Choose a camera" onClick={() => (asksForCamera.value = true)}>
+        <strong>No camera.</strong> {sentence(loss.reason ?? "")}
+      </Alert>
+    );
+  }
   if (loss !== null && connection.kind === "open") {
     return (
       <Alert about="camera">

@@ -49,6 +49,7 @@ export function pageActions(store: Store): ActionGroup[] {
     {
       title: "Access",
       actions: [
+        { text: "Change the camera…", run: () => (store.asksForCamera.value = true) },
         { text: "Take control…", run: () => (store.asksForControl.value = true) },
         { text: "Token…", run: () => (store.asksForToken.value = true) },
         ...(credentials.token.value === null ? [] : [{ text: "Forget the token", run: () => credentials.use(null) }]),

@@ -1,0 +1,61 @@
+"""The place of a camera that is not there: what the service serves until there is one."""
+
+from typing import Final, NoReturn
+
+from transientcam_driver import Camera, CameraError, CameraLost, Capabilities, Sequence, open_camera
+from transientcam_driver.camera import HostCamera
+from transientcam_driver.clock import RealClock
+
+NO_CAMERA: Final = "none"
+"""The name that stands for it."""
+_LIMITS: Final = {"min_frequency_hz": 1e6, "max_frequency_hz": 1e8, "tuning_step_hz": 1.0}
+_LIMITS_S: Final = {"min_exposure_s": 1e-6, "max_exposure_s": 1.0, "readout_s": 0.0}
+
+
+class CameraAbsent(CameraLost):
+    """No camera is chosen, or the one that is wanted cannot be opened."""
+
+    _sentence = "{reason}"
+
+
+class AbsentCamera(HostCamera):
+    """A `Camera` that is lost, with one pixel in an image that it never makes.
+
+    ``wanted``: what each `reconnect` tries to open, which becomes ``found``, with its name.
+    """
+
+    off_switch = None
+    found: tuple[str, Camera] | None = None
+
+    def __init__(self, reason: str = "no camera is chosen", *, wanted: str | None = None) -> None:
+        super().__init__(RealClock(), None)
+        self._reason, self._wanted = reason, wanted
+        named = {"model": NO_CAMERA, "serial": "", "firmware": "", "protocol_version": 0}
+        size = {"width": 1, "height": 1, "bits": 16, "max_harmonics": 12}
+        limits = {**_LIMITS, **_LIMITS_S, "streaming_readout_s": 0.0}
+        self._capabilities = Capabilities(**named, **size, **limits)  # type: ignore[arg-type]
+        self._applied = self._capabilities.apply(self._capabilities.nearest(Sequence()), epoch=1)
+
+    def _lost(self, *_: object, **__: object) -> NoReturn:
+        raise CameraAbsent(self._reason)
+
+    configure = start = status = read_frame = _lost
+
+    def reconnect(self) -> None:
+        """Try to open the wanted camera; raises CameraLost also where it is found."""
+        if self.found is None and self._wanted is not None:
+            try:
+                self.found = self._wanted, open_camera(self._wanted)
+            except CameraError as error:
+                self._reason = f"{self._wanted} cannot be opened: {error}"
+        self._lost()
+
+    def stop(self) -> None:
+        """Do nothing: there is no light, and nothing to give back."""
+
+    close = stop
+
+
+def open_chosen(spec: str) -> Camera:
+    """Open a camera as `open_camera` does, or the place of one."""
+    return AbsentCamera() if spec == NO_CAMERA else open_camera(spec)
