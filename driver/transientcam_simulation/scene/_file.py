@@ -25,8 +25,10 @@ from transientcam_simulation.base import (
     Waveform,
 )
 from transientcam_simulation.effects import CHOICES, EFFECTS
-from transientcam_simulation.scene._geometry import Ellipsoid, Rectangle, Shape
+from transientcam_simulation.scene._geometry import Ellipsoid, Rectangle
 from transientcam_simulation.scene._limits import require_modest
+from transientcam_simulation.scene._mesh import Mesh
+from transientcam_simulation.scene._mesh_file import load_mesh
 from transientcam_simulation.scene._motion import Motion, Repeat
 from transientcam_simulation.scene._scene import (
     Background,
@@ -35,12 +37,13 @@ from transientcam_simulation.scene._scene import (
     Light,
     ResponseFile,
     Scene,
+    Shape,
     Surface,
     TimeZero,
     Transport,
     Viewpoint,
 )
-from transientcam_simulation.scene._table import Table
+from transientcam_simulation.scene._table import MOST_M, Table
 
 BUILT_IN = Path(__file__).parents[1] / "scenes"
 MOST_BOUNCES = 8
@@ -50,7 +53,7 @@ MOST_S = 1e-3
 """Of a delay."""
 _FORMER_DIFFUSER = "diffusor"
 """How the table [diffuser] was spelt."""
-_SHAPES = ("rectangle", "sphere", "ellipsoid")
+_SHAPES = ("rectangle", "sphere", "ellipsoid", "mesh")
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +105,7 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
     name, description = top.text("name", name), top.text("description", "")
     responses = tuple(_response(table, folder) for table in top.tables("response"))
     motions = _motions(top.tables("motion"))
-    surfaces = tuple(_surface(table, motions) for table in top.tables("surface"))
+    surfaces = tuple(_surface(table, motions, folder) for table in top.tables("surface"))
     diffuser = _diffuser(top)
     if sum(map(bool, (responses, surfaces, diffuser))) != 1:
         allowed = "given, or [[response]] or [diffuser] instead, but only one of them"
@@ -323,20 +326,21 @@ def _motions(tables: list[Table]) -> dict[str, Motion]:
     return motions
 
 
-def _surface(table: Table, motions: dict[str, Motion]) -> Surface:
+def _surface(table: Table, motions: dict[str, Motion], folder: Path | None) -> Surface:
     kind: Kind = table.choice("kind", get_args(Kind))
     name = table.text("name", kind)
-    shape = _shape(table, kind)
+    shape, albedo = _shape(table, kind, folder)
     share = "reflectivity" if kind == "mirror" else "albedo"
+    moves = "mesh" if isinstance(shape, Mesh) else kind
     gloss, exponent = _gloss(table) if kind in ("diffuse", "translucent") else (0.0, 50.0)
     surface = Surface(
         name,
         kind,
         shape,
-        0.0 if kind == "stencil" else table.number(share, least=0, most=1),
+        0.0 if kind == "stencil" else table.number(share, albedo, least=0, most=1),
         _mask(table) if kind == "stencil" else None,
         _scatter(table) if kind == "translucent" else None,
-        _moves(table, kind, motions) if "motion" in table else (),
+        _moves(table, moves, motions) if "motion" in table else (),
         gloss,
         exponent,
     )
@@ -347,19 +351,39 @@ def _surface(table: Table, motions: dict[str, Motion]) -> Surface:
     return surface
 
 
-def _shape(table: Table, kind: Kind) -> Shape:
+def _shape(table: Table, kind: Kind, folder: Path | None) -> tuple[Shape, float | None]:
+    """Read a shape, and the albedo that its surface has by default."""
     allowed = _SHAPES if kind in ("diffuse", "translucent") else _SHAPES[:1]
     shape = table.choice("shape", allowed, "rectangle")
+    if shape == "mesh":
+        return _mesh(table, folder)
     centre_m = table.vector("centre_m")
     if shape == "sphere":
-        return Ellipsoid(centre_m, np.full(3, table.length("radius_m")))
+        return Ellipsoid(centre_m, np.full(3, table.length("radius_m"))), None
     if shape == "ellipsoid":
-        return Ellipsoid(centre_m, np.array(table.lengths("radii_m", 3)))
+        return Ellipsoid(centre_m, np.array(table.lengths("radii_m", 3))), None
     normal = table.vector("normal")
     if not np.any(normal):
         raise table.error("normal", normal.tolist(), "other than zero")
     width_m, height_m = table.lengths("size_m", 2)
-    return Rectangle.facing(centre_m, normal, size=(width_m, height_m))
+    return Rectangle.facing(centre_m, normal, size=(width_m, height_m)), None
+
+
+def _mesh(table: Table, folder: Path | None) -> tuple[Mesh, float | None]:
+    mesh, coloured = load_mesh(_file(table, "file", folder), smooth=table.switch("smooth", True))
+    scale = table.number("scale", 1.0, least=1e-9, most=1e9)
+    turn, position_m = np.eye(3), table.vector("position_m", (0.0, 0.0, 0.0))
+    angles_deg = table.vector("rotation_deg", (0.0, 0.0, 0.0))
+    for axis, angle_rad in zip(np.eye(3), np.radians(angles_deg), strict=True):
+        cross = np.cross(axis, np.eye(3)).T  # Rodrigues' formula
+        about = np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross
+        turn = turn + about @ turn
+    mesh = mesh.placed(scale * turn, position_m)
+    farthest_m = float(np.abs(mesh.extent()).max())
+    if farthest_m > MOST_M:
+        limit = f"smaller: a coordinate of {farthest_m:.3g} m is more than {MOST_M:g}"
+        raise table.error("scale", scale, limit)
+    return mesh, 1.0 if coloured else None
 
 
 def _gloss(table: Table) -> tuple[float, float]:
@@ -376,7 +400,7 @@ def _scatter(table: Table) -> Scatter:
     )
 
 
-def _moves(table: Table, kind: Kind, motions: dict[str, Motion]) -> tuple[Motion, ...]:
+def _moves(table: Table, kind: str, motions: dict[str, Motion]) -> tuple[Motion, ...]:
     if kind not in ("diffuse", "translucent"):
         raise table.error("motion", table.words("motion"), f"absent; a {kind} stays in its place")
     names = table.words("motion")

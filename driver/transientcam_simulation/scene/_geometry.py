@@ -244,10 +244,10 @@ class Ellipsoid:
         )
 
 
-Shape = Rectangle | Ellipsoid
+Primitive = Rectangle | Ellipsoid
 
 
-def cells_of(shape: Shape, up: Values, along: Values) -> Cells:
+def cells_of(shape: Primitive, up: Values, along: Values) -> Cells:
     """Cut a shape into patches: see `Cells`."""
     (y, x), (high, wide) = (
         [each.ravel() for each in np.meshgrid(*pair, indexing="ij")]
