@@ -198,9 +198,7 @@ class Ends:
         for index in left:
             surface = self.surfaces[index]
             if surface.opaque is not None:
-                assert isinstance(surface.shape, Rectangle)  # noqa: S101  (stencils are)
-                start, end = segment.ends
-                clear[blocked_by_mask(surface.shape, surface.opaque, start, end)] = 0
+                clear[blocked_by_mask(surface.mirror, surface.opaque, *segment.ends)] = 0
             elif isinstance(surface.shape, Mesh):
                 clear[surface.shape.hit(*segment.ends) < 1] = 0
             elif isinstance(surface.shape, Rectangle):

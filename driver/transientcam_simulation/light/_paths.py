@@ -425,8 +425,7 @@ def blocked(scene: Scene, start: Points, end: Points) -> NDArray[np.bool_]:
         if surface.opaque is None:
             blocked |= surface.shape.hit(start, end) < 1 - 1e-9
         else:
-            assert isinstance(surface.shape, Rectangle)  # noqa: S101  (stencils are)
-            blocked |= blocked_by_mask(surface.shape, surface.opaque, start, end)
+            blocked |= blocked_by_mask(surface.mirror, surface.opaque, start, end)
     return blocked
 
 
@@ -444,5 +443,4 @@ def hit(surface: Surface, start: Points, end: Points) -> NDArray[np.float64]:
     at = surface.shape.hit(start, end)
     if surface.opaque is None:
         return at
-    assert isinstance(surface.shape, Rectangle)  # noqa: S101  (stencils are)
-    return np.where(blocked_by_mask(surface.shape, surface.opaque, start, end), at, np.inf)
+    return np.where(blocked_by_mask(surface.mirror, surface.opaque, start, end), at, np.inf)

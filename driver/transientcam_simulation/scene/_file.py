@@ -126,8 +126,7 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
         effects=_effects(top.table("effects")),
         seed=top.integer("seed", 1, least=0, most=2**63 - 1),
     )
-    top.done()
-    return scene
+    return top.done(scene)
 
 
 def _open(path: Path) -> Table:
@@ -143,8 +142,7 @@ def _open(path: Path) -> Table:
 def _light(table: Table, *, somewhere: bool) -> Light:
     electrons_per_s = table.number("electrons_per_s", least=LEAST_E, most=MOST_E)
     if not somewhere:
-        table.done()
-        return Light(electrons_per_s, np.zeros(3), np.zeros(3), 0.0)
+        return table.done(Light(electrons_per_s, np.zeros(3), np.zeros(3), 0.0))
     light = Light(
         electrons_per_s=electrons_per_s,
         position_m=table.vector("position_m"),
@@ -153,8 +151,7 @@ def _light(table: Table, *, somewhere: bool) -> Light:
     )
     if np.array_equal(light.aim_at_m, light.position_m):
         raise table.error("aim_at_m", light.aim_at_m.tolist(), "away from position_m")
-    table.done()
-    return light
+    return table.done(light)
 
 
 def _viewpoint(table: Table) -> Viewpoint:
@@ -167,8 +164,7 @@ def _viewpoint(table: Table) -> Viewpoint:
     if not np.any((view.look_at_m - view.position_m)[:2]):
         allowed = "away from position_m, and not straight above or below it"
         raise table.error("look_at_m", view.look_at_m.tolist(), allowed)
-    table.done()
-    return view
+    return table.done(view)
 
 
 def _lens(table: Table) -> Lens:
@@ -177,9 +173,9 @@ def _lens(table: Table) -> Lens:
         for name, most in (("k1", 1.0), ("k2", 1.0), ("p1", 0.1), ("p2", 0.1), ("k3", 1.0))
     )
     x, y = (table.number(name, 0.0, least=-0.5, most=0.5) for name in ("centre_x", "centre_y"))
-    lens = Lens((k1, k2, p1, p2, k3), (x, y), table.number("vignetting", 0.0, least=0, most=16))
-    table.done()
-    return lens
+    return table.done(
+        Lens((k1, k2, p1, p2, k3), (x, y), table.number("vignetting", 0.0, least=0, most=16))
+    )
 
 
 def _sensor(table: Table) -> Sensor:
@@ -194,8 +190,7 @@ def _sensor(table: Table) -> Sensor:
     if sensor.dark_dn > sensor.highest_dn:
         allowed = f"a number of at most {sensor.highest_dn}, the highest code of the converter"
         raise table.error("dark_dn", sensor.dark_dn, allowed)
-    table.done()
-    return sensor
+    return table.done(sensor)
 
 
 def _device(table: Table, folder: Path | None) -> DeviceProfile:
@@ -215,8 +210,7 @@ def _device(table: Table, folder: Path | None) -> DeviceProfile:
     if "outlier_share" in table:
         share = table.number("outlier_share", least=0, most=1)
         profile = replace(profile, outliers=Outliers(share))
-    table.done()
-    return profile
+    return table.done(profile)
 
 
 def _pattern(table: Table, folder: Path | None) -> Pattern:
@@ -228,8 +222,7 @@ def _pattern(table: Table, folder: Path | None) -> Pattern:
     )
     if pattern.file is not None and pattern.delay_s:
         raise table.error("delay_s", pattern.delay_s, "absent beside file, which has the delays")
-    table.done()
-    return pattern
+    return table.done(pattern)
 
 
 def _file(table: Table, key: str, folder: Path | None) -> Path:
@@ -241,45 +234,43 @@ def _file(table: Table, key: str, folder: Path | None) -> Path:
 
 
 def _drift(table: Table) -> Drift:
-    drift = Drift(
-        rise_c=table.number("rise_c", least=-1e4, most=1e4),
-        time_constant_s=table.number("time_constant_s", least=1e-6, most=1e9),
-        delay_s_per_c=table.number("delay_s_per_c", least=-MOST_S, most=MOST_S),
+    return table.done(
+        Drift(
+            rise_c=table.number("rise_c", least=-1e4, most=1e4),
+            time_constant_s=table.number("time_constant_s", least=1e-6, most=1e9),
+            delay_s_per_c=table.number("delay_s_per_c", least=-MOST_S, most=MOST_S),
+        )
     )
-    table.done()
-    return drift
 
 
 def _lens_scatter(table: Table) -> LensScatter:
-    scatter = LensScatter(
-        share=table.number("share", least=0, most=0.5),
-        width=table.number("width", 0.15, least=1e-6, most=1e6),
+    return table.done(
+        LensScatter(
+            share=table.number("share", least=0, most=0.5),
+            width=table.number("width", 0.15, least=1e-6, most=1e6),
+        )
     )
-    table.done()
-    return scatter
 
 
 def _transport(table: Table) -> Transport:
     default = Transport()
-    transport = Transport(
-        mirror_bounces=table.integer(
-            "mirror_bounces", default.mirror_bounces, least=0, most=MOST_BOUNCES
-        ),
-        diffuse_bounces=(
-            table.integer("diffuse_bounces", least=0, most=MOST_BOUNCES)
-            if "diffuse_bounces" in table
-            else None
-        ),
-        patches=table.integer("patches", default.patches, least=2, most=64),
+    return table.done(
+        Transport(
+            mirror_bounces=table.integer(
+                "mirror_bounces", default.mirror_bounces, least=0, most=MOST_BOUNCES
+            ),
+            diffuse_bounces=(
+                table.integer("diffuse_bounces", least=0, most=MOST_BOUNCES)
+                if "diffuse_bounces" in table
+                else None
+            ),
+            patches=table.integer("patches", default.patches, least=2, most=64),
+        )
     )
-    table.done()
-    return transport
 
 
 def _ambient(table: Table) -> float:
-    electrons_per_s = table.number("electrons_per_s", 0.0, least=0, most=MOST_E)
-    table.done()
-    return electrons_per_s
+    return table.done(table.number("electrons_per_s", 0.0, least=0, most=MOST_E))
 
 
 def _diffuser(top: Table) -> Diffuser | None:
@@ -288,23 +279,23 @@ def _diffuser(top: Table) -> Diffuser | None:
     if "diffuser" in top and _FORMER_DIFFUSER in top:
         raise top.error(_FORMER_DIFFUSER, "a table", "absent beside [diffuser]")
     table = top.table("diffuser" if "diffuser" in top else _FORMER_DIFFUSER)
-    diffuser = Diffuser(
-        brightness=table.number("brightness", 1.0, least=1e-9, most=1e9),
-        delay_s=table.number("delay_s", 0.0, least=0, most=MOST_S),
-        fall_off=table.number("fall_off", 0.0, least=0, most=0.9),
+    return table.done(
+        Diffuser(
+            brightness=table.number("brightness", 1.0, least=1e-9, most=1e9),
+            delay_s=table.number("delay_s", 0.0, least=0, most=MOST_S),
+            fall_off=table.number("fall_off", 0.0, least=0, most=0.9),
+        )
     )
-    table.done()
-    return diffuser
 
 
 def _effects(table: Table) -> dict[str, str]:
-    effects = {
-        effect.name: table.choice(effect.name, CHOICES, "auto")
-        for effect in EFFECTS
-        if effect.optional
-    }
-    table.done()
-    return effects
+    return table.done(
+        {
+            effect.name: table.choice(effect.name, CHOICES, "auto")
+            for effect in EFFECTS
+            if effect.optional
+        }
+    )
 
 
 def _motions(tables: list[Table]) -> dict[str, Motion]:
@@ -322,7 +313,7 @@ def _motions(tables: list[Table]) -> dict[str, Motion]:
             longer = motion.period_s * motion.speed_m_s / SPEED_OF_LIGHT_M_S
             limit = f"of at least {longer:.3g}, or path_m is faster than light"
             raise table.error("period_s", motion.period_s, limit)
-        table.done()
+        table.done(motions)
     return motions
 
 
@@ -347,8 +338,7 @@ def _surface(table: Table, motions: dict[str, Motion], folder: Path | None) -> S
     if surface.reflectivity + gloss > 1 and surface.scatters:
         limit = f"at most {1 - surface.reflectivity:g}, what albedo leaves of the light"
         raise table.error("gloss", gloss, limit)
-    table.done()
-    return surface
+    return table.done(surface)
 
 
 def _shape(table: Table, kind: Kind, folder: Path | None) -> tuple[Shape, float | None]:
@@ -428,16 +418,16 @@ def _response(table: Table, folder: Path | None) -> ResponseFile:
     zero_file = _file(table, "time_zero_file", folder) if has_zero_file else None
     if time_zero_s is not None and zero_file is not None:
         raise table.error("time_zero_s", time_zero_s, "absent beside time_zero_file")
-    response = ResponseFile(
-        path=_file(table, "file", folder),
-        weight=table.number("weight", 1.0, least=1e-9, most=1e9),
-        delay_s=table.number("delay_s", 0.0, least=-MOST_S, most=MOST_S),
-        normalise=table.switch("normalise", True),
-        background=table.choice("background", get_args(Background), "none"),
-        time_zero=table.choice("time_zero", get_args(TimeZero), "start"),
-        time_zero_s=time_zero_s,
-        time_zero_file=zero_file,
-        bin_s=table.number("bin_s", least=1e-15, most=MOST_S) if "bin_s" in table else None,
+    return table.done(
+        ResponseFile(
+            path=_file(table, "file", folder),
+            weight=table.number("weight", 1.0, least=1e-9, most=1e9),
+            delay_s=table.number("delay_s", 0.0, least=-MOST_S, most=MOST_S),
+            normalise=table.switch("normalise", True),
+            background=table.choice("background", get_args(Background), "none"),
+            time_zero=table.choice("time_zero", get_args(TimeZero), "start"),
+            time_zero_s=time_zero_s,
+            time_zero_file=zero_file,
+            bin_s=table.number("bin_s", least=1e-15, most=MOST_S) if "bin_s" in table else None,
+        )
     )
-    table.done()
-    return response

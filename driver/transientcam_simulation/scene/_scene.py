@@ -96,7 +96,7 @@ class Surface:
 
     @property
     def mirror(self) -> Rectangle:
-        """The plane of a mirror."""
+        """The plane of a mirror or stencil."""
         assert isinstance(self.shape, Rectangle)  # noqa: S101  (scene files make no others)
         return self.shape
 
