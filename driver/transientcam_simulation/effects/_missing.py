@@ -25,6 +25,8 @@ MISSING = [
         "gloss sends on light of surfaces, or to surfaces, in {share} of the pixels",
         "further-bounces | light over more surfaces than the scene's file lets it go | "
         "its transport.diffuse_bounces leaves out too much in {share} of the pixels",
+        "between-meshes | light that a mesh and other surfaces, or its parts, give each other | "
+        "it brings too much in {share} of the pixels",
         "coarse-patches | light that surfaces give each other, where it changes within a patch | "
         "patches are too coarse in {share} of the pixels; more transport.patches may help",
         "blur | what moves blurs while an image is exposed | "

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_simulation.scene import Ellipsoid, Points, Rectangle, Shape
+from transientcam_simulation.scene import Ellipsoid, Points, Primitive, Rectangle
 
 Plane = NDArray[np.float32]
 Values: TypeAlias = NDArray[Any]
@@ -51,7 +51,7 @@ class Crossing:
         return between
 
 
-def crossing(shape: Shape, apex: Points, way: tuple[Plane, Plane, Plane]) -> Crossing:
+def crossing(shape: Primitive, apex: Points, way: tuple[Plane, Plane, Plane]) -> Crossing:
     """Cross lines, given by three planes of their components, with a shape."""
     if isinstance(shape, Ellipsoid):
         inside, at, _squared = near_ellipsoid(ball_of(shape.centre, shape.radii, apex), *way)

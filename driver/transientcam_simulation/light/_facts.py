@@ -19,7 +19,14 @@ from transientcam_simulation.light._rays import places_within, rays_through
 from transientcam_simulation.light._recent import Recent
 from transientcam_simulation.light._subpixel import PIXELS, may_be_thin
 from transientcam_simulation.light._variants import without_gloss, without_mirrors
-from transientcam_simulation.scene import Points, Rectangle, Scene, Surface, Viewpoint
+from transientcam_simulation.scene import (
+    Points,
+    Rectangle,
+    Scene,
+    Surface,
+    Viewpoint,
+    patch_edges_m,
+)
 
 _PIXELS = 20_000  # judged of a still scene, about; of larger images every second pixel a side, ...
 _PIXELS_MOVING = 1_500  # the same at each time
@@ -361,8 +368,8 @@ class SceneFacts:
     def _further_light(self) -> tuple[Values, ...]:
         """Estimate the brightness of light over several surfaces, which bounds its moments."""
         transport = self._scene.transport
-        scattering = [each for each in self._scene.surfaces if each.scatters]
-        flat = len(scattering) == 1 and isinstance(scattering[0].shape, Rectangle)
+        scattering = [self._scene.surfaces[k].shape for k in patch_edges_m(self._scene, 1)]
+        flat = len(scattering) == 1 and isinstance(scattering[0], Rectangle)
         flat = flat and not any(each.kind == "mirror" for each in self._scene.surfaces)
         if flat or not scattering or transport.diffuse_bounces == 0:
             return ()
@@ -378,11 +385,7 @@ def _some(frequencies_hz: tuple[float, ...]) -> tuple[float, ...]:
 def cosine_to_axis(camera: Viewpoint, rays: Points) -> Values:
     """Return the cosine of each ray's angle to the axis of the lens."""
     half_width = math.tan(math.radians(camera.field_of_view_deg) / 2)
-    x, y = camera.lens.centre
-    axis = camera.look_at_m - camera.position_m
-    axis = axis / np.linalg.norm(axis)
-    right = np.cross(axis, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    axis = axis + 2 * half_width * (x * right - y * np.cross(right, axis))
+    (x, y), (right, down, forward) = camera.lens.centre, camera.axes
+    axis = forward + 2 * half_width * (x * right + y * down)
     cosine: Values = rays @ (axis / np.linalg.norm(axis))
     return cosine

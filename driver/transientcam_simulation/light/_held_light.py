@@ -90,7 +90,7 @@ class HeldLight:
         for part in parts:
             index = int(ends.index[part.start])
             shape, grid, first = (
-                ends.surfaces[index].shape,
+                ends.surfaces[index].primitive,
                 patches.cells[index],
                 patches.first[index],
             )

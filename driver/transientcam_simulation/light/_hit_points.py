@@ -20,6 +20,7 @@ from transientcam_simulation.light._paths import ImageLight, Lit, RayEnds, beam,
 from transientcam_simulation.light._shares import Around, alone, axes_of
 from transientcam_simulation.scene import (
     Ellipsoid,
+    Mesh,
     Points,
     Rectangle,
     Scene,
@@ -158,8 +159,9 @@ class Ends:
         )
         distance_m, index = self.distance_m.astype(np.float64), self.index.astype(np.intp)
         every = np.arange(len(facing))
-        ends = RayEnds(every, point, index, distance_m, facing, direction)
-        return highlight(self.still, light, ends, up)
+        albedo = np.array([surface.reflectivity for surface in self.surfaces])[index]
+        ends = RayEnds(every, point, index, distance_m, facing, direction, up, albedo)
+        return highlight(self.still, light, ends)
 
     def _irradiance(
         self, light: ImageLight, normal: tuple[Plane, Plane, Plane], on: NDArray[np.intp]
@@ -196,9 +198,9 @@ class Ends:
         for index in left:
             surface = self.surfaces[index]
             if surface.opaque is not None:
-                assert isinstance(surface.shape, Rectangle)  # noqa: S101  (stencils are)
-                start, end = segment.ends
-                clear[blocked_by_mask(surface.shape, surface.opaque, start, end)] = 0
+                clear[blocked_by_mask(surface.mirror, surface.opaque, *segment.ends)] = 0
+            elif isinstance(surface.shape, Mesh):
+                clear[surface.shape.hit(*segment.ends) < 1] = 0
             elif isinstance(surface.shape, Rectangle):
                 soft = around if index in movers else None
                 _dim_behind_rectangle(surface.shape, index, *of, soft)
@@ -214,7 +216,7 @@ class Ends:
     ) -> None:
         """Take what surfaces cover of the pixels around points on others from their light."""
         if indices:
-            axes = axes_of(self.surfaces[k].shape for k in indices)
+            axes = axes_of(self.surfaces[k].primitive for k in indices)
             points = *segment.point, segment.near, mine, around.beside, around.reach[0]
             compiled_point_shadows.dim_behind_ellipsoids(
                 axes, segment.apex, np.array(indices, np.int32), *points, segment.boxes, clear

@@ -3,7 +3,8 @@
 A path starts where the ray through a pixel's centre ends, and is sent on at random by a few more
 surfaces, each of which takes the lamp's light, straight and over mirrors. What it brings counts
 for the kind of way it took: over a mirror between two scattering surfaces, by gloss of anything
-but the lamp, over more surfaces than the scene's file allows, or as radiosity follows it.
+but the lamp, over more surfaces than the scene's file allows, from or to a mesh, or as radiosity
+follows it.
 """
 
 from dataclasses import dataclass, replace
@@ -28,11 +29,10 @@ from transientcam_simulation.light._paths import (
     image_lights,
     light_on,
     light_rays,
-    normals_at,
 )
 from transientcam_simulation.light._radiosity import Interreflection
 from transientcam_simulation.light._variants import without_scattering
-from transientcam_simulation.scene import Ellipsoid, Points, Scene
+from transientcam_simulation.scene import Mesh, Points, Rectangle, Scene
 
 PIXELS = 64
 """At all times of a scene's life together."""
@@ -40,8 +40,13 @@ _PATHS = 512  # in each of two halves, by pixel
 _FURTHER = 3  # surfaces behind the one that is seen
 _PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])  # even places in two dimensions
 _SURE = 3.0  # standard errors by which patches must differ from paths
-_FIRST, _FOLLOWED, _MIRRORS, _GLOSS, _BOUNCES = range(5)  # ``_FIRST`` by radiosity, too
-_KINDS = {"mirrors-between": _MIRRORS, "gloss-of-surroundings": _GLOSS, "further-bounces": _BOUNCES}
+_FIRST, _FOLLOWED, _MIRRORS, _GLOSS, _BOUNCES, _MESHES = range(6)  # ``_FIRST`` by radiosity, too
+_KINDS = {
+    "mirrors-between": _MIRRORS,
+    "gloss-of-surroundings": _GLOSS,
+    "further-bounces": _BOUNCES,
+    "between-meshes": _MESHES,
+}
 
 
 @dataclass(frozen=True)
@@ -76,29 +81,32 @@ class SampledWays:
         ends = some(ends, np.repeat(np.arange(len(ends.ray)), 2 * paths))
         slot = ends.ray + pixels * (np.arange(len(ends.ray)) // paths % 2)
         length_m, weight = ends.distance_m, ends.throughput / paths
-        curved = np.array([isinstance(each.shape, Ellipsoid) for each in scene.surfaces])
-        over, glossy = np.zeros((2, len(slot)), dtype=bool)
+        curved = np.array([not isinstance(each.shape, Rectangle) for each in scene.surfaces])
+        meshes = np.array([isinstance(each.shape, Mesh) for each in scene.surfaces])
+        over, glossy, of_mesh = np.zeros((3, len(slot)), dtype=bool)
         lights, most = tuple(image_lights(scene)), scene.transport.diffuse_bounces
         found: list[tuple[NDArray[np.intp], Values, Values, NDArray[np.intp]]] = []
         for further in range(1, _FURTHER + 1):
             ask()
             way, factor, lobe = _sent_on(scene, ends, places, random.random(len(slot)))
+            leaves = meshes[ends.surface]
             sent = weight * factor
             goes = np.flatnonzero(sent > 0)
             ends = first_scattering(scene, ends.point[goes] + 1e-9 * way[goes], way[goes])
             on = goes[ends.ray]
             # a mirror turns rays
             over, glossy = over[on] | (ends.direction != way[on]).any(axis=1), glossy[on] | lobe[on]
+            of_mesh = of_mesh[on] | (~lobe[on] & (leaves[on] | meshes[ends.surface]))
             slot, weight, length_m = slot[on], sent[on], length_m[on] + ends.distance_m
-            normal = normals_at(scene, ends.point, ends.surface)
-            albedo = ends.throughput * of_surfaces(scene, "reflectivity")[ends.surface]
+            albedo = ends.throughput * ends.albedo
             cut = _BOUNCES if most is not None and further > most else min(further - 1, _FOLLOWED)
             kind = np.full(len(slot), cut)
+            kind[of_mesh] = _MESHES
             if moves:
                 kind = np.where(glossy, _GLOSS, np.where(over, _MIRRORS, kind))
             for light in lights:
-                far_m, irradiance = light_on(scene, light, ends.point, normal)
-                gloss = highlight(scene, light, ends, normal)
+                far_m, irradiance = light_on(scene, light, ends.point, ends.normal)
+                gloss = highlight(scene, light, ends)
                 shines = np.where(moves | curved[ends.surface], _GLOSS, kind)
                 for sends, by in ((albedo, kind), (gloss, shines)):
                     brings = weight * irradiance * sends
@@ -177,12 +185,11 @@ def _sent_on(
     scene: Scene, ends: RayEnds, places: Values, choice: Values
 ) -> tuple[Points, Values, NDArray[np.bool_]]:
     """Directions, the share of light that goes on so, and whether gloss sends it."""
-    normal = normals_at(scene, ends.point, ends.surface)
-    albedo, gloss = (of_surfaces(scene, name)[ends.surface] for name in ("reflectivity", "gloss"))
+    albedo, gloss = ends.albedo, of_surfaces(scene, "gloss")[ends.surface]
     part = np.divide(gloss, albedo + gloss, out=np.zeros(len(gloss)), where=gloss > 0)
     lobe = choice < part
-    way = around(normal, np.sqrt(places[:, 0]), places[:, 1])
+    way = around(ends.normal, np.sqrt(places[:, 0]), places[:, 1])
     share = albedo / np.maximum(1 - part, 1e-12)
-    mirrored, of_lobe = sent_by_gloss(scene, ends, normal, places)
+    mirrored, of_lobe = sent_by_gloss(scene, ends, places)
     way[lobe], share[lobe] = mirrored[lobe], of_lobe[lobe] / part[lobe]
     return way, share, lobe

@@ -40,7 +40,7 @@ from transientcam_simulation.light._shares import (
     shown_tiles,
 )
 from transientcam_simulation.light._still import Sight, StillLight, segments
-from transientcam_simulation.scene import Scene, Shape
+from transientcam_simulation.scene import Primitive, Scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ class MovingLight:
     def at(self, time_s: float, held: HeldLight | None = None) -> MovingResponses:
         """Impulse responses at a time; moments with light over several surfaces, if it is given."""
         scene = self.scene.at(time_s)
-        shapes = [scene.surfaces[k].shape for k in self._movers]
+        shapes = [scene.surfaces[k].primitive for k in self._movers]
         found = [each for sight in self._sights for each in self._cover(shapes, sight)]
         visible = self._visible(found)
         layers = self._lit(scene, visible) if visible else None
@@ -106,7 +106,7 @@ class MovingLight:
         region = union([*(each.region for each in visible), *(each.region for each in shadows)])
         return MovingResponses(self.still, scene, layers, uncovered, shadows, region, held)
 
-    def _cover(self, shapes: list[Shape], sight: Sight) -> Iterator[_VisibleSurface]:
+    def _cover(self, shapes: list[Primitive], sight: Sight) -> Iterator[_VisibleSurface]:
         """Shares of pixels that surfaces cover, where nothing that stands still is before them."""
         bundle = sight.bundle
         _tiles, regions = meeting(shapes, bundle)
@@ -159,7 +159,9 @@ class MovingLight:
         parts = tuple(slice(*pair) for pair in pairwise(ends))
         return Layers(places, share, lit, parts)
 
-    def _shadow(self, shapes: list[Shape], chain: int, shows: NDArray[np.bool_]) -> Shadow | None:
+    def _shadow(
+        self, shapes: list[Primitive], chain: int, shows: NDArray[np.bool_]
+    ) -> Shadow | None:
         """Share of the light by a chain of mirrors that is left on what stands still.
 
         Only near tiles that show any of it: each shape takes light at the edge of another one by

@@ -25,7 +25,6 @@ from transientcam_simulation.light._paths import (
     joined,
     light_on,
     light_on_ends,
-    normals_at,
     scatter_of,
 )
 from transientcam_simulation.scene import Points, Rectangle, Scene
@@ -53,18 +52,16 @@ def around(normal: Points, cosine: Values, turn: Values) -> Points:
     return directions
 
 
-def sent_by_gloss(
-    scene: Scene, ends: RayEnds, normal: Points, places: Values
-) -> tuple[Points, Values]:
+def sent_by_gloss(scene: Scene, ends: RayEnds, places: Values) -> tuple[Points, Values]:
     """Draw directions from the lobes at the ends of rays, and return what share of light goes so.
 
     ``places`` (P, 2) are from 0 to 1.
     """
     gloss, power = (of_surfaces(scene, name)[ends.surface] for name in ("gloss", "gloss_exponent"))
-    axis = around(normal, places[:, 0] ** (1 / (power + 1)), places[:, 1])
+    axis = around(ends.normal, places[:, 0] ** (1 / (power + 1)), places[:, 1])
     facing = -np.einsum("pc,pc->p", axis, ends.direction)
     way = ends.direction + 2 * facing[:, None] * axis
-    rising = np.einsum("pc,pc->p", way, normal).clip(0)
+    rising = np.einsum("pc,pc->p", way, ends.normal).clip(0)
     return way, gloss * (power + 8) / (power + 1) * facing.clip(0) * rising
 
 
@@ -135,10 +132,9 @@ class ShownByGloss:
 
 def _followed(scene: Scene, ends: RayEnds, places: Values) -> RayEnds:
     """Send rays on by gloss; ``ray`` is the index among those before."""
-    normal = normals_at(scene, ends.point, ends.surface)
-    way, share = sent_by_gloss(scene, ends, normal, places)
+    way, share = sent_by_gloss(scene, ends, places)
     goes = np.flatnonzero(share * ends.throughput > 0)
-    start = ends.point[goes] + _OFF_M * normal[goes]
+    start = ends.point[goes] + _OFF_M * ends.normal[goes]
     met = first_scattering(scene, start, way[goes])
     on = goes[met.ray]
     return RayEnds(
@@ -148,6 +144,8 @@ def _followed(scene: Scene, ends: RayEnds, places: Values) -> RayEnds:
         met.distance_m + ends.distance_m[on],
         met.throughput * (share * ends.throughput)[on],
         met.direction,
+        met.normal,
+        met.albedo,
     )
 
 
@@ -166,6 +164,7 @@ def between_patches(scene: Scene, patches: Patches) -> OverMirrors:
         ends = first_scattering(scene, patches.centre[to] + _OFF_M * normal, way)
         ends = some(ends, np.flatnonzero(glossy[ends.surface]))
         met = _followed(scene, ends, (places[ends.ray] + _PLASTIC[::-1]) % 1.0)
+        met = some(met, np.flatnonzero(np.isin(met.surface, list(patches.cells))))
         to = to[ends.ray[met.ray]]
         found.append(
             (to, patches.at(scene, met.point, met.surface), met.throughput / count, met.distance_m)

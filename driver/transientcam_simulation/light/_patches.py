@@ -40,13 +40,15 @@ class Patches:
     def of(cls, scene: Scene, per_side: int, *, moving: int = 0) -> "Patches":
         """Cut the longest side of all surfaces into so many patches: see `patch_edges_m`."""
         edges_m = patch_edges_m(scene, per_side, moving=moving).items()
-        counts = {k: scene.surfaces[k].shape.grid(edge_m) for k, edge_m in edges_m}
+        counts = {k: scene.surfaces[k].primitive.grid(edge_m) for k, edge_m in edges_m}
         return cls.cut(scene, {k: (evenly(up), evenly(along)) for k, (up, along) in counts.items()})
 
     @classmethod
     def cut(cls, scene: Scene, cuts: dict[int, Cuts]) -> "Patches":
         """Cut the scattering surfaces, by their index, at places from -1 to 1."""
-        cells = {index: cells_of(scene.surfaces[index].shape, *at) for index, at in cuts.items()}
+        cells = {
+            index: cells_of(scene.surfaces[index].primitive, *at) for index, at in cuts.items()
+        }
         grids, counts = list(cells.values()), [len(grid.centre) for grid in cells.values()]
         return cls(
             np.repeat(list(cells), counts),
@@ -76,7 +78,7 @@ class Patches:
         for index, cells in self.cells.items():
             mine = surface == index
             if mine.any():
-                near, weight = scene.surfaces[index].shape.between_cells(point[mine], cells)
+                near, weight = scene.surfaces[index].primitive.between_cells(point[mine], cells)
                 nearest = np.take_along_axis(near, weight.argmax(axis=1)[:, None], axis=1)
                 found[mine] = self.first[index] + nearest[:, 0]
         return found

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_simulation.base import Scatter, SparseResponses, ask
 from transientcam_simulation.scene import (
     Light,
+    Mesh,
     Points,
     Rectangle,
     Scene,
@@ -38,7 +39,7 @@ class RayEnds:
     """The scattering points on which rays of the camera end, flat.
 
     ``ray`` is the index of the ray, ``direction`` the way it comes along, ``throughput`` the share
-    of light left by mirrors on the way.
+    of light left by mirrors on the way; ``normal`` and ``albedo`` are those at the points.
     """
 
     ray: NDArray[np.intp]
@@ -47,6 +48,8 @@ class RayEnds:
     distance_m: NDArray[np.float64]
     throughput: NDArray[np.float64]
     direction: Points
+    normal: Points
+    albedo: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,25 +176,21 @@ def light_on_ends(scene: Scene, lights: tuple[ImageLight, ...], ends: RayEnds, *
         np.zeros((len(lights), rays)),
         np.zeros((len(lights), rays)),
     )
-    albedos = np.array([surface.reflectivity for surface in scene.surfaces])
-    reflectance = ends.throughput * albedos[ends.surface]
-    normal = normals_at(scene, ends.point, ends.surface)
+    reflectance = ends.throughput * ends.albedo
     lit.surface[ends.ray] = ends.surface
     lit.point[ends.ray] = ends.point
     lit.distance_m[ends.ray] = ends.distance_m
     lit.reflectance[ends.ray] = reflectance
     glossy = any(surface.gloss for surface in scene.surfaces)
     for k, light in enumerate(lights):
-        length_m, irradiance = light_on(scene, light, ends.point, normal)
+        length_m, irradiance = light_on(scene, light, ends.point, ends.normal)
         lit.delay_s[k, ends.ray] = (length_m + ends.distance_m) / SPEED_OF_LIGHT_M_S
-        sent = reflectance + highlight(scene, light, ends, normal) if glossy else reflectance
+        sent = reflectance + highlight(scene, light, ends) if glossy else reflectance
         lit.weight[k, ends.ray] = irradiance * sent
     return lit
 
 
-def highlight(
-    scene: Scene, light: ImageLight, ends: RayEnds, normal: Points
-) -> NDArray[np.float64]:
+def highlight(scene: Scene, light: ImageLight, ends: RayEnds) -> NDArray[np.float64]:
     """Reflectance of gloss towards the camera: Blinn's lobe around the half vector.
 
     Its factor (n + 8) / 8, beside a diffuse surface's albedo, keeps the energy of the lobe.
@@ -201,7 +200,7 @@ def highlight(
     way = light.positions_m[0] - ends.point
     half = way / np.linalg.norm(way, axis=-1, keepdims=True) - ends.direction
     half /= np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-12)
-    cosine = np.clip(np.einsum("pc,pc->p", half, normal), 0, 1)
+    cosine = np.clip(np.einsum("pc,pc->p", half, ends.normal), 0, 1)
     lobe: NDArray[np.float64] = gloss * (exponent + 8) / 8 * cosine**exponent * ends.throughput
     return lobe
 
@@ -221,15 +220,13 @@ def first_scattering(scene: Scene, eye: Points, direction: Points) -> RayEnds:
     scatters = np.array([surface.scatters for surface in scene.surfaces] + [False])
     reflects = np.array([surface.kind == "mirror" for surface in scene.surfaces] + [False])
     for _bounce in range(scene.mirror_bounces + 1):
-        length_m, which = first_hit(scene, start, direction)
-        point = start + length_m[:, None] * direction
-        distance_m = distance_m + length_m
-        normal = normals_at(scene, point, which)
-        facing = np.einsum("pc,pc->p", normal, direction) < 0
+        met = first_hit(scene, start, direction)
+        point, which = met.point, met.surface
+        distance_m = distance_m + met.length_m
+        facing = np.einsum("pc,pc->p", met.normal, direction) < 0
         end = scatters[which] & facing
-        ended.append(
-            (ray[end], point[end], which[end], distance_m[end], throughput[end], direction[end])
-        )
+        of_rays = ray, point, which, distance_m, throughput, direction, met.normal, met.albedo
+        ended.append(tuple(each[end] for each in of_rays))
         on = reflects[which] & facing
         if not on.any():
             break
@@ -242,16 +239,45 @@ def first_scattering(scene: Scene, eye: Points, direction: Points) -> RayEnds:
     return RayEnds(*(np.concatenate(parts) for parts in zip(*ended, strict=True)))
 
 
-def first_hit(
-    scene: Scene, start: Points, direction: Points
-) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return how far rays go, in m, and the index of the surface they meet; 0 and -1 for none."""
+class FirstHits(NamedTuple):
+    """What rays meet first: how far away, the surface by index (0 and -1: none), and what is there.
+
+    The normals (P, 3) of a mesh point to where a ray comes from, others out of the front.
+    """
+
+    length_m: NDArray[np.float64]
+    surface: NDArray[np.intp]
+    point: Points
+    normal: Points
+    albedo: NDArray[np.float64]
+
+
+def first_hit(scene: Scene, start: Points, direction: Points) -> FirstHits:
+    """Follow rays along unit vectors to the first surface."""
     nearest, which = np.full(len(direction), np.inf), np.full(len(direction), -1)
+    end, triangle = start + FAR_M * direction, np.zeros(len(direction), dtype=np.intp)
     for index, surface in enumerate(scene.surfaces):
-        at = hit(surface, start, start + FAR_M * direction)
-        closer = at < nearest
+        if isinstance(surface.shape, Mesh):
+            at, of_mesh = surface.shape.first_met(start, end)
+            closer = at < nearest
+            triangle[closer] = of_mesh[closer]
+        else:
+            at = hit(surface, start, end)
+            closer = at < nearest
         nearest[closer], which[closer] = at[closer], index
-    return np.where(which < 0, 0.0, nearest) * FAR_M, which
+    length_m = np.where(which < 0, 0.0, nearest) * FAR_M
+    point = start + length_m[:, None] * direction
+    normal = np.zeros_like(point)
+    albedo = np.array([*(each.reflectivity for each in scene.surfaces), 0.0])[which]
+    for index, surface in enumerate(scene.surfaces):
+        mine = np.flatnonzero(which == index)
+        if isinstance(surface.shape, Mesh):
+            there = point[mine], direction[mine], triangle[mine]
+            normal[mine], share = surface.shape.seen(*there)
+            albedo[mine] *= share
+        elif mine.size:
+            normal[mine] = surface.shape.normals(point[mine])
+    return FirstHits(length_m, which, point, normal, albedo)
 
 
 def image_lights(scene: Scene) -> Iterator[ImageLight]:
@@ -339,12 +365,11 @@ def light_on(
 
 
 def normals_at(scene: Scene, point: Points, surface: NDArray[np.intp]) -> Points:
-    """Return the normals of the surfaces that points lie on; none of points on none (-1)."""
+    """Return the normals of the surfaces, by index and no meshes, that points lie on."""
     normals = np.zeros_like(point)
-    for index, each in enumerate(scene.surfaces):
+    for index in np.unique(surface):
         mine = surface == index
-        if mine.any():
-            normals[mine] = each.shape.normals(point[mine])
+        normals[mine] = scene.surfaces[index].primitive.normals(point[mine])
     return normals
 
 
@@ -374,7 +399,7 @@ def unobstructed(
     for mirror, image_m in zip(mirrors, images_m, strict=False):
         start, end = stops[-1], start_of(image_m)
         fraction = mirror.shape.hit(start, end)
-        on = (fraction < 1) & mirror.shape.in_front(start)
+        on = (fraction < 1) & mirror.mirror.in_front(start)
         left, stops = left[on], [stop[on] for stop in stops]
         stops.append(stops[-1] + fraction[on][:, None] * (end[on] - stops[-1]))
     stops.append(start_of(images_m[-1]))
@@ -400,8 +425,7 @@ def blocked(scene: Scene, start: Points, end: Points) -> NDArray[np.bool_]:
         if surface.opaque is None:
             blocked |= surface.shape.hit(start, end) < 1 - 1e-9
         else:
-            assert isinstance(surface.shape, Rectangle)  # noqa: S101  (stencils are)
-            blocked |= blocked_by_mask(surface.shape, surface.opaque, start, end)
+            blocked |= blocked_by_mask(surface.mirror, surface.opaque, start, end)
     return blocked
 
 
@@ -419,5 +443,4 @@ def hit(surface: Surface, start: Points, end: Points) -> NDArray[np.float64]:
     at = surface.shape.hit(start, end)
     if surface.opaque is None:
         return at
-    assert isinstance(surface.shape, Rectangle)  # noqa: S101  (stencils are)
-    return np.where(blocked_by_mask(surface.shape, surface.opaque, start, end), at, np.inf)
+    return np.where(blocked_by_mask(surface.mirror, surface.opaque, start, end), at, np.inf)

@@ -42,7 +42,7 @@ class Gathering:
         for surface, cells in patches.cells.items():
             mine = lit.surface == surface
             if mine.any():
-                index[mine], weights[mine] = scene.surfaces[surface].shape.between_cells(
+                index[mine], weights[mine] = scene.surfaces[surface].primitive.between_cells(
                     lit.point[mine], cells
                 )
                 index[mine] += patches.first[surface]

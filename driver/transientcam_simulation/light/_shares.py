@@ -20,7 +20,7 @@ from transientcam_simulation.light import (
 )
 from transientcam_simulation.light._bundle import NOWHERE, TILE, Bundle, Region, numbers
 from transientcam_simulation.light._coverage import Crossing, Plane, covered, crossing
-from transientcam_simulation.scene import Ellipsoid, Shape
+from transientcam_simulation.scene import Ellipsoid, Primitive
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,15 @@ def alone(points: int) -> Around:
     return Around(np.full((4, points), points, dtype=np.int32))
 
 
-def axes_of(shapes: Iterable[Shape]) -> NDArray[np.float64]:
+def axes_of(shapes: Iterable[Primitive]) -> NDArray[np.float64]:
     """Return (N, 2, 3) centres and radii of the ellipsoids among shapes."""
     axes = [(each.centre, each.radii) for each in shapes if isinstance(each, Ellipsoid)]
     return np.array(axes, dtype=np.float64).reshape(-1, 2, 3)
 
 
-def meeting(shapes: list[Shape], bundle: Bundle) -> tuple[NDArray[np.bool_], list[Region | None]]:
+def meeting(
+    shapes: list[Primitive], bundle: Bundle
+) -> tuple[NDArray[np.bool_], list[Region | None]]:
     """Return which tiles (N, R, C) have lines that may meet shapes, and regions that hold them.
 
     A region is None if there are none.
@@ -82,7 +84,7 @@ def meeting(shapes: list[Shape], bundle: Bundle) -> tuple[NDArray[np.bool_], lis
 
 
 def seen(
-    shape: Shape, bundle: Bundle, region: Region, fills: Plane, *, soft: bool
+    shape: Primitive, bundle: Bundle, region: Region, fills: Plane, *, soft: bool
 ) -> tuple[Plane, Plane]:
     """Return shares (h, w) of what ``fills`` pixels that show a shape, and the t of its front.
 
@@ -111,7 +113,7 @@ def grown_tiles(tiles: NDArray[np.bool_], pixels: int) -> NDArray[np.bool_]:
 
 
 def shade(
-    shapes: list[Shape], bundle: Bundle, left: Plane, shows: NDArray[np.bool_], *, soft: bool
+    shapes: list[Primitive], bundle: Bundle, left: Plane, shows: NDArray[np.bool_], *, soft: bool
 ) -> list[Region]:
     """Take from shares (H, W) of light what shapes block; return the regions of those that do.
 
@@ -137,7 +139,9 @@ def shade(
     return blocking
 
 
-def _shade_flat(shape: Shape, bundle: Bundle, left: Plane, region: Region, *, soft: bool) -> bool:
+def _shade_flat(
+    shape: Primitive, bundle: Bundle, left: Plane, region: Region, *, soft: bool
+) -> bool:
     """Take what a rectangle blocks in a region; whether it blocks any."""
     way, near, far = bundle.within(region)
     cross = crossing(shape, bundle.apex, way)

@@ -265,7 +265,7 @@ class StillLight:
         lights = tuple(image_lights(scene))
         apexes = [eye, *(apex for light in lights for apex in light.positions_m)]
         thin = [
-            each.shape
+            each.primitive
             for each in scene.surfaces
             if each.opaque is None  # a stencil's own edge is that of nothing
             and any(may_be_thin(each.shape, apex, self.pixel_rad) for apex in apexes)

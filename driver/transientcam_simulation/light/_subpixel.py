@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from transientcam_simulation.light._bundle import Bundle
 from transientcam_simulation.light._coverage import Plane, crossing
-from transientcam_simulation.scene import Ellipsoid, Points, Shape
+from transientcam_simulation.scene import Ellipsoid, Mesh, Points, Primitive, Shape
 
 PIXELS = 2.0
 """Thinner than this between two sides counts as thin: others are met by some pixel's centre."""
@@ -16,7 +16,12 @@ _FAR_M = 1e3  # where surfaces are put that are not there
 def may_be_thin(
     shape: Shape, apex: Points, pixel_rad: float, *, pixels: float = _MAY_BE, aslant: bool = True
 ) -> bool:
-    """Whether a shape may be so thin, seen from a point; aslant: also where it shows its side."""
+    """Whether a shape may be so thin, seen from a point; aslant: also where it shows its side.
+
+    Of a mesh it is not known.
+    """
+    if isinstance(shape, Mesh):
+        return False
     away_m = float(np.linalg.norm(shape.extent() - apex, axis=-1).max())
     if isinstance(shape, Ellipsoid):
         across_m = 2 * float(shape.radii.min())
@@ -27,7 +32,7 @@ def may_be_thin(
     return across_m < pixels * pixel_rad * away_m and away_m < _FAR_M
 
 
-def crossed(shape: Shape, bundle: Bundle, counts: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def crossed(shape: Primitive, bundle: Bundle, counts: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Mark pixels (H, W) that a shape crosses where it is thin, seen along lines that count."""
     cross = crossing(shape, bundle.apex, bundle.way)
     found = counts & (cross.at > bundle.near) & (cross.at < bundle.far)

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from transientcam_driver.camera import SurfaceSeen
 from transientcam_simulation.light._followed import Within
-from transientcam_simulation.light._paths import Lit, first_hit, normals_at
+from transientcam_simulation.light._paths import Lit, first_hit
 from transientcam_simulation.scene import Points, Scene
 
 
@@ -23,9 +23,9 @@ def surface_seen(
     """
     assert scene.camera is not None  # noqa: S101  (a scene of surfaces has one)
     eye = scene.camera.position_m
-    length_m, which = first_hit(scene, np.broadcast_to(eye, directions.shape), directions)
-    point = eye + length_m[:, None] * directions
-    facing = np.einsum("pc,pc->p", normals_at(scene, point, which), directions) < 0
+    met = first_hit(scene, np.broadcast_to(eye, directions.shape), directions)
+    which, point = met.surface, met.point
+    facing = np.einsum("pc,pc->p", met.normal, directions) < 0
     seen = facing & np.array([each.opaque is None for each in scene.surfaces] + [False])[which]
     from_lamp_m = np.linalg.norm(point - scene.light.position_m, axis=-1)
     # a ray that a mirror turns ends on another surface than the one it meets first
@@ -36,6 +36,6 @@ def surface_seen(
         direct[each.pixel] = np.where(mine, weight, 0.0).mean(axis=0)
     light = brightness.ravel()
     share = np.divide(direct, light, out=np.zeros_like(direct), where=(light > 0) & seen)
-    range_m = np.where(seen, (length_m + from_lamp_m) / 2, np.nan)
+    range_m = np.where(seen, (met.length_m + from_lamp_m) / 2, np.nan)
     shape = brightness.shape
     return SurfaceSeen(range_m.reshape(shape), np.minimum(share, 1.0).reshape(shape))

@@ -39,7 +39,7 @@ from transientcam_simulation.light._variants import (
     without_mirrors,
     without_scattering,
 )
-from transientcam_simulation.scene import Scene
+from transientcam_simulation.scene import Scene, patches_of
 
 Values = NDArray[np.float64]
 KEPT_PIXELS: Final = 40_000
@@ -238,7 +238,7 @@ class SurfaceScenery:
             followed=followed,
         )
         tolerance = CALLED_ABOVE * float(wanted.noise.deviation(0.0, 0.0))
-        further = DiffuseInterreflection.name in effects
+        further = DiffuseInterreflection.name in effects and bool(patches_of(scene, 1))
         reflectance = still.reflectance.reshape(still.height, still.width)
         if not self.moves:
             responses: Responses = still.responses()

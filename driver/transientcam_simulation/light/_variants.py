@@ -29,7 +29,7 @@ def without_scattering(scene: Scene) -> Scene:
 def still_scene(scene: Scene) -> Scene:
     """Return the scene without what moves; surfaces keep their indices."""
     surfaces = tuple(
-        replace(each, shape=each.shape.moved(_AWAY), motions=()) if each.motions else each
+        replace(each, shape=each.primitive.moved(_AWAY), motions=()) if each.motions else each
         for each in scene.surfaces
     )
     return replace(scene, surfaces=surfaces)

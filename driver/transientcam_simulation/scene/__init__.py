@@ -12,13 +12,14 @@ from transientcam_simulation.scene._geometry import (
     Cells,
     Ellipsoid,
     Points,
+    Primitive,
     Rectangle,
-    Shape,
     blocked_by_mask,
     cells_of,
     evenly,
 )
 from transientcam_simulation.scene._limits import most_patches, patch_edges_m, patches_of
+from transientcam_simulation.scene._mesh import Mesh
 from transientcam_simulation.scene._motion import Motion
 from transientcam_simulation.scene._scene import (
     Background,
@@ -26,6 +27,7 @@ from transientcam_simulation.scene._scene import (
     Light,
     ResponseFile,
     Scene,
+    Shape,
     Surface,
     TimeZero,
     Viewpoint,

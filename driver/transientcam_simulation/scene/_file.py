@@ -25,8 +25,10 @@ from transientcam_simulation.base import (
     Waveform,
 )
 from transientcam_simulation.effects import CHOICES, EFFECTS
-from transientcam_simulation.scene._geometry import Ellipsoid, Rectangle, Shape
+from transientcam_simulation.scene._geometry import Ellipsoid, Rectangle
 from transientcam_simulation.scene._limits import require_modest
+from transientcam_simulation.scene._mesh import Mesh
+from transientcam_simulation.scene._mesh_file import load_mesh
 from transientcam_simulation.scene._motion import Motion, Repeat
 from transientcam_simulation.scene._scene import (
     Background,
@@ -35,12 +37,13 @@ from transientcam_simulation.scene._scene import (
     Light,
     ResponseFile,
     Scene,
+    Shape,
     Surface,
     TimeZero,
     Transport,
     Viewpoint,
 )
-from transientcam_simulation.scene._table import Table
+from transientcam_simulation.scene._table import MOST_M, Table
 
 BUILT_IN = Path(__file__).parents[1] / "scenes"
 MOST_BOUNCES = 8
@@ -50,7 +53,7 @@ MOST_S = 1e-3
 """Of a delay."""
 _FORMER_DIFFUSER = "diffusor"
 """How the table [diffuser] was spelt."""
-_SHAPES = ("rectangle", "sphere", "ellipsoid")
+_SHAPES = ("rectangle", "sphere", "ellipsoid", "mesh")
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +105,7 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
     name, description = top.text("name", name), top.text("description", "")
     responses = tuple(_response(table, folder) for table in top.tables("response"))
     motions = _motions(top.tables("motion"))
-    surfaces = tuple(_surface(table, motions) for table in top.tables("surface"))
+    surfaces = tuple(_surface(table, motions, folder) for table in top.tables("surface"))
     diffuser = _diffuser(top)
     if sum(map(bool, (responses, surfaces, diffuser))) != 1:
         allowed = "given, or [[response]] or [diffuser] instead, but only one of them"
@@ -123,8 +126,7 @@ def _scene(top: Table, *, name: str, file: Path | None) -> Scene:
         effects=_effects(top.table("effects")),
         seed=top.integer("seed", 1, least=0, most=2**63 - 1),
     )
-    top.done()
-    return scene
+    return top.done(scene)
 
 
 def _open(path: Path) -> Table:
@@ -140,8 +142,7 @@ def _open(path: Path) -> Table:
 def _light(table: Table, *, somewhere: bool) -> Light:
     electrons_per_s = table.number("electrons_per_s", least=LEAST_E, most=MOST_E)
     if not somewhere:
-        table.done()
-        return Light(electrons_per_s, np.zeros(3), np.zeros(3), 0.0)
+        return table.done(Light(electrons_per_s, np.zeros(3), np.zeros(3), 0.0))
     light = Light(
         electrons_per_s=electrons_per_s,
         position_m=table.vector("position_m"),
@@ -150,8 +151,7 @@ def _light(table: Table, *, somewhere: bool) -> Light:
     )
     if np.array_equal(light.aim_at_m, light.position_m):
         raise table.error("aim_at_m", light.aim_at_m.tolist(), "away from position_m")
-    table.done()
-    return light
+    return table.done(light)
 
 
 def _viewpoint(table: Table) -> Viewpoint:
@@ -164,8 +164,7 @@ def _viewpoint(table: Table) -> Viewpoint:
     if not np.any((view.look_at_m - view.position_m)[:2]):
         allowed = "away from position_m, and not straight above or below it"
         raise table.error("look_at_m", view.look_at_m.tolist(), allowed)
-    table.done()
-    return view
+    return table.done(view)
 
 
 def _lens(table: Table) -> Lens:
@@ -174,9 +173,9 @@ def _lens(table: Table) -> Lens:
         for name, most in (("k1", 1.0), ("k2", 1.0), ("p1", 0.1), ("p2", 0.1), ("k3", 1.0))
     )
     x, y = (table.number(name, 0.0, least=-0.5, most=0.5) for name in ("centre_x", "centre_y"))
-    lens = Lens((k1, k2, p1, p2, k3), (x, y), table.number("vignetting", 0.0, least=0, most=16))
-    table.done()
-    return lens
+    return table.done(
+        Lens((k1, k2, p1, p2, k3), (x, y), table.number("vignetting", 0.0, least=0, most=16))
+    )
 
 
 def _sensor(table: Table) -> Sensor:
@@ -191,8 +190,7 @@ def _sensor(table: Table) -> Sensor:
     if sensor.dark_dn > sensor.highest_dn:
         allowed = f"a number of at most {sensor.highest_dn}, the highest code of the converter"
         raise table.error("dark_dn", sensor.dark_dn, allowed)
-    table.done()
-    return sensor
+    return table.done(sensor)
 
 
 def _device(table: Table, folder: Path | None) -> DeviceProfile:
@@ -212,8 +210,7 @@ def _device(table: Table, folder: Path | None) -> DeviceProfile:
     if "outlier_share" in table:
         share = table.number("outlier_share", least=0, most=1)
         profile = replace(profile, outliers=Outliers(share))
-    table.done()
-    return profile
+    return table.done(profile)
 
 
 def _pattern(table: Table, folder: Path | None) -> Pattern:
@@ -225,8 +222,7 @@ def _pattern(table: Table, folder: Path | None) -> Pattern:
     )
     if pattern.file is not None and pattern.delay_s:
         raise table.error("delay_s", pattern.delay_s, "absent beside file, which has the delays")
-    table.done()
-    return pattern
+    return table.done(pattern)
 
 
 def _file(table: Table, key: str, folder: Path | None) -> Path:
@@ -238,45 +234,43 @@ def _file(table: Table, key: str, folder: Path | None) -> Path:
 
 
 def _drift(table: Table) -> Drift:
-    drift = Drift(
-        rise_c=table.number("rise_c", least=-1e4, most=1e4),
-        time_constant_s=table.number("time_constant_s", least=1e-6, most=1e9),
-        delay_s_per_c=table.number("delay_s_per_c", least=-MOST_S, most=MOST_S),
+    return table.done(
+        Drift(
+            rise_c=table.number("rise_c", least=-1e4, most=1e4),
+            time_constant_s=table.number("time_constant_s", least=1e-6, most=1e9),
+            delay_s_per_c=table.number("delay_s_per_c", least=-MOST_S, most=MOST_S),
+        )
     )
-    table.done()
-    return drift
 
 
 def _lens_scatter(table: Table) -> LensScatter:
-    scatter = LensScatter(
-        share=table.number("share", least=0, most=0.5),
-        width=table.number("width", 0.15, least=1e-6, most=1e6),
+    return table.done(
+        LensScatter(
+            share=table.number("share", least=0, most=0.5),
+            width=table.number("width", 0.15, least=1e-6, most=1e6),
+        )
     )
-    table.done()
-    return scatter
 
 
 def _transport(table: Table) -> Transport:
     default = Transport()
-    transport = Transport(
-        mirror_bounces=table.integer(
-            "mirror_bounces", default.mirror_bounces, least=0, most=MOST_BOUNCES
-        ),
-        diffuse_bounces=(
-            table.integer("diffuse_bounces", least=0, most=MOST_BOUNCES)
-            if "diffuse_bounces" in table
-            else None
-        ),
-        patches=table.integer("patches", default.patches, least=2, most=64),
+    return table.done(
+        Transport(
+            mirror_bounces=table.integer(
+                "mirror_bounces", default.mirror_bounces, least=0, most=MOST_BOUNCES
+            ),
+            diffuse_bounces=(
+                table.integer("diffuse_bounces", least=0, most=MOST_BOUNCES)
+                if "diffuse_bounces" in table
+                else None
+            ),
+            patches=table.integer("patches", default.patches, least=2, most=64),
+        )
     )
-    table.done()
-    return transport
 
 
 def _ambient(table: Table) -> float:
-    electrons_per_s = table.number("electrons_per_s", 0.0, least=0, most=MOST_E)
-    table.done()
-    return electrons_per_s
+    return table.done(table.number("electrons_per_s", 0.0, least=0, most=MOST_E))
 
 
 def _diffuser(top: Table) -> Diffuser | None:
@@ -285,23 +279,23 @@ def _diffuser(top: Table) -> Diffuser | None:
     if "diffuser" in top and _FORMER_DIFFUSER in top:
         raise top.error(_FORMER_DIFFUSER, "a table", "absent beside [diffuser]")
     table = top.table("diffuser" if "diffuser" in top else _FORMER_DIFFUSER)
-    diffuser = Diffuser(
-        brightness=table.number("brightness", 1.0, least=1e-9, most=1e9),
-        delay_s=table.number("delay_s", 0.0, least=0, most=MOST_S),
-        fall_off=table.number("fall_off", 0.0, least=0, most=0.9),
+    return table.done(
+        Diffuser(
+            brightness=table.number("brightness", 1.0, least=1e-9, most=1e9),
+            delay_s=table.number("delay_s", 0.0, least=0, most=MOST_S),
+            fall_off=table.number("fall_off", 0.0, least=0, most=0.9),
+        )
     )
-    table.done()
-    return diffuser
 
 
 def _effects(table: Table) -> dict[str, str]:
-    effects = {
-        effect.name: table.choice(effect.name, CHOICES, "auto")
-        for effect in EFFECTS
-        if effect.optional
-    }
-    table.done()
-    return effects
+    return table.done(
+        {
+            effect.name: table.choice(effect.name, CHOICES, "auto")
+            for effect in EFFECTS
+            if effect.optional
+        }
+    )
 
 
 def _motions(tables: list[Table]) -> dict[str, Motion]:
@@ -319,47 +313,67 @@ def _motions(tables: list[Table]) -> dict[str, Motion]:
             longer = motion.period_s * motion.speed_m_s / SPEED_OF_LIGHT_M_S
             limit = f"of at least {longer:.3g}, or path_m is faster than light"
             raise table.error("period_s", motion.period_s, limit)
-        table.done()
+        table.done(motions)
     return motions
 
 
-def _surface(table: Table, motions: dict[str, Motion]) -> Surface:
+def _surface(table: Table, motions: dict[str, Motion], folder: Path | None) -> Surface:
     kind: Kind = table.choice("kind", get_args(Kind))
     name = table.text("name", kind)
-    shape = _shape(table, kind)
+    shape, albedo = _shape(table, kind, folder)
     share = "reflectivity" if kind == "mirror" else "albedo"
+    moves = "mesh" if isinstance(shape, Mesh) else kind
     gloss, exponent = _gloss(table) if kind in ("diffuse", "translucent") else (0.0, 50.0)
     surface = Surface(
         name,
         kind,
         shape,
-        0.0 if kind == "stencil" else table.number(share, least=0, most=1),
+        0.0 if kind == "stencil" else table.number(share, albedo, least=0, most=1),
         _mask(table) if kind == "stencil" else None,
         _scatter(table) if kind == "translucent" else None,
-        _moves(table, kind, motions) if "motion" in table else (),
+        _moves(table, moves, motions) if "motion" in table else (),
         gloss,
         exponent,
     )
     if surface.reflectivity + gloss > 1 and surface.scatters:
         limit = f"at most {1 - surface.reflectivity:g}, what albedo leaves of the light"
         raise table.error("gloss", gloss, limit)
-    table.done()
-    return surface
+    return table.done(surface)
 
 
-def _shape(table: Table, kind: Kind) -> Shape:
+def _shape(table: Table, kind: Kind, folder: Path | None) -> tuple[Shape, float | None]:
+    """Read a shape, and the albedo that its surface has by default."""
     allowed = _SHAPES if kind in ("diffuse", "translucent") else _SHAPES[:1]
     shape = table.choice("shape", allowed, "rectangle")
+    if shape == "mesh":
+        return _mesh(table, folder)
     centre_m = table.vector("centre_m")
     if shape == "sphere":
-        return Ellipsoid(centre_m, np.full(3, table.length("radius_m")))
+        return Ellipsoid(centre_m, np.full(3, table.length("radius_m"))), None
     if shape == "ellipsoid":
-        return Ellipsoid(centre_m, np.array(table.lengths("radii_m", 3)))
+        return Ellipsoid(centre_m, np.array(table.lengths("radii_m", 3))), None
     normal = table.vector("normal")
     if not np.any(normal):
         raise table.error("normal", normal.tolist(), "other than zero")
     width_m, height_m = table.lengths("size_m", 2)
-    return Rectangle.facing(centre_m, normal, size=(width_m, height_m))
+    return Rectangle.facing(centre_m, normal, size=(width_m, height_m)), None
+
+
+def _mesh(table: Table, folder: Path | None) -> tuple[Mesh, float | None]:
+    mesh, coloured = load_mesh(_file(table, "file", folder), smooth=table.switch("smooth", True))
+    scale = table.number("scale", 1.0, least=1e-9, most=1e9)
+    turn, position_m = np.eye(3), table.vector("position_m", (0.0, 0.0, 0.0))
+    angles_deg = table.vector("rotation_deg", (0.0, 0.0, 0.0))
+    for axis, angle_rad in zip(np.eye(3), np.radians(angles_deg), strict=True):
+        cross = np.cross(axis, np.eye(3)).T  # Rodrigues' formula
+        about = np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross
+        turn = turn + about @ turn
+    mesh = mesh.placed(scale * turn, position_m)
+    farthest_m = float(np.abs(mesh.extent()).max())
+    if farthest_m > MOST_M:
+        limit = f"smaller: a coordinate of {farthest_m:.3g} m is more than {MOST_M:g}"
+        raise table.error("scale", scale, limit)
+    return mesh, 1.0 if coloured else None
 
 
 def _gloss(table: Table) -> tuple[float, float]:
@@ -376,7 +390,7 @@ def _scatter(table: Table) -> Scatter:
     )
 
 
-def _moves(table: Table, kind: Kind, motions: dict[str, Motion]) -> tuple[Motion, ...]:
+def _moves(table: Table, kind: str, motions: dict[str, Motion]) -> tuple[Motion, ...]:
     if kind not in ("diffuse", "translucent"):
         raise table.error("motion", table.words("motion"), f"absent; a {kind} stays in its place")
     names = table.words("motion")
@@ -404,16 +418,16 @@ def _response(table: Table, folder: Path | None) -> ResponseFile:
     zero_file = _file(table, "time_zero_file", folder) if has_zero_file else None
     if time_zero_s is not None and zero_file is not None:
         raise table.error("time_zero_s", time_zero_s, "absent beside time_zero_file")
-    response = ResponseFile(
-        path=_file(table, "file", folder),
-        weight=table.number("weight", 1.0, least=1e-9, most=1e9),
-        delay_s=table.number("delay_s", 0.0, least=-MOST_S, most=MOST_S),
-        normalise=table.switch("normalise", True),
-        background=table.choice("background", get_args(Background), "none"),
-        time_zero=table.choice("time_zero", get_args(TimeZero), "start"),
-        time_zero_s=time_zero_s,
-        time_zero_file=zero_file,
-        bin_s=table.number("bin_s", least=1e-15, most=MOST_S) if "bin_s" in table else None,
+    return table.done(
+        ResponseFile(
+            path=_file(table, "file", folder),
+            weight=table.number("weight", 1.0, least=1e-9, most=1e9),
+            delay_s=table.number("delay_s", 0.0, least=-MOST_S, most=MOST_S),
+            normalise=table.switch("normalise", True),
+            background=table.choice("background", get_args(Background), "none"),
+            time_zero=table.choice("time_zero", get_args(TimeZero), "start"),
+            time_zero_s=time_zero_s,
+            time_zero_file=zero_file,
+            bin_s=table.number("bin_s", least=1e-15, most=MOST_S) if "bin_s" in table else None,
+        )
     )
-    table.done()
-    return response

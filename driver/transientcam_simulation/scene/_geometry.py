@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 Points = NDArray[np.float64]  # (..., 3)
 Values = NDArray[np.float64]
 Bilinear = tuple[NDArray[np.intp], NDArray[np.float64]]  # (P, 4) cells, (P, 4) their weights
-_SIGNS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])  # of corners, around a front
+_SIGNS = np.array(
+    [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+)  # of corners, around a front
 _CLEAR = 1e-9  # fraction of a segment that counts as its end
 _CLEAR_OF_CURVED = 1e-6  # the same where a root of a quadratic says where the segment starts
 
@@ -96,9 +98,7 @@ class Rectangle:
 
     def extent(self) -> Points:
         """Return points (N, 3) whose convex hull holds it."""
-        across, along = self.right * self.width / 2, self.up * self.height / 2
-        signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        return self.centre + signs[:, :1] * across + signs[:, 1:] * along
+        return self.at(*_SIGNS.T)
 
     def tangents(self, apex: Points, middle: Points, across: Points) -> tuple[float, float]:
         """Lowest and highest tangent of its points' angles at an apex to a direction.
@@ -244,10 +244,10 @@ class Ellipsoid:
         )
 
 
-Shape = Rectangle | Ellipsoid
+Primitive = Rectangle | Ellipsoid
 
 
-def cells_of(shape: Shape, up: Values, along: Values) -> Cells:
+def cells_of(shape: Primitive, up: Values, along: Values) -> Cells:
     """Cut a shape into patches: see `Cells`."""
     (y, x), (high, wide) = (
         [each.ravel() for each in np.meshgrid(*pair, indexing="ij")]

@@ -1,6 +1,6 @@
 """What a scene will need before its light is known, and how much of it one from elsewhere may.
 
-It is counted as the light is built, by the same functions (`patch_edges_m`, `Shape.grid`).
+It is counted as the light is built, by the same functions (`patch_edges_m`, `Rectangle.grid`).
 """
 
 import math
@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from transientcam_driver.errors import SceneError
+from transientcam_simulation.scene._mesh import Mesh
 from transientcam_simulation.scene._scene import Scene
 
 MOST_SURFACES: Final = 32
@@ -27,12 +28,12 @@ def patch_edges_m(scene: Scene, per_side: int, *, moving: int = 0) -> dict[int, 
     """Return how long the edges of the patches of each scattering surface are, by its index.
 
     The longest side of all surfaces is cut into ``per_side`` patches, the others as finely; what
-    moves as if there were ``moving`` of them, if these are more.
+    moves as if there were ``moving`` of them, if these are more. Meshes are not cut.
     """
     sides_m = {
         index: float(np.ptp(each.shape.extent(), axis=0).max())
         for index, each in enumerate(scene.surfaces)
-        if each.scatters
+        if each.scatters and not isinstance(each.shape, Mesh)
     }
     longest_m = max(sides_m.values(), default=0.0)
     counts = {k: max(per_side, moving if scene.surfaces[k].motions else 0) for k in sides_m}
@@ -42,7 +43,7 @@ def patch_edges_m(scene: Scene, per_side: int, *, moving: int = 0) -> dict[int, 
 def patches_of(scene: Scene, per_side: int) -> int:
     """Return how many patches the scattering surfaces of a scene are cut into."""
     grids = (
-        scene.surfaces[index].shape.grid(edge_m)
+        scene.surfaces[index].primitive.grid(edge_m)
         for index, edge_m in patch_edges_m(scene, per_side).items()
     )
     return sum(rows * columns for rows, columns in grids)

@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from transientcam_driver.camera import Lens as RealLens, Sensor
 from transientcam_simulation.base import IDEAL, PINHOLE, DeviceProfile, Lens, Scatter
-from transientcam_simulation.scene._geometry import Points, Rectangle, Shape
+from transientcam_simulation.scene._geometry import Points, Primitive, Rectangle
+from transientcam_simulation.scene._mesh import Mesh
 from transientcam_simulation.scene._motion import Motion
 
 Background = Literal["none", "median"]
 TimeZero = Literal["start", "peak"]
+Shape = Primitive | Mesh
 Kind = Literal["diffuse", "translucent", "mirror", "stencil"]
 
 
@@ -94,8 +96,14 @@ class Surface:
 
     @property
     def mirror(self) -> Rectangle:
-        """The plane of a mirror."""
+        """The plane of a mirror or stencil."""
         assert isinstance(self.shape, Rectangle)  # noqa: S101  (scene files make no others)
+        return self.shape
+
+    @property
+    def primitive(self) -> Primitive:
+        """The shape of what is no mesh, which can be moved and cut into patches."""
+        assert not isinstance(self.shape, Mesh)  # noqa: S101  (meshes stay, and are not cut)
         return self.shape
 
     @property
@@ -111,7 +119,7 @@ class Surface:
         """Return it at its place at a time."""
         if not self.motions:
             return self
-        return replace(self, shape=self.shape.moved(self.offset_m(time_s)), motions=())
+        return replace(self, shape=self.primitive.moved(self.offset_m(time_s)), motions=())
 
 
 @dataclass(frozen=True, slots=True)

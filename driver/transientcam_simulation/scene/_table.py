@@ -3,13 +3,14 @@
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.errors import SceneError
 
+_Made = TypeVar("_Made")
 MOST_M: Final = 1e6
 """Of a coordinate or a size: squares and products of what is allowed stay finite."""
 LEAST_M: Final = 1e-6
@@ -142,10 +143,11 @@ class Table:
             for index, item in enumerate(value)
         ]
 
-    def done(self) -> None:
-        """Refuse keys that were not read: most likely a misspelt one."""
+    def done(self, made: _Made) -> _Made:
+        """Return what was made of it; refuse keys that were not read: most likely misspelt."""
         for key, value in self._left.items():
             raise self.error(key, value, f"absent; known here are {', '.join(self._known)}")
+        return made
 
     def _path(self, key: str) -> str:
         return f"{self._prefix}.{key}" if self._prefix else key

@@ -11,7 +11,7 @@ from transientcam_driver import Sequence
 from transientcam_simulation.emulated import world_of
 from transientcam_simulation.light._missing import SampledWays
 from transientcam_simulation.light._rays import rays_through
-from transientcam_simulation.scene import Scene, parse_scene
+from transientcam_simulation.scene import Mesh, Scene, parse_scene
 from transientcam_simulation.scene._motion import Motion
 
 SIZE = 163, 120
@@ -86,6 +86,27 @@ def test_light_on_ways_that_are_not_followed_has_the_size_that_a_path_tracer_fin
     assert np.abs(size - further).max() < 0.15 * further.max()
     assert not any(ways.change(each, (0.0,)).any() for each in KINDS if each != kind)
     assert not ways.followed.any()
+
+
+def test_light_between_a_mesh_and_a_wall_has_the_size_that_a_path_tracer_finds_of_two_walls() -> (
+    None
+):
+    walls = room(MATT)
+    plane = walls.surfaces[0].shape
+    triangles = plane.extent()[[[0, 1, 2], [2, 3, 0]]]
+    flat = np.ones((2, 3), dtype=np.float32), np.zeros((2, 3, 2), dtype=np.float32)
+    mesh = Mesh(triangles, None, *flat, np.full(2, -1, dtype=np.int32))
+    surfaces = replace(walls.surfaces[0], shape=mesh), walls.surfaces[1]
+
+    ways = sampled(replace(walls, surfaces=surfaces))
+
+    further = np.abs(traced(walls, 3) - traced(walls, 0)).max(axis=0)
+    size = ways.change("between-meshes", FREQUENCIES_HZ)
+    assert further.max() > 1e-3
+    assert np.linalg.norm(size) == pytest.approx(np.linalg.norm(further), rel=0.1)
+    assert not any(ways.change(each, (0.0,)).any() for each in KINDS)
+    assert not ways.followed.any()
+    assert not sampled(walls).change("between-meshes", FREQUENCIES_HZ).any()
 
 
 @pytest.mark.parametrize("floor", [MATT, MIRROR])
