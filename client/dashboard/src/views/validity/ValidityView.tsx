@@ -1,6 +1,6 @@
 import { type ReadonlySignal, useComputed } from "@preact/signals";
 import { useRef } from "preact/hooks";
-import { fixed, grouped } from "../../scales/format";
+import { fixed, grouped, NOTHING } from "../../scales/format";
 import { drawnOf, type Frame, sentOf } from "../../store/frames";
 import { aBoolean, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
@@ -60,6 +60,7 @@ export function ValidityView() {
 function Legend({ frame, reasons }: { frame: ReadonlySignal<Frame | null>; reasons: Reasons }) {
   const counts = useComputed(() => countReasons(reasons, frame.value === null ? [] : sentOf(frame.value)));
   const { total, valid, byName } = counts.value;
+  const unjudged = reasons.product === "trust" ? frame.value?.meta.accuracy?.not_judged : undefined;
   const share = (count: number): string => fixed(total === 0 ? NaN : (100 * count) / total, count === 0 || count === total ? 0 : 1, "%");
   return (
     <table class="listing legend">
@@ -72,16 +73,20 @@ function Legend({ frame, reasons }: { frame: ReadonlySignal<Frame | null>; reaso
           <td>{share(valid)}</td>
           <td class="legend-words">{reasons.good[1]}</td>
         </tr>
-        {reasons.all.map(({ name, title, words, colour }) => (
-          <tr key={name} data-flag={name} class={byName[name] === 0 ? "quiet" : ""} title={words}>
-            <th scope="row">
-              <Swatch colour={colour} /> {title}
-            </th>
-            <td>{grouped(byName[name])}</td>
-            <td>{share(byName[name])}</td>
-            <td class="legend-words">{words}</td>
-          </tr>
-        ))}
+        {reasons.all.map(({ name, title, words, colour, needs = "" }) => {
+          const unknown = unjudged?.includes(name) ?? false;
+          const said = unknown ? `not judged: it needs ${needs}` : words;
+          return (
+            <tr key={name} data-flag={name} class={byName[name] === 0 ? "quiet" : ""} title={said}>
+              <th scope="row">
+                <Swatch colour={colour} /> {title}
+              </th>
+              <td>{unknown ? NOTHING : grouped(byName[name])}</td>
+              <td>{unknown ? NOTHING : share(byName[name])}</td>
+              <td class="legend-words">{said}</td>
+            </tr>
+          );
+        })}
       </tbody>
     </table>
   );
