@@ -6,6 +6,7 @@ import { aBoolean, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { Toggle } from "../../ui/controls";
 import { saveNumbers, savePicture } from "../../ui/download";
+import { NEEDS } from "../../ui/flags";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { draw } from "../../ui/paint";
@@ -73,9 +74,9 @@ function Legend({ frame, reasons }: { frame: ReadonlySignal<Frame | null>; reaso
           <td>{share(valid)}</td>
           <td class="legend-words">{reasons.good[1]}</td>
         </tr>
-        {reasons.all.map(({ name, title, words, colour, needs = "" }) => {
+        {reasons.all.map(({ name, title, words, colour }) => {
           const unknown = unjudged?.includes(name) ?? false;
-          const said = unknown ? `not judged: it needs ${needs}` : words;
+          const said = unknown ? `not judged: it needs ${NEEDS[name]}` : words;
           return (
             <tr key={name} data-flag={name} class={byName[name] === 0 ? "quiet" : ""} title={said}>
               <th scope="row">
