@@ -6,6 +6,7 @@ import { SwitchedDialog } from "./ui/Dialog";
 import { Help } from "./ui/Help";
 import { shortcuts } from "./ui/shortcuts";
 import { Arrangement } from "./views/Arrangement";
+import { Examples } from "./views/examples/Examples";
 import { FileDrop } from "./views/files/FileDrop";
 import { Palette } from "./views/palette/Palette";
 import { ReplayBar } from "./views/replay/ReplayBar";
@@ -33,6 +34,7 @@ export function App({ onRetry }: { onRetry: () => void }) {
       <Arrangement />
       <ReplayBar />
       <SwitchedDialog open={store.help} title="Keys" inside={Help} />
+      <SwitchedDialog open={store.examples} title="Examples" inside={Examples} />
       <SwitchedDialog open={store.palette} title="All commands" inside={Palette} />
       <SwitchedDialog open={store.asksForLayout} title="Layouts" inside={LayoutDialog} />
       <SwitchedDialog open={store.asksForControl} title="Control" inside={ControlDialog} />

@@ -26,6 +26,7 @@ export function keepAddress(target: Window, store: Store): void {
   const { settings } = store;
   settings.add(timePart(store));
   settings.add(recordingPart(store));
+  settings.add(scenePart(store));
   let written = target.location.hash;
   settings.follow(written);
   target.addEventListener("hashchange", () => {
@@ -63,6 +64,24 @@ function timePart({ player, sequence, period_s }: Store): LinkPart {
         player.seek((Number(time_ns) * 1e-9) / period_s.peek());
         return true;
       });
+    },
+  };
+}
+
+/** The simulated scene that a link was made for: a page that is opened offers it and changes nothing by itself. */
+function scenePart({ camera, simulation, events }: Store): LinkPart {
+  const offer = async (scene: string): Promise<void> => {
+    const { simulated } = await until(() => camera.value ?? undefined);
+    if (simulated) await simulation.follow();
+    if (simulation.world.peek()?.scene === scene) return;
+    const show = { word: "Show it", run: () => void events.reported(() => simulation.set({ scene })) };
+    events.tell(`This link is of the simulated scene ${scene}.`, "plain", simulated ? { remedy: show } : {});
+  };
+  return {
+    write: () => "",
+    read: (said) => {
+      const scene = said.get("scene") ?? "";
+      if (/^[\w-]{1,60}$/.test(scene)) void offer(scene);
     },
   };
 }

@@ -42,6 +42,7 @@ export function pageActions(store: Store): ActionGroup[] {
       title: "Help",
       actions: [
         { text: "All commands (K)", run: () => (store.palette.value = true) },
+        { text: "Examples", run: () => (store.examples.value = true) },
         { text: "Keys (?)", run: () => (store.help.value = true) },
         { text: "Copy a link to what is shown", run: () => void copyLink(window, store) },
       ],

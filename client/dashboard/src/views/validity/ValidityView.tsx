@@ -16,7 +16,7 @@ import "../response/Listings.css";
 import "./ValidityView.css";
 
 /** Whether it is shown which ranges can be trusted, instead of the flags. */
-const TRUST: Setting<boolean> = { key: "validity.trust", initial: false, ...aBoolean() };
+const TRUST: Setting<boolean> = { key: "validity.trust", link: "trust", initial: false, ...aBoolean() };
 
 /** Which pixels something is wrong with, and what. */
 export function ValidityView() {
