@@ -6,12 +6,26 @@ import type { LinkPart } from "./settings";
 import type { Store } from "./store";
 import { until } from "./until";
 
+/** Holds what is shown, keeps its frame at the service and copies a link that opens that very frame. */
+export async function share(target: Window, store: Store): Promise<void> {
+  const frame = store.status.newest.peek()?.frame;
+  if (store.replay.active.peek() || frame === undefined) return copyLink(target, store);
+  [store.held.value, store.player.playing.value] = [true, false];
+  await store.events.reported(async () => {
+    const { id } = await store.recordings.start({ frame, name: `Shared frame ${frame}` });
+    await copyLink(target, store, `recording=${id}&frame=1`);
+  });
+}
+
 /** Puts the whole address of what is shown on the clipboard, and says so; shows it to be copied by hand where the browser refuses. */
-export async function copyLink(target: Window, store: Store): Promise<void> {
-  const { href } = Object.assign(new URL(target.location.href), { hash: store.settings.hash(true) });
+export async function copyLink(target: Window, store: Store, kept = ""): Promise<void> {
+  const hash = [...store.settings.hash(true).slice(1).split("&"), kept].filter(Boolean).join("&");
+  const { href } = Object.assign(new URL(target.location.href), { hash });
+  const what =
+    kept === "" ? "this layout, pixel and time" : "this very frame to all who reach the service, and this layout, pixel and time";
   try {
     await target.navigator.clipboard.writeText(href);
-    store.events.tell("The link was copied: it shows this layout, pixel and time, with pins, zoom and colours.", "good");
+    store.events.tell(`The link was copied: it shows ${what}, with pins, zoom and colours.`, "good");
   } catch {
     // Refused, or not over https.
     store.status.unreadable.value = `The link to what is shown: ${href}`;
@@ -26,7 +40,6 @@ export function keepAddress(target: Window, store: Store): void {
   const { settings } = store;
   settings.add(timePart(store));
   settings.add(recordingPart(store));
-  settings.add(scenePart(store));
   let written = target.location.hash;
   settings.follow(written);
   target.addEventListener("hashchange", () => {
@@ -64,24 +77,6 @@ function timePart({ player, sequence, period_s }: Store): LinkPart {
         player.seek((Number(time_ns) * 1e-9) / period_s.peek());
         return true;
       });
-    },
-  };
-}
-
-/** The simulated scene that a link was made for: a page that is opened offers it and changes nothing by itself. */
-function scenePart({ camera, simulation, events }: Store): LinkPart {
-  const offer = async (scene: string): Promise<void> => {
-    const { simulated } = await until(() => camera.value ?? undefined);
-    if (simulated) await simulation.follow();
-    if (simulation.world.peek()?.scene === scene) return;
-    const show = { word: "Show it", run: () => void events.reported(() => simulation.set({ scene })) };
-    events.tell(`This link is of the simulated scene ${scene}.`, "plain", simulated ? { remedy: show } : {});
-  };
-  return {
-    write: () => "",
-    read: (said) => {
-      const scene = said.get("scene") ?? "";
-      if (/^[\w-]{1,60}$/.test(scene)) void offer(scene);
     },
   };
 }

@@ -13,31 +13,25 @@ export function Examples({ onDone }: Done) {
   const task = useTask();
   const simulated = camera.value?.simulated === true;
   useEffect(() => void (simulated && simulation.follow()), [simulation, simulated]);
-  const show = async ({ scene, state }: Example, moves: boolean): Promise<void> => {
-    if (scene !== undefined && moves && !(await task.run("Preparing the scene…", () => simulation.set({ scene })))) return;
+  const show = async ({ scene, state }: Example): Promise<void> => {
+    const moves = scene !== undefined && simulated && obstacle.value === null && simulation.world.value?.scene !== scene;
+    if (moves && !(await task.run("Preparing the scene…", () => simulation.set({ scene })))) return;
     [store.alone.value, store.selected.value] = [null, null];
     settings.follow(state);
     onDone();
   };
   return (
     <div class="column spaced">
-      {EXAMPLES.map((example) => {
-        const { name, words, scene } = example;
-        const elsewhere = scene !== undefined && simulated && simulation.world.value?.scene !== scene;
-        const moves = elsewhere && obstacle.value === null;
-        const needs =
-          scene !== undefined && (moves ? `Puts the simulated camera before ${scene}` : `Made for the simulated scene ${scene}`);
-        return (
-          <div key={name} class="column">
-            <Button task={task} onClick={() => void show(example, moves)}>
-              {name}
-            </Button>
-            <span class="small quiet">
-              {words} {(elsewhere || (scene !== undefined && !simulated)) && `${needs}.`}
-            </span>
-          </div>
-        );
-      })}
+      {EXAMPLES.map((example) => (
+        <div key={example.name} class="column">
+          <Button task={task} onClick={() => void show(example)}>
+            {example.name}
+          </Button>
+          <span class="small quiet">
+            {example.words} {example.scene !== undefined && `Made for the simulated scene ${example.scene}.`}
+          </span>
+        </div>
+      ))}
       <TaskLine task={task} />
     </div>
   );

@@ -40,7 +40,8 @@ function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) 
   const shown = MAP_PRODUCTS.find((each) => each.product === choice.value && obstacleOf(each) === undefined) ?? MAP_PRODUCTS[0];
   const base = store.looks.of(shown.product);
   const [{ b }, way, source] = [store.comparison.maps[shown.product], store.comparison.ways[name], store.comparison.source.value];
-  const now = b.value === null ? "A" : way.value;
+  const blinked = store.comparison.blinked.value ? "B" : "A";
+  const now = b.value === null ? "A" : way.value === "blink" ? blinked : way.value;
   const look = now === "difference" ? store.looks.of(`${shown.product}-difference`) : base;
   const picture = usePicture(now, look, b);
   const canvas = useRef<HTMLCanvasElement>(null);

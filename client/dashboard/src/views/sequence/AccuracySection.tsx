@@ -2,7 +2,6 @@ import { engineering, fixed, numberOf } from "../../scales/format";
 import { useStore } from "../../store/store";
 import type { AppliedDocument, ChoiceDocument, PlanRequest } from "../../stream/documents";
 import { Button, Check, Form, NumberField } from "../../ui/controls";
-import { notJudgedWords } from "../../ui/flags";
 import { useProducts } from "../../ui/hooks";
 import { Obstacle, Steer } from "../../ui/Steer";
 import { type Task, useTask } from "../../ui/useTask";
@@ -29,7 +28,6 @@ export function AccuracySection({ applied }: { applied: AppliedDocument }) {
   const judged = tradeoff !== null && tradeoff.current.meta.sequence_id === applied.sequence_id && !accuracy.outdated.value;
   const truth_m = judged ? (tradeoff.current.range_error_m?.median ?? null) : null;
   const looked = accuracy.looked.value;
-  const unjudged = notJudgedWords(store.rangeErrors.now.value?.not_judged);
   const busy = accuracy.job.value !== null || task.busy.value !== null;
   const look = (choice: ChoiceDocument): void => {
     accuracy.looked.value = choice;
@@ -64,11 +62,6 @@ export function AccuracySection({ applied }: { applied: AppliedDocument }) {
         {looked === null ? <Summary applied={applied} /> : <ChoiceFacts choice={looked} />}
         {looked !== null && <PriceBar choice={looked} />}
         <PlannedMap />
-        {unjudged !== "" && (
-          <p class="small quiet" data-field="not_judged">
-            Of the ranges {unjudged}.
-          </p>
-        )}
         <details class="accuracy-goal">
           <summary>Plan for a target</summary>
           <GoalForm disabled={busy} onGoal={(goal) => void accuracy.plan(goal)} />
