@@ -21,7 +21,7 @@ export function Examples({ onDone }: Done) {
     onDone();
   };
   return (
-    <div class="column spaced">
+    <div class="control column">
       {EXAMPLES.map((example) => (
         <div key={example.name} class="column">
           <Button task={task} onClick={() => void show(example)}>
