@@ -258,7 +258,8 @@ def test_a_shared_link_opens_the_very_frame_for_another_user(
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
     open_page(page)
     page.get_by_role("button", name="Share").click()
-    expect(page.locator(".toast", has_text="The link was copied")).to_be_visible()
+    copied = "async () => (await navigator.clipboard.readText()).includes('recording=')"
+    page.wait_for_function(copied, timeout=60_000)
     context = browser.new_context()
     other = context.new_page()
     other.goto(page.evaluate("() => navigator.clipboard.readText()"))

@@ -6,8 +6,8 @@ import { SwitchedDialog } from "./ui/Dialog";
 import { Help } from "./ui/Help";
 import { shortcuts } from "./ui/shortcuts";
 import { Arrangement } from "./views/Arrangement";
-import { Examples } from "./views/examples/Examples";
 import { FileDrop } from "./views/files/FileDrop";
+import { later } from "./views/later";
 import { Palette } from "./views/palette/Palette";
 import { ReplayBar } from "./views/replay/ReplayBar";
 import { Banner } from "./views/status/Banner";
@@ -15,6 +15,8 @@ import { ControlDialog } from "./views/status/ControlDialog";
 import { LayoutDialog } from "./views/status/LayoutDialog";
 import { StatusBar } from "./views/status/StatusBar";
 import { TokenDialog } from "./views/status/TokenDialog";
+
+const Examples = later(() => import("./views/examples/Examples"));
 
 /** The page: how things stand, what is wrong, and the views. */
 export function App({ onRetry }: { onRetry: () => void }) {

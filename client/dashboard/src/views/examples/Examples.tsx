@@ -1,13 +1,12 @@
 import { useEffect } from "preact/hooks";
 import { useStore } from "../../store/store";
 import { Button } from "../../ui/controls";
-import type { Done } from "../../ui/Dialog";
 import { TaskLine } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
 import { EXAMPLES, type Example } from "./examples";
 
 /** Examples to choose from; on a simulated camera each can have its scene. */
-export function Examples({ onDone }: Done) {
+export function Examples() {
   const store = useStore();
   const { simulation, camera, obstacle, settings } = store;
   const task = useTask();
@@ -18,7 +17,7 @@ export function Examples({ onDone }: Done) {
     if (moves && !(await task.run("Preparing the scene…", () => simulation.set({ scene })))) return;
     [store.alone.value, store.selected.value] = [null, null];
     settings.follow(state);
-    onDone();
+    store.examples.value = false;
   };
   return (
     <div class="control column">
