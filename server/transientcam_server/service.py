@@ -364,21 +364,32 @@ class Service:
         else:
             self._loop.call_soon_threadsafe(self._happened, event)
 
-    async def record(self, options: RecordingOptions, *, history_s: float | None) -> dict[str, Any]:
+    async def record(
+        self, options: RecordingOptions, *, history_s: float | None, frame: int | None = None
+    ) -> dict[str, Any]:
         """Start a recording, with the frames of the last seconds if wanted, and describe it.
 
-        Raises Problem as `Library.start`; ``only-moments`` without images.
+        With ``frame`` it begins with this one of them instead. Raises Problem as `Library.start`;
+        ``only-moments`` without images; ``frame-gone`` and ``unknown-frame``.
         """
         self.require_images("Images are recorded")
-        if not history_s:
+        past = partial(self.history.newest, history_s or 0.0)
+        if frame is not None:
+            kept = self.history.frame(frame)
+            if kept.recipe.applied != self.camera.applied:
+                raise Problem(kinds.FRAME_GONE, f"Frame {frame} is of a sequence that has changed.")
+            past = partial(list, [kept])
+        elif not history_s:
             return await self.recordings.disk.run(self.recordings.start, options)
         # it waits for its past, also where the client is gone
-        return await asyncio.shield(self.workers.start(self._record_past(options, history_s)))
+        return await asyncio.shield(self.workers.start(self._record_past(options, past)))
 
-    async def _record_past(self, options: RecordingOptions, history_s: float) -> dict[str, Any]:
+    async def _record_past(
+        self, options: RecordingOptions, frames: Callable[[], list[Frame]]
+    ) -> dict[str, Any]:
         starting = replace(options, past=True)
         described = await self.recordings.disk.run(self.recordings.start, starting)
-        past = [(each.raw, each.recipe.applied) for each in self.history.newest(history_s)]
+        past = [(each.raw, each.recipe.applied) for each in frames()]
         count = self.recordings.precede(described["id"], past)
         return described | {"history_frames": count}
 

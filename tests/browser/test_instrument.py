@@ -252,6 +252,26 @@ def plane_of(
     return float(singular[2] / np.sqrt(len(found) - 3)), float(tilt)
 
 
+def test_a_shared_link_opens_the_very_frame_for_another_user(
+    page: Page, served: Served, browser: Browser
+) -> None:
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    open_page(page)
+    page.get_by_role("button", name="Share").click()
+    copied = "async () => (await navigator.clipboard.readText()).includes('recording=')"
+    page.wait_for_function(copied, timeout=60_000)
+    context = browser.new_context()
+    other = context.new_page()
+    other.goto(page.evaluate("() => navigator.clipboard.readText()"))
+    other.locator(".replay[data-frame='1']").wait_for()
+    other.locator(".panel-map canvas[data-frame]").wait_for()
+    ranges = "() => JSON.stringify([...transientcam.store.frames.of('range').value.values])"
+    other.wait_for_function(
+        f"([of]) => 'transientcam' in window && ({ranges})() === of", arg=[page.evaluate(ranges)]
+    )
+    context.close()
+
+
 def test_a_copied_link_shows_the_same_page_to_another_user(
     page: Page, served: Served, browser: Browser
 ) -> None:

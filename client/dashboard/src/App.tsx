@@ -8,6 +8,7 @@ import { shortcuts } from "./ui/shortcuts";
 import { Arrangement } from "./views/Arrangement";
 import { CameraDialog } from "./views/camera/CameraDialog";
 import { FileDrop } from "./views/files/FileDrop";
+import { later } from "./views/later";
 import { Palette } from "./views/palette/Palette";
 import { ReplayBar } from "./views/replay/ReplayBar";
 import { Banner } from "./views/status/Banner";
@@ -15,6 +16,8 @@ import { ControlDialog } from "./views/status/ControlDialog";
 import { LayoutDialog } from "./views/status/LayoutDialog";
 import { StatusBar } from "./views/status/StatusBar";
 import { TokenDialog } from "./views/status/TokenDialog";
+
+const Examples = later(() => import("./views/examples/Examples"));
 
 /** The page: how things stand, what is wrong, and the views. */
 export function App({ onRetry }: { onRetry: () => void }) {
@@ -34,6 +37,7 @@ export function App({ onRetry }: { onRetry: () => void }) {
       <Arrangement />
       <ReplayBar />
       <SwitchedDialog open={store.help} title="Keys" inside={Help} />
+      <SwitchedDialog open={store.examples} title="Examples" inside={Examples} />
       <SwitchedDialog open={store.palette} title="All commands" inside={Palette} />
       <SwitchedDialog open={store.asksForLayout} title="Layouts" inside={LayoutDialog} />
       <SwitchedDialog open={store.asksForControl} title="Control" inside={ControlDialog} />

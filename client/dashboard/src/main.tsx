@@ -21,7 +21,9 @@ effect(() => {
   if (store.player.playing.value || store.player.scrubbed.value || store.replay.playing.value) loop.wake();
 });
 document.addEventListener("visibilitychange", () => stream.hid());
-store.player.playing.value = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+store.player.playing.value = !still;
+if (still) store.comparison.blink_hz.value = 0;
 
 store.theme.show(document.documentElement);
 keepAddress(window, store);

@@ -1,9 +1,9 @@
 import { beforeEach, describe, expect, test, vi } from "vitest";
 
 import { Api } from "../../../client/dashboard/src/store/api";
-import { copyLink, keepAddress } from "../../../client/dashboard/src/store/permalink";
+import { copyLink, keepAddress, share } from "../../../client/dashboard/src/store/permalink";
 import { Store } from "../../../client/dashboard/src/store/store";
-import type { AppliedDocument, RecordingDocument } from "../../../client/dashboard/src/stream/documents";
+import type { AppliedDocument, FrameMeta, RecordingDocument } from "../../../client/dashboard/src/stream/documents";
 import { SIDE } from "../../../client/dashboard/src/views/response/sides";
 
 class FakeWindow {
@@ -171,4 +171,25 @@ test.each([
   const { copied: plain } = page();
   expect(await copied()).toBe(await plain());
   expect(opened).not.toHaveBeenCalled();
+});
+
+describe("sharing", () => {
+  test("holds the frame, has the service keep it, and copies a link to it", async () => {
+    const { store, target } = page("#pixel=81,20");
+    const start = vi.spyOn(store.recordings, "start").mockResolvedValue({ id: "kept-1" } as RecordingDocument);
+    store.player.playing.value = true;
+    store.status.newest.value = { frame: 41 } as FrameMeta;
+    await share(target as unknown as Window, store);
+    expect(start).toHaveBeenCalledWith(expect.objectContaining({ frame: 41 }));
+    expect([store.held.value, store.player.playing.value]).toEqual([true, false]);
+    expect(new URL(target.copied.at(-1) ?? "").hash).toMatch(/pixel=81,20.*&recording=kept-1&frame=1$/);
+  });
+
+  test("copies nothing where the service refuses, and says why", async () => {
+    const { store, target } = page();
+    store.status.newest.value = { frame: 41 } as FrameMeta;
+    await share(target as unknown as Window, store); // no service knows it here
+    expect(target.copied).toEqual([]);
+    expect(store.events.all.value.at(-1)).toMatchObject({ words: "Not here", tone: "bad" });
+  });
 });

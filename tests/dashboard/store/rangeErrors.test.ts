@@ -38,8 +38,8 @@ function bench(answer: () => FrameMeta) {
   return { status, replaying, held, requests, errors };
 }
 
-const noise = { error_m: 1e-3, of: "noise", planned_m: 1e-3, trusted_share: null, within_m: null };
-const interval = (error_m: number) => ({ error_m, of: "interval", planned_m: 5e-4, trusted_share: 0.82, within_m: 4e-3 });
+const noise = { error_m: 1e-3, of: "noise", planned_m: 1e-3, trusted_share: null, within_m: null, not_judged: [] };
+const interval = (error_m: number) => ({ error_m, of: "interval", planned_m: 5e-4, trusted_share: 0.82, within_m: 4e-3, not_judged: [] });
 
 describe("the error of the range", () => {
   test("is noise alone until the service was asked, once a sequence has stayed, and again", async () => {
@@ -124,6 +124,10 @@ test("a picture's ranges are stated as shares of it", () => {
     "82 % ± 4.0 mm",
     "82 % of the picture ± 4.0 mm (90 % intervals), 18 % not trusted",
   ]);
+  // pixels that nothing known would distrust count as trusted: the share is at most that
+  const [short, long] = words({ ...interval(5e-3), of: "interval", not_judged: ["no_direct_light"] });
+  expect(short).toBe("≤ 82 % ± 4.0 mm");
+  expect(long).toMatch(/^≤ 82 % .*; not judged: no direct light \(needs the beam of the light, .*calibrate URL --beam/);
   expect(words({ error_m: 1e-3, of: "noise", planned_m: 1e-3, trusted_share: 0.5, within_m: null })[0]).toBe("50 % trusted");
   expect(words({ ...noise, of: "noise" })[0]).toBe("± 1.0 mm noise");
 });

@@ -31,6 +31,11 @@ describe("commands", () => {
     expect(store.alone.value).toBeNull();
   });
 
+  const words = "help distance roi histogram screenshot export compare exposure colormap 3d fullscreen series share".split(" ");
+  test.each(words)("are found by the plain word %s", (word) => {
+    expect(matching(commandsOf(new Store({ shelf: null })), word)).not.toEqual([]);
+  });
+
   test("have words of their own each, and a key where a key does the same", () => {
     const commands = commandsOf(new Store({ shelf: null }));
     expect(new Set(commands.map(({ words }) => words)).size).toBe(commands.length);

@@ -4,7 +4,7 @@ import { multiplesWords } from "../../../client/dashboard/src/store/events";
 import { EVERYTHING } from "../../../client/dashboard/src/stream/demand";
 import type { FrameMeta } from "../../../client/dashboard/src/stream/documents";
 import { measuredOf, sequenceProblem } from "../../../client/dashboard/src/views/sequence/words";
-import { demandWords, exposureAdvice } from "../../../client/dashboard/src/views/status/words";
+import { demandWords, exposureAdvice, lowerFrequency_hz } from "../../../client/dashboard/src/views/status/words";
 
 const plain = (text: string): string => text.replaceAll("\u202f", " ");
 
@@ -61,4 +61,12 @@ test("multiples of a camera's own are shown as these", () => {
     value: "2, 10, 15",
   });
   expect(multiplesWords(3, { multiples: [2, 10, 15], phases_rad: [], max_range_m: null })).toBe("multiples 2, 10, 15");
+});
+
+test("a lower base frequency is offered where ranges lie at an end of what is unambiguous, as far as the camera goes", () => {
+  const applied = { base_frequency_hz: 23e6, unambiguous_range_m: 6.52 };
+  const offered = (low: number, high: number, min_frequency_hz = 5e5): number | null =>
+    lowerFrequency_hz({ low, high, kind: "linear" } as never, applied, { min_frequency_hz });
+  expect([offered(1.6, 3), offered(0.1, 3), offered(1.6, 6.4)]).toEqual([null, 11.5e6, 11.5e6]);
+  expect([offered(0.1, 3, 12e6), lowerFrequency_hz(null, applied, {})]).toEqual([null, null]);
 });

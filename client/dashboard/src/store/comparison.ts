@@ -14,7 +14,9 @@ import { oneOf, type Settings } from "./settings";
 export type Source = Readonly<{ of: string; frame: number | null }>;
 
 /** What a map panel shows of two frames. */
-export const WAYS = ["A", "B", "difference", "wipe"] as const;
+export const WAYS = ["A", "B", "difference", "wipe", "blink"] as const;
+/** Changes a second that can be chosen for blinking: none is by key alone; three flashes a second are the most that is safe. */
+export const BLINKS_HZ = [0, 0.5, 1, 2, 4] as const;
 export type Way = (typeof WAYS)[number];
 
 /** What says which differences of ranges mean something. */
@@ -28,6 +30,9 @@ export class Comparison {
   readonly source: Signal<Source | null>;
   /** What the map panels show, by their views. */
   readonly ways: Readonly<Record<string, Signal<Way>>>;
+  /** Whether blinking shows B at this moment, and how often a second it changes. */
+  readonly blinked = signal(false);
+  readonly blink_hz = signal<(typeof BLINKS_HZ)[number]>(2);
   /** Names of the frames that this browser keeps. */
   readonly kept = signal<readonly string[]>([]);
   /** Why B cannot be had; null if it can. */
@@ -96,6 +101,10 @@ export class Comparison {
     await stored(() => set(name, frames));
     this.source.value = { of: name, frame: null };
     this.recompute(); // another frame may have had the name
+  }
+
+  blink(): void {
+    this.blinked.value = !this.blinked.peek();
   }
 
   /** Reads which frames are kept, without one that is to be removed. Raises RequestError. */

@@ -96,7 +96,7 @@ export const END_REASONS: Readonly<Record<string, string | undefined>> = {
 
 /** Images that did not arrive, as a sentence. */
 export function lossWords(count: number): string {
-  return `${grouped(count)} ${count === 1 ? "image" : "images"} did not arrive intact from the camera: its connection, or the service's machine, was too busy.`;
+  return `${grouped(count)} ${count === 1 ? "image" : "images"} did not arrive intact from the camera: its connection, or the service's machine, was too busy. Another port, or a longer exposure with fewer images a second, helps.`;
 }
 
 /** Why the camera was lost, without saying once more that it was. */

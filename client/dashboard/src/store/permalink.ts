@@ -6,12 +6,26 @@ import type { LinkPart } from "./settings";
 import type { Store } from "./store";
 import { until } from "./until";
 
+/** Holds what is shown, keeps its frame at the service and copies a link that opens that very frame. */
+export async function share(target: Window, store: Store): Promise<void> {
+  const frame = store.status.newest.peek()?.frame;
+  if (store.replay.active.peek() || frame === undefined) return copyLink(target, store);
+  [store.held.value, store.player.playing.value] = [true, false];
+  await store.events.reported(async () => {
+    const { id } = await store.recordings.start({ frame, name: `Shared frame ${frame}` });
+    await copyLink(target, store, `recording=${id}&frame=1`);
+  });
+}
+
 /** Puts the whole address of what is shown on the clipboard, and says so; shows it to be copied by hand where the browser refuses. */
-export async function copyLink(target: Window, store: Store): Promise<void> {
-  const { href } = Object.assign(new URL(target.location.href), { hash: store.settings.hash(true) });
+export async function copyLink(target: Window, store: Store, kept = ""): Promise<void> {
+  const hash = [...store.settings.hash(true).slice(1).split("&"), kept].filter(Boolean).join("&");
+  const { href } = Object.assign(new URL(target.location.href), { hash });
+  const what =
+    kept === "" ? "this layout, pixel and time" : "this very frame to all who reach the service, and this layout, pixel and time";
   try {
     await target.navigator.clipboard.writeText(href);
-    store.events.tell("The link was copied: it shows this layout, pixel and time, with pins, zoom and colours.", "good");
+    store.events.tell(`The link was copied: it shows ${what}, with pins, zoom and colours.`, "good");
   } catch {
     // Refused, or not over https.
     store.status.unreadable.value = `The link to what is shown: ${href}`;

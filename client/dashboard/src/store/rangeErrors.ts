@@ -19,6 +19,8 @@ export interface RangeErrorFigure {
   readonly trusted_share: number | null;
   /** Half of the interval that 9 of 10 trusted pixels have, or less. */
   readonly within_m: number | null;
+  /** Reasons for distrust, by name, that nothing known would tell: `trusted_share` counts their pixels. */
+  readonly not_judged?: readonly string[];
 }
 
 /** Noise and bias of a frame's median pixel together, as plans state them: half of an interval is more. Null if unknown. */
@@ -76,7 +78,11 @@ export class RangeErrors {
     this.now = computed(() => {
       const meta = status.newest.value;
       const accuracy = this.of(PRODUCTS[0]).value?.meta.accuracy ?? meta?.accuracy;
-      const share = { trusted_share: accuracy?.trusted_share ?? null, within_m: accuracy?.within_m ?? null };
+      const share = {
+        trusted_share: accuracy?.trusted_share ?? null,
+        within_m: accuracy?.within_m ?? null,
+        not_judged: accuracy?.not_judged ?? [],
+      };
       const planned_m = plannedError_m(accuracy ?? null) ?? NaN;
       if (accuracy?.range_error_m != null) return { error_m: accuracy.range_error_m, of: "interval", planned_m, ...share };
       const noise_m = accuracy?.range_std_m ?? meta?.predicted_range_std_m?.median;

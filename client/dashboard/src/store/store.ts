@@ -102,6 +102,8 @@ export class Store extends Ground {
   readonly pointed = signal<Pixel | null>(null);
   /** Whether the list of keys is open. */
   readonly help = signal(false);
+  /** Whether the examples are shown. */
+  readonly examples = signal(false);
   /** Whether it is asked who controls the camera. */
   readonly asksForControl = signal(false);
   /** Whether a token is asked for. */

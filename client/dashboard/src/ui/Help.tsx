@@ -10,6 +10,7 @@ const TOGETHER: readonly (readonly [keys: string, words: string])[] = [
   ["`Shift` + click, `Enter`", "in a picture: pin a pixel as A, B or C"],
   ["`Shift` + drag, `R`", "in a picture: measure a rectangle; Escape removes it and the pins"],
   ["`Ctrl` + click, `C`", "in a picture: set or remove a corner of a polygon, and measure it"],
+  ["two fingers, one that stays", "in a picture: zoom and move all pictures; pin the pixel"],
   ["arrows, + −", "in the points: turn, come nearer, go"],
 ];
 

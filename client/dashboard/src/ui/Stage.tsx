@@ -25,6 +25,8 @@ const CLICK_PX = 4;
 /** One notch of a wheel, 100 units, and one press of a key. */
 const ZOOM_PER_UNIT = 1.002;
 const KEY_ZOOM = 1.25;
+/** How long a finger stays to pin. */
+const STAYS_S = 0.5;
 
 interface Drag {
   readonly kind: "pan" | "region" | "corner";
@@ -38,7 +40,7 @@ interface Drag {
  *
  * Pointing at it sets the pointed pixel, a click or tap selects one, for all views alike; the wheel zooms, dragging
  * moves what is zoomed, a double click shows it whole again. With Shift a click pins a pixel and dragging marks a
- * region; with Ctrl or Cmd a click sets a corner of a region. With the stage focused, Shift and the arrow keys move the
+ * region; with Ctrl or Cmd a click sets a corner of a region. Two fingers zoom and move, one that stays pins a pixel. With the stage focused, Shift and the arrow keys move the
  * selected pixel, + and − zoom, Enter pins it, R marks a region around it, C sets a corner there and Escape takes
  * regions and pins away.
  */
@@ -48,6 +50,9 @@ export function Stage({ label, frame, children }: StageProps) {
   const { viewport, measures } = store;
   const picture = useRef<HTMLDivElement>(null);
   const drag = useRef<Drag | null>(null);
+  /** Where fingers touch the picture, and what happens when one stays. */
+  const fingers = useRef(new Map<number, PointerEvent>());
+  const stays = useRef<ReturnType<typeof setTimeout>>(undefined);
 
   const shareAt = (event: MouseEvent): Point => {
     const box = (picture.current as HTMLElement).getBoundingClientRect();
@@ -72,6 +77,18 @@ export function Stage({ label, frame, children }: StageProps) {
 
   const onPointerDown = (event: PointerEvent): void => {
     if (event.button !== 0) return;
+    clearTimeout(stays.current);
+    if (event.pointerType === "touch") {
+      fingers.current.set(event.pointerId, event);
+      if (fingers.current.size > 1) {
+        drag.current = null;
+        return;
+      }
+      stays.current = setTimeout(() => {
+        measures.pin(pixelAt(event));
+        drag.current = null;
+      }, 1000 * STAYS_S);
+    }
     drag.current = {
       kind: event.shiftKey ? "region" : event.ctrlKey || event.metaKey ? "corner" : "pan",
       from: pixelAt(event),
@@ -84,11 +101,24 @@ export function Stage({ label, frame, children }: StageProps) {
     moveDrag(event);
     store.pointed.value = pixelAt(event); // after the picture was moved under the pointer
   };
+  /** Two fingers: the picture follows their middle, and grows as they part. */
+  const pinch = (event: PointerEvent): void => {
+    const [[from, before], [to, after]] = [0, 1].map((step) => {
+      if (step === 1) fingers.current.set(event.pointerId, event);
+      const [a, b] = [...fingers.current.values()];
+      const [one, other] = [a, b].map(shareAt);
+      return [{ x: (one.x + other.x) / 2, y: (one.y + other.y) / 2 }, Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY)] as const;
+    });
+    viewport.zoomAt(from, after / before);
+    viewport.pan({ x: to.x - from.x, y: to.y - from.y });
+  };
   const moveDrag = (event: PointerEvent): void => {
+    if (fingers.current.size === 2 && fingers.current.has(event.pointerId)) pinch(event);
     const now = drag.current;
     if (now === null) return;
     now.moved ||= Math.hypot(event.clientX - now.last.clientX, event.clientY - now.last.clientY) > CLICK_PX;
     if (!now.moved) return;
+    clearTimeout(stays.current);
     if (now.kind === "region") {
       measures.region.value = regionOf(now.from, pixelAt(event));
     } else if (now.kind === "pan") {
@@ -97,9 +127,14 @@ export function Stage({ label, frame, children }: StageProps) {
       now.last = event;
     }
   };
+  const release = (event: PointerEvent): void => {
+    clearTimeout(stays.current);
+    fingers.current.delete(event.pointerId);
+    drag.current = null;
+  };
   const onPointerUp = (event: PointerEvent): void => {
     const ended = drag.current;
-    drag.current = null;
+    release(event);
     if (ended === null || ended.moved) return;
     if (ended.kind === "region") measures.pin(pixelAt(event));
     else if (ended.kind === "corner") measures.corner(pixelAt(event));
@@ -143,7 +178,8 @@ export function Stage({ label, frame, children }: StageProps) {
         onPointerLeave={() => (store.pointed.value = null)}
         onPointerDown={onPointerDown}
         onPointerUp={onPointerUp}
-        onPointerCancel={() => (drag.current = null)}
+        onPointerCancel={release}
+        onContextMenu={(event) => fingers.current.size > 0 && event.preventDefault()}
         onDblClick={() => viewport.reset()}
         onKeyDown={onKeyDown}
       >

@@ -13,6 +13,18 @@ export function save(name: string, content: Blob): void {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
+/** Hands a table out, comma-separated: names with their units first, and nothing where there is no value. */
+export function saveTable(name: string, rows: readonly (readonly (string | number | null | undefined)[])[]): void {
+  const cell = (value: string | number | null | undefined): string => (value == null || Number.isNaN(value) ? "" : String(value));
+  save(
+    `${name}.csv`,
+    new Blob(
+      rows.map((row) => `${row.map(cell).join(",")}\n`),
+      { type: "text/csv" },
+    ),
+  );
+}
+
 /**
  * Hands a file of the service to the browser's downloads, under the name that the service gives it, else under `name`.
  *

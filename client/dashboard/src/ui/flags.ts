@@ -61,6 +61,21 @@ export const DISTRUST: readonly Flag[] = [
   { bit: 10, name: "noise", title: "Noise", words: "the noise leaves the range open", colour: "#a0522d" },
 ];
 
+/** What has to be known for a reason to be judged, where that may be missing. */
+export const NEEDS: Readonly<Record<string, string>> = {
+  no_direct_light: "the beam of the light, which “transientcam calibrate URL --beam” measures before a white wall",
+  shadow: "the place of the light beside the lens, in the settings “lens”",
+  motion: "the images of the frame",
+  drift: "a calibration that was measured, with its temperature",
+};
+
+/** What could not be judged of a frame, and what would let it be, in words; "" where all was. */
+export function notJudgedWords(names: readonly string[] = []): string {
+  const missing = DISTRUST.filter(({ name }) => names.includes(name));
+  const words = missing.map(({ name, title }) => `${title.toLowerCase()} (needs ${NEEDS[name]})`).join(", ");
+  return words && `not judged: ${words}`;
+}
+
 /** The gravest flag of a pixel; null where nothing was wrong. */
 export function gravest(bits: number): Flag | null {
   return FLAGS.find(({ bit }) => (bits & bit) !== 0) ?? null;

@@ -72,6 +72,7 @@ export const SHORTCUTS: readonly Shortcut[] = [
     words: "show the panel under the pointer alone, or all again",
     run: ({ alone }) => (alone.value = alone.peek() === null ? panelNow() : null),
   },
+  { keys: ["v"], shown: "V", words: "blink: the other of the compared frames", run: ({ comparison }) => comparison.blink() },
   { keys: ["l"], shown: "L", words: "the next layout", run: (store) => nextLayout(store) },
   { keys: ["z"], shown: "Z", words: "undo the last change of the layout", withControl: true, run: ({ layouts }) => layouts.undo() },
   { keys: ["k"], shown: "K", words: "all commands, to be searched", withControl: true, run: ({ palette }) => (palette.value = true) },

@@ -1,9 +1,9 @@
 import { signal } from "@preact/signals";
-import type { ComponentType } from "preact";
+import type { ComponentType, FunctionComponent } from "preact";
 import { useEffect } from "preact/hooks";
 
 /** The view of a module, its one export, which is loaded when it is first shown: the first picture does not wait for it. */
-export function later(load: () => Promise<Readonly<Record<string, ComponentType>>>): ComponentType {
+export function later(load: () => Promise<Readonly<Record<string, ComponentType>>>): FunctionComponent {
   const loaded = signal<ComponentType | null>(null);
   const Trouble = () => <p class="absent">This part of the page could not be loaded: load the page anew.</p>;
   return () => {

@@ -149,6 +149,8 @@ class RecordingRequest(
     history_s: float | None = Field(default=None, ge=0, le=3600, allow_inf_nan=False)
     """Begin with the frames of so many seconds before, as far as `GET /frames` has them; 0 is
     without."""
+    frame: int | None = Field(default=None, ge=1)
+    """Only this one of the frames that `GET /frames` has; it is frame 1 of the recording."""
     annotations: dict[str, Any] = Field(default_factory=dict)
     """Anything worth keeping with it, at most 16 KiB as JSON."""
 

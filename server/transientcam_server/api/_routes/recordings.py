@@ -75,6 +75,8 @@ async def read_recordings(
         kinds.ONLY_MOMENTS,
         kinds.RECORDING_NOT_STORED,
         kinds.DISK_STALLED,
+        kinds.FRAME_GONE,
+        kinds.UNKNOWN_FRAME,
     ),
 )
 @needs(Role.OPERATOR, lease=False)  # it does not disturb the client that controls the camera
@@ -82,12 +84,14 @@ async def start_recording(service: ServiceOf, wanted: RecordingRequest) -> Recor
     """Record every frame from now on, raw, until it is stopped or a limit is reached.
 
     With `history_s` it begins with the frames of the last seconds, as far as they are kept and of
-    the same sequence. One recording runs at a time. A change of the sequence ends it.
+    the same sequence; with `frame` it is one of these alone. One recording runs at a time. A change
+    of the sequence ends it.
     """
     service.acquisition.require_free()  # what a calibration captures is not recorded
-    limits = Limits(duration_s=wanted.duration_s, size_bytes=wanted.max_bytes, frames=wanted.frames)
+    count = wanted.frames if wanted.frame is None else 1
+    limits = Limits(duration_s=wanted.duration_s, size_bytes=wanted.max_bytes, frames=count)
     order = RecordingOptions(name=wanted.name, limits=limits, annotations=wanted.annotations)
-    return document(await service.record(order, history_s=wanted.history_s))
+    return document(await service.record(order, history_s=wanted.history_s, frame=wanted.frame))
 
 
 @router.get(

@@ -135,6 +135,25 @@ def test_only_as_much_of_the_past_is_saved_as_was_asked_for(http: httpx.Client) 
     assert document["frames"] == started["history_frames"]
 
 
+def test_one_frame_of_the_last_seconds_is_recorded_alone(http: httpx.Client) -> None:
+    http.get("/api/v1/frames/6", params={"wait_s": 10.0})
+    wanted = http.get("/api/v1/frames/4/range.npy").content
+
+    identity = http.post(RECORDINGS, json={"frame": 4, "name": "shared"}).json()["id"]
+    document = finished(http, identity)
+
+    assert (document["frames"], document["reason"]) == (1, "frames")
+    assert http.get(f"{RECORDINGS}/{identity}/frames/1/range.npy").content == wanted
+
+    harmonics = http.get("/api/v1/sequence").json()["harmonics"]
+    http.put("/api/v1/sequence", json={"harmonics": harmonics - 1}).raise_for_status()
+    # a recording is of one sequence, which is the camera's
+    for number, why in ((1_000_000, "unknown-frame"), (4, "frame-gone")):
+        refused = http.post(RECORDINGS, json={"frame": number})
+        assert refused.json()["type"] == f"/problems/{why}"
+    assert http.get(RECORDINGS).json()["active"] is None
+
+
 def test_no_past_is_a_past_of_no_seconds(http: httpx.Client) -> None:
     http.get("/api/v1/frames/3", params={"wait_s": 10.0})
 

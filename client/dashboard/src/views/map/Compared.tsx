@@ -1,17 +1,17 @@
 import { type Signal, useSignal } from "@preact/signals";
-import { useRef } from "preact/hooks";
+import { useEffect, useRef } from "preact/hooks";
 
 import { deviation, engineering, fixed } from "../../scales/format";
-import { beyondShare, differing, type Source, WAYS, type Way } from "../../store/comparison";
+import { BLINKS_HZ, beyondShare, differing, type Source, WAYS, type Way } from "../../store/comparison";
 import type { Look } from "../../store/looks";
 import { type Store, useStore } from "../../store/store";
-import { Button, Form, Remove, Tabs, TextField } from "../../ui/controls";
+import { Button, Choice, Form, Remove, Tabs, TextField } from "../../ui/controls";
 import { PopoverButton } from "../../ui/PopoverButton";
 import { useTask } from "../../ui/useTask";
 import { clock, duration } from "../replay/words";
 import { valueAtPixel } from "./Readout";
 
-const WORDS: Readonly<Record<Way, string>> = { A: "A", B: "B", difference: "A − B", wipe: "Wipe" };
+const WORDS: Readonly<Record<Way, string>> = { A: "A", B: "B", difference: "A − B", wipe: "Wipe", blink: "Blink" };
 
 /** What B is, in words. */
 export function sourceWords({ comparison, recordings }: Store): string {
@@ -74,6 +74,12 @@ export function Compared({ source, look, way }: { source: Source; look: Look; wa
   const store = useStore();
   const { comparison, recordings } = store;
   const { product, unit, decimals } = look.product;
+  const blink_hz = way.value !== "blink" ? 0 : comparison.blink_hz.value;
+  useEffect(() => {
+    if (blink_hz === 0) return undefined;
+    const timer = setInterval(() => comparison.blink(), 1000 / blink_hz);
+    return () => clearInterval(timer);
+  }, [comparison, blink_hz]);
   const compared = comparison.of(product);
   const [a, b, apart] = [look.frame.value, compared.b.value, compared.difference.value];
   const pixel = store.pointed.value ?? store.selected.value;
@@ -92,6 +98,15 @@ export function Compared({ source, look, way }: { source: Source; look: Look; wa
           options={WAYS.map((value) => ({ value, text: WORDS[value] }))}
           onChange={(chosen) => (way.value = chosen)}
         />
+        {way.value === "blink" && (
+          <Choice
+            bare
+            label="Changes a second"
+            chosen={comparison.blink_hz}
+            of={BLINKS_HZ}
+            text={(hz) => (hz === 0 ? "by key V" : `${hz} Hz`)}
+          />
+        )}
         <Remove what="Compare no longer" onClick={() => (comparison.source.value = null)} />
       </div>
       <div class="row">

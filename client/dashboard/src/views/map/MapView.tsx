@@ -41,7 +41,8 @@ function MapPanel({ name, choice }: { name: ViewName; choice: Signal<string> }) 
   const shown = maps.find((each) => each.product === choice.value && obstacleOf(each) === undefined) ?? maps[0];
   const base = store.looks.of(shown.product);
   const [{ b }, way, source] = [store.comparison.of(shown.product), store.comparison.ways[name], store.comparison.source.value];
-  const now = b.value === null ? "A" : way.value;
+  const blinked = store.comparison.blinked.value ? "B" : "A";
+  const now = b.value === null ? "A" : way.value === "blink" ? blinked : way.value;
   const look = now === "difference" ? store.looks.of(`${shown.product}-difference`) : base;
   const picture = usePicture(now, look, b);
   const canvas = useRef<HTMLCanvasElement>(null);

@@ -23,7 +23,7 @@ const ALSO: Readonly<Partial<Record<ViewName, string>>> = {
   map: "distance depth histogram roi region measure",
   plots: "profile roi region time chart",
   points: "3d cloud distance measure",
-  sequence: "exposure frequency plan",
+  sequence: "exposure frequency plan series",
   validity: "mask invalid flags trust",
   series: "compare noise bias accuracy frames csv",
   recordings: "export download hdf5",

@@ -4,7 +4,7 @@ import type uPlot from "uplot";
 import { oneOf, type Setting } from "../../store/settings";
 import { type Store, useStore } from "../../store/store";
 import { Tabs } from "../../ui/controls";
-import { save } from "../../ui/download";
+import { savePicture, saveTable } from "../../ui/download";
 import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { History, KEPT_S } from "./history";
@@ -31,15 +31,15 @@ export function PlotsView() {
   const store = useStore();
   const side = store.settings.of(SIDE);
   const look = store.looks.of(store.mapProduct.value);
-  const { product, name } = look.product;
+  const { product, name, unit } = look.product;
   useProducts([product]);
   const key = `${product} ${side.value}`;
   const data = useMemo(() => signal<uPlot.AlignedData>([[]]), [key]);
   const csv = (): void => {
     const [along, ...lines] = data.peek();
-    const head = [side.peek() === "time" ? "time_s" : "distance_px", ...lines.map((_, n) => `value_${n + 1}`)];
-    const rows = [head, ...[...along].map((at, n) => [at, ...lines.map((line) => line[n] ?? "")])];
-    save(`${product}-${side.peek()}.csv`, new Blob([rows.map((row) => `${row.join(",")}\n`).join("")], { type: "text/csv" }));
+    const names = side.peek() === "time" ? placesOf(store).map((place) => place.name.replace(", ", "_")) : [name];
+    const head = [side.peek() === "time" ? "time_s" : "distance_px", ...names.map((each) => `${product}_${each}_${unit}`.toLowerCase())];
+    saveTable(`${product}-${side.peek()}`, [head, ...[...along].map((at, n) => [at, ...lines.map((line) => line[n])])]);
   };
   return (
     <Panel
@@ -50,7 +50,10 @@ export function PlotsView() {
         </h2>
       }
       tools={<Tabs label="What of the values" value={side.value} options={SIDES} onChange={(value) => (side.value = value)} />}
-      downloads={[{ text: "Values (CSV)", run: csv }]}
+      downloads={[
+        { text: "Picture (PNG)", run: () => savePicture(`${product}-${side.peek()}`, document.querySelector(".line-chart canvas")) },
+        { text: "Values (CSV)", run: csv },
+      ]}
     >
       <div class="plots column grow spaced">
         {side.value === "time" ? <OverTime key={key} look={look} data={data} /> : <AlongLine key={key} look={look} data={data} />}

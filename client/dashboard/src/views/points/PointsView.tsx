@@ -31,7 +31,7 @@ const NAMES: Record<Exclude<Colouring, "light">, string> = { range: "range", val
 /** What the colours are made of, besides the range and the light. */
 const NEEDED: Record<Colouring, readonly string[]> = { range: [], light: [], validity: ["flags"], flight: ["coefficients"] };
 
-const COLOURING: Setting<Colouring> = { key: "points.colouring", initial: "range", ...oneOf(COLOURINGS) };
+const COLOURING: Setting<Colouring> = { key: "points.colouring", link: "points", initial: "range", ...oneOf(COLOURINGS) };
 const SIZE_PX: Setting<number> = { key: "points.size", initial: 2, ...aNumber() };
 const SHADED: Setting<boolean> = { key: "points.shaded", initial: true, ...aBoolean() };
 const SURROUNDED: Setting<boolean> = { key: "points.surrounded", initial: true, ...aBoolean() };

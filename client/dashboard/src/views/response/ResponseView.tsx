@@ -11,7 +11,7 @@ import type { Lit } from "../../store/player";
 import { aBoolean, type Setting } from "../../store/settings";
 import { type Store, useStore } from "../../store/store";
 import { Tabs, Toggle } from "../../ui/controls";
-import { save } from "../../ui/download";
+import { save, savePicture } from "../../ui/download";
 import { FirstFrame } from "../../ui/FirstFrame";
 import { useComputedOf, useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
@@ -73,10 +73,12 @@ export function ResponseView() {
     const name = `pixel-${now.pixel.x}-${now.pixel.y}-${aspect}-${looked.peek()?.meta.frame ?? 0}.csv`;
     save(name, new Blob([csvOf(drawnOf(aspect, now, store.measures.pins.peek(), truth))], { type: "text/csv" }));
   };
+  const files = ASPECTS.map(({ value, text }) => ({ text: `${text} (CSV)`, run: download(value) }));
+  files.push({ text: "Picture (PNG)", run: () => savePicture(`pixel-${place.peek()}`, document.querySelector(".response-plot canvas")) });
   return (
     <Panel
       name="response"
-      downloads={shown.value === null ? [] : ASPECTS.map(({ value, text }) => ({ text: `${text} (CSV)`, run: download(value) }))}
+      downloads={shown.value === null ? [] : files}
       title={
         <h2>
           Impulse response <span class="quiet">{place.value === null ? "" : `of pixel ${place.value}`}</span>

@@ -1,6 +1,8 @@
 import { useSignal } from "@preact/signals";
+import type { Accuracy } from "../../store/accuracy";
 import { useStore } from "../../store/store";
 import { Button } from "../../ui/controls";
+import { saveTable } from "../../ui/download";
 import { Panel } from "../../ui/Panel";
 import { Steer } from "../../ui/Steer";
 import { AccuracySection } from "./AccuracySection";
@@ -15,6 +17,7 @@ export function SequenceView() {
     <Panel
       name="sequence"
       title={<h2>Sequence and accuracy</h2>}
+      downloads={accuracy.tradeoff.value === null ? [] : [{ text: "Front (CSV)", run: () => saveTable("front", frontTable(accuracy)) }]}
       tools={
         applied !== null &&
         !editing.value && (
@@ -47,4 +50,14 @@ export function SequenceView() {
       )}
     </Panel>
   );
+}
+
+/** The front that was predicted, a row a sequence. */
+function frontTable({ tradeoff }: Accuracy) {
+  const names = ["capture_s", "range_error_median_m", "range_error_low_m", "range_error_high_m", "harmonics", "exposure_s", "takes"];
+  const rows = (tradeoff.peek()?.front ?? []).map(({ capture_s, predicted: { range_error_m }, sequence }) => {
+    const { median, low, high } = range_error_m;
+    return [capture_s, median, low, high, sequence.harmonics, sequence.exposure_s, sequence.takes];
+  });
+  return [names, ...rows];
 }

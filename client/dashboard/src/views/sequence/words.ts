@@ -3,6 +3,7 @@ import { plainWords } from "../../store/api";
 import type { RangeErrorFigure } from "../../store/rangeErrors";
 import type { SequenceDocument } from "../../stream/documents";
 import type { Problem, TakeOrder, Zeroth } from "../../stream/protocol";
+import { notJudgedWords } from "../../ui/flags";
 
 /** Names of the fields as the form has them. */
 export const FIELD_NAMES: Readonly<Record<string, string>> = {
@@ -83,7 +84,12 @@ export function shareWords(error: RangeErrorFigure | null): { readonly short: st
     return { short, long: `the error of the range in the median pixel is ${errorWords(error)}` };
   }
   const [trusted, rest] = [error.trusted_share, 1 - error.trusted_share].map((share) => fixed(100 * share, 0, "%"));
-  return { short: `${trusted} ${within}`, long: `${trusted} of the picture ${within} (90 % intervals), ${rest} not trusted` };
+  const unjudged = notJudgedWords(error.not_judged);
+  const most = unjudged === "" ? "" : "≤\u202f";
+  return {
+    short: `${most}${trusted} ${within}`,
+    long: [`${most}${trusted} of the picture ${within} (90 % intervals), ${rest} not trusted`, unjudged].filter(Boolean).join("; "),
+  };
 }
 
 /** Goals as the service names them, as the form does, with their values. */

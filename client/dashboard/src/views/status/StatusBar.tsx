@@ -10,7 +10,7 @@ import { useTask } from "../../ui/useTask";
 import { shareWords } from "../sequence/words";
 import { Figures } from "./Figures";
 import { Steering } from "./Steering";
-import { demandWords, exposureAdvice } from "./words";
+import { demandWords, exposureAdvice, lowerFrequency_hz } from "./words";
 import "./StatusBar.css";
 import type { Happening } from "../../store/events";
 
@@ -26,7 +26,7 @@ export function StatusBar() {
       <NoWatchdog />
       <LessAsked />
       <Preparing />
-      <Exposure />
+      <Fault />
       <Performance />
       <Subject />
       <Figures />
@@ -107,25 +107,43 @@ function Preparing() {
   );
 }
 
-/** That the picture is too bright or too dark to be measured, and a click that sets another exposure. */
-function Exposure() {
-  const { status, sequence, sequencing, camera, replay } = useStore();
+/** Share of all pixels that are too far from their calibration from which on something is done about it. */
+const DRIFTED = 0.1;
+
+/** What spoils all ranges, the gravest alone, and a click that mends it. */
+function Fault() {
+  const { status, sequence, sequencing, camera, replay, rangeErrors, frames, alone } = useStore();
   const task = useTask();
   const [applied, shown] = [sequence.value, status.newest.value];
-  const advice = exposureAdvice(shown, camera.value?.capabilities ?? {});
-  if (advice === null || applied === null || replay.active.value) return null;
-  const { word, long, exposure_s } = advice;
-  // What was changed already shows with the frames to come.
-  if (exposure_s === null || applied.exposure_s !== shown?.exposure_s) return <Sign field="exposure" short={word} long={long} />;
-  const set = (): Promise<boolean> => task.run("Applying…", () => sequencing.set({ ...applied, exposure_s }));
-  return (
-    <span data-field="exposure">
-      <Steer title={task.refusal.value ?? long} task={task} onClick={() => void set()}>
+  if (applied === null || shown === null || replay.active.value) return null;
+  const capabilities = camera.value?.capabilities ?? {};
+  const mend = (field: string, word: string, remedy: string, long: string, work: () => Promise<unknown>) => (
+    <span data-field={field}>
+      <Steer title={task.refusal.value ?? long} task={task} onClick={() => void task.run("Applying…", work)}>
         {word}
-        <span class="wide">: exposure {engineering(exposure_s, "s", 2)}</span>
+        <span class="wide">: {remedy}</span>
       </Steer>
     </span>
   );
+  const advice = exposureAdvice(shown, capabilities);
+  // What was changed already shows with the frames to come.
+  const changed = applied.exposure_s !== shown.exposure_s || applied.base_frequency_hz !== shown.base_frequency_hz;
+  if (advice !== null) {
+    const { word, long, exposure_s } = advice;
+    if (exposure_s === null || changed) return <Sign field="exposure" short={word} long={long} />;
+    const set = () => sequencing.set({ ...applied, exposure_s });
+    return mend("exposure", word, `exposure ${engineering(exposure_s, "s", 2)}`, long, set);
+  }
+  const trust = rangeErrors.of("range_error").value?.meta.accuracy?.trust;
+  if (trust != null && trust.drift > DRIFTED * Object.values(trust).reduce((sum, count) => sum + count)) {
+    const long = "The camera is much warmer or colder than at its calibration: shows how to calibrate it";
+    return mend("drift", "Drifted", "calibrate", long, async () => void (alone.value = "calibration"));
+  }
+  const base_frequency_hz = changed ? null : lowerFrequency_hz(frames.of("range").value?.map ?? null, applied, capabilities);
+  if (base_frequency_hz === null) return null;
+  const [end, frequency] = [fixed(applied.unambiguous_range_m, 1, "m"), engineering(base_frequency_hz, "Hz", 3)];
+  const long = `Ranges lie at the ends of the unambiguous ${end}: what is farther seems near. Sets the base frequency to ${frequency}`;
+  return mend("ambiguous", "Out of range?", frequency, long, () => sequencing.set({ ...applied, base_frequency_hz }));
 }
 
 /** A sign in the header, and what it means. */

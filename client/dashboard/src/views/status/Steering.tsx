@@ -1,10 +1,11 @@
 import { fixed } from "../../scales/format";
 import { captureOne } from "../../store/capture";
+import { share } from "../../store/permalink";
 import { useStore } from "../../store/store";
 import { ActionMenu } from "../../ui/ActionMenu";
 import { Button, Toggle } from "../../ui/controls";
 import { useNow } from "../../ui/hooks";
-import { ControlIcon, HoldIcon, PauseIcon, PlayIcon, SingleIcon } from "../../ui/icons";
+import { ControlIcon, HoldIcon, PauseIcon, PlayIcon, ShareIcon, SingleIcon } from "../../ui/icons";
 import { Steer } from "../../ui/Steer";
 import { useTask } from "../../ui/useTask";
 import { pageActions } from "./pageActions";
@@ -23,6 +24,9 @@ export function Steering() {
         </Toggle>
       )}
       <Capture />
+      <Button class="roomy" aria-label="Share" title="Copy a link that opens this very frame" onClick={() => void share(window, store)}>
+        <ShareIcon />
+      </Button>
       <ActionMenu label="Page: layout, colours, help" groups={pageActions(store)} />
     </div>
   );

@@ -1,5 +1,5 @@
 import { LAYOUTS } from "../../store/layout";
-import { copyLink } from "../../store/permalink";
+import { copyLink, share } from "../../store/permalink";
 import type { Store } from "../../store/store";
 import { THEMES, type ThemeChoice } from "../../store/theme";
 import type { ActionGroup } from "../../ui/ActionMenu";
@@ -42,7 +42,9 @@ export function pageActions(store: Store): ActionGroup[] {
       title: "Help",
       actions: [
         { text: "All commands (K)", run: () => (store.palette.value = true) },
+        { text: "Examples", run: () => (store.examples.value = true) },
         { text: "Keys (?)", run: () => (store.help.value = true) },
+        { text: "Share this frame", run: () => void share(window, store) },
         { text: "Copy a link to what is shown", run: () => void copyLink(window, store) },
       ],
     },

@@ -1,11 +1,12 @@
 /** Words of the header. */
 
 import { engineering, fixed } from "../../scales/format";
+import type { Span } from "../../scales/scale";
 import { kindOf } from "../../store/api";
 import type { Credentials } from "../../store/credentials";
 import { THINNED } from "../../store/frames";
 import type { Decision } from "../../stream/demand";
-import type { FrameMeta } from "../../stream/documents";
+import type { AppliedDocument, FrameMeta } from "../../stream/documents";
 
 /** Why the service lets this page in no more, or not yet. */
 export function tokenWords({ token, refused }: Credentials): string {
@@ -33,6 +34,19 @@ export function exposureAdvice(
     wanted_s === exposure_s ? "no exposure of this camera mends that" : `sets the exposure to ${engineering(wanted_s, "s", 2)}`;
   const long = `${fixed(100 * share, 0, "%")} of the pixels ${why} and have no value: ${remedy}`;
   return { word, long, exposure_s: wanted_s === exposure_s ? null : wanted_s };
+}
+
+/** Shares of the unambiguous range below and above which ranges lie at its ends. */
+const [NEAR_END, FAR_END] = [0.03, 0.95];
+
+/** The base frequency to try where ranges lie at the ends of what is unambiguous, as what is farther seems near; null where none do. */
+export function lowerFrequency_hz(
+  span: Span | null,
+  { base_frequency_hz, unambiguous_range_m }: Pick<AppliedDocument, "base_frequency_hz" | "unambiguous_range_m">,
+  { min_frequency_hz: least_hz = Infinity }: Readonly<Record<string, unknown>>,
+): number | null {
+  const inside = span === null || (span.low > NEAR_END * unambiguous_range_m && span.high < FAR_END * unambiguous_range_m);
+  return inside || base_frequency_hz / 2 < Number(least_hz) ? null : base_frequency_hz / 2;
 }
 
 /** What less is asked for, as a sign and as sentences; `zoomed` where only a part of the picture is in sight. */

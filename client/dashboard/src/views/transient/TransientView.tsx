@@ -3,7 +3,7 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import { rangeOfTime_m } from "../../physics/constants";
 import { densityAt } from "../../physics/maximumEntropy";
 import { Poles } from "../../physics/poles";
-import { fixed, significant, superscript } from "../../scales/format";
+import { fixed, significant } from "../../scales/format";
 import { gateStart_rad, NAMES, type Play, type TransientLook } from "../../store/lightLook";
 import { AMPLITUDE } from "../../store/mapCatalogue";
 import { SPEEDS_NS } from "../../store/player";
@@ -94,6 +94,12 @@ export function TransientView() {
         <LightBar look={look} play={play} />
       </div>
       <footer class="panel-foot column spaced">
+        <p class="panel-row small quiet">
+          Light crosses the room, slowed {slowness(player.speed_ns.value)} times. Click a pixel to see when its light came back.{" "}
+          <Button class="link" onClick={() => (store.examples.value = true)}>
+            More to see
+          </Button>
+        </p>
         <FilmProgress filming={filming} />
         <Timeline />
         <div class="panel-row wrapped apart">
@@ -107,12 +113,7 @@ export function TransientView() {
           </Button>
           <TimeReadout />
           <DensityReadout play={play} />
-          <div class="wrapped spaced">
-            <span class="quiet slowed roomy" title="How many times slower than light really is">
-              1 : {slowness(player.speed_ns.value)}
-            </span>
-            <Choice bare label="Speed" chosen={player.speed_ns} of={SPEEDS_NS} text={(speed) => `${speed} ns/s`} />
-          </div>
+          <Choice bare label="Speed" chosen={player.speed_ns} of={SPEEDS_NS} text={(speed) => `${speed} ns/s`} />
         </div>
       </footer>
     </Panel>
@@ -132,12 +133,10 @@ function partsOf(look: TransientLook, store: Store): FigureParts {
   };
 }
 
-/** Times slower than real: 5 ns of flight in a second are 2·10⁸. */
+/** Times slower than real: 5 ns of flight in a second are 200 million. */
 function slowness(speed_ns: number): string {
-  const factor = 1e9 / speed_ns;
-  const exponent = Math.floor(Math.log10(factor));
-  const mantissa = factor / 10 ** exponent;
-  return `${mantissa === 1 ? "" : `${Number(mantissa.toFixed(1))}·`}10${superscript(exponent)}`;
+  const millions = 1e3 / speed_ns;
+  return millions < 1000 ? `${millions} million` : `${millions / 1000} billion`;
 }
 
 /** The density at the pixel looked at, at the player's time; or the light within the gate or up to then. */

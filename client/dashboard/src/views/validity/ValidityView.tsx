@@ -1,11 +1,12 @@
 import { type ReadonlySignal, useComputed } from "@preact/signals";
 import { useRef } from "preact/hooks";
-import { fixed, grouped } from "../../scales/format";
+import { fixed, grouped, NOTHING } from "../../scales/format";
 import { drawnOf, type Frame, sentOf } from "../../store/frames";
 import { aBoolean, type Setting } from "../../store/settings";
 import { useStore } from "../../store/store";
 import { Toggle } from "../../ui/controls";
 import { saveNumbers, savePicture } from "../../ui/download";
+import { NEEDS } from "../../ui/flags";
 import { useDrawing, useProducts } from "../../ui/hooks";
 import { Panel } from "../../ui/Panel";
 import { draw } from "../../ui/paint";
@@ -15,7 +16,7 @@ import "../response/Listings.css";
 import "./ValidityView.css";
 
 /** Whether it is shown which ranges can be trusted, instead of the flags. */
-const TRUST: Setting<boolean> = { key: "validity.trust", initial: false, ...aBoolean() };
+const TRUST: Setting<boolean> = { key: "validity.trust", link: "trust", initial: false, ...aBoolean() };
 
 /** Which pixels something is wrong with, and what. */
 export function ValidityView() {
@@ -60,6 +61,7 @@ export function ValidityView() {
 function Legend({ frame, reasons }: { frame: ReadonlySignal<Frame | null>; reasons: Reasons }) {
   const counts = useComputed(() => countReasons(reasons, frame.value === null ? [] : sentOf(frame.value)));
   const { total, valid, byName } = counts.value;
+  const unjudged = reasons.product === "trust" ? frame.value?.meta.accuracy?.not_judged : undefined;
   const share = (count: number): string => fixed(total === 0 ? NaN : (100 * count) / total, count === 0 || count === total ? 0 : 1, "%");
   return (
     <table class="listing legend">
@@ -72,16 +74,20 @@ function Legend({ frame, reasons }: { frame: ReadonlySignal<Frame | null>; reaso
           <td>{share(valid)}</td>
           <td class="legend-words">{reasons.good[1]}</td>
         </tr>
-        {reasons.all.map(({ name, title, words, colour }) => (
-          <tr key={name} data-flag={name} class={byName[name] === 0 ? "quiet" : ""} title={words}>
-            <th scope="row">
-              <Swatch colour={colour} /> {title}
-            </th>
-            <td>{grouped(byName[name])}</td>
-            <td>{share(byName[name])}</td>
-            <td class="legend-words">{words}</td>
-          </tr>
-        ))}
+        {reasons.all.map(({ name, title, words, colour }) => {
+          const unknown = unjudged?.includes(name) ?? false;
+          const said = unknown ? `not judged: it needs ${NEEDS[name]}` : words;
+          return (
+            <tr key={name} data-flag={name} class={byName[name] === 0 ? "quiet" : ""} title={said}>
+              <th scope="row">
+                <Swatch colour={colour} /> {title}
+              </th>
+              <td>{unknown ? NOTHING : grouped(byName[name])}</td>
+              <td>{unknown ? NOTHING : share(byName[name])}</td>
+              <td class="legend-words">{said}</td>
+            </tr>
+          );
+        })}
       </tbody>
     </table>
   );
