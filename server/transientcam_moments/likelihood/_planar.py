@@ -16,6 +16,8 @@ from transientcam_moments.likelihood import (
 from transientcam_moments.likelihood._choice import (
     DELAY_RAD,
     LATE_STEPS,
+    LONE_SHAPE,
+    LONE_STEPS,
     MORE_TAIL_STEPS,
     MOST_RETURNS,
     PLANES,
@@ -26,11 +28,13 @@ from transientcam_moments.likelihood._choice import (
     TAIL_STEPS,
     bar_of_returns,
     bar_of_tail,
+    join_lone,
     missed,
     nothing,
     offer_returns,
     offer_tail,
     split,
+    start_lone,
     start_of_tail,
     turns_of,
     worth_more_returns,
@@ -283,14 +287,32 @@ def _fit_tail(
 ) -> tuple[Array, ...]:
     """Fit a return with a tail, put it where it is the better model, and into the average.
 
-    Returns what it has become, and chi-square with the prior.
+    So is one tail without a return. Returns what the first has become, and chi-square with the
+    prior.
     """
+    given = (0,) * (len(data.re) - 1), power, (0,) * 4, data.weight, PRIOR
+    allowed = data.numbers >= 4
+    state = _tail_of(data, state, power, steps, 0.0, bar_of_tail(4, data.penalty, found))
+    offer_tail(*given, shapes, *state, data.penalty, allowed, found)
+    if power != LONE_SHAPE:
+        return state
+    x, y, d, t = start_lone(power, *state[:5])
+    bar = bar_of_tail(3, data.penalty, found)
+    lone = _tail_of(data, (x, y, 0 * d, d, d, t), power, LONE_STEPS, tail.LONE, bar)
+    join_lone(*given, shapes, *lone, data.penalty, allowed, found)
+    return state
+
+
+def _tail_of(
+    data: Data, state: tuple[Array, ...], power: int, steps: int, lone: float, bar: Array
+) -> tuple[Array, ...]:
+    """Take at most so many steps of a tail."""
     x, y, w, v, d, t = state
     order, unknowns = (0,) * (len(data.re) - 1), (0,) * 4
     ur, ui, lag, qr, qi, rr, ri = ([d] * len(data.re) for _ in range(7))
     tail.shape(order, power, d, lag, qr, qi)
     tail.turn_back(order, data.re, data.im, x, y, ur, ui)
-    w, v = tail.weigh(order, data.weight, ur, ui, qr, qi)
+    w, v = tail.weigh(order, data.weight, lone, ur, ui, qr, qi)
     tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
     cost = sharp.chi_square(order, data.weight, rr, ri) + PRIOR * t * t
 
@@ -298,21 +320,17 @@ def _fit_tail(
         lag, qr, qi, rr, ri = (list(part) for part in state[:5])
         x, y, w, v, d, t, cost, damping = state[5:]
         new = tail.step(
-            order, power, unknowns, data.re, data.im, data.weight, PRIOR,
+            order, power, unknowns, data.re, data.im, data.weight, PRIOR, lone,
             x, y, w, v, d, t, lag, qr, qi, rr, ri, cost, damping, bar,
         )  # fmt: skip
         return tuple(lag), tuple(qr), tuple(qi), tuple(rr), tuple(ri), *new
 
     banks = (tuple(part) for part in (lag, qr, qi, rr, ri))
     damping = sharp.FIRST_DAMPING + 0 * cost
-    bar = bar_of_tail(data.penalty, found)
-    state = _times(steps, step, (*banks, x, y, w, v, d, t, cost, damping), _moving)[5:12]
-    x, y, w, v, d, t, cost = state
-    offer_tail(
-        order, power, unknowns, data.weight, PRIOR, shapes, x, y, w, v, d, t, cost, data.penalty,
-        data.numbers >= 4, found,
-    )  # fmt: skip
-    return state
+    found: tuple[Array, ...] = _times(
+        steps, step, (*banks, x, y, w, v, d, t, cost, damping), _moving
+    )
+    return found[5:12]
 
 
 def _moving(state: Any) -> bool:
