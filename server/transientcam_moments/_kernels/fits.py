@@ -118,8 +118,8 @@ def start_tail(x2: Bank, y2: Bank, w2: Bank, active: Mask, state: Bank) -> None:
 
 @njit(error_model="numpy")
 def step_tail(
-    order: Length, power: int, unknowns: Length, steps: int, data_r: Bank, data_i: Bank,
-    weight: Bank, state: Bank, bar: Plane,
+    order: Length, power: int, unknowns: Length, steps: int, lone: float, data_r: Bank,
+    data_i: Bank, weight: Bank, state: Bank, bar: Plane,
 ) -> None:  # fmt: skip
     """Take at most so many steps of a return with a tail, until all pixels have settled."""
     like = data_r[0]
@@ -130,7 +130,7 @@ def step_tail(
     lag = bank(like, order, 1)
     tail.shape(order, power, d, lag, qr, qi)
     tail.turn_back(order, data_r, data_i, x, y, ur, ui)
-    w, v = tail.weigh(order, weight, ur, ui, qr, qi)
+    w, v = tail.weigh(order, weight, lone, ur, ui, qr, qi)
     tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
     cost = sharp.chi_square(order, weight, rr, ri) + choice.PRIOR * t * t
     damping = state[DAMPING]
@@ -138,8 +138,8 @@ def step_tail(
         if not some(damping < sharp.SETTLED):
             break
         x, y, w, v, d, t, cost, damping = tail.step(
-            order, power, unknowns, data_r, data_i, weight, choice.PRIOR, x, y, w, v, d, t, lag, qr,
-            qi, rr, ri, cost, damping, bar,
+            order, power, unknowns, data_r, data_i, weight, choice.PRIOR, lone, x, y, w, v, d, t,
+            lag, qr, qi, rr, ri, cost, damping, bar,
         )  # fmt: skip
     state[0], state[1], state[2], state[3], state[4], state[5] = x, y, w, v, d, t
     state[DAMPING], state[7] = damping, cost

@@ -19,7 +19,7 @@ from transientcam_moments._kernels.fits import (
 from transientcam_moments._kernels.packing import ROW, pack, put, take, unpack
 from transientcam_moments._kernels.portable import bank, infinity, product_bank, select, some
 from transientcam_moments.arrays import Bank, Length, Mask, Plane
-from transientcam_moments.likelihood import choice, sharp, start
+from transientcam_moments.likelihood import choice, sharp, start, tail
 
 TAIL_ROUNDS: Final = (3, 3, choice.TAIL_STEPS - 6)
 """Steps of a tail after each of which the pixels are packed that go on."""
@@ -153,12 +153,13 @@ def fit_second(
         simd.store(rooms, _COST * ROW + at, cost)
         simd.store(rooms, _MOVING * ROW + at, damping)
         start_tail(x, y, w, allowed, state)
-        bar = choice.bar_of_tail(penalty, found)
+        bar = choice.bar_of_tail(4, penalty, found)
         step_tail(
             order,
             choice.TAIL_SHAPES[0],
             (0, 0, 0, 0),
             TAIL_ROUNDS[0],
+            0.0,
             data_r,
             data_i,
             weight,
@@ -197,8 +198,9 @@ def step_late(order: Length, steps: int, rooms: Reals, count: int, late: Reals) 
         _take_data(order, one, data_r, data_i, weight, rooms, at)
         bar = simd.load(one, rooms, _PENALTY * ROW + at)
         step_tail(
-            order, choice.TAIL_SHAPES[0], (0, 0, 0, 0), steps, data_r, data_i, weight, state, bar
-        )
+            order, choice.TAIL_SHAPES[0], (0, 0, 0, 0), steps, 0.0, data_r, data_i, weight, state,
+            bar,
+        )  # fmt: skip
         put(state, _STATE, rooms, _TAIL, at)
         moving += _pack_moving(order, one, data_r, data_i, weight, state, bar, late, moving)
     simd.store(late, (_TAIL + DAMPING) * ROW + moving, sharp.SETTLED * one)
@@ -228,7 +230,7 @@ def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
     one = simd.ones(rooms, 1)
     data_r, data_i = bank(one, order, 1), bank(one, order, 1)
     weight, found = bank(one, order, 1), bank(one, (), 27)
-    points, state = bank(one, (), 6), bank(one, (), 8)
+    points, state, lone = bank(one, (), 6), bank(one, (), 8), bank(one, (), 8)
     packed = 0
     for at in range(0, count, simd.width(one)):
         take(found, _FOUND, one, rooms, 0, at)
@@ -237,16 +239,17 @@ def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
         numbers = simd.load(one, rooms, _NUMBERS * ROW + at)
         allowed = (penalty > 0.0) & (numbers >= 4.0)
         _take_data(order, one, data_r, data_i, weight, rooms, at)
-        _offer_tail(order, choice.TAIL_SHAPES[0], weight, state, penalty, allowed, found)
+        power = choice.TAIL_SHAPES[0]
+        _offer_tail(order, power, data_r, data_i, weight, state, lone, penalty, allowed, found)
         worth = allowed & choice.worth_more_shapes(state[7], found)
         for k in range(1, len(choice.TAIL_SHAPES) if some(worth) else 0):
             power = choice.TAIL_SHAPES[k]
             state[4] = state[4] * (float(choice.TAIL_SHAPES[k - 1]) / float(power))
             state[DAMPING] = select(worth, sharp.FIRST_DAMPING * one, sharp.SETTLED)
-            bar = choice.bar_of_tail(penalty, found)
+            bar = choice.bar_of_tail(4, penalty, found)
             steps = choice.MORE_TAIL_STEPS
-            step_tail(order, power, (0, 0, 0, 0), steps, data_r, data_i, weight, state, bar)
-            _offer_tail(order, power, weight, state, penalty, worth, found)
+            step_tail(order, power, (0, 0, 0, 0), steps, 0.0, data_r, data_i, weight, state, bar)
+            _offer_tail(order, power, data_r, data_i, weight, state, lone, penalty, worth, found)
         put(found, _FOUND, rooms, 0, at)
         moving = simd.load(one, rooms, _MOVING * ROW + at)
         more = _needs_more(found, penalty, numbers, moving)
@@ -265,11 +268,26 @@ def offer_tails(order: Length, rooms: Reals, count: int, third: Reals) -> int:
 
 @njit(error_model="numpy")
 def _offer_tail(
-    order: Length, power: int, weight: Bank, state: Bank, penalty: Plane, allowed: Mask, found: Bank
-) -> None:
+    order: Length, power: int, data_r: Bank, data_i: Bank, weight: Bank, state: Bank, lone: Bank,
+    penalty: Plane, allowed: Mask, found: Bank,
+) -> None:  # fmt: skip
+    """Offer what is in `state`, and one shape without a return, for which `lone` is room."""
+    shapes = len(choice.TAIL_SHAPES)
     choice.offer_tail(
-        order, power, (0, 0, 0, 0), weight, choice.PRIOR, len(choice.TAIL_SHAPES), state[0],
-        state[1], state[2], state[3], state[4], state[5], state[7], penalty, allowed, found,
+        order, power, (0, 0, 0, 0), weight, choice.PRIOR, shapes, state[0], state[1], state[2],
+        state[3], state[4], state[5], state[7], penalty, allowed, found,
+    )  # fmt: skip
+    if power != choice.LONE_SHAPE:
+        return
+    x, y, d, t = choice.start_lone(power, state[0], state[1], state[2], state[3], state[4])
+    lone[0], lone[1], lone[2], lone[3], lone[4], lone[5] = x, y, 0.0 * d, d, d, t
+    lone[DAMPING] = select(allowed, sharp.FIRST_DAMPING + 0.0 * d, sharp.SETTLED)
+    bar = choice.bar_of_tail(3, penalty, found)
+    steps = choice.LONE_STEPS
+    step_tail(order, power, (0, 0, 0, 0), steps, tail.LONE, data_r, data_i, weight, lone, bar)
+    choice.join_lone(
+        order, power, (0, 0, 0, 0), weight, choice.PRIOR, shapes, lone[0], lone[1], lone[2],
+        lone[3], lone[4], lone[5], lone[7], penalty, allowed, found,
     )  # fmt: skip
 
 

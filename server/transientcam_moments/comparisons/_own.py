@@ -94,7 +94,7 @@ LIKELIHOOD = Technique(
     harmonics=from_zeroth,
     least_harmonics=1,
     assumptions="Few sharp returns, or one with a gamma-shaped tail; the noise of the moments.",
-    cost="Up to nine fits of 4 to 10 Levenberg-Marquardt steps, in compiled kernels.",
+    cost="Up to ten fits of 4 to 10 Levenberg-Marquardt steps, in compiled kernels.",
     failure="Light of another shape biases the range; chi-square then says so where it exceeds "
     "the noise.",
     estimate=likelihood_estimate,

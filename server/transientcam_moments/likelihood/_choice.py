@@ -20,6 +20,7 @@ from transientcam_moments.arrays import (
     least,
     logarithm,
     magnitude,
+    root,
     root_eps,
     select,
     smaller,
@@ -50,6 +51,8 @@ LATE_STEPS: Final = 60
 TAIL_STEPS: Final = 10
 MORE_TAIL_STEPS: Final = 5
 """Of the fit of each further shape, which begins with what the one before found."""
+LONE_SHAPE, LONE_STEPS = 1, 5
+"""Of the tail that is fitted without a return as well, from what it is with one on."""
 TAIL_SHAPES: Final = (3, 2, 1, 5)
 """Shapes of the gamma distribution of the tail, the first one tried first."""
 WORTH: Final = 3.0
@@ -212,7 +215,7 @@ def offer_tail(
     better = (score < found[SCORE]) & allowed
     zero = 0.0 * cost
     spread = bank(cost, unknowns, 0)
-    common = tail.deviations(order, power, unknowns, weight, prior, w, v, d, spread)
+    tail.deviations(order, power, unknowns, weight, prior, 0.0, w, v, d, spread)
     found[X], found[Y] = select(better, x, found[X]), select(better, y, found[Y])
     found[WEIGHT] = select(better, w, found[WEIGHT])
     for k in range(1, MOST_RETURNS):
@@ -231,12 +234,38 @@ def offer_tail(
     score = chi_square + 4.0 * penalty - (3.0 * MARGIN - 2.0 * math.log(shapes))
     allowed = allowed & (v > 0.0)
     join(phase_of(x, y), spread[2], score, allowed, found)
-    # the same without light at its beginning, as wax has it, as far as the fit is linear
-    slope = common / larger(spread[0], least(spread[0]))
-    moved = larger(smaller(slope * w, 1.0 + zero), -1.0 + zero)
-    square = larger(spread[2] - slope * common, zero)
-    lost = w * w / larger(spread[0], least(spread[0]))
-    join(phase_of(x, y) - moved, square, score + lost - penalty + MARGIN, allowed, found)
+
+
+def start_lone(
+    power: int, x: Array, y: Array, w: Array, v: Array, d: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Return point, d and t of a tail without a return that is as late, and spread, as one with it.
+
+    As wax has it, which light leaves only after it was scattered.
+    """
+    share = v / larger(w + v, least(w))
+    late = (share * float(power)) * d
+    square = late * ((1.0 + float(power)) * d - late)
+    ratio = root(square * float(power)) / DELAY_RAD
+    ratio = larger(smaller(ratio, MOST_RATIO + 0.0 * ratio), LEAST_RATIO + 0.0 * ratio)
+    # half of the angle for its tangent: enough for a start
+    half = 0.5 * (late - DELAY_RAD * ratio)
+    scale = 1.0 / (1.0 + half * half)
+    c, s = (1.0 - half * half) * scale, 2.0 * half * scale
+    return x * c - y * s, x * s + y * c, ratio * (DELAY_RAD / float(power)), logarithm(ratio)
+
+
+def join_lone(
+    order: Length, power: int, unknowns: Length, weight: Bank, prior: float, shapes: int, x: Array,
+    y: Array, w: Array, v: Array, d: Array, t: Array, cost: Array, penalty: Array, allowed: Any,
+    found: Bank,
+) -> None:  # fmt: skip
+    """Take a tail without a return into the average, as often as any shape with one."""
+    spread = bank(cost, unknowns, 0)
+    tail.deviations(order, power, unknowns, weight, prior, tail.LONE, w, v, d, spread)
+    score = larger(cost - prior * t * t, 0.0 * cost) + 3.0 * penalty
+    score = score - (2.0 * MARGIN - 2.0 * math.log(shapes))
+    join(phase_of(x, y), spread[2], score, allowed & (v > 0.0), found)
 
 
 def bar_of_returns(unknowns: int, penalty: Array, found: Bank) -> Array:
@@ -249,9 +278,9 @@ def worth_more_returns(penalty: Array, found: Bank) -> Any:
     return bar_of_returns(6, penalty, found) > -3.0
 
 
-def bar_of_tail(penalty: Array, found: Bank) -> Array:
-    """Return the same of a return with a tail, but for the share of its shape."""
-    return found[LEAST_SCORE] - 4.0 * penalty + 3.0 * MARGIN
+def bar_of_tail(unknowns: int, penalty: Array, found: Bank) -> Array:
+    """Return the same of a tail with a return, 4 unknowns, or none, but for its shape's share."""
+    return found[LEAST_SCORE] - float(unknowns) * penalty + (float(unknowns) - 1.0) * MARGIN
 
 
 def average_variance(numbers: Array, found: Bank) -> Array:

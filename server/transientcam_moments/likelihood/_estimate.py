@@ -230,8 +230,8 @@ def likelihood(
 
     The phase of the direct return is the mean over all of them, with the weights exp(-s / 2):
     s = chi^2 + n_unknowns log n_numbers, and 6 more for each component beside the first; tails of
-    several shapes share one prior, and count once more with w = 0, as far as the fit is linear, as
-    of wax. Its variance is the mean of theirs and what their phases spread.
+    several shapes share one prior. That with p = 1 is fitted once more with w = 0, as of wax. The
+    variance is the mean of theirs and what their phases spread.
     More than one return is tried where one leaves enough to explain, and shapes of tails beside the
     first one where that is not far worse than the best model.
 

@@ -16,6 +16,8 @@ from transientcam_moments.likelihood import (
 from transientcam_moments.likelihood._choice import (
     DELAY_RAD,
     LATE_STEPS,
+    LONE_SHAPE,
+    LONE_STEPS,
     MORE_TAIL_STEPS,
     MOST_RETURNS,
     PLANES,
@@ -26,11 +28,13 @@ from transientcam_moments.likelihood._choice import (
     TAIL_STEPS,
     bar_of_returns,
     bar_of_tail,
+    join_lone,
     missed,
     nothing,
     offer_returns,
     offer_tail,
     split,
+    start_lone,
     start_of_tail,
     turns_of,
     worth_more_returns,
@@ -281,30 +285,40 @@ def _fit_tail(
 ) -> State:
     """Fit a return with a tail, put it where it is the better model, and into the average.
 
-    Returns what it has become, and chi-square with the prior.
+    So is one tail without a return. Returns what the first has become, and chi-square with the
+    prior.
     """
+    given: tuple[Any, ...] = (0,) * (len(data.re) - 1), power, (0,) * 4, data.weight, PRIOR, shapes
+    allowed = data.numbers >= 4
+    state = _tail_of(data, state, power, steps, 0.0, bar_of_tail(4, data.penalty, found))
+    offer_tail(*(*given, *state, data.penalty, allowed, found))
+    if power != LONE_SHAPE:
+        return state
+    x, y, d, t = start_lone(power, *state[:5])
+    bar = bar_of_tail(3, data.penalty, found)
+    lone = _tail_of(data, (x, y, 0 * d, d, d, t), power, LONE_STEPS, tail.LONE, bar)
+    join_lone(*(*given, *lone, data.penalty, allowed, found))
+    return state
+
+
+def _tail_of(data: Data, state: State, power: int, steps: int, lone: float, bar: Array) -> State:
+    """Take at most so many steps of a tail."""
     x, y, w, v, d, t = state
     order, unknowns = (0,) * (len(data.re) - 1), (0,) * 4
     ur, ui, lag, qr, qi, rr, ri = ([d] * len(data.re) for _ in range(7))
     tail.shape(order, power, d, lag, qr, qi)
     tail.turn_back(order, data.re, data.im, x, y, ur, ui)
-    w, v = tail.weigh(order, data.weight, ur, ui, qr, qi)
+    w, v = tail.weigh(order, data.weight, lone, ur, ui, qr, qi)
     tail.remains(order, ur, ui, w, v, qr, qi, rr, ri)
     cost = sharp.chi_square(order, data.weight, rr, ri) + PRIOR * t * t
     damping = sharp.FIRST_DAMPING + 0 * cost
-    given = list(data.re), list(data.im), list(data.weight), bar_of_tail(data.penalty, found)
-    state = repeat(
-        _step_tail, steps, (order, power, unknowns), given,
+    found = repeat(
+        _step_tail, steps, (order, power, unknowns, lone),
+        (list(data.re), list(data.im), list(data.weight), bar),
         (damping < sharp.SETTLED, lag, qr, qi, rr, ri, x, y, w, v, d, t, cost, damping),
         alike=True,
     )  # fmt: skip
-    *state, _ = state[6:]
-    x, y, w, v, d, t, cost = state
-    offer_tail(
-        order, power, unknowns, data.weight, PRIOR, shapes, x, y, w, v, d, t, cost, data.penalty,
-        data.numbers >= 4, found,
-    )  # fmt: skip
-    return tuple(state)
+    return found[6:13]
 
 
 def _step_returns(first: bool, fixed: State, given: State, state: State) -> State:
@@ -316,8 +330,9 @@ def _step_returns(first: bool, fixed: State, given: State, state: State) -> Stat
 
 def _step_tail(first: bool, fixed: State, given: State, state: State) -> State:
     _, lag, qr, qi, rr, ri, x, y, w, v, d, t, cost, damping = state
+    *shape, lone = fixed
     *data, bar = given
     *found, damping = tail.step(
-        *fixed, *data, PRIOR, x, y, w, v, d, t, lag, qr, qi, rr, ri, cost, damping, bar
+        *shape, *data, PRIOR, lone, x, y, w, v, d, t, lag, qr, qi, rr, ri, cost, damping, bar
     )
     return damping < sharp.SETTLED, lag, qr, qi, rr, ri, *found, damping

@@ -5,7 +5,8 @@ the density of a gamma distribution of shape p and mean delay p d. A normal prio
 down where there is no tail to measure it by.
 
 Names as in `sharp`; ``power`` is p. The unknowns are w, v, phi and log d, and
-``t`` is log(d) less its mean in the prior, kept beside d. The data are turned back by
+``t`` is log(d) less its mean in the prior, kept beside d. ``lone`` is 0, or `LONE` for a tail
+without a return, whose w it keeps at 0. The data are turned back by
 exp(-i j phi), in ``ur`` and ``ui``, which changes no weighted sum of squares; the moments of the
 tail are then in ``qr`` and ``qi``, and 1 / (1 + (j d)^2) in ``lag``.
 """
@@ -24,6 +25,8 @@ from transientcam_moments.arrays import (
 from transientcam_moments.likelihood._linear import decompose, solve, variances
 from transientcam_moments.likelihood._sharp import REACH, chi_square, judge
 
+LONE = 1e9
+"""How much more than the moments tell of w is known of it then."""
 LONGER = 0.7
 """The most that log d changes in a step."""
 SHORTEST, LONGEST = -3.2, 2.4
@@ -54,7 +57,7 @@ def turn_back(
 
 
 def weigh(
-    order: Length, weight: Bank, ur: Bank, ui: Bank, qr: Bank, qi: Bank
+    order: Length, weight: Bank, lone: float, ur: Bank, ui: Bank, qr: Bank, qi: Bank
 ) -> tuple[Array, Array]:
     """Return the light w and v >= 0 that explains most with given phase and tail."""
     ww, wv, vv = weight[0], weight[0] * qr[0], weight[0] * qr[0] * qr[0]
@@ -66,7 +69,7 @@ def weigh(
         vv = vv + weight[j] * (qr[j] * qr[j] + qi[j] * qi[j])
         gw = gw + weight[j] * ur[j]
         gv = gv + weight[j] * (ur[j] * qr[j] + ui[j] * qi[j])
-    ww, vv = ww * (1.0 + rounding(ww)), vv * (1.0 + rounding(ww))
+    ww, vv = ww * (1.0 + lone + rounding(ww)), vv * (1.0 + rounding(ww))
     inverse = 1.0 / (ww * vv - wv * wv)
     w, v = (vv * gw - wv * gv) * inverse, (ww * gv - wv * gw) * inverse
     alone, late = gw / ww, gv / vv
@@ -88,6 +91,7 @@ def information(
     order: Length,
     power: int,
     weight: Bank,
+    lone: float,
     w: Array,
     v: Array,
     d: Array,
@@ -132,6 +136,7 @@ def information(
         g[1] = g[1] + mr * rr[j] + mi * ri[j]
         g[2] = g[2] + nr * rr[j] + ni * ri[j]
         g[3] = g[3] + kr * rr[j] + ki * ri[j]
+    a[0] = a[0] * (1.0 + lone)
 
 
 def step(
@@ -142,6 +147,7 @@ def step(
     data_i: Bank,
     weight: Bank,
     prior: float,
+    lone: float,
     x: Array,
     y: Array,
     w: Array,
@@ -163,7 +169,7 @@ def step(
     """
     m = len(order)
     a, g = square_bank(cost, unknowns, 0), bank(cost, unknowns, 0)
-    information(order, power, weight, w, v, d, lag, qr, qi, rr, ri, a, g)
+    information(order, power, weight, lone, w, v, d, lag, qr, qi, rr, ri, a, g)
     a[15] = a[15] + prior
     g[3] = g[3] - prior * t
     for i in range(4):
@@ -186,7 +192,7 @@ def step(
     tr, ti = bank(cost, order, 1), bank(cost, order, 1)
     shape(order, power, td, late, sr, si)
     turn_back(order, data_r, data_i, tx, ty, ur, ui)
-    tw, tv = weigh(order, weight, ur, ui, sr, si)
+    tw, tv = weigh(order, weight, lone, ur, ui, sr, si)
     remains(order, ur, ui, tw, tv, sr, si, tr, ti)
     tried = chi_square(order, weight, tr, ti) + prior * tt * tt
     lower, damping = judge(cost, tried, damping, bar)
@@ -212,20 +218,18 @@ def deviations(
     unknowns: Length,
     weight: Bank,
     prior: float,
+    lone: float,
     w: Array,
     v: Array,
     d: Array,
     out: Bank,
-) -> Array:
-    """Put the variances of w, v, phi and log d in `out`; return the covariance of w and phi."""
+) -> None:
+    """Put the variances of w, v, phi and log d in `out`."""
     lag, qr, qi = bank(d, order, 1), bank(d, order, 1), bank(d, order, 1)
     shape(order, power, d, lag, qr, qi)
     a, g = square_bank(d, unknowns, 0), bank(d, unknowns, 0)
     # the gradient, of what the tail itself would leave, is not asked for
-    information(order, power, weight, w, v, d, lag, qr, qi, qr, qi, a, g)
+    information(order, power, weight, lone, w, v, d, lag, qr, qi, qr, qi, a, g)
     a[15] = a[15] + prior
     decompose(unknowns, a)
-    g[0], g[1], g[2], g[3] = 1.0 + 0.0 * d, 0.0 * d, 0.0 * d, 0.0 * d
-    solve(unknowns, a, g, 2)
     variances(unknowns, a, out)
-    return g[2]

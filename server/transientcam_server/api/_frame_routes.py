@@ -1,9 +1,9 @@
 """The routes of one frame, the same for the camera's frames and for those of recordings."""
 
 from collections.abc import Awaitable, Callable
-from typing import Protocol
+from typing import Annotated, Final, Protocol
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Depends, Query, Response
 
 from transientcam_server.api._documents.frame import FrameDocument
 from transientcam_server.api._documents.pixel import PixelDocument
@@ -22,6 +22,15 @@ from transientcam_server.api._frame_query import (
 from transientcam_server.api._problems import documented
 from transientcam_server.errors import ProblemKind, kinds
 from transientcam_server.imaging import Frame, Pipeline
+
+_JUDGED: Final = ("range", "range_error")
+_Computed = Annotated[
+    bool,
+    Query(
+        description="compute range and accuracy first, which are null else until a product needs "
+        "them"
+    ),
+]
 
 
 class ChosenFrame(Protocol):
@@ -64,8 +73,14 @@ def add_frame_routes(
         description=frame[1],
         responses=documented(*missing),
     )
-    async def read_frame(chosen: ChosenFrame = chosen_of) -> FrameDocument:
-        return FrameDocument.model_validate((await chosen.frame()).meta())
+    async def read_frame(
+        chosen: ChosenFrame = chosen_of, *, computed: _Computed = False
+    ) -> FrameDocument:
+        found = await chosen.frame()
+        if computed:
+            products = (await chosen.pipeline()).products
+            await found.computed(products[name] for name in _JUDGED if name in products)
+        return FrameDocument.model_validate(found.meta())
 
     @router.get(
         f"{path}/pixel",

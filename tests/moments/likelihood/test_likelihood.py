@@ -350,7 +350,7 @@ def test_no_step_raises_chi_square(monkeypatch: pytest.MonkeyPatch) -> None:
         return run
 
     monkeypatch.setattr(sharp, "step", watched(sharp.step, 11))
-    monkeypatch.setattr(tail, "step", watched(tail.step, 18))
+    monkeypatch.setattr(tail, "step", watched(tail.step, 19))
     b = some_moments(pixels=300)
 
     tm.likelihood(b, equal_noise(b, 0.003))
@@ -376,6 +376,20 @@ def test_more_models_never_have_a_worse_score() -> None:
 
     assert (score(two) <= score(one) + 1e-9).all()
     assert (score(three) <= score(two) + 1e-9).all()
+
+
+def test_wax_is_not_later_than_its_deviation_says() -> None:
+    random = np.random.default_rng(3)
+    phase, delay = random.uniform(1, 3, 300), random.uniform(0.1, 0.4, 300)
+    j = np.arange(5)[:, None]
+    b = np.exp(1j * j * phase) / (1 - 1j * j * delay)  # an exponential decay, no return
+    noise = equal_noise(b, 1 / 300)
+
+    found = tm.likelihood(tm.noise.draw(b, noise, random, draws=1)[:, 0], noise)
+
+    off = np.angle(np.exp(1j * (found.average_rad - phase)))
+    assert np.mean(np.abs(off) > 3 * found.average_std_rad) < 0.06
+    assert np.median(np.abs(off)) < 0.2 * np.median(delay)
 
 
 # -- what is measured -------------------------------------------------------------------------

@@ -162,7 +162,8 @@ class FrameDocument(Document):
     predicted_range_std_m: PredictedStdDocument | None = None
     """Null until the range was computed."""
     accuracy: RangeAccuracyDocument | None = None
-    """Null until one of the products range_std, range_bias, range_error, trust was computed."""
+    """Null until one of the products range_std, range_bias, range_error, trust was computed, as
+    `computed=true` has it done."""
 
 
 class HistoryDocument(Document):

@@ -524,3 +524,17 @@ def test_an_answer_too_large_for_memory_is_refused_before_it_is_computed(
     assert problem["type"] == "/problems/answer-too-large"
     assert (problem["field"], problem["value"], problem["limit"]) == ("time_s", 11, "at most 10")
     assert steady.get(f"{LATEST}/transient", params={"bins": 10}).status_code == 200
+
+
+def test_what_a_frame_is_worth_is_null_until_computed_or_asked_for(http: httpx.Client) -> None:
+    number = wait_for_frame(http)["frame"]
+    judged = ("accuracy", "pixels", "neighbours", "predicted_range_std_m")
+
+    bare = http.get(f"/api/v1/frames/{number}").json()
+    asked = http.get(f"/api/v1/frames/{number}", params={"computed": True}).json()
+
+    assert bare["accuracy"] is None
+    assert all(asked[name] is not None for name in judged)
+    # that of every pixel, where a live frame has time for one in sixteen
+    error_m = npy(http.get(f"/api/v1/frames/{number}/range_error.npy"))
+    assert asked["accuracy"]["range_error_m"] == pytest.approx(np.nanmedian(error_m), rel=0.1)
