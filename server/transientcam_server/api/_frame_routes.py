@@ -65,7 +65,7 @@ def add_frame_routes(
         responses=documented(*missing),
     )
     async def read_frame(chosen: ChosenFrame = chosen_of) -> FrameDocument:
-        return FrameDocument.model_validate((await chosen.frame()).meta())
+        return (await chosen.frame()).meta()
 
     @router.get(
         f"{path}/pixel",
