@@ -69,8 +69,9 @@ class ImageHeader:
             return None
         if crc32c(data[: _HEADER.size]) != _CRC.unpack_from(data, _HEADER.size)[0]:
             return None
-        _, _, _, flags, *fields, centi, payload_bytes, payload_crc = _HEADER.unpack_from(data)
-        return cls(ImageFlag(flags), *fields, centi / 100, payload_bytes, payload_crc)
+        flags, *fields = _HEADER.unpack_from(data)[3:]
+        fields[-3] /= 100  # the temperature
+        return cls(ImageFlag(flags), *fields)
 
 
 def payload_checksum(payload: bytes | bytearray | memoryview) -> int:
