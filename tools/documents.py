@@ -1,10 +1,10 @@
-"""What is written of what the programs state: types for both clients, pages of docs/.
+"""What is written of what the programs state: types for the dashboard, pages of docs/.
 
-The models of `transientcam_server.api._documents` state each document once. OpenAPI and AsyncAPI
-documents follow from them, and of these the types of the Python client and of the dashboard: run
-``python tools/documents.py --write``. Without ``--write`` it says which file is not as it
-would be written, and fails where one is. The types of the dashboard are always written: only its
-compiler's check reads them, and the repository does not keep them.
+The models of `transientcam_server.api._documents`, and for a frame `transientcam.documents`, state
+each document once. OpenAPI and AsyncAPI documents follow from them, and of these the types of the
+dashboard: run ``python tools/documents.py --write``. Without ``--write`` it says which file is not
+as it would be written, and fails where one is. The types of the dashboard are always written: only
+its compiler's check reads them, and the repository does not keep them.
 
 No published generator serves: openapi-typescript needs the compiler of TypeScript 5, and
 json-schema-to-typescript states a document anew wherever a field that refers to it is described.
@@ -12,7 +12,6 @@ json-schema-to-typescript states a document anew wherever a field that refers to
 
 import argparse
 import json
-import subprocess
 import sys
 from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
@@ -30,21 +29,9 @@ from transientcam_server.api._docs.asyncapi import asyncapi
 from transientcam_server.settings import Settings
 
 _ROOT = Path(__file__).parents[1]
-PYTHON = _ROOT / "client/transientcam/documents.py"
 TYPESCRIPT = _ROOT / "client/dashboard/src/stream/documents.d.ts"
 """Which git ignores."""
 OPERATIONS = _ROOT / "docs/operations.md"
-_WRITTEN = "`python tools/documents.py --write` writes this file"
-_OF_A_FRAME = (
-    "PixelCountsDocument",
-    "PredictedStdDocument",
-    "TrustCountsDocument",
-    "RangeAccuracyDocument",
-    "FramesAveragedDocument",
-    "HopDocument",
-    "FrameDocument",
-    "FrameMeta",
-)
 _Schema = Mapping[str, Any]
 
 
@@ -73,15 +60,7 @@ def files() -> dict[Path, str]:
             f"export type Notice = {_typescript(streamed['notice'])};",
         )
     )
-    python = "\n".join(
-        (
-            f'"""What the service says of a frame, in JSON and in messages.\n\n{_WRITTEN}.\n"""\n',
-            "from typing import TypedDict\n",
-            *(_typed_dict(name, schemas[name]) for name in _OF_A_FRAME),
-        )
-    )
     return {
-        PYTHON: _formatted(python),
         TYPESCRIPT: typescript + "\n",
         OPERATIONS: with_table(OPERATIONS.read_text(encoding="utf-8")),
         **reference.pages(),
@@ -202,42 +181,6 @@ def _identifier(name: str) -> str:
 
 def _name(reference: str) -> str:
     return reference.rpartition("/")[2]
-
-
-# -- Python ------------------------------------------------------------------------------------
-
-
-def _typed_dict(name: str, schema: _Schema) -> str:
-    fields = [
-        f"{key}: {_python(each)}\n" + _docstring(each) for key, each in schema["properties"].items()
-    ]
-    head = f"class {name}({schema.get('extends', 'TypedDict')}):\n"
-    return head + indent(_docstring(schema) + "\n" + "".join(fields), "    ") + "\n"
-
-
-def _docstring(schema: _Schema) -> str:
-    text = schema.get("description")
-    if text is None:
-        return ""
-    return f'"""{text}\n"""\n' if "\n\n" in text else f'"""{text}"""\n'
-
-
-def _python(schema: _Schema) -> str:
-    match schema:
-        case {"$ref": str(reference)}:
-            return _name(reference)
-        case {"anyOf": either}:
-            return " | ".join(map(_python, either))
-        case {"type": "array", "items": items}:
-            return f"list[{_python(items)}]"
-    names = {"string": "str", "integer": "int", "number": "float", "null": "None"}
-    return names[schema["type"]]
-
-
-def _formatted(source: str) -> str:
-    """Return a Python source as ruff has it."""
-    ruff = (sys.executable, "-m", "ruff", "format", f"--stdin-filename={PYTHON}", "-")
-    return subprocess.run(ruff, input=source, stdout=subprocess.PIPE, text=True, check=True).stdout
 
 
 def main() -> None:

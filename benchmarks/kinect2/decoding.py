@@ -18,7 +18,7 @@ from tests.driver.cameras.kinect2.vectors import (
     load,
     noise,
 )
-from transientcam_driver.cameras.kinect2 import SUB_IMAGES, Assembler, Rows, encoder, measurement
+from transientcam_driver.cameras.kinect2 import SUB_IMAGES, Assembler, Rows, codes, encoder
 
 SCENES: Final = ("ramp", "noisy", "two_returns")
 NOISY_STD: Final = 4.0
@@ -117,7 +117,7 @@ def speed() -> Table:
 
     steps = {
         "packets to sub-images": measure(assembled).best_s,
-        "sub-images to images": measure(lambda: measurement.images(data[:-1])).best_s,
+        "sub-images to images": measure(lambda: codes.frame_images(data[:-1])).best_s,
     }
     steps["both"] = sum(steps.values())
     made = Table("Decoding a frame, on one core", ("step", "time", "frames a second"))

@@ -18,7 +18,6 @@ from transientcam_driver.cameras.kinect2 import (
     P0Tables,
     codes,
     encoder,
-    measurement,
 )
 from transientcam_moments.comparisons._sra import sra
 
@@ -166,7 +165,7 @@ def _through_codes(
     samples = encoder.samples(np.pad(inside, ((0, 0), (0, 0), (1, 1))), gains)
     if rng is not None:
         samples = samples + rng.normal(0, std, samples.shape)
-    images = measurement.images(codes.sub_images(samples))
+    images = codes.frame_images(codes.sub_images(samples))
     measured = tm.measure(images, zeroth="estimated", phases_rad=SAMPLING.phases_rad)
     back = np.asarray(tm.calibrate(measured, gains))[1:, :, 1:-1].reshape((3, -1))
     return back[:, : moments[0].size].reshape(moments.shape)

@@ -1,9 +1,13 @@
-"""What the service says of a frame, in JSON and in messages.
+"""What the service says of a frame, in JSON and in messages: stated here for both sides.
 
-`python tools/documents.py --write` writes this file.
+The service describes its interface by these fields and their descriptions.
 """
 
-from typing import TypedDict
+from typing import Literal
+
+from typing_extensions import TypedDict  # that of Python 3.11 does not tell its fields to pydantic
+
+Neighbours = Literal["edge-preserving", "gaussian", "none"]
 
 
 class PixelCountsDocument(TypedDict):
@@ -115,7 +119,7 @@ class FrameDocument(TypedDict):
     """Counts the settings of the reconstruction; those that it was computed with."""
     estimator: str
     """What its range, direct and indirect light are taken from."""
-    neighbours: str | None
+    neighbours: Neighbours | None
     """How its moments were averaged over pixels, once they were."""
     device_time_s: float
     """Start of the first exposure, by the camera's clock."""

@@ -15,7 +15,28 @@ _BLOCK_BYTES: Final = 16 * 1024
 _BLOCKS: Final = 2048
 
 
-class RemoteFile(io.RawIOBase):
+class SizedFile(io.RawIOBase):
+    """A file of a known size that can be read from any place; a subclass has ``readinto``."""
+
+    size_bytes = 0
+    _place = 0
+
+    def readable(self) -> bool:
+        """Return True."""
+        return True
+
+    def seekable(self) -> bool:
+        """Return True."""
+        return True
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        """Move to a place, and return it."""
+        start = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self.size_bytes}[whence]
+        self._place = max(0, start + offset)
+        return self._place
+
+
+class RemoteFile(SizedFile):
     """A file on a server that answers with ranges; it keeps what was read last, up to 32 MiB.
 
     ``url``: of the file.
@@ -44,36 +65,19 @@ class RemoteFile(io.RawIOBase):
             http_client(httpx.Client, token=token, timeout_s=timeout_s, transport=transport)
         )
         self._blocks: OrderedDict[int, bytes] = OrderedDict()
-        self._place = 0
         self._tag: str | None = None
-        self.size = 0
-        """In bytes."""
         try:
             self._block(0)
         except BaseException:
             self.close()
             raise
 
-    def readable(self) -> bool:
-        """Return True."""
-        return True
-
-    def seekable(self) -> bool:
-        """Return True."""
-        return True
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Move to a place, and return it."""
-        start = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self.size}[whence]
-        self._place = max(0, start + offset)
-        return self._place
-
     def readinto(self, buffer: "memoryview[int]") -> int:  # type: ignore[override]  # a buffer
         """Fill a buffer as far as the file goes; return how many bytes that were."""
         view = memoryview(buffer).cast("B")
         done = 0
-        while done < len(view) and self._place < self.size:
-            piece = self._piece(min(len(view) - done, self.size - self._place))
+        while done < len(view) and self._place < self.size_bytes:
+            piece = self._piece(min(len(view) - done, self.size_bytes - self._place))
             view[done : done + len(piece)] = piece
             done += len(piece)
             self._place += len(piece)
@@ -130,7 +134,7 @@ class RemoteFile(io.RawIOBase):
         _, _, total = response.headers.get("content-range", "").partition("/")
         if not total.isdecimal():
             raise ProtocolError("content-range", total, "bytes first-last/size")
-        self.size, self._tag = int(total), response.headers.get("etag")
-        if len(answer.body) != min(size, self.size - first):
+        self.size_bytes, self._tag = int(total), response.headers.get("etag")
+        if len(answer.body) != min(size, self.size_bytes - first):
             raise ProtocolError("answer", f"{len(answer.body)} bytes", "those requested")
         return answer.body

@@ -33,6 +33,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 import transientcam_moments as tm
+from transientcam.documents import Neighbours
 from transientcam.wire import FIRST_MESSAGE_WITHIN_S, MAX_SUBSCRIPTIONS
 from transientcam_compiled import cores
 from transientcam_moments.comparisons import PLUGINS, TECHNIQUES
@@ -115,7 +116,6 @@ def _with_plugged(schema: dict[str, Any]) -> None:
     schema["enum"] = [*schema["enum"], *PLUGINS.names()]
 
 
-Neighbours = Literal["edge-preserving", "gaussian", "none"]
 CorruptImages = Literal["keep", "repair", "fill"]
 
 

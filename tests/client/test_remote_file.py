@@ -55,7 +55,7 @@ def test_it_reads_as_the_file_does(file: RemoteFile) -> None:
         place, count = (int(each) for each in random.integers(0, 1_100_000, 2))
         assert file.seek(place) == local.seek(place)
         assert file.read(count) == local.read(count)
-    assert file.size == file.seek(0, io.SEEK_END) == len(CONTENT)
+    assert file.size_bytes == file.seek(0, io.SEEK_END) == len(CONTENT)
     assert file.seek(-3, io.SEEK_CUR) == len(CONTENT) - 3
     assert file.read() == CONTENT[-3:]
 

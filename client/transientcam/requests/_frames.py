@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Any, Final
 
 import numpy as np
@@ -19,7 +18,7 @@ from transientcam.requests._request import (
 )
 from transientcam.wire import MAX_SERVER_MESSAGE_BYTES, MEDIA_TYPE, parse_frame
 
-_MEDIA_TYPES: Final = {
+FILE_TYPES: Final = {
     "png": "image/png",
     "npy": "application/x-npy",
     "npz": "application/x-npz",
@@ -27,28 +26,7 @@ _MEDIA_TYPES: Final = {
     "ply": "application/x-ply",
     "csv": "text/csv",
 }
-
-
-class FileFormat(StrEnum):
-    """File formats that the daemon writes frames in."""
-
-    PNG = "png"
-    """16 bit (range in mm), of products that are images."""
-    NPY = "npy"
-    """The array alone."""
-    NPZ = "npz"
-    """The array with its metadata."""
-    TIFF = "tiff"
-    """Unchanged values, a page for each image."""
-    PLY = "ply"
-    """Of ``pointcloud``: points with range, amplitude and flags."""
-    CSV = "csv"
-    """A line for each row, of products that are images."""
-
-    @property
-    def media_type(self) -> str:
-        """Its media type, as the daemon names it."""
-        return _MEDIA_TYPES[self]
+"""Media types of the files that the daemon writes frames in, by their format."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,11 +116,11 @@ def file(
 ) -> Request[bytes]:
     """Build the request for a product of a frame as a file.
 
-    Raises ParameterError if ``form`` is no `FileFormat`.
+    Raises ParameterError if ``form`` is none of `FILE_TYPES`.
     """
-    if form not in tuple(FileFormat):
-        raise ParameterError("form", form, f"one of {', '.join(FileFormat)}")
-    media_type = FileFormat(form).media_type
+    if form not in FILE_TYPES:
+        raise ParameterError("form", form, f"one of {', '.join(FILE_TYPES)}")
+    media_type = FILE_TYPES[form]
     return Request(
         "GET",
         f"{which.path}/{segment(product)}.{form}",

@@ -24,7 +24,7 @@ from transientcam_driver.clock import VirtualClock
 from transientcam_server.imaging import Calibration, Recipe, evaluate
 from transientcam_server.settings import ReconstructionSettings
 
-_Array = NDArray[Any]
+Array = NDArray[Any]
 Options = Mapping[str, str]
 """Options in the name of a simulated camera."""
 NO_OPTIONS: Final[Options] = MappingProxyType({})
@@ -57,7 +57,7 @@ class ReconstructedShot:
         return self.applied.sequence.base_frequency_hz
 
     @property
-    def lit(self) -> _Array:
+    def lit(self) -> Array:
         """Pixels (H, W) that light comes back to, directly or not."""
         return np.isfinite(self.truth.first_return_m) & (self.truth.brightness > 0)
 
@@ -114,7 +114,7 @@ class Bench:
         takes = sequence.takes
         return replace(sequence, takes=min(takes, _QUICK_TAKES) if self.quick else takes)
 
-    def raw(self, scene: str, sequence: Sequence) -> tuple[_Array, Truth]:
+    def raw(self, scene: str, sequence: Sequence) -> tuple[Array, Truth]:
         """Return uncalibrated images (N, H, W) of a scene with its own device, and the truth."""
         with ExitStack() as stack:
             camera = stack.enter_context(open_camera(f"sim:{scene}", clock=VirtualClock()))

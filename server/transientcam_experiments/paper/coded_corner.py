@@ -4,17 +4,15 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import Sequence, SubPhases, list_scenes
-from transientcam_experiments.paper.bench import Bench
+from transientcam_experiments.paper.bench import Array, Bench
 from transientcam_moments.comparisons import Code, coded as estimate, maximum_length_code
 
-_Array = NDArray[Any]
 SEQUENCE: Final = Sequence(
     base_frequency_hz=11.5e6,
     harmonics=8,
@@ -37,13 +35,13 @@ class CodedCapture:
     ``truth_m`` (H, W) is the true range.
     """
 
-    samples: _Array
-    shifts_rad: _Array
-    harmonics: _Array
+    samples: Array
+    shifts_rad: Array
+    harmonics: Array
     code: Code
-    truth_m: _Array
+    truth_m: Array
 
-    def range_m(self, step: int) -> _Array:
+    def range_m(self, step: int) -> Array:
         """Return the range of every ``step``-th pixel both ways, NaN where none is found."""
         found = estimate(
             self.samples[:, ::step, ::step],
@@ -51,7 +49,7 @@ class CodedCapture:
             shifts_rad=self.shifts_rad,
             harmonics=self.harmonics,
         )
-        range_m: _Array = tm.range_m(found.first_phase_rad(), SEQUENCE.base_frequency_hz)
+        range_m: Array = tm.range_m(found.first_phase_rad(), SEQUENCE.base_frequency_hz)
         return range_m
 
 
@@ -81,7 +79,7 @@ def capture(bench: Bench) -> CodedCapture:
     )
 
 
-def _write(folder: Path, contents: _Array) -> Path:
+def _write(folder: Path, contents: Array) -> Path:
     """Write the corner with a device of its own, its light weakened, and other light."""
     phase = 2 * np.pi * np.arange(_WAVE) / _WAVE
     orders = np.arange(1, HARMONICS + 1)

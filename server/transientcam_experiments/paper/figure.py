@@ -31,10 +31,6 @@ class Statement:
     reason: str = ""
     """Why ours differs; empty where it does not."""
 
-    def to_document(self) -> dict[str, Any]:
-        """Return the fields for JSON."""
-        return {name: getattr(self, name) for name in self.__slots__}
-
 
 def check(
     source: str,
@@ -85,14 +81,6 @@ class Table:
     def of(cls, title: str, rows: Sequence[Mapping[str, Any]]) -> "Table":
         """Return a table of rows that name their cells by the same columns."""
         return cls(title, tuple(rows[0]), [tuple(row.values()) for row in rows])
-
-    def to_document(self) -> dict[str, Any]:
-        """Return the fields for JSON."""
-        return {
-            "title": self.title,
-            "columns": list(self.columns),
-            "rows": [list(row) for row in self.rows],
-        }
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,15 +3,13 @@
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import Array, Bench, ReconstructedShot
 from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 
-_Array = NDArray[Any]
 SEQUENCE: Final = Sequence(base_frequency_hz=11.5e6, harmonics=7, takes=20)
 _FRAME_S: Final = 19.3e-9
 _GRID: Final = 1 << 17
@@ -42,7 +40,7 @@ def _pixel(shot: ReconstructedShot) -> tuple[int, int]:
     return int(y), int(x)
 
 
-def _statements(b: _Array, phase: _Array, density: _Array) -> list[Statement]:
+def _statements(b: Array, phase: Array, density: Array) -> list[Statement]:
     # the rectangle rule is exact to rounding for what has no harmonics beyond half the samples
     again = np.exp(1j * np.arange(_ORDER + 1)[:, None] * phase) @ density * (2 * np.pi / _GRID)
     reciprocal = np.abs(np.fft.rfft(1 / density, axis=0))
@@ -84,13 +82,13 @@ def _statements(b: _Array, phase: _Array, density: _Array) -> list[Statement]:
     ]
 
 
-def _inverse_fourier(b: _Array, phase: _Array) -> _Array:
+def _inverse_fourier(b: Array, phase: Array) -> Array:
     waves = np.exp(-1j * phase[:, None] * np.arange(1, b.shape[0]))
-    result: _Array = (b[0].real + 2 * (waves @ b[1:]).real) / (2 * np.pi)
+    result: Array = (b[0].real + 2 * (waves @ b[1:]).real) / (2 * np.pi)
     return result
 
 
-def _table(b: _Array, density: _Array, phase: _Array) -> Table:
+def _table(b: Array, density: Array, phase: Array) -> Table:
     fourier = _inverse_fourier(b, phase)
     rows = [
         (
@@ -114,7 +112,7 @@ def _moments(shot: ReconstructedShot, y: int, x: int) -> Table:
     return Table("Moments of the pixel", ("j", "modulus over b_0", "phase in degrees"), rows)
 
 
-def _draw(shot: ReconstructedShot, y: int, x: int, phase: _Array) -> Any:
+def _draw(shot: ReconstructedShot, y: int, x: int, phase: Array) -> Any:
     with style.style():
         picture = style.new(11.0, 6.6)
         halves: Any = picture.subfigures(2, 1, height_ratios=(1.0, 1.05))
@@ -135,7 +133,7 @@ def _draw_scene(part: Any, shot: ReconstructedShot, y: int, x: int) -> None:
     style.scale(part, axes, "density / (DN/ns)")
 
 
-def _draw_signal(part: Any, shot: ReconstructedShot, y: int, x: int, phase: _Array) -> None:
+def _draw_signal(part: Any, shot: ReconstructedShot, y: int, x: int, phase: Array) -> None:
     response, modulation = part.subplots(2, 1, sharex=True)
     turn = 2 * np.pi * shot.base_frequency_hz
     there = shot.truth.weight[:, y, x] > 0
@@ -150,7 +148,7 @@ def _draw_signal(part: Any, shot: ReconstructedShot, y: int, x: int, phase: _Arr
     modulation.legend(loc="upper right", ncols=3)
 
 
-def _draw_reconstruction(part: Any, shot: ReconstructedShot, y: int, x: int, phase: _Array) -> None:
+def _draw_reconstruction(part: Any, shot: ReconstructedShot, y: int, x: int, phase: Array) -> None:
     upper, lower = part.subplots(2, 1, sharex=True)
     b = tm.bias(shot.found.moments[:, y, x].astype(np.complex128)).moments
     h = tm.density(tm.levinson(b), phase)

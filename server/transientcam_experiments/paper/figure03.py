@@ -6,17 +6,15 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import Sequence, SubPhases
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S, Scheme
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench
+from transientcam_experiments.paper.bench import Array, Bench
 from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_server.errors import InputError
 
-_Array = NDArray[Any]
 _F_HZ: Final = 23e6
 _WIDTH, _HEIGHT = 163, 120
 _SAMPLES: Final = 2048
@@ -63,7 +61,7 @@ def make(bench: Bench) -> FigureResult:
     return FigureResult(_draw(curves), _statements(curves), tables, _remarks(curves))
 
 
-def _waveforms(bench: Bench) -> dict[str, _Array]:
+def _waveforms(bench: Bench) -> dict[str, Array]:
     phase = 2 * np.pi * np.arange(_SAMPLES) / _SAMPLES
     waveforms = {
         "triangle": 2 / np.pi * np.arcsin(np.cos(phase)),
@@ -75,7 +73,7 @@ def _waveforms(bench: Bench) -> dict[str, _Array]:
     return waveforms
 
 
-def _rows(path: Path) -> _Array:
+def _rows(path: Path) -> Array:
     """Read a measured correlation function. Raises InputError where the file holds none."""
     try:
         rows = np.load(path, allow_pickle=False)
@@ -87,7 +85,7 @@ def _rows(path: Path) -> _Array:
     return rows.astype(float)
 
 
-def measured(bench: Bench, wave: _Array, scheme: Steps) -> _Array:
+def measured(bench: Bench, wave: Array, scheme: Steps) -> Array:
     """Return the effective modulation over one period of delays, measured over USB: (W).
 
     The difference of opposite images, which is what four-bucket sampling uses.
@@ -101,11 +99,11 @@ def measured(bench: Bench, wave: _Array, scheme: Steps) -> _Array:
     with TemporaryDirectory() as folder:
         scene = _write(Path(folder), wave)
         images, _ = bench.raw(f"{scene}?noise=off&modulation-harmonics=on", sequence)
-    difference: _Array = (images[0].astype(float) - images[2]).mean(axis=0)
+    difference: Array = (images[0].astype(float) - images[2]).mean(axis=0)
     return difference
 
 
-def _write(folder: Path, wave: _Array) -> Path:
+def _write(folder: Path, wave: Array) -> Path:
     """Write a scene: column x of the sensor sees one return, x / W of a period late.
 
     Light that is spread evenly over the period is modulated by nothing, and keeps a waveform that
@@ -120,17 +118,17 @@ def _write(folder: Path, wave: _Array) -> Path:
     return scene
 
 
-def _spectrum(curve: _Array) -> _Array:
+def _spectrum(curve: Array) -> Array:
     spectrum = np.abs(np.fft.rfft(curve))[: _HIGHEST + 1]
-    relative: _Array = spectrum / spectrum[1]
+    relative: Array = spectrum / spectrum[1]
     return relative
 
 
-def _distortion(curve: _Array) -> float:
+def _distortion(curve: Array) -> float:
     return float(np.sqrt((_spectrum(curve)[2:] ** 2).sum()))
 
 
-def _statements(curves: dict[str, dict[Steps, _Array]]) -> list[Statement]:
+def _statements(curves: dict[str, dict[Steps, Array]]) -> list[Statement]:
     triangle = curves["triangle"]
     arccos = [_distortion(curve) for scheme, curve in triangle.items() if scheme.kind == "arccos"]
     cancelled = max(
@@ -188,7 +186,7 @@ def _statements(curves: dict[str, dict[Steps, _Array]]) -> list[Statement]:
     ]
 
 
-def _remarks(curves: dict[str, dict[Steps, _Array]]) -> list[str]:
+def _remarks(curves: dict[str, dict[Steps, Array]]) -> list[str]:
     """Return a remark on where the rival is better."""
     remarks = []
     for name, each in curves.items():
@@ -206,7 +204,7 @@ def _remarks(curves: dict[str, dict[Steps, _Array]]) -> list[str]:
     ]
 
 
-def _table(name: str, curves: dict[Steps, _Array]) -> Table:
+def _table(name: str, curves: dict[Steps, Array]) -> Table:
     rows = []
     for scheme, curve in curves.items():
         spectrum = _spectrum(curve)
@@ -223,9 +221,9 @@ def _table(name: str, curves: dict[Steps, _Array]) -> Table:
     return Table(f"{name}: harmonics over the fundamental, measured over USB", columns, rows)
 
 
-def _gain(scheme: Steps, harmonics: _Array) -> _Array:
+def _gain(scheme: Steps, harmonics: Array) -> Array:
     steps = SubPhases(scheme.kind, scheme.n)
-    gain: _Array = tm.modulation_gain(harmonics, steps.phases_rad, np.array(steps.weights))
+    gain: Array = tm.modulation_gain(harmonics, steps.phases_rad, np.array(steps.weights))
     return gain
 
 
@@ -233,7 +231,7 @@ def _percent(value: float) -> str:
     return f"{value:.3%}"
 
 
-def _draw(curves: dict[str, dict[Steps, _Array]]) -> Any:
+def _draw(curves: dict[str, dict[Steps, Array]]) -> Any:
     with style.style():
         picture = style.new(11.0, 2.9 * len(curves))
         grid = picture.subplots(len(curves), 3, squeeze=False)
@@ -243,7 +241,7 @@ def _draw(curves: dict[str, dict[Steps, _Array]]) -> Any:
     return picture
 
 
-def _draw_curves(curve: Any, rest: Any, name: str, each: dict[Steps, _Array]) -> None:
+def _draw_curves(curve: Any, rest: Any, name: str, each: dict[Steps, Array]) -> None:
     phase = np.degrees(2 * np.pi * np.arange(_WIDTH) / _WIDTH)
     colours = (style.NOISY, style.OURS, style.OTHER)
     for key, colour in zip(_SHOWN, colours, strict=True):
@@ -262,7 +260,7 @@ def _draw_curves(curve: Any, rest: Any, name: str, each: dict[Steps, _Array]) ->
     rest.set(xticks=range(0, 361, 90), ylabel="% of the fundamental")
 
 
-def _draw_distortion(axes: Any, name: str, each: dict[Steps, _Array]) -> None:
+def _draw_distortion(axes: Any, name: str, each: dict[Steps, Array]) -> None:
     for kind, colour, marker in (
         ("arccos", style.OURS, "o"),
         ("harmonic-cancellation", style.OTHER, "s"),

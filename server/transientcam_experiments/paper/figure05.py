@@ -3,15 +3,13 @@
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench
+from transientcam_experiments.paper.bench import Array, Bench
 from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.synthetic import PIXEL
 
-_Array = NDArray[Any]
 _M: Final = 5
 _F_HZ: Final = 23e6
 _NEAR: Final = 1e-4
@@ -52,24 +50,24 @@ def make(bench: Bench) -> FigureResult:
     )
 
 
-def singular_brightness(b: _Array) -> float:
+def singular_brightness(b: Array) -> float:
     """Return the b_0 at which the Toeplitz matrix of moments (m + 1) becomes singular."""
     return float(b[0].real - tm.smallest_eigenvalue(b[:, None])[0])
 
 
-def _density(b: _Array, b_0: float, phase: _Array) -> _Array:
+def _density(b: Array, b_0: float, phase: Array) -> Array:
     changed = np.concatenate([[b_0], b[1:]])
-    density: _Array = tm.density(tm.levinson(changed[:, None]), phase)[:, 0]
+    density: Array = tm.density(tm.levinson(changed[:, None]), phase)[:, 0]
     return density
 
 
-def _highest(b: _Array, b_0: float) -> float:
+def _highest(b: Array, b_0: float) -> float:
     """Return the density of the highest peak, between the points of any grid."""
     changed = np.concatenate([[b_0], b[1:]])
     return float(tm.peaks(tm.levinson(changed[:, None])).density.max())
 
 
-def _error(density: _Array, truth: _Array) -> float:
+def _error(density: Array, truth: Array) -> float:
     """Return the distance of two smoothed densities over the true brightness.
 
     Unsmoothed, the distance of densities near sharp returns says nothing (Sec. 5.2): two returns
@@ -81,13 +79,13 @@ def _error(density: _Array, truth: _Array) -> float:
     return float(np.abs(smoothed).mean() * 2 * np.pi / PIXEL.brightness)
 
 
-def _cumulative_error(density: _Array, truth: _Array) -> float:
+def _cumulative_error(density: Array, truth: Array) -> float:
     """Return the mean distance of two cumulative densities over the true brightness."""
     step = 2 * np.pi / density.size
     return float(np.abs(np.cumsum(density - truth) * step).mean() / PIXEL.brightness)
 
 
-def _concentrated(b: _Array, phase: _Array, density: _Array) -> float:
+def _concentrated(b: Array, phase: Array, density: Array) -> float:
     """Return the share of the light within a window around each of Pisarenko's m returns."""
     returns = tm.pisarenko(b[:, None])
     apart = phase[:, None] - returns.phase_rad[:, 0]
@@ -96,7 +94,7 @@ def _concentrated(b: _Array, phase: _Array, density: _Array) -> float:
 
 
 def _statements(
-    b: _Array, phase: _Array, sparsest: _Array, swept: _Array, errors: dict[str, _Array]
+    b: Array, phase: Array, sparsest: Array, swept: Array, errors: dict[str, Array]
 ) -> list[Statement]:
     best = {name: float(swept[each.argmin()]) for name, each in errors.items()}
     heights = [_highest(b, b_0) for b_0 in swept]
@@ -145,7 +143,7 @@ def _statements(
     ]
 
 
-def _table(b: _Array, phase: _Array, truth: _Array, densities: dict[float, _Array]) -> Table:
+def _table(b: Array, phase: Array, truth: Array, densities: dict[float, Array]) -> Table:
     rows = []
     for b_0, density in densities.items():
         changed = np.concatenate([[b_0], b[1:]])
@@ -162,11 +160,11 @@ def _table(b: _Array, phase: _Array, truth: _Array, densities: dict[float, _Arra
 
 
 def _draw(
-    phase: _Array,
-    truth: _Array,
-    densities: dict[float, _Array],
-    swept: _Array,
-    errors: dict[str, _Array],
+    phase: Array,
+    truth: Array,
+    densities: dict[float, Array],
+    swept: Array,
+    errors: dict[str, Array],
 ) -> Any:
     with style.style():
         picture = style.new(11.0, 3.8)

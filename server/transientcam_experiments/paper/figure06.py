@@ -3,15 +3,13 @@
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import Array, Bench, ReconstructedShot
 from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.mirrors import shots, thrice
 
-_Array = NDArray[Any]
 _SEQUENCE: Final = Sequence(harmonics=4, base_frequency_hz=23e6, takes=30)
 _NAMES: Final = ("strongest", "second", "third")
 _NEAR_S: Final = 0.5e-9
@@ -37,7 +35,7 @@ def make(bench: Bench) -> FigureResult:
     )
 
 
-def _strongest(shot: ReconstructedShot) -> tuple[_Array, _Array]:
+def _strongest(shot: ReconstructedShot) -> tuple[Array, Array]:
     """Return times in s and weights (3, H, W) of the three strongest returns, by strength."""
     returns = shot.found.returns
     order = np.argsort(-returns.weight, axis=0)[:3]
@@ -46,13 +44,13 @@ def _strongest(shot: ReconstructedShot) -> tuple[_Array, _Array]:
     return phase / (2 * np.pi * shot.base_frequency_hz), weight
 
 
-def _ranked_truth(shot: ReconstructedShot) -> tuple[_Array, _Array]:
+def _ranked_truth(shot: ReconstructedShot) -> tuple[Array, Array]:
     order = np.argsort(-shot.truth.weight, axis=0)[:3]
     delay_s = np.take_along_axis(shot.truth.delay_s, order, axis=0)
     return delay_s, np.take_along_axis(shot.truth.weight, order, axis=0)
 
 
-def _errors(shot: ReconstructedShot, k: int) -> tuple[_Array, _Array]:
+def _errors(shot: ReconstructedShot, k: int) -> tuple[Array, Array]:
     """Return errors (H, W) of time in s and of strength: of the return nearest the true k-th."""
     delay_s, true_weight = _ranked_truth(shot)
     time_s, weight = _strongest(shot)
@@ -72,7 +70,7 @@ def _noise(one: ReconstructedShot, other: ReconstructedShot, k: int) -> float:
 
 
 def _statements(
-    shot: ReconstructedShot, where: _Array, errors: list[tuple[_Array, _Array]], noise: list[float]
+    shot: ReconstructedShot, where: Array, errors: list[tuple[Array, Array]], noise: list[float]
 ) -> list[Statement]:
     near = np.all([np.abs(each[0]) < _NEAR_S for each in errors], axis=0)
     _, weight = _strongest(shot)
@@ -108,7 +106,7 @@ def _statements(
 
 
 def _table(
-    shot: ReconstructedShot, where: _Array, errors: list[tuple[_Array, _Array]], noise: list[float]
+    shot: ReconstructedShot, where: Array, errors: list[tuple[Array, Array]], noise: list[float]
 ) -> Table:
     rows = [
         {
@@ -123,7 +121,7 @@ def _table(
     return Table.of("Pixels with three returns", rows)
 
 
-def _draw(time_s: _Array, weight: _Array) -> Any:
+def _draw(time_s: Array, weight: Array) -> Any:
     with style.style():
         picture = style.new(11.0, 5.6)
         upper, lower = picture.subplots(2, 3)

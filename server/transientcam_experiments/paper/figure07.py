@@ -4,15 +4,13 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench
+from transientcam_experiments.paper.bench import Array, Bench
 from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.synthetic import CONTINUOUS, Response
 
-_Array = NDArray[Any]
 _M: Final = 5
 _F_HZ: Final = 23e6
 _RADIUS: Final = 0.93
@@ -57,7 +55,7 @@ def _sharper(scale: float) -> Response:
     return replace(CONTINUOUS, returns=tuple(returns))
 
 
-def _width(response: Response, m: int, phase: _Array) -> tuple[float, float]:
+def _width(response: Response, m: int, phase: Array) -> tuple[float, float]:
     b = response.moments(_F_HZ, m)[:, None]
     lower, upper = tm.bounds(b, phase, _RADIUS)
     width = upper - lower
@@ -65,13 +63,13 @@ def _width(response: Response, m: int, phase: _Array) -> tuple[float, float]:
     return float(width.mean() / mean), float(width.max() / upper.max())
 
 
-def _truth(phase: _Array) -> _Array:
+def _truth(phase: Array) -> Array:
     """Return the true density over phase, per radian."""
     turn = 2 * np.pi * _F_HZ
     return CONTINUOUS.density(phase / turn) / turn
 
 
-def candidates(b: _Array, phase: _Array, several: int, rng: np.random.Generator) -> _Array:
+def candidates(b: Array, phase: Array, several: int, rng: np.random.Generator) -> Array:
     """Return smoothed densities (N, T) that share all moments: the truth, the estimates, others.
 
     A positive measure for b less a small positive one exists where the matrix stays positive:
@@ -95,37 +93,37 @@ def candidates(b: _Array, phase: _Array, several: int, rng: np.random.Generator)
     return np.array(found)
 
 
-def _returns(b: _Array, phase: _Array) -> _Array:
+def _returns(b: Array, phase: Array) -> Array:
     """Return the smoothed Pisarenko estimate: kernels at its returns, and its uniform part."""
     returns = tm.pisarenko(b[:, None])
-    smoothed: _Array = np.full(phase.shape, returns.uniform[0] / (2 * np.pi))
+    smoothed: Array = np.full(phase.shape, returns.uniform[0] / (2 * np.pi))
     for at, weight in zip(returns.phase_rad[:, 0], returns.weight[:, 0], strict=True):
         if weight > 0:
             smoothed = smoothed + weight * _kernel(phase - at)
     return smoothed
 
 
-def _toeplitz(b: _Array) -> _Array:
+def _toeplitz(b: Array) -> Array:
     j = np.arange(b.size)
     both = np.concatenate([b[:0:-1].conj(), b])
-    matrix: _Array = both[j[:, None] - j[None] + b.size - 1]
+    matrix: Array = both[j[:, None] - j[None] + b.size - 1]
     return matrix
 
 
-def _kernel(phase: _Array) -> _Array:
+def _kernel(phase: Array) -> Array:
     """Poisson's kernel."""
-    kernel: _Array = (1 - _RADIUS**2) / (2 * np.pi * np.abs(1 - _RADIUS * np.exp(1j * phase)) ** 2)
+    kernel: Array = (1 - _RADIUS**2) / (2 * np.pi * np.abs(1 - _RADIUS * np.exp(1j * phase)) ** 2)
     return kernel
 
 
-def _smooth(density: _Array) -> _Array:
+def _smooth(density: Array) -> Array:
     """Convolve with Poisson's kernel: harmonic k is multiplied by r^|k|."""
     spectrum = np.fft.rfft(density)
-    smoothed: _Array = np.fft.irfft(spectrum * _RADIUS ** np.arange(spectrum.size), density.size)
+    smoothed: Array = np.fft.irfft(spectrum * _RADIUS ** np.arange(spectrum.size), density.size)
     return smoothed
 
 
-def must_peak(phase: _Array, lower: _Array, upper: _Array) -> tuple[float, float]:
+def must_peak(phase: Array, lower: Array, upper: Array) -> tuple[float, float]:
     """Return where a maximum must be: what is compatible is lower on both sides."""
     top = int(lower.argmax())
     below = upper < lower[top]
@@ -135,16 +133,16 @@ def must_peak(phase: _Array, lower: _Array, upper: _Array) -> tuple[float, float
     return float(phase[before[-1]]), float(phase[top + after[0]])
 
 
-def _outside(smoothed: _Array, lower: _Array, upper: _Array) -> float:
+def _outside(smoothed: Array, lower: Array, upper: Array) -> float:
     """Return how far densities leave the bounds, over the highest bound."""
     return float(np.maximum(lower - smoothed, smoothed - upper).max() / upper.max())
 
 
 def _statements(
-    phase: _Array,
-    lower: _Array,
-    upper: _Array,
-    smoothed: _Array,
+    phase: Array,
+    lower: Array,
+    upper: Array,
+    smoothed: Array,
     widths: list[tuple[int, float, float]],
 ) -> list[Statement]:
     truth = smoothed[0]
@@ -208,7 +206,7 @@ def _statements(
     ]
 
 
-def _draw(b: _Array, phase: _Array, lower: _Array, upper: _Array, smoothed: _Array) -> Any:
+def _draw(b: Array, phase: Array, lower: Array, upper: Array, smoothed: Array) -> Any:
     with style.style():
         picture = style.new(11.0, 3.8)
         left, right = picture.subplots(1, 2)

@@ -3,11 +3,10 @@
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, Options, ReconstructedShot
+from transientcam_experiments.paper.bench import Array, Bench, Options, ReconstructedShot
 from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.mirrors import (
     SEQUENCES,
@@ -18,7 +17,6 @@ from transientcam_experiments.paper.mirrors import (
     title,
 )
 
-_Array = NDArray[Any]
 _DEVICES: Final[dict[str, Options]] = {
     "as captured": {},
     "pure sinusoids": {"modulation-harmonics": "off", "lens-scatter": "off"},
@@ -56,7 +54,7 @@ def _shares_with(bench: Bench, name: str) -> dict[str, float]:
     return shares
 
 
-def _biased(b: _Array, shot: ReconstructedShot) -> float:
+def _biased(b: Array, shot: ReconstructedShot) -> float:
     least = shot.found.settings.epsilon * b[0].real
     return float((tm.smallest_eigenvalue(b) < least)[shot.lit].mean())
 
@@ -66,7 +64,7 @@ def biased_in_a_room(shot: ReconstructedShot, share: float) -> float:
     return _biased(_with_diffuse(shot, share), shot)
 
 
-def _with_diffuse(shot: ReconstructedShot, share: float) -> _Array:
+def _with_diffuse(shot: ReconstructedShot, share: float) -> Array:
     """Return the captured moments (m + 1, H, W) with a share of light from a room around.
 
     It begins with the first return and decays exponentially.
@@ -76,7 +74,7 @@ def _with_diffuse(shot: ReconstructedShot, share: float) -> _Array:
     j = np.arange(len(b))[:, None, None]
     first = np.exp(1j * j * omega * np.nan_to_num(shot.truth.delay_s[0]))
     room = b[0].real * first / (1 - 1j * j * omega * _DIFFUSE_DECAY_S)
-    mixed: _Array = (1 - share) * b + share * room
+    mixed: Array = (1 - share) * b + share * room
     return mixed
 
 
@@ -111,7 +109,7 @@ def make(bench: Bench) -> FigureResult:
     )
 
 
-def _density(shot: ReconstructedShot) -> _Array:
+def _density(shot: ReconstructedShot) -> Array:
     """Return the density (3, H, W) in DN/ns."""
     return np.asarray(shot.found.density(np.array(TIMES_S))) * 1e-9
 
@@ -124,10 +122,10 @@ def _noise(pair: list[ReconstructedShot]) -> float:
     return float(np.median(relative[bright]))
 
 
-def _heights(shot: ReconstructedShot) -> _Array:
+def _heights(shot: ReconstructedShot) -> Array:
     """Return the density (P) of each pixel's highest peak over its brightness, in 1/ns."""
     highest = shot.found.peaks.density.max(axis=0) / shot.found.brightness
-    height: _Array = highest[shot.lit] * 2 * np.pi * shot.base_frequency_hz * 1e-9
+    height: Array = highest[shot.lit] * 2 * np.pi * shot.base_frequency_hz * 1e-9
     return height
 
 

@@ -3,11 +3,10 @@
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import Array, Bench, ReconstructedShot
 from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.mirrors import (
     SEQUENCES,
@@ -18,7 +17,6 @@ from transientcam_experiments.paper.mirrors import (
     title,
 )
 
-_Array = NDArray[Any]
 _QUADRATURE: Final = 100_000
 _FRONT_S: Final = 0.5e-9
 
@@ -43,7 +41,7 @@ class _Errors:
     return.
     """
 
-    def __init__(self, shot: ReconstructedShot, times_s: _Array) -> None:
+    def __init__(self, shot: ReconstructedShot, times_s: Array) -> None:
         where = thrice(shot)
         found = np.asarray(shot.found.cumulative(times_s))[:, where]
         delay_s = shot.truth.delay_s[:3][:, where]
@@ -53,13 +51,13 @@ class _Errors:
         self.waves = np.array([self._of(time_s) for time_s in between_s])
         self.fronts = np.array([self._of(time_s - _FRONT_S) for time_s in delay_s])
 
-    def _of(self, time_s: _Array) -> _Array:
+    def _of(self, time_s: Array) -> Array:
         index = np.abs(self._times_s[:, None] - time_s).argmin(axis=0)
         at_s = np.zeros(self._where.shape)
         at_s[self._where] = self._times_s[index]
         true = returned(self._shot, at_s)[self._where]
         found = np.take_along_axis(self._found, index[None], axis=0)[0]
-        errors: _Array = (found - true) / self._brightness
+        errors: Array = (found - true) / self._brightness
         return errors
 
 

@@ -4,16 +4,14 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import Array, Bench, ReconstructedShot
 from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.tradeoff.truth import Sample, cumulative
 
-_Array = NDArray[Any]
 _SEQUENCE: Final = Sequence(harmonics=4, base_frequency_hz=23e6, takes=40)
 _SCENE: Final = Path(__file__).with_name("large-corner.toml")
 _TIMES_S: Final = (21.5e-9, 26.0e-9, 29.5e-9)
@@ -28,7 +26,7 @@ def make(bench: Bench) -> FigureResult:
     return FigureResult(_draw(shot, walls), _statements(shot, walls), (_table(walls),))
 
 
-def _walls(shot: ReconstructedShot) -> dict[str, _Array]:
+def _walls(shot: ReconstructedShot) -> dict[str, Array]:
     """Return the pixels of each wall, without those near the edge between them."""
     column = np.arange(shot.lit.shape[1]) / shot.lit.shape[1]
     left = np.broadcast_to(column < 0.45, shot.lit.shape)
@@ -40,7 +38,7 @@ class _Wall:
     """What is measured of one wall: sharpness of peaks, and errors of sampled pixels."""
 
     def __init__(
-        self, shot: ReconstructedShot, estimated: _Array, where: _Array, bench: Bench
+        self, shot: ReconstructedShot, estimated: Array, where: Array, bench: Bench
     ) -> None:
         turn = 2 * np.pi * shot.base_frequency_hz
         y, x = np.nonzero(where)
@@ -66,19 +64,19 @@ class _Wall:
         self.exact_error = self._error(exact, np.ones(self.y.size))
         self.true_eigenvalue = float(np.median(tm.smallest_eigenvalue(exact)))
 
-    def _error(self, b: _Array, brightness: _Array) -> float:
+    def _error(self, b: Array, brightness: Array) -> float:
         found = tm.cumulative(tm.levinson(b), self.phase) / brightness
         return float(np.abs(found - self.true).mean())
 
 
-def _moments(light: list[tuple[_Array, _Array]], turn: float) -> _Array:
+def _moments(light: list[tuple[Array, Array]], turn: float) -> Array:
     """Return the moments (m + 1, P) of responses of brightness 1, without any error."""
     j = np.arange(_SEQUENCE.harmonics + 1)[:, None]
     each = [np.exp(1j * j * turn * time_s) @ share for time_s, share in light]
     return np.stack(each, axis=1)
 
 
-def _width_ns(b: _Array, turn: float) -> float:
+def _width_ns(b: Array, turn: float) -> float:
     """Return the typical time in which the middle half of the light comes back."""
     phase = np.linspace(0, 2 * np.pi, 2049)
     back = np.asarray(tm.cumulative(tm.levinson(b), phase)) / b[0].real
@@ -86,7 +84,7 @@ def _width_ns(b: _Array, turn: float) -> float:
     return float(np.median(phase[quarters[1]] - phase[quarters[0]]) / turn * 1e9)
 
 
-def _spread(time_s: _Array, share: _Array) -> float:
+def _spread(time_s: Array, share: Array) -> float:
     back = np.cumsum(share)
     first, last = (int(np.searchsorted(back, part)) for part in (0.25, 0.75))
     return float(time_s[last] - time_s[first])

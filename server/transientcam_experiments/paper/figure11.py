@@ -3,7 +3,6 @@
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from transientcam_experiments.paper import random_responses, style
 from transientcam_experiments.paper.bench import Bench
@@ -12,7 +11,6 @@ from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Sta
 from transientcam_experiments.paper.outcome import Outcome, outcome
 from transientcam_experiments.paper.synthetic import CONTINUOUS, SPARSE
 
-_Array = NDArray[Any]
 _COLUMNS: Final = 4
 _SHOWN_DRAWS: Final = 20
 _CASES: Final = (SPARSE, CONTINUOUS)

@@ -4,16 +4,14 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver import Sequence
 from transientcam_experiments.paper import coded_corner, style
-from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import WITHOUT_OUTLIERS, Array, Bench, ReconstructedShot
 from transientcam_experiments.paper.contenders import Contender
 from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 
-_Array = NDArray[Any]
 DATA: Final = Sequence(harmonics=4, base_frequency_hz=23e6, takes=4)
 """The paper's data set: "f = 23 MHz and 4 averaged takes (without outliers)"."""
 MORE: Final = Sequence(harmonics=8, base_frequency_hz=11.5e6, takes=4)
@@ -52,13 +50,13 @@ class Ranged:
     """A technique's ranges (H, W) in m, NaN where it finds none, and the true ones."""
 
     entry: Contender
-    range_m: _Array
-    truth_m: _Array
+    range_m: Array
+    truth_m: Array
 
     @property
-    def error_m(self) -> _Array:
+    def error_m(self) -> Array:
         """Error (N) of the pixels that have a range."""
-        error: _Array = (self.range_m - self.truth_m)[np.isfinite(self.range_m)]
+        error: Array = (self.range_m - self.truth_m)[np.isfinite(self.range_m)]
         return error
 
     @property
@@ -117,7 +115,7 @@ def _coded(entry: Contender, bench: Bench, step: int) -> Ranged:
     return Ranged(entry, captured.range_m(step), captured.truth_m[::step, ::step])
 
 
-def directions(shot: ReconstructedShot) -> _Array:
+def directions(shot: ReconstructedShot) -> Array:
     """Return unit vectors (3, H, W) of the pixels' lines of sight: x right, y away, z up."""
     height, width = shot.lit.shape
     pixel = 2 * np.tan(np.radians(_FIELD_OF_VIEW_DEG) / 2) / width
@@ -270,7 +268,7 @@ def _beaten(title: str, among: list[Ranged], best: Ranged) -> str:
     return f"{text}."
 
 
-def _draw(ranged: list[Ranged], direction: _Array) -> Any:
+def _draw(ranged: list[Ranged], direction: Array) -> Any:
     columns = 4
     rows = -(-len(ranged) // columns)
     with style.style():
@@ -287,7 +285,7 @@ def _draw(ranged: list[Ranged], direction: _Array) -> Any:
     return picture
 
 
-def _draw_one(axes: Any, each: Ranged, direction: _Array) -> None:
+def _draw_one(axes: Any, each: Ranged, direction: Array) -> None:
     """Draw the points from above, and the walls as a line."""
     points = direction * each.range_m
     axes.plot(points[0], points[1], ".", color=style.OURS, markersize=1.6, alpha=0.5)

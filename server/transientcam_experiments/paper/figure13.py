@@ -4,15 +4,13 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import Array, Bench, ReconstructedShot
 from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.visitor import MOMENTS_S, VIDEO, VIDEO_HZ, parts, video
 
-_Array = NDArray[Any]
 _TIMES_S: Final = (9.9e-9, 13.8e-9, 24.2e-9)
 _LONG_S: Final = 0.00192
 _NEAR_S: Final = 1e-9
@@ -32,7 +30,7 @@ def make(bench: Bench) -> FigureResult:
     )
 
 
-def _density(shot: ReconstructedShot) -> _Array:
+def _density(shot: ReconstructedShot) -> Array:
     return np.asarray(shot.found.density(np.array(_TIMES_S))) * 1e-9
 
 

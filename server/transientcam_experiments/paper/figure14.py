@@ -4,15 +4,13 @@ from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, Options, ReconstructedShot
+from transientcam_experiments.paper.bench import Array, Bench, Options, ReconstructedShot
 from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.visitor import MOMENTS_S, VIDEO, parts, video
 
-_Array = NDArray[Any]
 _OUTLIER: Final = 0.2
 """Share of a pixel's light that is put to the wrong side in an outlier."""
 _AMBIENT: Final[Options] = {"ambient": "on"}
@@ -27,15 +25,15 @@ def make(bench: Bench) -> FigureResult:
     )
 
 
-def _mirrored(shot: ReconstructedShot) -> _Array:
+def _mirrored(shot: ReconstructedShot) -> Array:
     """Return the pixels of the wall with light over both mirrors."""
     return parts(shot)["wall over two mirrors"]
 
 
-def _wrong(shot: ReconstructedShot) -> _Array:
+def _wrong(shot: ReconstructedShot) -> Array:
     """Return the error (H, W) of the indirect light over the brightness."""
     true = shot.truth.brightness - shot.truth.direct
-    error: _Array = (np.asarray(shot.found.indirect) - true) / np.maximum(
+    error: Array = (np.asarray(shot.found.indirect) - true) / np.maximum(
         shot.truth.brightness, 1e-30
     )
     return error
@@ -46,7 +44,7 @@ def _outliers(shot: ReconstructedShot) -> float:
     return float((np.abs(_wrong(shot))[shot.lit] > _OUTLIER).mean())
 
 
-def _time_errors_s(shot: ReconstructedShot) -> tuple[_Array, _Array]:
+def _time_errors_s(shot: ReconstructedShot) -> tuple[Array, Array]:
     """Return the errors (H, W) of the time of the direct return: Pisarenko's, one frequency's."""
     turn = 2 * np.pi * shot.base_frequency_hz
     single = np.remainder(np.angle(shot.found.moments[1]), 2 * np.pi)
@@ -174,8 +172,8 @@ def _draw(frames: dict[float, ReconstructedShot]) -> Any:
     return picture
 
 
-def _time_ns(shot: ReconstructedShot) -> _Array:
-    time_ns: _Array = np.asarray(shot.found.phase_rad) / (2 * np.pi * shot.base_frequency_hz) * 1e9
+def _time_ns(shot: ReconstructedShot) -> Array:
+    time_ns: Array = np.asarray(shot.found.phase_rad) / (2 * np.pi * shot.base_frequency_hz) * 1e9
     return time_ns
 
 

@@ -5,16 +5,14 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 import transientcam_moments as tm
 from transientcam_driver.sequence import SPEED_OF_LIGHT_M_S
 from transientcam_experiments.paper import style
-from transientcam_experiments.paper.bench import Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import Array, Bench, ReconstructedShot
 from transientcam_experiments.paper.figure import FigureResult, PaperFigure, Statement, Table, check
 from transientcam_experiments.paper.mirrors import SEQUENCES, shots, thrice
 
-_Array = NDArray[Any]
 _TIMES_S: Final = np.linspace(9e-9, 31e-9, 881)
 _WIDTH: Final = 163
 _BINS: Final = 164
@@ -69,8 +67,8 @@ def _line(shot: ReconstructedShot, row: int) -> tm.Coefficients:
     )
 
 
-def _phase(shot: ReconstructedShot) -> _Array:
-    phase: _Array = 2 * np.pi * shot.base_frequency_hz * _TIMES_S
+def _phase(shot: ReconstructedShot) -> Array:
+    phase: Array = 2 * np.pi * shot.base_frequency_hz * _TIMES_S
     return phase
 
 
@@ -79,7 +77,7 @@ def _closest_s(shot: ReconstructedShot, row: int) -> float:
     return float(np.nanmin(gaps))
 
 
-def _widths_ns(shot: ReconstructedShot, row: int, streak: _Array) -> tuple[_Array, _Array]:
+def _widths_ns(shot: ReconstructedShot, row: int, streak: Array) -> tuple[Array, Array]:
     """Return weight and full width at half maximum in ns of the peaks at the true returns."""
     weights, widths = [], []
     for x in np.flatnonzero(thrice(shot)[row]):
@@ -129,7 +127,7 @@ def _merging(pairs: ReconstructedShot) -> list[tuple[float, float]]:
 
 
 def _statements(
-    shot: ReconstructedShot, row: int, streak: _Array, merging: list[tuple[float, float]]
+    shot: ReconstructedShot, row: int, streak: Array, merging: list[tuple[float, float]]
 ) -> list[Statement]:
     weight, width = _widths_ns(shot, row, streak)
     weak, strong = width[weight < 0.2], width[weight > 0.5]
@@ -163,7 +161,7 @@ def _statements(
     ]
 
 
-def _draw(shot: ReconstructedShot, row: int, streak: _Array, pairs: ReconstructedShot) -> Any:
+def _draw(shot: ReconstructedShot, row: int, streak: Array, pairs: ReconstructedShot) -> Any:
     middle = _scanline(pairs)
     turn = 2 * np.pi * pairs.base_frequency_hz
     closing = turn * np.asarray(tm.density(_line(pairs, middle), _phase(pairs))) * 1e-9
@@ -183,7 +181,7 @@ def _draw(shot: ReconstructedShot, row: int, streak: _Array, pairs: Reconstructe
     return picture
 
 
-def _draw_streak(axes: Any, streak: _Array, title: str) -> None:
+def _draw_streak(axes: Any, streak: Array, title: str) -> None:
     extent = (_TIMES_S[0] * 1e9, _TIMES_S[-1] * 1e9, streak.shape[1] - 0.5, -0.5)
     # the logarithm, so that broad peaks are seen beside sharp ones
     axes.imshow(

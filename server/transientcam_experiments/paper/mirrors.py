@@ -1,14 +1,12 @@
 """The scene of Figures 1, 6, 8, 9 and 15, and the sequences that the paper captured it with."""
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from transientcam_driver import Sequence
-from transientcam_experiments.paper.bench import Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import Array, Bench, ReconstructedShot
 
-_Array = NDArray[Any]
 TIMES_S: Final = (11.3e-9, 19.3e-9, 26.7e-9)
 """Times of flight of the frames in Figures 8 and 9."""
 SEQUENCES: Final = {
@@ -35,14 +33,14 @@ def title(name: str) -> str:
     )
 
 
-def thrice(shot: ReconstructedShot) -> _Array:
+def thrice(shot: ReconstructedShot) -> Array:
     """Return the pixels (H, W) with three returns, each of a tenth of the strongest at least."""
     weight = shot.truth.weight[:3]
     return np.asarray((weight > 0.1 * weight.max(axis=0)).all(axis=0) & shot.lit)
 
 
-def returned(shot: ReconstructedShot, time_s: _Array) -> _Array:
+def returned(shot: ReconstructedShot, time_s: Array) -> Array:
     """Return the light that is really back at each pixel's time (H, W), in DN."""
     back = np.nan_to_num(shot.truth.delay_s, nan=np.inf) <= time_s
-    light: _Array = np.where(back, shot.truth.weight, 0).sum(axis=0)
+    light: Array = np.where(back, shot.truth.weight, 0).sum(axis=0)
     return light

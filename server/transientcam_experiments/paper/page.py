@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,8 +30,8 @@ def document_of(
         "title": figure.title,
         "caption": figure.caption,
         "picture": str(FOLDER / picture_name(figure.number)),
-        "statements": [each.to_document() for each in made.statements],
-        "tables": [each.to_document() for each in made.tables],
+        "statements": [asdict(each) for each in made.statements],
+        "tables": [asdict(each) for each in made.tables],
         "remarks": list(made.remarks),
         "seconds": round(seconds, 1),
         "quick": quick,

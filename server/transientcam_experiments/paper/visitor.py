@@ -1,14 +1,12 @@
 """The scene of Figures 13 and 14, and the moments of its transient video that they show."""
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from transientcam_driver import Sequence
-from transientcam_experiments.paper.bench import Bench, ReconstructedShot
+from transientcam_experiments.paper.bench import Array, Bench, ReconstructedShot
 
-_Array = NDArray[Any]
 VIDEO: Final = Sequence(harmonics=3, zeroth="estimated", exposure_s=0.0005)
 """Three frequencies, no zeroth moment: twelve images of 0.5 ms (Sec. 6.3)."""
 VIDEO_HZ: Final = 18.6
@@ -24,7 +22,7 @@ def video(bench: Bench) -> dict[float, list[ReconstructedShot]]:
     }
 
 
-def parts(shot: ReconstructedShot) -> dict[str, _Array]:
+def parts(shot: ReconstructedShot) -> dict[str, Array]:
     """Return the pixels (H, W) of the actor, of the wall, and of the wall lit over mirrors."""
     first = shot.truth.delay_s[0]
     actor = shot.lit & (first < 12.8e-9)

@@ -6,7 +6,6 @@ from transientcam_moments.arrays import Array, chosen
 from transientcam_moments.comparisons._estimate import GRID_PHASES, GridEstimate, Real, grid_rad
 from transientcam_moments.comparisons._pixels import pixels_of
 from transientcam_moments.comparisons._technique import Technique, from_first
-from transientcam_moments.errors import ParameterError
 
 WINDOWS = ("hann", "none")
 CORRECTIONS = ("lift", "clip", "none")
@@ -36,8 +35,7 @@ def inverse_fourier(
     chosen("correction", correction, CORRECTIONS)
     pixels = pixels_of(b, least=1, name="inverse-fourier", first=int(correction == "lift"))
     m = pixels.m
-    if bins <= 2 * m:
-        raise ParameterError("bins", bins, f"more than {2 * m}")
+    pixels.require_bins(bins)
     orders = np.arange(1, m + 1)
     weights = 0.5 + 0.5 * np.cos(np.pi * orders / (m + 1)) if window == "hann" else 1.0 + 0 * orders
     angles = grid_rad(bins)[:, None] * orders

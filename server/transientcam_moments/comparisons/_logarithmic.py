@@ -46,8 +46,7 @@ def logarithmic(
     if steps < 1:
         raise ParameterError("steps", steps, "at least 1")
     pixels = pixels_of(b, least=_LEAST, name="logarithmic")
-    if bins <= 2 * pixels.m:
-        raise ParameterError("bins", bins, f"more than {2 * pixels.m}")
+    pixels.require_bins(bins)
     solve = program(range(1, pixels.m + 1), bins=bins, epsilon=epsilon)
 
     def descend(c: Complex) -> Real | None:

@@ -36,8 +36,7 @@ def matching_pursuit(
     pixels = pixels_of(b, least=_LEAST, name="matching-pursuit")
     if not 1 <= returns <= pixels.m:
         raise ParameterError("returns", returns, f"1 to m = {pixels.m}")
-    if bins <= 2 * pixels.m:
-        raise ParameterError("bins", bins, f"more than {2 * pixels.m}")
+    pixels.require_bins(bins)
     in_range("tolerance", tolerance, 0.0, 1.0, "0 to 1")
 
     def pursue(c: Complex) -> tuple[Real, Real]:

@@ -40,6 +40,11 @@ class Pixels:
         """The order of the moments."""
         return int(self.b.shape[0]) - 1
 
+    def require_bins(self, bins: int) -> None:
+        """Raise a ParameterError where there are no more than 2 m bins of phase."""
+        if bins <= 2 * self.m:
+            raise ParameterError("bins", bins, f"more than {2 * self.m}")
+
     def sparse(self, phase_rad: Real, weight: Real, uniform: Real | None = None) -> SparseEstimate:
         """Return found returns (K, P) of these pixels, sorted and in the unit of the moments.
 

@@ -52,8 +52,7 @@ def regularised(
     if iterations < 1:
         raise ParameterError("iterations", iterations, ">= 1")
     pixels = pixels_of(b, least=_LEAST, name="regularised")
-    if bins <= 2 * pixels.m:
-        raise ParameterError("bins", bins, f"more than {2 * pixels.m}")
+    pixels.require_bins(bins)
     image = len(pixels.trailing) == 2
     problem = Problem(pixels, temporal, spatial if image else 0.0, delta, bins)
     light = problem.solve(iterations) * problem.per_pixel

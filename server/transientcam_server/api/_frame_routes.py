@@ -80,7 +80,7 @@ def add_frame_routes(
         if computed:
             products = (await chosen.pipeline()).products
             await found.computed(products[name] for name in _JUDGED if name in products)
-        return FrameDocument.model_validate(found.meta())
+        return found.meta()
 
     @router.get(
         f"{path}/pixel",

@@ -30,7 +30,7 @@ from transientcam_driver.cameras.kinect2 import (
     P0Tables,
     Rows,
     capabilities_of,
-    measurement,
+    codes,
 )
 from transientcam_server.errors import InputError
 from transientcam_server.imaging import FACTORY_ID, Intrinsics
@@ -89,7 +89,7 @@ def import_kinect2(
                     RawFrame(
                         number=number,
                         epoch=applied.epoch,
-                        images=measurement.images(sub_images[:MEASURED]),
+                        images=codes.frame_images(sub_images[:MEASURED]),
                         labels=applied.labels,
                         device_time_s=time_s,
                         host_time_s=began_s + time_s,

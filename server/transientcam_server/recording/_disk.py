@@ -8,7 +8,6 @@ was there before the error.
 
 import atexit
 import ctypes
-import io
 import os
 import weakref
 from collections.abc import Iterator
@@ -18,6 +17,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import h5py
 from h5py._objects import phil
+
+from transientcam.remote_file import SizedFile
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer, WriteableBuffer
@@ -36,7 +37,7 @@ _checksum.argtypes = ctypes.c_char_p, ctypes.c_size_t, ctypes.c_uint32
 _checksum.restype = ctypes.c_uint32
 
 
-class DiskFile(io.RawIOBase):
+class DiskFile(SizedFile):
     """A file for h5py to write.
 
     ``mode``: ``r+``, ``w`` or ``x``, as h5py has them.
@@ -49,7 +50,6 @@ class DiskFile(io.RawIOBase):
         self.error: BaseException | None = None
         self.size_bytes = os.fstat(self._descriptor).st_size
         self._unwritten: list[tuple[int, bytes]] = []
-        self._at = 0
         _OPEN.add(self)
 
     def require_written(self) -> None:
@@ -72,28 +72,14 @@ class DiskFile(io.RawIOBase):
 
     # -- called by HDF5 ------------------------------------------------------------------------
 
-    def readable(self) -> bool:
-        """Return True."""
-        return True
-
     def writable(self) -> bool:
         """Return True."""
         return True
 
-    def seekable(self) -> bool:
-        """Return True."""
-        return True
-
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Move to a place, and return it."""
-        begin = {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self.size_bytes}[whence]
-        self._at = begin + offset
-        return self._at
-
     def readinto(self, buffer: "WriteableBuffer", /) -> int:
         """Fill a buffer as far as the file goes; return how many bytes that were."""
         into = memoryview(buffer).cast("B")
-        begin, end = self._at, min(self._at + len(into), self.size_bytes)
+        begin, end = self._place, min(self._place + len(into), self.size_bytes)
         into[: max(0, end - begin)] = bytes(max(0, end - begin))
         try:
             data = os.pread(self._descriptor, max(0, end - begin), begin)
@@ -104,12 +90,12 @@ class DiskFile(io.RawIOBase):
             first, last = max(at, begin), min(at + len(data), end)
             if first < last:
                 into[first - begin : last - begin] = data[first - at : last - at]
-        self._at = max(begin, end)
+        self._place = max(begin, end)
         return max(0, end - begin)
 
     def write(self, data: "ReadableBuffer", /) -> int:
         """Write bytes, or keep them after an error; return how many they are."""
-        piece = _marked(bytes(data)) if self._at == 0 else memoryview(data).cast("B")
+        piece = _marked(bytes(data)) if self._place == 0 else memoryview(data).cast("B")
         size = len(piece)
         if self.error is None:
             try:
@@ -117,14 +103,14 @@ class DiskFile(io.RawIOBase):
             except BaseException as error:  # an interruption, too, would reach HDF5
                 self.error = error
         if self.error is not None:
-            self._unwritten.append((self._at, bytes(piece)))
-        self._at += size
-        self.size_bytes = max(self.size_bytes, self._at)
+            self._unwritten.append((self._place, bytes(piece)))
+        self._place += size
+        self.size_bytes = max(self.size_bytes, self._place)
         return size
 
     def truncate(self, size: int | None = None) -> int:
         """Cut the file, or make it longer."""
-        size = self._at if size is None else size
+        size = self._place if size is None else size
         if self.error is None and size != self.size_bytes:
             try:
                 os.ftruncate(self._descriptor, size)
@@ -140,7 +126,7 @@ class DiskFile(io.RawIOBase):
         super().close()
 
     def _write(self, piece: bytes | memoryview) -> None:
-        at, left = self._at, memoryview(piece)
+        at, left = self._place, memoryview(piece)
         while left:
             written = os.pwrite(self._descriptor, left, at)
             if not written:

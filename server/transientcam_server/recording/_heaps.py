@@ -5,10 +5,11 @@ states its size. HDF5 follows it to its end, also where an object of the size 0 
 where a sector of a disk was lost. Meanwhile nothing else in the process can use HDF5.
 """
 
-import io
 import os
 from collections.abc import Iterator
 from typing import IO, TYPE_CHECKING, Final
+
+from transientcam.remote_file import SizedFile
 
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
@@ -24,7 +25,7 @@ _HEAD_BYTES: Final = 16
 _SIZE_AT: Final = 8
 
 
-class CheckedReader(io.RawIOBase):
+class CheckedReader(SizedFile):
     """A file for h5py to read, of which it gets no damaged heap; closed with this object.
 
     A heap is looked at when its first bytes are read, wherever it lies; reading them raises
@@ -34,21 +35,6 @@ class CheckedReader(io.RawIOBase):
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
         self.size_bytes = stream.seek(0, os.SEEK_END)
-        self._at = 0
-
-    def readable(self) -> bool:
-        """Return True."""
-        return True
-
-    def seekable(self) -> bool:
-        """Return True."""
-        return True
-
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Move to a place, and return it."""
-        begin = {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self.size_bytes}[whence]
-        self._at = begin + offset
-        return self._at
 
     def readinto(self, buffer: "WriteableBuffer", /) -> int:
         """Fill a buffer as far as the file goes; return how many bytes that were.
@@ -56,15 +42,15 @@ class CheckedReader(io.RawIOBase):
         Raises ValueError if a damaged heap begins there.
         """
         into = memoryview(buffer).cast("B")
-        data = _read(self._stream, self._at, len(into))
+        data = _read(self._stream, self._place, len(into))
         before = b""
         if data and data[0] in _BEGIN[1:]:  # the first bytes of a heap may be read in two pieces
-            before_bytes = min(len(_BEGIN) - 1, self._at)
-            before = _read(self._stream, self._at - before_bytes, before_bytes)
+            before_bytes = min(len(_BEGIN) - 1, self._place)
+            before = _read(self._stream, self._place - before_bytes, before_bytes)
         for at in _begins(before + data):
-            _require_sound(self._stream, self._at - len(before) + at, self.size_bytes)
+            _require_sound(self._stream, self._place - len(before) + at, self.size_bytes)
         into[: len(data)] = data
-        self._at += len(data)
+        self._place += len(data)
         return len(data)
 
     def close(self) -> None:

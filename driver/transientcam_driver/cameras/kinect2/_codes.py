@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from transientcam_driver.cameras.kinect2._layout import (
     CODE_BITS,
     HEIGHT,
+    IN_ORDER,
     ROW_BYTES,
     SUB_IMAGE_BYTES,
     WIDTH,
@@ -96,6 +97,15 @@ def images(data: NDArray[np.uint8]) -> NDArray[np.uint16]:
             words[half:, :, k] = stored[: half - 1 : -1]
         image[:, [0, -1]] = ZERO_DN
     return made
+
+
+def frame_images(sub_images: NDArray[np.uint8]) -> NDArray[np.uint16]:
+    """Decode the sub-images of a frame into its images as a `RawFrame` holds them.
+
+    They are at 16, 80 and 120 MHz, each at 0, 120 and 240 degrees: the labels of a sequence with
+    `layout.SAMPLING`. ``sub_images``: 9 or more, in the order of their numbers; else as `images`.
+    """
+    return images(sub_images[list(IN_ORDER)])
 
 
 def _columns(sub_image: NDArray[np.uint8]) -> Iterator[NDArray[np.uint64]]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.camera import AppliedSequence, RawFrame
-from transientcam_driver.cameras.kinect2 import _measurement as measurement
+from transientcam_driver.cameras.kinect2 import _codes as codes
 from transientcam_driver.cameras.kinect2._abilities import FRAME_RATE_HZ
 from transientcam_driver.cameras.kinect2._frame_queue import Arrival
 from transientcam_driver.cameras.kinect2._packets import TICK_S
@@ -45,7 +45,7 @@ class FrameMaker:
         begin_s = self._begin_s(arrival)
         self._lost += arrival.lost
         self._number += -(-arrival.lost // applied.images)
-        self._takes.append((begin_s, measurement.images(arrival.sub_images.data)))
+        self._takes.append((begin_s, codes.frame_images(arrival.sub_images.data)))
         if len(self._takes) < applied.sequence.takes:
             return None
         first_s, images = self._takes[0]

@@ -1,7 +1,7 @@
 """Images of a TOFcam660: the header in front of the pixels, and the packets they travel in."""
 
 import struct
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Final
 
 import numpy as np
@@ -66,14 +66,7 @@ class PacketHeader:
 
     def pack(self) -> bytes:
         """Return the bytes."""
-        return _PACKET.pack(
-            self.measurement,
-            self.image_bytes,
-            self.bytes_here,
-            self.offset,
-            self.packets,
-            self.number,
-        )
+        return _PACKET.pack(*astuple(self))
 
     @classmethod
     def unpack(cls, data: bytes | memoryview) -> "PacketHeader":

@@ -5,6 +5,7 @@ from typing import Any, Final
 from pydantic import TypeAdapter
 
 from transientcam import wire
+from transientcam_server.api._documents.document import EXAMPLES
 from transientcam_server.api._documents.frame import FrameDocument
 from transientcam_server.errors import ProblemDocument
 from transientcam_server.imaging import product_names
@@ -154,9 +155,10 @@ def _schemas() -> dict[str, _Schema]:
         "error": _map({"type": _constant("error"), "problem": _reference("schemas", "problem")}),
         "problem": _of_type(ProblemDocument),
     }
-    meta = FrameDocument.model_json_schema(ref_template=_SCHEMAS + "{model}")
+    meta = TypeAdapter(FrameDocument).json_schema(ref_template=_SCHEMAS + "{model}")
     meta["properties"] |= {"region": _REGION, "decimation": _integer(1, wire.MAX_DECIMATION)}
     meta["required"] = sorted(meta["properties"])
+    meta["examples"] = [EXAMPLES["FrameDocument"]]
     schemas |= meta.pop("$defs", {})
     return schemas | {"meta": meta}
 

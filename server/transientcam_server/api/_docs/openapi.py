@@ -9,6 +9,7 @@ from fastapi import APIRouter, FastAPI, Request, Response
 
 from transientcam_driver import Capabilities
 from transientcam_driver.sequence import READ_ONLY_FIELDS
+from transientcam_server.api._documents.document import EXAMPLES
 
 PATH: Final = "/openapi.json"
 router = APIRouter(include_in_schema=False)
@@ -48,7 +49,7 @@ async def interface(request: Request) -> Response:
 
 
 def describe_limits(app: FastAPI, camera: Capabilities, *, prefix: str) -> None:
-    """Add to the OpenAPI document of ``app`` what one camera can do, field by field.
+    """Add to the OpenAPI document of ``app`` examples, and what one camera can do, field by field.
 
     What depends on several fields, as the highest frequency, it does not state.
     """
@@ -56,7 +57,10 @@ def describe_limits(app: FastAPI, camera: Capabilities, *, prefix: str) -> None:
 
     def openapi() -> dict[str, Any]:
         if app.openapi_schema is None:
-            paths = generate()["paths"]
+            made = generate()
+            for name, example in EXAMPLES.items():  # FastAPI would leave out what is null
+                made["components"]["schemas"][name]["examples"] = [example]
+            paths = made["paths"]
             for path, method in (("/sequence", "put"), ("/sequence/validate", "post")):
                 body = paths[prefix + path][method]["requestBody"]["content"]["application/json"]
                 body["schema"] = _limited(body["schema"], camera)
@@ -70,6 +74,7 @@ def describe_limits(app: FastAPI, camera: Capabilities, *, prefix: str) -> None:
 def _limited(sequence: dict[str, Any], camera: Capabilities) -> dict[str, Any]:
     """Return the schema of a sequence with the limits of a camera."""
     schema = copy.deepcopy(sequence)  # other applications have other cameras
+    schema["examples"] = [EXAMPLES["SequenceDocument"]]
     properties = schema["properties"]
     least_hz, most_hz = camera.min_frequency_hz, camera.max_frequency_hz
     stated: dict[str, dict[str, Any]] = {

@@ -4,15 +4,7 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    GetJsonSchemaHandler,
-    field_validator,
-)
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic import BaseModel, BeforeValidator, ConfigDict, field_validator
 
 from transientcam_server.settings import no_switch_for_a_number
 
@@ -31,21 +23,12 @@ JsonInteger = Annotated[int, BeforeValidator(_whole)]
 
 
 class Document(BaseModel):
-    """A JSON document whose fields are described beside them, and whose example was captured.
+    """A JSON document whose fields are described beside them.
 
     ``model_validate`` makes one of any value that has attributes of the same names.
     """
 
     model_config = ConfigDict(use_attribute_docstrings=True, from_attributes=True)
-
-    @classmethod
-    def __get_pydantic_json_schema__(
-        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        schema = handler(core_schema)
-        if cls.__name__ in EXAMPLES:
-            handler.resolve_ref_schema(schema)["examples"] = [EXAMPLES[cls.__name__]]
-        return schema
 
 
 class RequestDocument(Document):

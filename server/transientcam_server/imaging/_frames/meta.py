@@ -1,7 +1,9 @@
 """What is known of a frame, as the wire contract has it."""
 
+from typing import cast
+
 import transientcam_moments as tm
-from transientcam.documents import FrameDocument
+from transientcam.documents import FrameDocument, Neighbours
 from transientcam_driver import RawFrame
 from transientcam_server.imaging._errors_of_range.accuracy import RangeAccuracy
 from transientcam_server.imaging._frames.stages import Computed
@@ -28,7 +30,7 @@ def frame_meta(
         "calibration_id": calibration_id(recipe.gains),
         "reconstruction_id": recipe.settings_version,
         "estimator": recipe.technique,
-        "neighbours": None if found is None else found.settings.neighbours,
+        "neighbours": None if found is None else cast("Neighbours", found.settings.neighbours),
         "device_time_s": raw.device_time_s,
         "host_time_s": raw.host_time_s,
         "captured_unix_s": raw.captured_unix_s,

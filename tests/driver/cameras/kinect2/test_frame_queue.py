@@ -6,7 +6,7 @@ import pytest
 from tests.driver.cameras.kinect2.standing import STILL, emulated
 from transientcam_driver import CameraError, CameraLost, Counters
 from transientcam_driver.camera import AppliedSequence
-from transientcam_driver.cameras.kinect2 import Identity, capabilities_of, encoder, measurement
+from transientcam_driver.cameras.kinect2 import Identity, capabilities_of, codes, encoder
 from transientcam_driver.cameras.kinect2._frame_queue import ROOM_FRAMES, Arrival, FrameQueue
 from transientcam_driver.cameras.kinect2._frames import FrameMaker
 from transientcam_driver.cameras.kinect2._packets import SubImages
@@ -138,7 +138,7 @@ def test_images_lost_before_any_take_of_a_frame_are_counted_in_it() -> None:
     assert frame is not None
     assert (frame.lost_images, frame.number) == (27, 2)
     assert frame.capture_s == pytest.approx(4 * PERIOD_TICKS * 0.125e-3 + 1 / 30)
-    assert np.array_equal(frame.by_take[1], measurement.images(STILL.data))
+    assert np.array_equal(frame.by_take[1], codes.frame_images(STILL.data))
 
 
 @pytest.mark.parametrize("fault", [Fault.DROP, Fault.CORRUPT_PIXELS])

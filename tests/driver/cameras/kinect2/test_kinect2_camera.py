@@ -17,10 +17,10 @@ from tests.driver.cameras.kinect2.standing import (
     firmware,
 )
 from transientcam_driver import CameraError, CameraLost, CameraNotFound, Sequence
-from transientcam_driver.cameras.kinect2 import Kinect2Camera, measurement
+from transientcam_driver.cameras.kinect2 import Kinect2Camera, codes
 from transientcam_simulation.emulated._kinect2 import EmulatedKinect2
 
-IMAGES = measurement.images(STILL.data)
+IMAGES = codes.frame_images(STILL.data)
 
 
 def read_on(camera: Kinect2Camera) -> None:

@@ -12,7 +12,6 @@ from transientcam_driver.cameras.kinect2 import (
     P0Tables,
     codes,
     encoder,
-    measurement,
 )
 
 FREQUENCIES_HZ = np.array([16e6, 80e6, 120e6])
@@ -50,7 +49,7 @@ def test_moments_come_back_through_packets() -> None:
     sub_images = codes.sub_images(encoder.samples(b, gains))
     sent = encoder.packets(sub_images, sequence=1, timestamp=2)
     (frame,) = [each for each in map(assembler.push, sent) if each is not None]
-    found = tm.calibrate(measured(measurement.images(frame.data)), gains)
+    found = tm.calibrate(measured(codes.frame_images(frame.data)), gains)
 
     off = (found[1:] - b)[:, :, 1:-1]
     # rounding spreads evenly over a count: 1/12, times 2/3 of three samples, over the response
@@ -65,7 +64,7 @@ def test_moments_come_back_through_packets() -> None:
 def test_images_are_in_the_order_of_their_labels() -> None:
     sub_images = codes.sub_images(np.arange(9.0)[:, None, None] + np.zeros((9, 424, 512)))
 
-    images = measurement.images(sub_images)
+    images = codes.frame_images(sub_images)
 
     # 16 MHz at 0, 120 and 240 degrees, then 80 and 120 MHz: sub-image k has the phase - 120 k
     order = [3, 5, 4, 0, 2, 1, 6, 8, 7]

@@ -18,7 +18,7 @@ from tests.driver.cameras.kinect2.standing import SERIAL, STILL, emulated
 from tests.driver.cameras.kinect2.usb3 import Usb3Mount
 from tests.driver.cameras.open_usb.usbfs.processes import PRELOAD, missing_libraries, skip_or_fail
 from transientcam_driver import CameraError
-from transientcam_driver.cameras.kinect2 import measurement
+from transientcam_driver.cameras.kinect2 import codes
 from transientcam_driver.cameras.kinect2._usb_port import require_bandwidth
 
 PROGRAM = Path(__file__).parent / "usb_program.py"
@@ -95,7 +95,7 @@ def test_a_port_without_the_bandwidth_is_refused() -> None:
 
 def test_frames_travel_through_isochronous_transfers_of_the_real_libusb(program: Program) -> None:
     camera = program.mount.device.camera
-    shown = hashlib.sha256(measurement.images(STILL.data).tobytes()).hexdigest()
+    shown = hashlib.sha256(codes.frame_images(STILL.data).tobytes()).hexdigest()
 
     assert program.do("list") == [[f"kinect2:{SERIAL}", None]]
     assert program.do("open") == [SERIAL, "2.3.3913.7"]

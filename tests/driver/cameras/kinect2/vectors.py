@@ -18,7 +18,7 @@ from transientcam_driver.cameras.kinect2 import (
     DepthParameters,
     P0Tables,
     Rows,
-    measurement,
+    codes,
 )
 from transientcam_driver.cameras.kinect2._codes import SATURATED_DN
 from transientcam_server.imaging import Intrinsics
@@ -81,7 +81,7 @@ def load(name: str) -> Scene:
     with np.load(folder() / f"{name}.npz") as archive:
         stored = dict(archive)
     sub_images = stored["packet"].reshape((SUB_IMAGES, -1))
-    images = measurement.images(sub_images[:-1])
+    images = codes.frame_images(sub_images[:-1])
     gains = P0Tables.unpack(stored["p0_response"].tobytes()).gains()
     measured = tm.measure(images, zeroth="estimated", phases_rad=SAMPLING.phases_rad)
     moments = np.asarray(tm.calibrate(measured, gains))[1:]

@@ -12,7 +12,7 @@ from transientcam_driver.cameras.kinect2 import (
     P0Tables,
     Request,
     _commands as commands,
-    measurement,
+    codes,
 )
 from transientcam_driver.cameras.kinect2._codes import SATURATED_DN
 from transientcam_driver.clock import VirtualClock
@@ -29,7 +29,7 @@ PATCH = np.s_[:, 180:240, 220:290]
 def two_frames() -> TwoFrames:
     device, simulation = build_kinect2(find_scene("wall"), seed=1, clock=VirtualClock())
     frames = [
-        measurement.images(device._pixels.sub_images(number, device_time_s=number / 30))
+        codes.frame_images(device._pixels.sub_images(number, device_time_s=number / 30))
         for number in range(2)
     ]
     assert frames[0].max() < SATURATED_DN

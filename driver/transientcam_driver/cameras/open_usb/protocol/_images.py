@@ -1,7 +1,7 @@
 """Image packets: the header in front of the pixels, and their checksums (usb-protocol 8.1)."""
 
 import struct
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from enum import IntFlag
 
 from crc32c import crc32c
@@ -50,24 +50,15 @@ class ImageHeader:
 
     def pack(self) -> bytes:
         """Return the 64 bytes, with their checksum."""
+        *fields, temperature_c, payload_bytes, payload_crc = astuple(self)
         body = _HEADER.pack(
             IMAGE_MAGIC,
             VERSION,
             IMAGE_HEADER_BYTES,
-            self.flags,
-            self.epoch,
-            self.frame,
-            self.number,
-            self.index,
-            self.count,
-            self.tuning_word,
-            self.phase,
-            self.harmonic,
-            self.exposure_ns,
-            self.device_time_ns,
-            centidegrees(self.temperature_c),
-            self.payload_bytes,
-            self.payload_crc,
+            *fields,
+            centidegrees(temperature_c),
+            payload_bytes,
+            payload_crc,
         )
         return body + _CRC.pack(crc32c(body))
 
@@ -78,23 +69,9 @@ class ImageHeader:
             return None
         if crc32c(data[: _HEADER.size]) != _CRC.unpack_from(data, _HEADER.size)[0]:
             return None
-        fields = iter(_HEADER.unpack_from(data, 0)[3:])
-        return cls(
-            flags=ImageFlag(next(fields)),
-            epoch=next(fields),
-            frame=next(fields),
-            number=next(fields),
-            index=next(fields),
-            count=next(fields),
-            tuning_word=next(fields),
-            phase=next(fields),
-            harmonic=next(fields),
-            exposure_ns=next(fields),
-            device_time_ns=next(fields),
-            temperature_c=next(fields) / 100,
-            payload_bytes=next(fields),
-            payload_crc=next(fields),
-        )
+        flags, *fields = _HEADER.unpack_from(data)[3:]
+        fields[-3] /= 100  # the temperature
+        return cls(ImageFlag(flags), *fields)
 
 
 def payload_checksum(payload: bytes | bytearray | memoryview) -> int:
