@@ -89,6 +89,7 @@ def _limited(sequence: dict[str, Any], camera: Capabilities) -> dict[str, Any]:
         properties[name] |= limits
         if "minimum" in limits:
             properties[name].pop("exclusiveMinimum", None)
+    properties["sampling"]["anyOf"][0]["$ref"] = "#/components/schemas/SamplingDocument"
     parts = properties["sub_phases"]
     parts["properties"]["n"]["maximum"] = camera.max_sub_phases
     parts["properties"]["scheme"]["enum"] = list(camera.schemes)
