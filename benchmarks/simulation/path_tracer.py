@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from transientcam_simulation.scene import Ellipsoid, Rectangle, Scene
+from transientcam_simulation.scene import Ellipsoid, Mesh, Rectangle, Scene
 
 LIGHT_M_S = 299_792_458.0
 REPETITIONS = 8
@@ -329,6 +329,8 @@ class Tracer:
 def _part(scene: Scene, index: int, time_s: float) -> _Part:
     surface = scene.surfaces[index]
     shape, scatter = surface.shape, surface.scatter
+    if isinstance(shape, Mesh):
+        raise ValueError(f"surface {index} is a mesh, which is not traced here")
     centre = shape.centre
     for motion in surface.motions:
         knots = list(motion.path_m)

@@ -209,7 +209,7 @@ class _Pairs:
 
 def _best_pair(data: Data) -> tuple[SharpFit, Array]:
     """Return the best fit of two returns (P), and the lead over those with another range (P)."""
-    banks = (np.stack(each) for each in data[:3])
+    banks: Any = [np.stack(each) for each in data[:3]]
     stacked = Data(*banks, data.penalty, data.numbers)
     pairs = _Pairs(stacked, _starts(stacked))
     pairs.improve(FIRST_STEPS)

@@ -323,16 +323,20 @@ def _tail_of(data: Data, state: State, power: int, steps: int, lone: float, bar:
 
 def _step_returns(first: bool, fixed: State, given: State, state: State) -> State:
     _, pr, pi, w, rr, ri, cost, damping = state
-    *data, bar = given
-    cost, damping = sharp.step(*fixed, *data, pr, pi, w, rr, ri, cost, damping, bar)
+    order, returns, unknowns = fixed
+    re, im, weight, bar = given
+    cost, damping = sharp.step(
+        order, returns, unknowns, re, im, weight, pr, pi, w, rr, ri, cost, damping, bar
+    )
     return damping < sharp.SETTLED, pr, pi, w, rr, ri, cost, damping
 
 
 def _step_tail(first: bool, fixed: State, given: State, state: State) -> State:
     _, lag, qr, qi, rr, ri, x, y, w, v, d, t, cost, damping = state
-    *shape, lone = fixed
-    *data, bar = given
+    order, power, unknowns, lone = fixed
+    re, im, weight, bar = given
     *found, damping = tail.step(
-        *shape, *data, PRIOR, lone, x, y, w, v, d, t, lag, qr, qi, rr, ri, cost, damping, bar
-    )
+        order, power, unknowns, re, im, weight, PRIOR, lone, x, y, w, v, d, t, lag, qr, qi, rr, ri,
+        cost, damping, bar,
+    )  # fmt: skip
     return damping < sharp.SETTLED, lag, qr, qi, rr, ri, *found, damping

@@ -81,8 +81,7 @@ def test_a_reconstruction_has_its_likelihood_from_the_device(
     b, _ = _images()
     settings = tm.Settings(base_frequency_hz=23e6, neighbours="none")
     moments = 1000 * b.reshape(M + 1, 20, 20)
-    expected = tm.Reconstructor(settings, calibration=np.ones(M + 1))(moments)
-    expected = expected.likelihood
+    expected = tm.Reconstructor(settings, calibration=np.ones(M + 1))(moments).likelihood
     monkeypatch.setattr(_gpu, "device_of", lambda name: device)
 
     found = tm.Reconstructor(settings, calibration=np.ones(M + 1), device="gpu")(moments)

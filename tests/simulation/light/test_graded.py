@@ -11,7 +11,7 @@ from transientcam_simulation.light._graded import graded
 from transientcam_simulation.light._paths import light_rays
 from transientcam_simulation.light._radiosity import Interreflection
 from transientcam_simulation.light._rays import rays_through
-from transientcam_simulation.scene import Scene, parse_scene
+from transientcam_simulation.scene import Rectangle, Scene, parse_scene
 
 SIZE = 163, 120
 
@@ -80,6 +80,7 @@ def test_where_light_changes_evenly_patches_stay_as_they_are() -> None:
     """Far apart, so that no light to speak of is given."""
     scene = stair(patches=12)
     tread = scene.surfaces[1]
+    assert isinstance(tread.shape, Rectangle)
     far = replace(tread, shape=tread.shape.moved(np.array([0.0, 0.0, -40.0])))
     scene = replace(scene, surfaces=(scene.surfaces[0], far))
 

@@ -13,7 +13,7 @@ from transientcam_simulation.light._over_gloss import Glow, ShownByGloss
 from transientcam_simulation.light._paths import light_rays
 from transientcam_simulation.light._radiosity import Interreflection
 from transientcam_simulation.light._rays import rays_through
-from transientcam_simulation.scene import Points, Scene, parse_scene
+from transientcam_simulation.scene import Points, Rectangle, Scene, parse_scene
 
 SIZE = 163, 120
 PIXEL = np.arange(300, 163 * 120, 1100)
@@ -94,7 +94,9 @@ def test_a_very_sharp_lobe_glows_as_a_mirror_shows_the_lamp() -> None:
     lobe = 0.5 * (9008 / 9002) * floor**2
     expected = lobe * way[:, 1] / far_m**3
     shown = image[:2] + way[:, :2] * (-0.7 - image[2]) / way[:, 2:]
-    clear = np.abs(shown - scene.surfaces[1].shape.centre[:2]).max(axis=1) < 0.8
+    shape = scene.surfaces[1].shape
+    assert isinstance(shape, Rectangle)
+    clear = np.abs(shown - shape.centre[:2]).max(axis=1) < 0.8
     clear &= np.hypot(*(shown - [0.3, 1.6]).T) > 0.3
     assert clear.sum() > 5
     assert glow[wall][clear] == pytest.approx(expected[clear], rel=0.03)

@@ -39,7 +39,8 @@ def mesh_of(scene: Scene) -> Mesh:
 
 def bar() -> trimesh.Trimesh:
     """Longest along x, shortest along z."""
-    return trimesh.creation.box((3.0, 2.0, 1.0))
+    made: trimesh.Trimesh = trimesh.creation.box((3.0, 2.0, 1.0))
+    return made
 
 
 def linear(colour: int) -> float:
@@ -139,8 +140,10 @@ def test_the_luminance_of_a_texture_is_the_albedo(tmp_path: Path, name: str) -> 
 
 def test_colours_of_vertices_and_of_triangles_are_albedo(tmp_path: Path) -> None:
     by_vertex, by_face = bar(), bar()
-    by_vertex.visual.vertex_colors = [[188, 188, 188, 255]] * len(by_vertex.vertices)
-    by_face.visual.face_colors = [[255, 0, 0, 255]] * 6 + [[0, 255, 0, 255]] * 6
+    visual: Any = by_vertex.visual
+    visual.vertex_colors = [[188, 188, 188, 255]] * len(by_vertex.vertices)
+    visual = by_face.visual
+    visual.face_colors = [[255, 0, 0, 255]] * 6 + [[0, 255, 0, 255]] * 6
     by_vertex.export(tmp_path / "vertex.ply")
     by_face.export(tmp_path / "face.ply")
 
@@ -152,7 +155,8 @@ def test_colours_of_vertices_and_of_triangles_are_albedo(tmp_path: Path) -> None
 
 def glb(folder: Path, change: Callable[[dict[str, Any]], None]) -> str:
     """Write a glTF file with another header than it should have."""
-    data = bytes(bar().export(file_type="glb"))
+    exported: Any = bar().export(file_type="glb")
+    data = bytes(exported)
     (length,) = struct.unpack("<I", data[12:16])
     header = json.loads(data[20 : 20 + length])
     change(header)

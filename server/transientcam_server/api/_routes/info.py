@@ -94,5 +94,7 @@ def _product(product: Product) -> InfoDocument.ProductDocument:
         formats=[name for name, encoding in ENCODINGS.items() if encoding.fits(product)],
         over_time=product.over_time,
         streamed=not product.over_time,
-        stated=product.stated and {each: getattr(product.stated, each) for each in _STATED[-3:]},
+        stated=None
+        if product.stated is None
+        else {each: getattr(product.stated, each) for each in _STATED[-3:]},
     )
