@@ -9,16 +9,18 @@ from dataclasses import replace
 from pathlib import Path
 
 import httpx
+from fastapi import FastAPI
 
 from tests.conformance.breaking import Answer, Breaker, Breaking
 from tests.conformance.broken_promises import with_status
 from tests.conftest import ROOT
 from tests.serving import serving
+from transientcam_server.service import Service
 
 CONFIG = Path(__file__).with_name("schemathesis.toml")
 PROGRAM = "from schemathesis.cli import schemathesis; schemathesis()"
 ENDLESS = "mjpeg"
-NOT_RECORDINGS = "mjpeg|calibrations|jobs|frames"
+NOT_RECORDINGS = "mjpeg|calibrations|jobs|frames|camera$"
 STILL_THERE = "Deleted resource still available"
 ALL_PHASES = "examples,coverage,fuzzing"
 
@@ -60,9 +62,23 @@ def in_its_own_process(*arguments: str, directory: Path) -> "subprocess.Complete
     )
 
 
+def staying(app: FastAPI) -> None:
+    """Have a camera that was opened in the place of the one that is served closed again."""
+    service: Service = app.state.service
+    change = service.change_camera
+
+    async def change_and_stay(spec: str) -> None:
+        await change(spec)
+        assert service.successor is not None
+        service.successor[1].close()
+        service._successor = None
+
+    vars(service)["change_camera"] = change_and_stay
+
+
 def test_every_answer_is_a_documented_one(tmp_path: Path) -> None:
     recordings = {"directory": tmp_path / "recordings", "min_free_bytes": 0}
-    with serving("sim:wall?noise=off", recordings=recordings) as daemon:
+    with serving("sim:wall?noise=off", prepare=staying, recordings=recordings) as daemon:
         result = fuzz(daemon.url, tmp_path, "--exclude-path", "/api/v1/simulation/faults")
         with httpx.Client(base_url=daemon.url) as client:
             alive = client.get("/livez").status_code
