@@ -230,11 +230,7 @@ def _measure_here(
         for name, each in points.items():
             task = progress.add_task(name, total=len(each))
             experiment.measure(
-                each,
-                records,
-                scene=name,
-                seed=seed,
-                progress=_steps(progress, task),
+                each, records, scene=name, seed=seed, progress=_steps(progress, task)
             )
 
 

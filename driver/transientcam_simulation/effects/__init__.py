@@ -6,12 +6,7 @@ number. A new effect is a class here and an entry in ``EFFECTS``.
 """
 
 from transientcam_simulation.effects._ambient_light import AmbientLight
-from transientcam_simulation.effects._conditions import (
-    CALLED_ABOVE,
-    WORST_ABOVE,
-    Call,
-    Conditions,
-)
+from transientcam_simulation.effects._conditions import CALLED_ABOVE, WORST_ABOVE, Call, Conditions
 from transientcam_simulation.effects._effect import (
     Effect,
     Exposure,

@@ -32,11 +32,7 @@ def make(bench: Bench) -> FigureResult:
         _draw(b, phase, lower, upper, smoothed),
         _statements(phase, lower, upper, smoothed, widths),
         (
-            Table(
-                "Bounds on the continuous response",
-                ("m", *_WIDTHS),
-                widths,
-            ),
+            Table("Bounds on the continuous response", ("m", *_WIDTHS), widths),
             Table(
                 "Bounds where every return is narrower, m = 5",
                 ("widths and decays times", *_WIDTHS),

@@ -7,12 +7,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.camera import (
-    AppliedSequence,
-    Capabilities,
-    FactoryCalibration,
-    RawFrame,
-)
+from transientcam_driver.camera import AppliedSequence, Capabilities, FactoryCalibration, RawFrame
 from transientcam_driver.cameras.free_running._frequencies import common_base
 from transientcam_driver.cameras.free_running._measurement import Capture, Description
 from transientcam_driver.cameras.free_running._rendering import BITS, Renderer

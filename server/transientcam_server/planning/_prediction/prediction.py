@@ -210,12 +210,7 @@ class Predictor:
         return _HARDLY * float(known[int(share * (known.size - 1))])
 
     def predict(
-        self,
-        estimator: str,
-        sequence: Sequence,
-        *,
-        closely: bool = False,
-        capture_s: float = 0.0,
+        self, estimator: str, sequence: Sequence, *, closely: bool = False, capture_s: float = 0.0
     ) -> Prediction:
         """Predict the errors of a sequence and an estimator, with intervals.
 
@@ -489,11 +484,7 @@ def _error(
 
 
 def _within(
-    share: float,
-    errors: PixelErrors,
-    farthest_m: _Array | None,
-    picks: _Array,
-    drift_m: float,
+    share: float, errors: PixelErrors, farthest_m: _Array | None, picks: _Array, drift_m: float
 ) -> Figure:
     """Return the figure of what a share of the ranges is within; few draws tell its interval."""
 

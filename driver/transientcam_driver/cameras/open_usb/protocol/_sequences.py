@@ -6,11 +6,7 @@ from dataclasses import dataclass
 from transientcam_driver.camera import Capabilities
 from transientcam_driver.cameras.open_usb.protocol._codes import SCHEMES, TAKE_ORDERS, ZEROTHS
 from transientcam_driver.cameras.open_usb.protocol._requests import VERSION
-from transientcam_driver.cameras.open_usb.protocol._units import (
-    nanoseconds,
-    phase_rad,
-    phase_word,
-)
+from transientcam_driver.cameras.open_usb.protocol._units import nanoseconds, phase_rad, phase_word
 from transientcam_driver.errors import ProtocolError
 from transientcam_driver.sequence import Sequence, SubPhases
 
