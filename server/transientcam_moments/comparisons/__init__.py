@@ -93,22 +93,8 @@ def technique_of(name: str) -> Technique:
 
 
 __all__ = [
-    "PLUGINS",
-    "TECHNIQUES",
-    "Code",
-    "Estimate",
-    "GridEstimate",
-    "LikelihoodEstimate",
-    "MaximumEntropyEstimate",
-    "SparseEstimate",
-    "Technique",
-    "check_order",
-    "coded",
-    "equal_shifts_rad",
-    "from_first",
-    "from_zeroth",
-    "grid_rad",
-    "maximum_length_code",
-    "separated",
+    "PLUGINS", "TECHNIQUES", "Code", "Estimate", "GridEstimate", "LikelihoodEstimate",
+    "MaximumEntropyEstimate", "SparseEstimate", "Technique", "check_order", "coded",
+    "equal_shifts_rad", "from_first", "from_zeroth", "grid_rad", "maximum_length_code", "separated",
     "technique_of",
-]
+]  # fmt: skip
