@@ -83,17 +83,9 @@ class SequenceWords:
     def pack(self) -> bytes:
         """Payload of SET_SEQUENCE."""
         words = self._LAYOUT.pack(
-            VERSION,
-            self.harmonics,
-            self.zeroth,
-            self.scheme,
-            self.sub_phases,
-            self.take_order,
-            self.takes,
-            self.base_word,
-            self.low_word,
-            self.exposure_ns,
-        )
+            VERSION, self.harmonics, self.zeroth, self.scheme, self.sub_phases, self.take_order,
+            self.takes, self.base_word, self.low_word, self.exposure_ns,
+        )  # fmt: skip
         return words + self._OFFSET.pack(self.phase_offset) if self.phase_offset else words
 
     @classmethod
