@@ -203,8 +203,7 @@ def _statements(
 
 
 def _draw(b: Array, phase: Array, lower: Array, upper: Array, smoothed: Array) -> Any:
-    with style.style():
-        picture = style.new(11.0, 3.8)
+    with style.new(11.0, 3.8) as picture:
         left, right = picture.subplots(1, 2)
         left.plot(
             phase,

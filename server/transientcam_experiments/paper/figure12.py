@@ -271,8 +271,7 @@ def _beaten(title: str, among: list[Ranged], best: Ranged) -> str:
 def _draw(ranged: list[Ranged], direction: Array) -> Any:
     columns = 4
     rows = -(-len(ranged) // columns)
-    with style.style():
-        picture = style.new(11.0, 2.5 * rows)
+    with style.new(11.0, 2.5 * rows) as picture:
         panels = picture.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for axes in panels.flat[len(ranged) :]:
             axes.set_visible(False)

@@ -150,8 +150,7 @@ def _table(frames: dict[float, list[ReconstructedShot]]) -> Table:
 
 
 def _draw(frames: dict[float, ReconstructedShot]) -> Any:
-    with style.style():
-        picture = style.new(11.0, 2.3 * len(frames))
+    with style.new(11.0, 2.3 * len(frames)) as picture:
         panels = picture.subplots(len(frames), 3)
         densities = {at_s: _density(shot) for at_s, shot in frames.items()}
         for column, time_s in enumerate(_TIMES_S):
