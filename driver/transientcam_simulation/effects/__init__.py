@@ -56,24 +56,9 @@ NOISE = (ShotNoise, ReadNoise)
 """Switched off by ``noise=off``."""
 
 EFFECTS: tuple[type[Effect], ...] = (
-    Distortion,
-    MirrorPaths,
-    Gloss,
-    DiffuseInterreflection,
-    Scattering,
-    MixedPixels,
-    MotionDuringSequence,
-    ModulationHarmonics,
-    AmbientLight,
-    AmplitudeRollOff,
-    LensScatter,
-    Vignetting,
-    PixelPattern,
-    DarkCurrentElectrons,
-    ThermalDrift,
-    SynchronisationOutliers,
-    Saturation,
-    *NOISE,
-    Quantisation,
-)
+    Distortion, MirrorPaths, Gloss, DiffuseInterreflection, Scattering, MixedPixels,
+    MotionDuringSequence, ModulationHarmonics, AmbientLight, AmplitudeRollOff, LensScatter,
+    Vignetting, PixelPattern, DarkCurrentElectrons, ThermalDrift, SynchronisationOutliers,
+    Saturation, *NOISE, Quantisation,
+)  # fmt: skip
 """In the order in which they happen."""
