@@ -402,16 +402,9 @@ class Predictor:
         return np.clip(errors.std_m, 1e-9, 1e3), np.clip(errors.bias_m, 1e-9, 1e3)
 
     def _errors(
-        self,
-        estimator: str,
-        harmonics: int,
-        base_frequency_hz: float,
-        noise: _Array,
-        draws: int,
-        zeroth: str,
-        pixels: slice = slice(None),
-        lost: tuple[float, int] = (0.0, 1),
-    ) -> PixelErrors:
+        self, estimator: str, harmonics: int, base_frequency_hz: float, noise: _Array, draws: int,
+        zeroth: str, pixels: slice = slice(None), lost: tuple[float, int] = (0.0, 1),
+    ) -> PixelErrors:  # fmt: skip
         self._go_on()
         b, left = self._averaged(harmonics, base_frequency_hz, noise[pixels], pixels)
         variance = np.broadcast_to(left**2, b.shape).astype(np.float32)
