@@ -152,15 +152,9 @@ def _table(captures: dict[str, list[ReconstructedShot]], errors: dict[str, _Erro
         for name, pair in captures.items()
     ]
     columns = (
-        "captured with",
-        "after wave 1",
-        "after wave 2",
-        "after wave 3",
-        "before front 1",
-        "before front 2",
-        "before front 3",
-        "between two captures",
-    )
+        "captured with", "after wave 1", "after wave 2", "after wave 3", "before front 1",
+        "before front 2", "before front 3", "between two captures",
+    )  # fmt: skip
     return Table("Median error of the cumulative density in % of the brightness", columns, rows)
 
 

@@ -136,16 +136,9 @@ def _table(frames: dict[float, list[ReconstructedShot]]) -> Table:
         times = [value for found_true in arrivals.values() for value in found_true]
         rows.append((at_s, *times, 100 * _complete(pair[0]), 100 * _noise(pair)))
     columns = (
-        "time / s",
-        "actor / ns",
-        "true",
-        "wall / ns",
-        "true",
-        "over mirrors / ns",
-        "true",
-        "complete pixels / %",
-        "difference of two frames / %",
-    )
+        "time / s", "actor / ns", "true", "wall / ns", "true", "over mirrors / ns", "true",
+        "complete pixels / %", "difference of two frames / %",
+    )  # fmt: skip
     return Table("When light comes back, by part of the scene", columns, rows)
 
 
