@@ -23,8 +23,7 @@ def draw(figures: Path) -> None:
     found = ranges(shot.found.measured, settings, calibration=gains)
     lens = Intrinsics.of_field(FIELD_DEG, width=truth.shape[1], height=truth.shape[0])
     true, middle = lens.points(truth), truth.shape[0] // 2
-    with style.style():
-        picture = style.new(11.0, 3.2)
+    with style.new(11.0, 3.2) as picture:
         panels: Any = picture.subplots(1, len(SHOWN), sharex=True, sharey=True)
         for axes, name in zip(panels, SHOWN, strict=True):
             errors = errors_of(found[name], truth, turn_m(shot.base_frequency_hz))

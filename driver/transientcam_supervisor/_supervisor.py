@@ -55,11 +55,7 @@ class Supervisor:
     """
 
     def __init__(
-        self,
-        program: str | None,
-        *,
-        silence_s: float,
-        clock: Callable[[], float] = since_boot_s,
+        self, program: str | None, *, silence_s: float, clock: Callable[[], float] = since_boot_s
     ) -> None:
         self._program = program
         self._silence_s = silence_s

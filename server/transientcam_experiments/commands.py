@@ -182,11 +182,9 @@ def _capture_on(
     grid: "Grid",
     scenes: list[str],
     records: "Records",
-    *,
-    repetitions: int,
-    seed: int,
+    **kept: int,
 ) -> None:
-    """Capture on a cluster what is left of all scenes."""
+    """Capture on a cluster what is left of all scenes; ``kept`` are repetitions and seed."""
     from transientcam_experiments.tradeoff.clustered import measure_on
 
     with (
@@ -195,15 +193,8 @@ def _capture_on(
     ):
         for name in scenes:
             task = progress.add_task(f"{name}, captures", total=None)
-            measure_on(
-                client,
-                grid,
-                records,
-                scene=name,
-                repetitions=repetitions,
-                seed=seed,
-                progress=_steps(progress, task),
-            )
+            steps = _steps(progress, task)
+            measure_on(client, grid, records, scene=name, progress=steps, **kept)
 
 
 def _steps(progress: Any, task: Any) -> Callable[[str], None]:
@@ -230,11 +221,7 @@ def _measure_here(
         for name, each in points.items():
             task = progress.add_task(name, total=len(each))
             experiment.measure(
-                each,
-                records,
-                scene=name,
-                seed=seed,
-                progress=_steps(progress, task),
+                each, records, scene=name, seed=seed, progress=_steps(progress, task)
             )
 
 

@@ -48,49 +48,17 @@ from transientcam_moments.arrays import MAX_HARMONICS, chosen
 from transientcam_moments.errors import DeviceUnavailable, ParameterError
 
 __all__ = [
-    "LANES",
-    "MOST_ROOTS",
-    "THREAD",
-    "Progress",
-    "Spread",
-    "State",
-    "at_once",
-    "cache_directory",
-    "compile",
-    "device_state",
-    "devices",
-    "load",
-    "make_ready",
-    "only_note",
-    "over",
-    "over_all_cores",
-    "prepare",
-    "preparing",
-    "ready",
-    "settled",
-    "state",
-    "use_all_cores",
-    "use_device",
-    "use_one_thread",
-]
+    "LANES", "MOST_ROOTS", "THREAD", "Progress", "Spread", "State", "at_once", "cache_directory",
+    "compile", "device_state", "devices", "load", "make_ready", "only_note", "over",
+    "over_all_cores", "prepare", "preparing", "ready", "settled", "state", "use_all_cores",
+    "use_device", "use_one_thread",
+]  # fmt: skip
 
 LANES = (
-    "pisarenko",
-    "smallest_eigenvalue",
-    "smooth",
-    "neighbours",
-    "measure",
-    "separate",
-    "levinson",
-    "density",
-    "peaks",
-    "reconstruct",
-    "likelihood",
-    "pairs",
-    "harmonics",
-    "covariance",
+    "pisarenko", "smallest_eigenvalue", "smooth", "neighbours", "measure", "separate", "levinson",
+    "density", "peaks", "reconstruct", "likelihood", "pairs", "harmonics", "covariance",
     "direct_noise",
-)
+)  # fmt: skip
 Progress = Callable[[int, int, str], None]
 """Takes kernels done, kernels in all, and the name of the next one ("" after the last)."""
 

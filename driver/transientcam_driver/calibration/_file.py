@@ -18,11 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_driver.camera import AppliedSequence, Capabilities
-from transientcam_driver.errors import (
-    CalibrationFileError,
-    CalibrationMismatch,
-    DriverError,
-)
+from transientcam_driver.errors import CalibrationFileError, CalibrationMismatch, DriverError
 from transientcam_driver.sequence import Sequence
 
 DEVICE_FIELDS = ("serial", "width", "height")

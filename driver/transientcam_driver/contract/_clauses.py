@@ -10,12 +10,7 @@ import numpy as np
 
 from transientcam_driver.camera import Camera, CameraState
 from transientcam_driver.contract._bench import Bench
-from transientcam_driver.contract._expecting import (
-    ContractBroken,
-    ContractSkipped,
-    raises,
-    require,
-)
+from transientcam_driver.contract._expecting import ContractBroken, ContractSkipped, raises, require
 from transientcam_driver.errors import (
     CameraClosed,
     CameraError,

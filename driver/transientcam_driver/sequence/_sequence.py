@@ -19,12 +19,8 @@ TakeOrder = Literal["sequential", "interleaved"]
 Kind = Literal["off", "on", "modulated"]
 
 DERIVED_FIELDS = (
-    "images",
-    "capture_s",
-    "frame_rate_hz",
-    "unambiguous_range_m",
-    "data_rate_bytes_s",
-)
+    "images", "capture_s", "frame_rate_hz", "unambiguous_range_m", "data_rate_bytes_s",
+)  # fmt: skip
 """What follows from a sequence on one camera: fields of an applied one and of its document."""
 DRIVER_FIELDS = frozenset({"phase_offset_rad"})
 """What documents of a sequence do not have: only calibrations are measured with it."""

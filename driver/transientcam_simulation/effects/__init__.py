@@ -6,12 +6,7 @@ number. A new effect is a class here and an entry in ``EFFECTS``.
 """
 
 from transientcam_simulation.effects._ambient_light import AmbientLight
-from transientcam_simulation.effects._conditions import (
-    CALLED_ABOVE,
-    WORST_ABOVE,
-    Call,
-    Conditions,
-)
+from transientcam_simulation.effects._conditions import CALLED_ABOVE, WORST_ABOVE, Call, Conditions
 from transientcam_simulation.effects._effect import (
     Effect,
     Exposure,
@@ -61,24 +56,9 @@ NOISE = (ShotNoise, ReadNoise)
 """Switched off by ``noise=off``."""
 
 EFFECTS: tuple[type[Effect], ...] = (
-    Distortion,
-    MirrorPaths,
-    Gloss,
-    DiffuseInterreflection,
-    Scattering,
-    MixedPixels,
-    MotionDuringSequence,
-    ModulationHarmonics,
-    AmbientLight,
-    AmplitudeRollOff,
-    LensScatter,
-    Vignetting,
-    PixelPattern,
-    DarkCurrentElectrons,
-    ThermalDrift,
-    SynchronisationOutliers,
-    Saturation,
-    *NOISE,
-    Quantisation,
-)
+    Distortion, MirrorPaths, Gloss, DiffuseInterreflection, Scattering, MixedPixels,
+    MotionDuringSequence, ModulationHarmonics, AmbientLight, AmplitudeRollOff, LensScatter,
+    Vignetting, PixelPattern, DarkCurrentElectrons, ThermalDrift, SynchronisationOutliers,
+    Saturation, *NOISE, Quantisation,
+)  # fmt: skip
 """In the order in which they happen."""

@@ -6,12 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from transientcam_simulation.effects._conditions import Call, Conditions, always, weigh
-from transientcam_simulation.effects._effect import (
-    Exposure,
-    ImageEffect,
-    LightPlanes,
-    PlaneEffect,
-)
+from transientcam_simulation.effects._effect import Exposure, ImageEffect, LightPlanes, PlaneEffect
 
 _SATURATION_COST_S_PER_PIXEL = 4e-10
 _SHOT_COST_S_PER_PIXEL = 1.2e-8

@@ -136,21 +136,19 @@ def build(
         height=height,
         bits=scene.sensor.bits,
     )
-
     world, prepare = world_before(
         scene, width=width, height=height, seed=seed, readout_s=capabilities.streaming_readout_s
     )
-
-    def power_on(now_s: float) -> Firmware:
-        return Firmware(capabilities, world, power_on_s=now_s)
-
-    device = EmulatedDevice(capabilities, power_on, clock=clock)
-
-    def set_interlock(closed: bool) -> None:
-        device.set_interlock(closed=closed)
-
-    handle = SimulationHandle(scene, world, device, prepare=prepare, set_interlock=set_interlock)
-    return device, handle
+    device = EmulatedDevice(
+        capabilities, lambda now_s: Firmware(capabilities, world, power_on_s=now_s), clock=clock
+    )
+    return device, SimulationHandle(
+        scene,
+        world,
+        device,
+        prepare=prepare,
+        set_interlock=lambda closed: device.set_interlock(closed=closed),
+    )
 
 
 def world_before(

@@ -99,9 +99,5 @@ PLUGIN: Final = CameraPlugin(
     find=_find,
     check=_check,
     facts=_facts,
-    options={
-        **_OPTIONS,
-        **OF_EMULATION,
-        "scene": f"of the emulation, {_SCENE} without it",
-    },
+    options={**_OPTIONS, **OF_EMULATION, "scene": f"of the emulation, {_SCENE} without it"},
 )

@@ -282,14 +282,10 @@ def _place(coordinate: Values, middles: Values) -> tuple[NDArray[np.intp], Value
 
 
 def _bilinear(
-    row: NDArray[np.intp],
-    up: NDArray[np.float64],
-    next_row: NDArray[np.intp],
-    column: NDArray[np.intp],
-    right: NDArray[np.float64],
-    next_column: NDArray[np.intp],
+    row: NDArray[np.intp], up: NDArray[np.float64], next_row: NDArray[np.intp],
+    column: NDArray[np.intp], right: NDArray[np.float64], next_column: NDArray[np.intp],
     columns: int,
-) -> Bilinear:
+) -> Bilinear:  # fmt: skip
     cells = [
         row * columns + column,
         row * columns + next_column,

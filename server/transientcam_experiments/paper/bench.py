@@ -139,12 +139,7 @@ class Bench:
         return self._calibrations[key]
 
     def _captured(
-        self,
-        scene: str,
-        sequence: Sequence,
-        frames: int,
-        at_s: float,
-        options: Options,
+        self, scene: str, sequence: Sequence, frames: int, at_s: float, options: Options
     ) -> list[ReconstructedShot]:
         calibration = self.calibration(sequence, options=options)
         shots = []

@@ -14,11 +14,7 @@ from transientcam_experiments.paper.bench import Array, Bench
 from transientcam_moments.comparisons import Code, coded as estimate, maximum_length_code
 
 SEQUENCE: Final = Sequence(
-    base_frequency_hz=11.5e6,
-    harmonics=8,
-    zeroth="estimated",
-    takes=4,
-    sub_phases=SubPhases("none"),
+    base_frequency_hz=11.5e6, harmonics=8, zeroth="estimated", takes=4, sub_phases=SubPhases("none")
 )
 """The code repeated with eight frequencies, four shifts each: 32 images a take."""
 HARMONICS: Final = 9

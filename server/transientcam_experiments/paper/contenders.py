@@ -59,25 +59,16 @@ class Contender:
 _F: Final = 23e6
 _HALF: Final = 11e6
 CONTENDERS: Final = (
-    Contender("maximum-entropy", _F, 3),
-    Contender("pisarenko", _F, 3),
-    Contender("pisarenko-merged", _F, 3),
-    Contender("likelihood", _F, 3),
-    Contender("godbaz", _HALF, 4),
-    Contender("spumic", _HALF, 6),
-    Contender("sra", _F, 3),
-    Contender("sra-table", _F, 3),
-    Contender("single-frequency", _F, 1),
-    Contender("dorrington", _F, 2),
-    Contender("high-frequency", _F, 3),
-    Contender("inverse-fourier", _F, 3),
-    Contender("regularised", _HALF, 8),
-    Contender("logarithmic", _F, 3),
-    Contender("matrix-pencil", _HALF, 7),
+    Contender("maximum-entropy", _F, 3), Contender("pisarenko", _F, 3),
+    Contender("pisarenko-merged", _F, 3), Contender("likelihood", _F, 3),
+    Contender("godbaz", _HALF, 4), Contender("spumic", _HALF, 6), Contender("sra", _F, 3),
+    Contender("sra-table", _F, 3), Contender("single-frequency", _F, 1),
+    Contender("dorrington", _F, 2), Contender("high-frequency", _F, 3),
+    Contender("inverse-fourier", _F, 3), Contender("regularised", _HALF, 8),
+    Contender("logarithmic", _F, 3), Contender("matrix-pencil", _HALF, 7),
     Contender("matching-pursuit", _HALF, 8, {"returns": 3}),
-    Contender("frequency-domain", _HALF, 8, {"returns": 3}),
-    Contender("coded", _F, 1),
-)
+    Contender("frequency-domain", _HALF, 8, {"returns": 3}), Contender("coded", _F, 1),
+)  # fmt: skip
 """At the frequencies of the paper's Figure 11 where it prints them, else at those they need."""
 
 

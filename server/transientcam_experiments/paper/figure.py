@@ -58,15 +58,9 @@ def check(
         limits.append(f"at most {form.format(at_most)}")
         passes = passes and value <= at_most
     return Statement(
-        source,
-        says,
-        measure,
-        value,
-        form.format(value),
-        " and ".join(limits),
-        bool(passes),
+        source, says, measure, value, form.format(value), " and ".join(limits), bool(passes),
         "" if passes else otherwise,
-    )
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -113,8 +113,7 @@ def _moments(shot: ReconstructedShot, y: int, x: int) -> Table:
 
 
 def _draw(shot: ReconstructedShot, y: int, x: int, phase: Array) -> Any:
-    with style.style():
-        picture = style.new(11.0, 6.6)
+    with style.new(11.0, 6.6) as picture:
         halves: Any = picture.subfigures(2, 1, height_ratios=(1.0, 1.05))
         upper, lower = halves
         left, middle, right = upper.subfigures(1, 3, width_ratios=(1.0, 1.25, 1.25))

@@ -232,8 +232,7 @@ def _percent(value: float) -> str:
 
 
 def _draw(curves: dict[str, dict[Steps, Array]]) -> Any:
-    with style.style():
-        picture = style.new(11.0, 2.9 * len(curves))
+    with style.new(11.0, 2.9 * len(curves)) as picture:
         grid = picture.subplots(len(curves), 3, squeeze=False)
         for (name, each), row in zip(curves.items(), grid, strict=True):
             _draw_curves(row[0], row[1], name, each)

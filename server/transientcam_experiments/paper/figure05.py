@@ -166,8 +166,7 @@ def _draw(
     swept: Array,
     errors: dict[str, Array],
 ) -> Any:
-    with style.style():
-        picture = style.new(11.0, 3.8)
+    with style.new(11.0, 3.8) as picture:
         curves, sweep = picture.subplots(1, 2, width_ratios=(2.2, 1.0))
         colours = ("#000000", style.FOURTH, style.OURS, style.OTHER, "#E69F00")
         curves.plot(phase, truth, color=style.TRUTH, linestyle=":", linewidth=2.2, label="truth")

@@ -122,8 +122,7 @@ def _table(
 
 
 def _draw(time_s: Array, weight: Array) -> Any:
-    with style.style():
-        picture = style.new(11.0, 5.6)
+    with style.new(11.0, 5.6) as picture:
         upper, lower = picture.subplots(2, 3)
         seen = weight > _SHOWN * weight[:1]
         most = float(np.percentile(weight[0], 99))

@@ -32,11 +32,7 @@ def make(bench: Bench) -> FigureResult:
         _draw(b, phase, lower, upper, smoothed),
         _statements(phase, lower, upper, smoothed, widths),
         (
-            Table(
-                "Bounds on the continuous response",
-                ("m", *_WIDTHS),
-                widths,
-            ),
+            Table("Bounds on the continuous response", ("m", *_WIDTHS), widths),
             Table(
                 "Bounds where every return is narrower, m = 5",
                 ("widths and decays times", *_WIDTHS),
@@ -207,8 +203,7 @@ def _statements(
 
 
 def _draw(b: Array, phase: Array, lower: Array, upper: Array, smoothed: Array) -> Any:
-    with style.style():
-        picture = style.new(11.0, 3.8)
+    with style.new(11.0, 3.8) as picture:
         left, right = picture.subplots(1, 2)
         left.plot(
             phase,

@@ -322,8 +322,7 @@ def _table(captures: dict[str, list[ReconstructedShot]]) -> Table:
 
 
 def _draw(first: dict[str, ReconstructedShot]) -> Any:
-    with style.style():
-        picture = style.new(10.0, 7.6)
+    with style.new(10.0, 7.6) as picture:
         rows: Any = picture.subfigures(3, 1)
         for part, (name, shot) in zip(rows, first.items(), strict=True):
             part.suptitle(title(name), fontsize=9.5, x=0.02, ha="left")

@@ -152,21 +152,14 @@ def _table(captures: dict[str, list[ReconstructedShot]], errors: dict[str, _Erro
         for name, pair in captures.items()
     ]
     columns = (
-        "captured with",
-        "after wave 1",
-        "after wave 2",
-        "after wave 3",
-        "before front 1",
-        "before front 2",
-        "before front 3",
-        "between two captures",
-    )
+        "captured with", "after wave 1", "after wave 2", "after wave 3", "before front 1",
+        "before front 2", "before front 3", "between two captures",
+    )  # fmt: skip
     return Table("Median error of the cumulative density in % of the brightness", columns, rows)
 
 
 def _draw(first: dict[str, ReconstructedShot]) -> Any:
-    with style.style():
-        picture = style.new(10.0, 7.6)
+    with style.new(10.0, 7.6) as picture:
         rows: Any = picture.subfigures(3, 1)
         for part, (name, shot) in zip(rows, first.items(), strict=True):
             part.suptitle(title(name), fontsize=9.5, x=0.02, ha="left")

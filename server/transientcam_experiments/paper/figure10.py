@@ -160,8 +160,7 @@ def _table(walls: dict[str, _Wall]) -> Table:
 
 def _draw(shot: ReconstructedShot, walls: dict[str, _Wall]) -> Any:
     frames = np.asarray(shot.found.density(np.array(_TIMES_S))) * 1e-9
-    with style.style():
-        picture = style.new(11.0, 5.6)
+    with style.new(11.0, 5.6) as picture:
         parts: Any = picture.subfigures(2, 1)
         upper, lower = parts
         panels = upper.subplots(1, 3)

@@ -142,9 +142,8 @@ def ranked(title: str, errors: dict[str, float]) -> str:
 
 
 def _draw(outcomes: _Outcomes) -> Any:
-    with style.style():
-        rows = -(-len(CONTENDERS) // _COLUMNS)
-        picture = style.new(11.0, 3.25 * rows)
+    rows = -(-len(CONTENDERS) // _COLUMNS)
+    with style.new(11.0, 3.25 * rows) as picture:
         halves: Any = picture.subfigures(2, 1)
         for part, case, letter in zip(halves, _CASES, "ab", strict=True):
             part.suptitle(f"({letter}) {case.name} response", fontsize=11, x=0.02, ha="left")

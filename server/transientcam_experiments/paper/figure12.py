@@ -19,29 +19,18 @@ MORE: Final = Sequence(harmonics=8, base_frequency_hz=11.5e6, takes=4)
 OUTLIER_M: Final = 0.1
 _F, _HALF = DATA.base_frequency_hz, MORE.base_frequency_hz
 ENTRIES: Final = (
-    Contender("single-frequency", _F, 1),
-    Contender("godbaz", _F, 4),
-    Contender("maximum-entropy", _F, 3),
-    Contender("pisarenko", _F, 4),
-    Contender("maximum-entropy", _F, 4),
-    Contender("pisarenko", _F, 3),
-    Contender("pisarenko-merged", _F, 4),
-    Contender("likelihood", _F, 3),
-    Contender("dorrington", _F, 2),
-    Contender("sra", _F, 3),
-    Contender("sra-table", _F, 3),
-    Contender("logarithmic", _F, 3),
-    Contender("high-frequency", _F, 4),
-    Contender("inverse-fourier", _F, 4),
-    Contender("regularised", _F, 4),
-    Contender("spumic", _HALF, 6),
-    Contender("coded", _HALF, 8),
-    Contender("matrix-pencil", _HALF, 7),
-    Contender("matching-pursuit", _HALF, 8),
-    Contender("frequency-domain", _HALF, 8),
-    Contender("maximum-entropy", _HALF, 8),
+    Contender("single-frequency", _F, 1), Contender("godbaz", _F, 4),
+    Contender("maximum-entropy", _F, 3), Contender("pisarenko", _F, 4),
+    Contender("maximum-entropy", _F, 4), Contender("pisarenko", _F, 3),
+    Contender("pisarenko-merged", _F, 4), Contender("likelihood", _F, 3),
+    Contender("dorrington", _F, 2), Contender("sra", _F, 3), Contender("sra-table", _F, 3),
+    Contender("logarithmic", _F, 3), Contender("high-frequency", _F, 4),
+    Contender("inverse-fourier", _F, 4), Contender("regularised", _F, 4),
+    Contender("spumic", _HALF, 6), Contender("coded", _HALF, 8),
+    Contender("matrix-pencil", _HALF, 7), Contender("matching-pursuit", _HALF, 8),
+    Contender("frequency-domain", _HALF, 8), Contender("maximum-entropy", _HALF, 8),
     Contender("pisarenko", _HALF, 8),
-)
+)  # fmt: skip
 """The paper's four first, then the others with its data, then those with more frequencies."""
 
 
@@ -271,8 +260,7 @@ def _beaten(title: str, among: list[Ranged], best: Ranged) -> str:
 def _draw(ranged: list[Ranged], direction: Array) -> Any:
     columns = 4
     rows = -(-len(ranged) // columns)
-    with style.style():
-        picture = style.new(11.0, 2.5 * rows)
+    with style.new(11.0, 2.5 * rows) as picture:
         panels = picture.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for axes in panels.flat[len(ranged) :]:
             axes.set_visible(False)

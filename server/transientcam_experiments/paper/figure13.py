@@ -136,22 +136,14 @@ def _table(frames: dict[float, list[ReconstructedShot]]) -> Table:
         times = [value for found_true in arrivals.values() for value in found_true]
         rows.append((at_s, *times, 100 * _complete(pair[0]), 100 * _noise(pair)))
     columns = (
-        "time / s",
-        "actor / ns",
-        "true",
-        "wall / ns",
-        "true",
-        "over mirrors / ns",
-        "true",
-        "complete pixels / %",
-        "difference of two frames / %",
-    )
+        "time / s", "actor / ns", "true", "wall / ns", "true", "over mirrors / ns", "true",
+        "complete pixels / %", "difference of two frames / %",
+    )  # fmt: skip
     return Table("When light comes back, by part of the scene", columns, rows)
 
 
 def _draw(frames: dict[float, ReconstructedShot]) -> Any:
-    with style.style():
-        picture = style.new(11.0, 2.3 * len(frames))
+    with style.new(11.0, 2.3 * len(frames)) as picture:
         panels = picture.subplots(len(frames), 3)
         densities = {at_s: _density(shot) for at_s, shot in frames.items()}
         for column, time_s in enumerate(_TIMES_S):

@@ -153,8 +153,7 @@ def _draw(frames: dict[float, ReconstructedShot]) -> Any:
         ("indirect", lambda shot: shot.found.indirect),
         ("time of the direct return", _time_ns),
     )
-    with style.style():
-        picture = style.new(9.5, 9.4)
+    with style.new(9.5, 9.4) as picture:
         panels = picture.subplots(4, len(frames))
         most = max(float(np.percentile(shot.truth.brightness, 99)) for shot in frames.values())
         for number, (name, image_of) in enumerate(rows):

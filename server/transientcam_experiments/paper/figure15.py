@@ -165,8 +165,7 @@ def _draw(shot: ReconstructedShot, row: int, streak: Array, pairs: Reconstructed
     middle = _scanline(pairs)
     turn = 2 * np.pi * pairs.base_frequency_hz
     closing = turn * np.asarray(tm.density(_line(pairs, middle), _phase(pairs))) * 1e-9
-    with style.style():
-        picture = style.new(11.0, 4.4)
+    with style.new(11.0, 4.4) as picture:
         left, centre, right = picture.subplots(1, 3, width_ratios=(0.8, 1.2, 1.2))
         frame = np.asarray(shot.found.cumulative(np.array([35e-9])))[0]
         style.show(left, frame, "the scanline in (a)")

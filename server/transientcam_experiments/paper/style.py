@@ -1,6 +1,7 @@
 """The style of all pictures: one set of sizes, colours and labels."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from io import BytesIO
 from typing import Any, Final
 
@@ -41,16 +42,13 @@ _RC: Final[dict[str, Any]] = {
 _DPI = 110
 
 
-def style() -> Any:
-    """Return a context in which pictures get their looks."""
-    return rc_context(_RC)  # type: ignore[arg-type]  # its keys are typed one by one
-
-
-def new(width_in: float, height_in: float) -> Figure:
-    """Return an empty picture that needs no display."""
-    picture = Figure(figsize=(width_in, height_in), layout="constrained")
-    FigureCanvasAgg(picture)
-    return picture
+@contextmanager
+def new(width_in: float, height_in: float) -> Iterator[Figure]:
+    """Give an empty picture that needs no display, and what is drawn inside its looks."""
+    with rc_context(_RC):  # type: ignore[arg-type]  # its keys are typed one by one
+        picture = Figure(figsize=(width_in, height_in), layout="constrained")
+        FigureCanvasAgg(picture)
+        yield picture
 
 
 def png(picture: Figure) -> bytes:

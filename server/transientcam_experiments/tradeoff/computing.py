@@ -40,25 +40,19 @@ class Task:
 
 def tasks(harmonics: int, grid: Grid) -> Iterator[Task]:
     """Yield everything that is measured of moments (m + 1, ...) in double precision."""
+
+    def point(task: str, method: str, dtype: str, **bins: int) -> dict[str, Any]:
+        return {"task": task, "method": method, "dtype": dtype, "harmonics": harmonics, **bins}
+
     for name, run in _ESTIMATORS.items():
         for dtype in ("float32", "float64"):
-            yield Task(
-                {"task": "range", "method": name, "dtype": dtype, "harmonics": harmonics},
-                _as(dtype, run),
-                run,
-            )
+            yield Task(point("range", name, dtype), _as(dtype, run), run)
     for bins in grid.bins:
         phase = 2 * np.pi * np.arange(bins) / bins
         for dtype in ("float32", "float64"):
             for form in ("modulus", "fourier"):
                 yield Task(
-                    {
-                        "task": "density",
-                        "method": form,
-                        "dtype": dtype,
-                        "harmonics": harmonics,
-                        "bins": bins,
-                    },
+                    point("density", form, dtype, bins=bins),
                     _as(dtype, _density(phase, form)),
                     _exact(_density_with_digits, phase, _density(phase, "modulus"))
                     if dtype == "float64"
@@ -66,26 +60,14 @@ def tasks(harmonics: int, grid: Grid) -> Iterator[Task]:
                 )
             closed = _closed_form(phase)
             yield Task(
-                {
-                    "task": "cumulative",
-                    "method": "closed form",
-                    "dtype": dtype,
-                    "harmonics": harmonics,
-                    "bins": bins,
-                },
+                point("cumulative", "closed form", dtype, bins=bins),
                 _as(dtype, closed),
                 _exact(_cumulative_with_digits, phase, closed) if dtype == "float64" else closed,
             )
     phase = 2 * np.pi * np.arange(grid.bins[0]) / grid.bins[0]
     for points in QUADRATURE_POINTS:
         yield Task(
-            {
-                "task": "cumulative",
-                "method": f"quadrature, {points} points",
-                "dtype": "float32",
-                "harmonics": harmonics,
-                "bins": grid.bins[0],
-            },
+            point("cumulative", f"quadrature, {points} points", "float32", bins=grid.bins[0]),
             _as("float32", _quadrature(phase, points)),
             _closed_form(phase),
         )

@@ -58,9 +58,7 @@ def points_of(grid: Grid, *, scene: str, repetitions: int, seed: int) -> list[Po
 
     def capture_point(sequence: Sequence) -> Point:
         return point(
-            "capture",
-            sequence.to_document(),
-            lambda bench: bench.capture(sequence, repetitions),
+            "capture", sequence.to_document(), lambda bench: bench.capture(sequence, repetitions)
         )
 
     def computing_point(harmonics: int, task: computing.Task) -> Point:
@@ -77,10 +75,7 @@ def points_of(grid: Grid, *, scene: str, repetitions: int, seed: int) -> list[Po
             "estimating",
             settings,
             lambda bench: estimating.measure_any(
-                technique,
-                bench.scene(settings["harmonics"]),
-                repetitions=repetitions,
-                seed=seed,
+                technique, bench.scene(settings["harmonics"]), repetitions=repetitions, seed=seed
             ),
         )
 

@@ -30,73 +30,57 @@ class Axes:
         return record.kind == self.kind and positive and mine
 
 
-def _capture(error: str, label: str, title: str) -> Axes:
-    return Axes("capture", title, "capture_s", "capture time / s", error, label, "harmonics", {})
+_TIME: Final = ("seconds", "computing time of a frame / s")
+_COSTS: Final = {
+    "capture": ("capture_s", "capture time / s", "harmonics"),
+    "computing": (*_TIME, "method"),
+    "estimating": (*_TIME, "estimator"),
+    "transport": ("bytes", "bytes of a frame", "coding"),
+}
 
 
-PLOTS: Final[dict[str, Axes]] = {
-    "repeatability": _capture(
-        "range_std_m", "standard deviation of a typical pixel / m", "Capture time: noise of range"
+def _axes(kind: str, title: str, error: str, error_label: str, **only: str) -> Axes:
+    cost, cost_label, colour = _COSTS[kind]
+    return Axes(kind, title, cost, cost_label, error, error_label, colour, only)
+
+
+PLOTS: Final = {
+    "repeatability": _axes(
+        "capture",
+        "Capture time: noise of range",
+        "range_std_m",
+        "standard deviation of a typical pixel / m",
     ),
-    "range": _capture("range_rmse_m", "RMSE / m", "Capture time: error of range"),
-    "median": _capture(
-        "range_median_m", "median error / m", "Capture time: error of a typical range"
+    "range": _axes("capture", "Capture time: error of range", "range_rmse_m", "RMSE / m"),
+    "median": _axes(
+        "capture", "Capture time: error of a typical range", "range_median_m", "median error / m"
     ),
-    "cumulative": _capture(
-        "cumulative_mean", "mean error / brightness", "Capture time: cumulative density"
+    "cumulative": _axes(
+        "capture", "Capture time: cumulative density", "cumulative_mean", "mean error / brightness"
     ),
-    "bounds": _capture(
-        "bound_width", "width / mean density", "Capture time: bounds on the density"
+    "bounds": _axes(
+        "capture", "Capture time: bounds on the density", "bound_width", "width / mean density"
     ),
-    "computing": Axes(
+    "computing": _axes(
         "computing",
         "Computing time: cumulative density",
-        "seconds",
-        "computing time of a frame / s",
         "error_worst",
         "worst error / brightness",
-        "method",
-        {"task": "cumulative"},
+        task="cumulative",
     ),
-    "density": Axes(
-        "computing",
-        "Computing time: density",
-        "seconds",
-        "computing time of a frame / s",
-        "error_worst",
-        "worst error / peak",
-        "method",
-        {"task": "density"},
+    "density": _axes(
+        "computing", "Computing time: density", "error_worst", "worst error / peak", task="density"
     ),
-    "estimating": Axes(
-        "estimating",
-        "Estimators of range",
-        "seconds",
-        "computing time of a frame / s",
-        "range_median_m",
-        "median error / m",
-        "estimator",
-        {},
-    ),
-    "transport": Axes(
+    "estimating": _axes("estimating", "Estimators of range", "range_median_m", "median error / m"),
+    "transport": _axes(
         "transport",
         "Transport: density",
-        "bytes",
-        "bytes of a frame",
         "error_median",
         "added error / brightness",
-        "coding",
-        {"product": "coefficients"},
+        product="coefficients",
     ),
-    "transport-range": Axes(
-        "transport",
-        "Transport: range",
-        "bytes",
-        "bytes of a frame",
-        "error_worst",
-        "worst added error / m",
-        "coding",
-        {"product": "range"},
+    "transport-range": _axes(
+        "transport", "Transport: range", "error_worst", "worst added error / m", product="range"
     ),
 }
 """Every plot by the name of its file."""

@@ -59,9 +59,7 @@ def adapters(_tell: object) -> list[Adapter]:
 
 def _adapters() -> list[tuple[Adapter, Any]]:
     import wgpu  # type: ignore[import-untyped]  # it has no marker
-    from wgpu.backends.wgpu_native.extras import (  # type: ignore[import-untyped]
-        set_instance_extras,
-    )
+    from wgpu.backends.wgpu_native.extras import set_instance_extras  # type: ignore[import-untyped]
 
     # else drivers complain on the terminal that there is no display
     os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.gettempdir())

@@ -133,11 +133,7 @@ class DevicePass:
         return self._planes(found, planes, False if saturated is None else saturated, spread)
 
     def _planes(
-        self,
-        found: Rows,
-        smoothed: Complexes,
-        saturated: Booleans | bool | None,
-        spread: Spread,
+        self, found: Rows, smoothed: Complexes, saturated: Booleans | bool | None, spread: Spread
     ) -> Planes:
         m, bad = self._m, self._constants.bad
         *numbers, packed = found.planes

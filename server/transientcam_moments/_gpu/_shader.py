@@ -22,15 +22,8 @@ STEPS: Final = 24
 """Towards the roots at most, as kernels give to pixels that need more than others."""
 EPS: Final = float(np.finfo(np.float32).eps)
 PLANES: Final = (
-    "brightness",
-    "validity",
-    "uniform",
-    "direct",
-    "indirect",
-    "range",
-    "residual",
-    "packed",
-)
+    "brightness", "validity", "uniform", "direct", "indirect", "range", "residual", "packed",
+)  # fmt: skip
 """Rows of the results, before phases, weights and moments; the last holds flags and count."""
 ZEROTH: Final = {"low-frequency": 4, "on-off": 2, "estimated": 0}
 NON_FINITE: Final = 8

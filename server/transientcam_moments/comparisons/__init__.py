@@ -55,26 +55,14 @@ from transientcam_moments.comparisons._technique import Technique, from_first, f
 TECHNIQUES: dict[str, Technique] = {
     technique.name: technique
     for technique in (
-        _own.MAXIMUM_ENTROPY,
-        _own.PISARENKO,
-        _own.LIKELIHOOD,
-        _own.MERGED,
-        _single_frequency.TECHNIQUE,
-        _inverse_fourier.TECHNIQUE,
-        _godbaz.TECHNIQUE,
-        _spumic.TECHNIQUE,
-        _sra.TECHNIQUE,
-        _sra_table.TECHNIQUE,
-        _matrix_pencil.TECHNIQUE,
-        _matching_pursuit.TECHNIQUE,
-        _dorrington.TECHNIQUE,
-        _regularised.TECHNIQUE,
-        _coded.TECHNIQUE,
-        _frequency_domain.TECHNIQUE,
-        _logarithmic.TECHNIQUE,
+        _own.MAXIMUM_ENTROPY, _own.PISARENKO, _own.LIKELIHOOD, _own.MERGED,
+        _single_frequency.TECHNIQUE, _inverse_fourier.TECHNIQUE, _godbaz.TECHNIQUE,
+        _spumic.TECHNIQUE, _sra.TECHNIQUE, _sra_table.TECHNIQUE, _matrix_pencil.TECHNIQUE,
+        _matching_pursuit.TECHNIQUE, _dorrington.TECHNIQUE, _regularised.TECHNIQUE,
+        _coded.TECHNIQUE, _frequency_domain.TECHNIQUE, _logarithmic.TECHNIQUE,
         _high_frequency.TECHNIQUE,
     )
-}
+}  # fmt: skip
 """Every technique by its name; the paper's first."""
 PLUGINS.taken.update(("automatic", *TECHNIQUES))
 
@@ -93,22 +81,8 @@ def technique_of(name: str) -> Technique:
 
 
 __all__ = [
-    "PLUGINS",
-    "TECHNIQUES",
-    "Code",
-    "Estimate",
-    "GridEstimate",
-    "LikelihoodEstimate",
-    "MaximumEntropyEstimate",
-    "SparseEstimate",
-    "Technique",
-    "check_order",
-    "coded",
-    "equal_shifts_rad",
-    "from_first",
-    "from_zeroth",
-    "grid_rad",
-    "maximum_length_code",
-    "separated",
+    "PLUGINS", "TECHNIQUES", "Code", "Estimate", "GridEstimate", "LikelihoodEstimate",
+    "MaximumEntropyEstimate", "SparseEstimate", "Technique", "check_order", "coded",
+    "equal_shifts_rad", "from_first", "from_zeroth", "grid_rad", "maximum_length_code", "separated",
     "technique_of",
-]
+]  # fmt: skip

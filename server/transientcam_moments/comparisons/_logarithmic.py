@@ -15,12 +15,7 @@ _LEAST = 1
 
 
 def logarithmic(
-    b: Array,
-    *,
-    epsilon: float = EPSILON,
-    delta: float = 0.05,
-    steps: int = STEPS,
-    bins: int = BINS,
+    b: Array, *, epsilon: float = EPSILON, delta: float = 0.05, steps: int = STEPS, bins: int = BINS
 ) -> SparseEstimate:
     """Estimate the response of least sum of logarithms on a grid, pixel by pixel.
 

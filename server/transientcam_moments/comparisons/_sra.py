@@ -22,11 +22,7 @@ _LEAST = 1
 
 
 def sra(
-    b: Array,
-    *,
-    epsilon: float = EPSILON,
-    bins: int = BINS,
-    harmonics: Sequence[int] | None = None,
+    b: Array, *, epsilon: float = EPSILON, bins: int = BINS, harmonics: Sequence[int] | None = None
 ) -> SparseEstimate:
     """Estimate the non-negative response of least 1-norm on a grid, pixel by pixel.
 

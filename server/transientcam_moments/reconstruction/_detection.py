@@ -36,14 +36,9 @@ def undetected(moments: Array, noise: MomentNoise) -> Array:
 
 
 def undetected_pixels(
-    moments: Array,
-    brightness: Array,
-    noise_of: Callable[..., MomentNoise],
-    sigma_px: float,
-    calibration: Array | None,
-    ambient: Array | None,
-    share: Array | None = None,
-) -> Array | None:
+    moments: Array, brightness: Array, noise_of: Callable[..., MomentNoise], sigma_px: float,
+    calibration: Array | None, ambient: Array | None, share: Array | None = None,
+) -> Array | None:  # fmt: skip
     """Return what `undetected` does of smoothed moments (m + 1, ...), quickly where most are lit.
 
     ``noise_of`` returns the noise of moments that no gain was taken out of, as `smoothed_of` takes

@@ -39,15 +39,10 @@ def applicable(settings: Settings, known: Sensor | ImageNoise | None) -> Setting
 
 
 def over_neighbours(
-    moments: Array,
-    settings: Settings,
-    known: Sensor | ImageNoise | None,
-    calibration: Array | None,
-    left_out: Sequence[Array | None],
-    images: CapturedImages | None,
-    spread: Spread,
-    frames: Array | None = None,
-) -> tuple[Array, Array | None]:
+    moments: Array, settings: Settings, known: Sensor | ImageNoise | None,
+    calibration: Array | None, left_out: Sequence[Array | None], images: CapturedImages | None,
+    spread: Spread, frames: Array | None = None,
+) -> tuple[Array, Array | None]:  # fmt: skip
     """Average calibrated moments (m + 1, ...) over neighbours.
 
     By settings that are `applicable` with the known noise of the images. Pixels of the masks
@@ -81,13 +76,9 @@ def over_neighbours(
 
 
 def measured_noise(
-    moments: Array,
-    settings: Settings,
-    sensor: Sensor | ImageNoise | None,
-    calibration: Array | None,
-    images: CapturedImages | None,
-    ambient_dn: float = 0.0,
-) -> MomentNoise | None:
+    moments: Array, settings: Settings, sensor: Sensor | ImageNoise | None,
+    calibration: Array | None, images: CapturedImages | None, ambient_dn: float = 0.0,
+) -> MomentNoise | None:  # fmt: skip
     """Return the noise of moments of one frame, each pixel by itself; None if it isn't known."""
     noise_of = sensor_noise(settings, sensor, calibration, len(moments))
     if noise_of is None or sensor is None:

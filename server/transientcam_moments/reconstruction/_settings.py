@@ -23,14 +23,9 @@ CORRUPT_IMAGES = ("keep", "repair", "fill")
 OF_ANY_MULTIPLES = ("likelihood", "two-returns", "unwrapped-phase")
 """Estimators that serve moments of any multiples of the base frequency."""
 OWN = (
-    "pisarenko",
-    "maximum-entropy",
-    "likelihood",
-    "single-frequency",
-    "pisarenko-merged",
-    "two-returns",
-    "unwrapped-phase",
-)
+    "pisarenko", "maximum-entropy", "likelihood", "single-frequency", "pisarenko-merged",
+    "two-returns", "unwrapped-phase",
+)  # fmt: skip
 """Estimators that `Reconstruction` implements itself."""
 ESTIMATORS = (
     *OWN,

@@ -69,11 +69,7 @@ class Looks:
             cached, key = self._cached, (base, ambient_dn_per_s, self._calibrated_c())
             if cached is None or cached[0] != key or self._clock() > cached[1]:
                 scene = await self._queue.run(
-                    look_through,
-                    self._planner,
-                    self._twin(),
-                    *key,
-                    progress=progress,
+                    look_through, self._planner, self._twin(), *key, progress=progress
                 )
                 cached = self._cached = (key, self._clock() + CACHED_S, scene)
             return cached[2]

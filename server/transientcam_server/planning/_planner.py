@@ -71,10 +71,7 @@ class Planner:
     """
 
     def __init__(
-        self,
-        capabilities: Capabilities,
-        sensor: tm.noise.Sensor,
-        settings: ReconstructionSettings,
+        self, capabilities: Capabilities, sensor: tm.noise.Sensor, settings: ReconstructionSettings
     ) -> None:
         self._capabilities = capabilities
         self._sensor = sensor

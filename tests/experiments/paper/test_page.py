@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from matplotlib.figure import Figure
 
-from transientcam_experiments.paper import FIGURES, FigureResult, PaperFigure, Table, page, style
+from transientcam_experiments.paper import FIGURES, FigureResult, PaperFigure, Table, page
 from transientcam_experiments.paper.figure import check
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -14,7 +15,7 @@ DOCS = Path(__file__).parents[3] / "docs"
 
 def _document(number: int, *, value: float = 1.0) -> dict[str, Any]:
     made = FigureResult(
-        style.new(1, 1),
+        Figure(),
         (check("Sec. 1", "It is | so.", "how | much", value, at_most=2.0, otherwise="because"),),
         (Table("A table", ("a|b", "c"), (("x|y", 1234.5), (3, None), (0.12345, float("nan")))),),
         ("A remark.",),

@@ -7,12 +7,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from transientcam_driver.camera import (
-    AppliedSequence,
-    Capabilities,
-    FactoryCalibration,
-    RawFrame,
-)
+from transientcam_driver.camera import AppliedSequence, Capabilities, FactoryCalibration, RawFrame
 from transientcam_driver.cameras.free_running._frequencies import common_base
 from transientcam_driver.cameras.free_running._measurement import Capture, Description
 from transientcam_driver.cameras.free_running._rendering import BITS, Renderer
@@ -226,24 +221,11 @@ def capabilities_of(about: Description, renderer: Renderer) -> Capabilities:
     exposure_s = min(getattr(about.measurements[0], "exposure_s", period_s), period_s)
     least_s = about.min_exposure_s or exposure_s
     return Capabilities(
-        model=about.model,
-        serial=about.serial,
-        firmware=about.firmware,
-        protocol_version=2,
-        width=about.width,
-        height=about.height,
-        bits=BITS,
-        readout_s=period_s - exposure_s,
-        streaming_readout_s=period_s - exposure_s,
-        tuning_step_hz=base_hz,
-        min_frequency_hz=base_hz,
-        max_frequency_hz=base_hz * multiples[-1],
-        max_harmonics=len(multiples),
-        min_exposure_s=least_s,
-        max_exposure_s=about.max_exposure_s or max(least_s, exposure_s),
-        max_takes=_MOST_TAKES,
-        sampling=Sampling(multiples, renderer.phases_rad, about.max_range_m),
-        dark_dn=renderer.dark_dn,
-        heartbeat_s=about.heartbeat_s,
-        clock=about.clock,
-    )
+        model=about.model, serial=about.serial, firmware=about.firmware, protocol_version=2,
+        width=about.width, height=about.height, bits=BITS, readout_s=period_s - exposure_s,
+        streaming_readout_s=period_s - exposure_s, tuning_step_hz=base_hz, min_frequency_hz=base_hz,
+        max_frequency_hz=base_hz * multiples[-1], max_harmonics=len(multiples),
+        min_exposure_s=least_s, max_exposure_s=about.max_exposure_s or max(least_s, exposure_s),
+        max_takes=_MOST_TAKES, sampling=Sampling(multiples, renderer.phases_rad, about.max_range_m),
+        dark_dn=renderer.dark_dn, heartbeat_s=about.heartbeat_s, clock=about.clock,
+    )  # fmt: skip

@@ -6,10 +6,7 @@ into the images of a frame, ``tables`` and ``parameters`` read what the camera k
 those that OpenKinect/libfreenect2 accepts.
 """
 
-from transientcam_driver.cameras.kinect2 import (
-    _codes as codes,
-    _encoder as encoder,
-)
+from transientcam_driver.cameras.kinect2 import _codes as codes, _encoder as encoder
 from transientcam_driver.cameras.kinect2._abilities import (
     EXPOSURE_S,
     FRAME_RATE_HZ,

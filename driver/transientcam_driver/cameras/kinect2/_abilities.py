@@ -23,22 +23,11 @@ MOST_TAKES: Final = 16
 def capabilities_of(identity: Identity) -> Capabilities:
     """Return them with the name of one camera."""
     return Capabilities(
-        model="Kinect v2",
-        serial=identity.serial,
-        firmware=identity.firmware,
-        protocol_version=1,
-        width=WIDTH,
-        height=HEIGHT,
-        bits=BITS,
-        readout_s=IMAGE_PERIOD_S - EXPOSURE_S,
-        streaming_readout_s=IMAGE_PERIOD_S - EXPOSURE_S,
-        tuning_step_hz=1.0,
+        model="Kinect v2", serial=identity.serial, firmware=identity.firmware, protocol_version=1,
+        width=WIDTH, height=HEIGHT, bits=BITS, readout_s=IMAGE_PERIOD_S - EXPOSURE_S,
+        streaming_readout_s=IMAGE_PERIOD_S - EXPOSURE_S, tuning_step_hz=1.0,
         min_frequency_hz=BASE_FREQUENCY_HZ,
         max_frequency_hz=BASE_FREQUENCY_HZ * SAMPLING.multiples[-1],
-        max_harmonics=len(SAMPLING.multiples),
-        min_exposure_s=EXPOSURE_S,
-        max_exposure_s=EXPOSURE_S,
-        max_takes=MOST_TAKES,
-        sampling=SAMPLING,
-        dark_dn=float(ZERO_DN),
-    )
+        max_harmonics=len(SAMPLING.multiples), min_exposure_s=EXPOSURE_S, max_exposure_s=EXPOSURE_S,
+        max_takes=MOST_TAKES, sampling=SAMPLING, dark_dn=float(ZERO_DN),
+    )  # fmt: skip

@@ -31,12 +31,7 @@ class ControlConnection:
     """
 
     def __init__(
-        self,
-        host: str,
-        port: int,
-        *,
-        answer_s: float,
-        clock: Callable[[], float] = time.monotonic,
+        self, host: str, port: int, *, answer_s: float, clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._answer_s = answer_s
         self._clock = clock

@@ -263,29 +263,18 @@ class Tofcam660:
         region = self._options.region
         inside_m = offset_m(self.calibration, temperature_c) if self.calibration else 0.0
         return Capabilities(
-            model="ESPROS TOFcam660",
-            serial=f"{wafer}-{chip}",
-            firmware=".".join(map(str, self.firmware)),
-            protocol_version=self.firmware[0],
-            width=region.width,
-            height=region.height,
-            bits=12,
-            readout_s=READOUT_S,
-            streaming_readout_s=READOUT_S,
-            settle_s=self._options.settle_s,
-            tuning_step_hz=1.0,
-            min_frequency_hz=MIN_FREQUENCY_HZ,
-            max_frequency_hz=MAX_FREQUENCY_HZ,
+            model="ESPROS TOFcam660", serial=f"{wafer}-{chip}",
+            firmware=".".join(map(str, self.firmware)), protocol_version=self.firmware[0],
+            width=region.width, height=region.height, bits=12, readout_s=READOUT_S,
+            streaming_readout_s=READOUT_S, settle_s=self._options.settle_s, tuning_step_hz=1.0,
+            min_frequency_hz=MIN_FREQUENCY_HZ, max_frequency_hz=MAX_FREQUENCY_HZ,
             low_frequency_hz=MIN_FREQUENCY_HZ,
             max_harmonics=len(self._options.multiples) or MAX_HARMONICS,
-            sampling=Sampling(self._options.multiples),
-            min_exposure_s=1e-6,
-            max_exposure_s=_LONGEST_US / 1e6,
-            exposure_step_s=1e-6,
-            zeroths=("estimated", "low-frequency"),
-            delay_s=2 * inside_m / SPEED_OF_LIGHT_M_S,
+            sampling=Sampling(self._options.multiples), min_exposure_s=1e-6,
+            max_exposure_s=_LONGEST_US / 1e6, exposure_step_s=1e-6,
+            zeroths=("estimated", "low-frequency"), delay_s=2 * inside_m / SPEED_OF_LIGHT_M_S,
             dark_dn=float(ZERO_DN),
-        )
+        )  # fmt: skip
 
     @contextmanager
     def _closed_on_failure(self) -> Iterator[None]:

@@ -54,11 +54,8 @@ def build_kinect2(
     parameters, tables = reported_lens(field_deg_of(scene)), p0_tables(scene.device.seed)
     answers = parameters.pack(), tables.pack()
 
-    def power_on() -> EmulatedFirmware:
-        return EmulatedFirmware(serial, *answers)
-
     pixels = DifferencePixels(world, tables.gains(), seed=scene.seed if seed is None else seed)
-    device = EmulatedKinect2(power_on, pixels, clock=clock)
+    device = EmulatedKinect2(lambda: EmulatedFirmware(serial, *answers), pixels, clock=clock)
     return device, SimulationHandle(scene, world, device, prepare=prepare)
 
 

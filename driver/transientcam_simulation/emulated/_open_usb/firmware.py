@@ -284,21 +284,14 @@ class Firmware:
         payload = pixels.astype("<u2", copy=False).tobytes()  # usb-protocol 8.1
         assert self._words is not None  # noqa: S101  (what is exposed has a sequence)
         header = ImageHeader(
-            flags=self._image_flags(image, label),
-            epoch=self._epoch,
-            frame=image.frame,
-            number=image.number,
-            index=image.index,
-            count=len(self._labels),
-            tuning_word=self._words.word(label.harmonic),
-            phase=phase_word(label.phase_rad),
-            harmonic=label.harmonic,
-            exposure_ns=self._words.exposure_ns,
+            flags=self._image_flags(image, label), epoch=self._epoch, frame=image.frame,
+            number=image.number, index=image.index, count=len(self._labels),
+            tuning_word=self._words.word(label.harmonic), phase=phase_word(label.phase_rad),
+            harmonic=label.harmonic, exposure_ns=self._words.exposure_ns,
             device_time_ns=round(device_time_s * 1e9),
-            temperature_c=self._renderer.temperature_c(device_time_s),
-            payload_bytes=len(payload),
+            temperature_c=self._renderer.temperature_c(device_time_s), payload_bytes=len(payload),
             payload_crc=payload_checksum(payload),
-        )
+        )  # fmt: skip
         packet = header.pack() + payload
         self._ready = (image, packet)
         return packet

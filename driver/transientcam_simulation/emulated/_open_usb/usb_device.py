@@ -53,11 +53,7 @@ class EmulatedDevice:
     """
 
     def __init__(
-        self,
-        capabilities: Capabilities,
-        power_on: Callable[[float], Firmware],
-        *,
-        clock: Clock,
+        self, capabilities: Capabilities, power_on: Callable[[float], Firmware], *, clock: Clock
     ) -> None:
         self.changed = threading.Condition()
         self.clock = clock

@@ -210,12 +210,7 @@ class Predictor:
         return _HARDLY * float(known[int(share * (known.size - 1))])
 
     def predict(
-        self,
-        estimator: str,
-        sequence: Sequence,
-        *,
-        closely: bool = False,
-        capture_s: float = 0.0,
+        self, estimator: str, sequence: Sequence, *, closely: bool = False, capture_s: float = 0.0
     ) -> Prediction:
         """Predict the errors of a sequence and an estimator, with intervals.
 
@@ -407,16 +402,9 @@ class Predictor:
         return np.clip(errors.std_m, 1e-9, 1e3), np.clip(errors.bias_m, 1e-9, 1e3)
 
     def _errors(
-        self,
-        estimator: str,
-        harmonics: int,
-        base_frequency_hz: float,
-        noise: _Array,
-        draws: int,
-        zeroth: str,
-        pixels: slice = slice(None),
-        lost: tuple[float, int] = (0.0, 1),
-    ) -> PixelErrors:
+        self, estimator: str, harmonics: int, base_frequency_hz: float, noise: _Array, draws: int,
+        zeroth: str, pixels: slice = slice(None), lost: tuple[float, int] = (0.0, 1),
+    ) -> PixelErrors:  # fmt: skip
         self._go_on()
         b, left = self._averaged(harmonics, base_frequency_hz, noise[pixels], pixels)
         variance = np.broadcast_to(left**2, b.shape).astype(np.float32)
@@ -489,11 +477,7 @@ def _error(
 
 
 def _within(
-    share: float,
-    errors: PixelErrors,
-    farthest_m: _Array | None,
-    picks: _Array,
-    drift_m: float,
+    share: float, errors: PixelErrors, farthest_m: _Array | None, picks: _Array, drift_m: float
 ) -> Figure:
     """Return the figure of what a share of the ranges is within; few draws tell its interval."""
 

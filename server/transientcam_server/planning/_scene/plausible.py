@@ -87,11 +87,7 @@ class _RotatedMoments:
 
 
 def plausible_ranges(
-    b: _Array,
-    variance: _Array,
-    base_frequency_hz: float,
-    direct_m: _Array,
-    uncertainty_m: _Array,
+    b: _Array, variance: _Array, base_frequency_hz: float, direct_m: _Array, uncertainty_m: _Array
 ) -> tuple[_Array, _Array]:
     """Return the earliest and the latest range (P) that the direct light may have.
 

@@ -263,11 +263,7 @@ def summary_of_front(front: list[Choice], scene: SceneStatistics) -> str:
     doubt = _doubt(finest, scene)
     flat = flat_from(
         [
-            (
-                each.predicted.range_std.median,
-                each.predicted.range_bias_m,
-                each.range_error.median,
-            )
+            (each.predicted.range_std.median, each.predicted.range_bias_m, each.range_error.median)
             for each in front
         ]
     )

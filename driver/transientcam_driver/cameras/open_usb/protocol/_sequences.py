@@ -6,11 +6,7 @@ from dataclasses import dataclass
 from transientcam_driver.camera import Capabilities
 from transientcam_driver.cameras.open_usb.protocol._codes import SCHEMES, TAKE_ORDERS, ZEROTHS
 from transientcam_driver.cameras.open_usb.protocol._requests import VERSION
-from transientcam_driver.cameras.open_usb.protocol._units import (
-    nanoseconds,
-    phase_rad,
-    phase_word,
-)
+from transientcam_driver.cameras.open_usb.protocol._units import nanoseconds, phase_rad, phase_word
 from transientcam_driver.errors import ProtocolError
 from transientcam_driver.sequence import Sequence, SubPhases
 
@@ -87,17 +83,9 @@ class SequenceWords:
     def pack(self) -> bytes:
         """Payload of SET_SEQUENCE."""
         words = self._LAYOUT.pack(
-            VERSION,
-            self.harmonics,
-            self.zeroth,
-            self.scheme,
-            self.sub_phases,
-            self.take_order,
-            self.takes,
-            self.base_word,
-            self.low_word,
-            self.exposure_ns,
-        )
+            VERSION, self.harmonics, self.zeroth, self.scheme, self.sub_phases, self.take_order,
+            self.takes, self.base_word, self.low_word, self.exposure_ns,
+        )  # fmt: skip
         return words + self._OFFSET.pack(self.phase_offset) if self.phase_offset else words
 
     @classmethod

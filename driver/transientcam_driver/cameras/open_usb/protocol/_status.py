@@ -14,17 +14,10 @@ STATUS_BYTES = _STATUS.size
 def pack_status(status: Status) -> bytes:
     """Answer to GET_STATUS (usb-protocol 6)."""
     return _STATUS.pack(
-        VERSION,
-        status.state,
-        status.flags,
-        status.epoch,
-        status.next_image,
-        nanoseconds(status.device_time_s),
-        status.dropped_images,
-        status.fifo_bytes,
-        status.fifo_high_water_bytes,
-        centidegrees(status.temperature_c or 0.0),
-    )
+        VERSION, status.state, status.flags, status.epoch, status.next_image,
+        nanoseconds(status.device_time_s), status.dropped_images, status.fifo_bytes,
+        status.fifo_high_water_bytes, centidegrees(status.temperature_c or 0.0),
+    )  # fmt: skip
 
 
 def unpack_status(data: bytes) -> Status:
@@ -39,16 +32,9 @@ def unpack_status(data: bytes) -> Status:
     if state not in tuple(DeviceState):
         raise ProtocolError(f"status with the unknown state {state}")
     return Status(
-        DeviceState(state),
-        StatusFlag(flags),
-        epoch,
-        image,
-        time_ns / 1e9,
-        dropped,
-        fifo,
-        high,
+        DeviceState(state), StatusFlag(flags), epoch, image, time_ns / 1e9, dropped, fifo, high,
         centi / 100,
-    )
+    )  # fmt: skip
 
 
 _TIME = struct.Struct("<Q")
