@@ -41,13 +41,7 @@ export class WebGl2Renderer implements DensityRenderer {
 
   /** A renderer on `canvas`, or null where the browser refuses WebGL2. */
   static create(canvas: HTMLCanvasElement): WebGl2Renderer | null {
-    const gl = canvas.getContext("webgl2", {
-      alpha: false,
-      antialias: false,
-      depth: false,
-      stencil: false,
-      powerPreference: "low-power",
-    });
+    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, stencil: false, powerPreference: "low-power" });
     return gl === null ? null : new WebGl2Renderer(canvas, gl);
   }
 

@@ -106,11 +106,7 @@ export class DemandControl {
 
   get decision(): Decision {
     const first = (slow: Bottleneck): Step | undefined => (this.#rests ? undefined : this.#steps.find((step) => step.slow === slow));
-    return {
-      demand: this.demand,
-      carried_bytes_s: first("link")?.carried_bytes_s ?? null,
-      pictures_hz: first("page")?.before_hz ?? null,
-    };
+    return { demand: this.demand, carried_bytes_s: first("link")?.carried_bytes_s ?? null, pictures_hz: first("page")?.before_hz ?? null };
   }
 
   /** Another session or sequence: what was measured does not hold any more. */
