@@ -56,10 +56,7 @@ interface RequestDetails<Body = unknown> {
 }
 
 /** What was read, and the tag of its version, to change just this one. */
-export interface Tagged<T> {
-  readonly document: T;
-  readonly tag: string | null;
-}
+export type Tagged<T> = Readonly<{ document: T; tag: string | null }>;
 
 /** Where the newest frame of the camera is; frames of recordings are elsewhere. */
 export const LIVE = "/frames/latest";

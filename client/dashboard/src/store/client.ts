@@ -356,10 +356,7 @@ function sameSequence(one: AppliedDocument, other: AppliedDocument | null): bool
   return other !== null && JSON.stringify({ ...one, sequence_id: 0 }) === JSON.stringify({ ...other, sequence_id: 0 });
 }
 
-interface Errand {
-  readonly resolve: (reports: readonly FrameReport[]) => void;
-  readonly reject: (error: Error) => void;
-}
+type Errand = Readonly<{ resolve: (reports: readonly FrameReport[]) => void; reject: (error: Error) => void }>;
 
 /** How long the picture stays where it is before only the part in sight is asked for. */
 const SETTLED_S = 0.3;

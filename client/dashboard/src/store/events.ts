@@ -8,10 +8,7 @@ import { refusalIn } from "./api";
 export type EventTone = "plain" | "good" | "bad";
 
 /** What can be done about what happened. */
-interface Remedy {
-  readonly word: string;
-  readonly run: () => void;
-}
+type Remedy = Readonly<{ word: string; run: () => void }>;
 
 export interface Happening {
   /** Counts the happenings of this page. */
@@ -109,10 +106,7 @@ export function inWords(notice: Notice): Sentence | null {
   return (WORDS[notice.kind] as ((notice: Notice) => Sentence) | undefined)?.(notice) ?? null;
 }
 
-interface Sentence {
-  readonly words: string;
-  readonly tone: EventTone;
-}
+type Sentence = Readonly<{ words: string; tone: EventTone }>;
 
 const plain = (words: string): Sentence => ({ words, tone: "plain" });
 const good = (words: string): Sentence => ({ words, tone: "good" });

@@ -13,11 +13,7 @@ export const SUBPROTOCOL = "transientcam.v1.msgpack";
 export type Dtype = "<f4" | "<f8" | "<c8" | "<u2" | "|u1";
 
 /** An array in C order. Complex numbers ("<c8") lie as pairs of float32: real, imaginary. */
-export interface NdArray {
-  readonly dtype: Dtype;
-  readonly shape: readonly number[];
-  readonly data: Numbers;
-}
+export type NdArray = Readonly<{ dtype: Dtype; shape: readonly number[]; data: Numbers }>;
 
 /** What the camera is doing, in the service's words. */
 export type CameraState = CameraDocument["state"];
@@ -53,10 +49,7 @@ type SequenceChanged = Extract<StatedNotice, { kind: "sequence-changed" }>;
 /** An event; the sequence in it is the document that REST answers. */
 export type Notice = Exclude<StatedNotice, SequenceChanged> | (Omit<SequenceChanged, "sequence"> & { readonly sequence: AppliedDocument });
 
-export interface ErrorMessage {
-  readonly type: "error";
-  readonly problem: Problem;
-}
+export type ErrorMessage = Readonly<{ type: "error"; problem: Problem }>;
 
 /** RFC 9457, with the extensions of this service; what the page itself finds wrong has fewer fields. */
 export interface Problem extends Partial<ProblemDocument> {
@@ -65,11 +58,7 @@ export interface Problem extends Partial<ProblemDocument> {
 }
 
 /** A frame has this product: of its array one pixel came, and the rest is to be requested. */
-export interface AnnouncementMessage {
-  readonly type: "announcement";
-  readonly frame: number;
-  readonly product: string;
-}
+export type AnnouncementMessage = Readonly<{ type: "announcement"; frame: number; product: string }>;
 
 export type ServerMessage = Hello | FrameMessage | AnnouncementMessage | Notice | ErrorMessage;
 

@@ -24,12 +24,7 @@ export type Command =
   | { readonly type: "bring"; readonly ticket: number; readonly path: string; readonly products: readonly string[] };
 
 /** What was brought of a frame; the problem is that of the first product that could not be. */
-export interface Brought {
-  readonly type: "brought";
-  readonly ticket: number;
-  readonly reports: readonly FrameReport[];
-  readonly problem: Problem | null;
-}
+export type Brought = Readonly<{ type: "brought"; ticket: number; reports: readonly FrameReport[]; problem: Problem | null }>;
 
 /** From the worker to the page. */
 export type Report = FrameReport | ConnectionEvent | Brought;

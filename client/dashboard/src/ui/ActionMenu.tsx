@@ -3,15 +3,9 @@ import { useRef } from "preact/hooks";
 import { PopoverButton } from "./PopoverButton";
 import "./ActionMenu.css";
 
-export interface Action {
-  readonly text: string;
-  readonly run: () => void;
-}
+export type Action = Readonly<{ text: string; run: () => void }>;
 
-export interface ActionGroup {
-  readonly title: string;
-  readonly actions: readonly Action[];
-}
+export type ActionGroup = Readonly<{ title: string; actions: readonly Action[] }>;
 
 /**
  * Things to do, behind one small button: a menu after the WAI-ARIA pattern "menu button".

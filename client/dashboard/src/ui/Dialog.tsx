@@ -58,9 +58,7 @@ interface SwitchedDialogProps {
   readonly inside: ComponentType<Done>;
 }
 
-export interface Done {
-  readonly onDone: () => void;
-}
+export type Done = Readonly<{ onDone: () => void }>;
 
 /** A dialog that is open while a signal says so. */
 export function SwitchedDialog({ open, title, inside: Inside }: SwitchedDialogProps) {

@@ -26,13 +26,7 @@ export interface Model {
 }
 
 /** What the model says of its coefficients. */
-interface Shape {
-  readonly frame: number;
-  readonly harmonics: number;
-  readonly width: number;
-  readonly height: number;
-  readonly base_frequency_hz: number;
-}
+type Shape = Readonly<{ frame: number; harmonics: number; width: number; height: number; base_frequency_hz: number }>;
 
 /** The coefficients that a model holds. */
 export function coefficientsIn(model: Model): Coefficients {

@@ -36,10 +36,7 @@ const LEAST_SHARE = 0.02;
 const COMPLETE = 0.999;
 
 /** A pixel of a frame. */
-export interface Subject {
-  readonly coefficients: Coefficients;
-  readonly index: number;
-}
+export type Subject = Readonly<{ coefficients: Coefficients; index: number }>;
 
 /** What is drawn of a pixel. */
 export interface Drawn {

@@ -23,10 +23,7 @@ export function sifted(returns: readonly ReturnDocument[]): {
 }
 
 /** A line of the table: what was found, what is true, or both. */
-export interface ReturnLine {
-  readonly found: ReturnDocument | null;
-  readonly truth: ReturnDocument | null;
-}
+export type ReturnLine = Readonly<{ found: ReturnDocument | null; truth: ReturnDocument | null }>;
 
 /** Returns beside the true ones, by time. The two are the same one where each is the nearest to the other. */
 export function linesOf(found: readonly ReturnDocument[], truth: readonly ReturnDocument[]): ReturnLine[] {

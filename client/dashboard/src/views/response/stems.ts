@@ -14,10 +14,7 @@ interface Stem {
 }
 
 /** The returns that were found and those that are true. */
-export interface Stems {
-  readonly found: readonly Stem[];
-  readonly truth: readonly Stem[];
-}
+export type Stems = Readonly<{ found: readonly Stem[]; truth: readonly Stem[] }>;
 
 export const NO_STEMS: Stems = { found: [], truth: [] };
 

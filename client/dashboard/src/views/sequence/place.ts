@@ -4,15 +4,9 @@ import { fraction, type Scale, ticks } from "../../scales/scale";
 import { plannedError_m } from "../../store/rangeErrors";
 import type { AppliedDocument, ChoiceDocument, FrameMeta, TradeoffDocument } from "../../stream/documents";
 
-export interface Ends {
-  readonly time: Scale;
-  readonly error: Scale;
-}
+export type Ends = Readonly<{ time: Scale; error: Scale }>;
 
-export interface Standing {
-  readonly capture_s: number;
-  readonly range_error_m: number;
-}
+export type Standing = Readonly<{ capture_s: number; range_error_m: number }>;
 
 /** Room around what is shown, as a factor. */
 const ROOM = 1.25;

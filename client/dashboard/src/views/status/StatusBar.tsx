@@ -40,11 +40,7 @@ export function StatusBar() {
 /** A class of the style sheet. */
 type Tone = "good" | "waiting" | "bad" | "quiet";
 
-interface State {
-  readonly tone: Tone;
-  readonly word: string;
-  readonly why?: string;
-}
+type State = Readonly<{ tone: Tone; word: string; why?: string }>;
 
 function StateChip() {
   const { status, held, replay, calibrating, sequence } = useStore();
