@@ -159,14 +159,8 @@ export function sequenceKey({ sequence_id }: AppliedDocument): string {
 }
 
 function leaseWords({ change, holder, from }: Extract<Notice, { kind: "lease-changed" }>): string {
-  switch (change) {
-    case "taken-over":
-      return `${holder} has taken over control from ${from}.`;
-    case "granted":
-      return `${holder} has taken control.`;
-    case "lapsed":
-      return "Control has lapsed: its holder did not renew it.";
-    default:
-      return "Control was given back: every client may change things.";
-  }
+  if (change === "taken-over") return `${holder} has taken over control from ${from}.`;
+  if (change === "granted") return `${holder} has taken control.`;
+  if (change === "lapsed") return "Control has lapsed: its holder did not renew it.";
+  return "Control was given back: every client may change things.";
 }
