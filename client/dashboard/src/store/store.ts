@@ -166,7 +166,6 @@ export class Store extends Ground {
     api.onRefusal = (problem) => {
       this.lease.refused(kindOf(problem));
       if (problem.status !== 401) return;
-      api.credentials.refused.value = problem;
       this.caller.forget();
       this.asksForToken.value = true;
     };

@@ -57,6 +57,12 @@ export interface Problem extends Partial<ProblemDocument> {
   readonly takes?: readonly { readonly takes: number; readonly capture_s: number; readonly range_std_m: number }[];
 }
 
+/** Why the service refused; of a proxy's page in the place of a problem the status has to do. */
+export async function problemOf(answer: Response): Promise<Problem> {
+  const problem: Problem = { title: `The service answered ${answer.status} ${answer.statusText}.`, status: answer.status };
+  return { ...problem, ...((await answer.json().catch(() => ({}))) as Problem) };
+}
+
 /** A frame has this product: of its array one pixel came, and the rest is to be requested. */
 export type AnnouncementMessage = Readonly<{ type: "announcement"; frame: number; product: string }>;
 
