@@ -108,14 +108,8 @@ export function histogram(values: ArrayLike<number>, scale: Scale, bins: number,
  */
 export function autoLimits(previous: Span | null, span: Span): Span {
   if (!(span.high >= span.low)) return previous ?? { low: 0, high: 1 };
-  if (
-    previous !== null &&
-    span.low >= previous.low &&
-    span.high <= previous.high &&
-    span.high - span.low > 0.5 * (previous.high - previous.low)
-  ) {
-    return previous;
-  }
+  const within = previous !== null && span.low >= previous.low && span.high <= previous.high;
+  if (within && span.high - span.low > 0.5 * (previous.high - previous.low)) return previous;
   const width = span.high - span.low || Math.abs(span.high) || 1;
   const step = niceStep(width, 6);
   // Half a step of room on either side, so that noise at the ends does not move them.

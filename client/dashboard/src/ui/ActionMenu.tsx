@@ -30,11 +30,8 @@ export function ActionMenu({ label, groups }: { label: string; groups: readonly 
     event.stopPropagation(); // keys of the page would move the light
     if (event.key === "Tab") menu.current?.hidePopover();
     const all = entries();
-    const next = neighbour(
-      all.map((entry) => entry.textContent ?? ""),
-      all.indexOf(document.activeElement as HTMLElement),
-      event.key,
-    );
+    const texts = all.map((entry) => entry.textContent ?? "");
+    const next = neighbour(texts, all.indexOf(document.activeElement as HTMLElement), event.key);
     if (next === null) return;
     event.preventDefault();
     all[next]?.focus();

@@ -56,13 +56,8 @@ export function raysOf(lens: Lens, width: number, height: number): Float64Array 
 }
 
 /** How far along its ray the light of a range turned back: |p| + |p - light| is twice the range; NaN where that is too short. */
-export function alongRay(
-  { light_x_m = 0, light_y_m = 0, light_z_m = 0 }: Lens,
-  range_m: number,
-  x: number,
-  y: number,
-  unit: number,
-): number {
+export function alongRay(lens: Lens, range_m: number, x: number, y: number, unit: number): number {
+  const { light_x_m = 0, light_y_m = 0, light_z_m = 0 } = lens;
   const square = light_x_m ** 2 + light_y_m ** 2 + light_z_m ** 2;
   if (square === 0) return range_m;
   const around = 4 * range_m * range_m - square;

@@ -10,12 +10,10 @@ const SAME_S = 1e-9;
 /** The fewest looks that a deviation is computed from. */
 const FEWEST = 5;
 
+type Sifted = Readonly<{ strong: readonly ReturnDocument[]; weak: number; weakShare: number }>;
+
 /** The returns that are worth a line, by time, and the light of the others together. */
-export function sifted(returns: readonly ReturnDocument[]): {
-  readonly strong: readonly ReturnDocument[];
-  readonly weak: number;
-  readonly weakShare: number;
-} {
+export function sifted(returns: readonly ReturnDocument[]): Sifted {
   const light = returns.reduce((sum, { weight }) => sum + Math.max(0, weight), 0);
   const strong = returns.filter(({ weight }) => weight >= WEAK_SHARE * light).sort((a, b) => a.time_s - b.time_s);
   const rest = returns.filter((each) => !strong.includes(each));

@@ -14,11 +14,7 @@ const ROOM = 1.25;
 /** Scales, in s and m, that hold the front and the frame beside which it was predicted: what follows trembles, and the axes must not. */
 export function endsOf({ front, current }: TradeoffDocument): Ends {
   const times = [current.capture_s, ...front.map(({ capture_s }) => capture_s)];
-  const errors = front.flatMap(({ predicted }) => [
-    predicted.range_error_m.low,
-    predicted.range_error_m.high ?? predicted.range_error_m.low,
-    predicted.range_error_m.median,
-  ]);
+  const errors = front.map(({ predicted }) => predicted.range_error_m).flatMap(({ low, high, median }) => [low, high ?? low, median]);
   const then = plannedError_m(current.meta.accuracy);
   if (then !== null) errors.push(then);
   const scale = (values: readonly number[]): Scale => ({
