@@ -62,9 +62,7 @@ export type Done = Readonly<{ onDone: () => void }>;
 
 /** A dialog that is open while a signal says so. */
 export function SwitchedDialog({ open, title, inside: Inside }: SwitchedDialogProps) {
-  const close = (): void => {
-    open.value = false;
-  };
+  const close = (): void => void (open.value = false);
   return (
     <Dialog open={open.value} title={title} onClose={close}>
       <Inside onDone={close} />

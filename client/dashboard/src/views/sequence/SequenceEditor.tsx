@@ -70,9 +70,7 @@ export function SequenceEditor({ applied, onDone }: { applied: AppliedDocument; 
 
   const judged = verdict.value;
   const wrong = judged.kind === "refused" ? fieldOf(judged.problem) : null;
-  const set = (change: Partial<Draft>): void => {
-    draft.value = { ...draft.peek(), ...change };
-  };
+  const set = (change: Partial<Draft>): void => void (draft.value = { ...draft.peek(), ...change });
 
   return (
     <Form class="editor column grow spaced fades" onSubmit={() => void apply()}>
