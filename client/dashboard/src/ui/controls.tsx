@@ -166,9 +166,7 @@ export function keptAs(value: string, onType: (text: string) => void): TypedProp
   };
 }
 
-interface FieldProps extends TypedProps {
-  readonly label: string;
-}
+type FieldProps = TypedProps & Readonly<{ label: string }>;
 
 /** Words as they are typed. */
 export function TextField({ label, class: kind = "field", ...input }: FieldProps) {

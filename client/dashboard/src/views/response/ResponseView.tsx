@@ -126,9 +126,7 @@ function selectFirst(store: Store, frame: ReadonlySignal<Frame | null>): () => v
   });
 }
 
-interface Shown extends Subject {
-  readonly pixel: Pixel;
-}
+type Shown = Subject & Readonly<{ pixel: Pixel }>;
 
 interface PlotProps {
   readonly aspect: Aspect;
